@@ -34,8 +34,9 @@ std::string line_of(int count, const std::string& device) {
 }
 
 std::string configuration(int count, const std::string& link, const std::string& cycle, const std::string& more = "") {
-    std::string text = "[bus]\nlink = " + link + "\ncycle = " + cycle + "\n" + more +
-                       "[type drive]\ndevice = cia402\nvendor = 0xFFFFFF\noutputs = 6040 6060 607A 60FF\ninputs = 6041 6061 6064 606C\ndc = sync0\n";
+    std::string text =
+        "[bus]\nlink = " + link + "\ncycle = " + cycle + "\n" + more +
+        "[type drive]\ndevice = cia402\nvendor = 0xFFFFFF\noutputs = 6040 6060 607A 60FF\ninputs = 6041 6061 6064 606C\ndc = sync0\n";
     for (int i = 0; i < count; ++i) text += fmt::format("[slave {} d{}]\ntype = drive\n", i, i);
     return text;
 }
@@ -170,13 +171,15 @@ void cycles(const Options& options, Report& report, const std::string& here, con
     report.row({"  p99", "us", share(ours[0].wall, 0.99), raw, share(floor[0].wall, 0.99), {}});
     report.row({"  back to back beside SOEM, p50", "us", share(ours[0].wall, 0.5), by, peer.wall, {}});
     report.row({"  CPU beside SOEM, p50", "us", share(ours[0].cpu, 0.5), by, peer.cpu, {}});
-    report.row({"50 drives, a cycle in each millisecond, p50", "us", share(ours[1].wall, 0.5), raw, share(floor[1].wall, 0.5), at_most(1.25)});
+    report.row(
+        {"50 drives, a cycle in each millisecond, p50", "us", share(ours[1].wall, 0.5), raw, share(floor[1].wall, 0.5), at_most(1.25)});
     report.row({"  p99", "us", share(ours[1].wall, 0.99), raw, share(floor[1].wall, 0.99), {}});
     report.row({"  beside SOEM, p50", "us", share(ours[1].wall, 0.5), by, peer.paced, {}});
     report.row({"50 drives, scan to OP with mapping and clocks", "ms", median(starts), by, peer.start_ms, limit(300)});
-    report.note(fmt::format("frame of {} bytes; {} exchanges, {} incomplete, {} without an answer in time; {} rounds, SCHED_FIFO {}, the responder has "
-                            "the same CPU and a higher priority",
-                            frame_bytes, domain.exchanges, domain.incomplete, ours[0].missed + ours[1].missed, rounds, priority));
+    report.note(fmt::format(
+        "frame of {} bytes; {} exchanges, {} incomplete, {} without an answer in time; {} rounds, SCHED_FIFO {}, the responder has "
+        "the same CPU and a higher priority",
+        frame_bytes, domain.exchanges, domain.incomplete, ours[0].missed + ours[1].missed, rounds, priority));
 }
 
 /// How far the thread of the runtime is from the grid of the reference clock, which runs 100 ppm fast.
@@ -189,11 +192,13 @@ void reference_clock(const Options& options, Report& report, const std::string& 
     const TemporaryFolder folder;
     const std::string file = folder.file("bench.ethercat", configuration(drives, "eth:" + here, "1ms"));
     Runtime runtime;
-    runtime.apply(new_thread("servo", period_ns, last) + "loadrt ethercat config=" + file + "\naddf ethercat.0.receive servo\naddf ethercat.0.transmit servo\n");
+    runtime.apply(new_thread("servo", period_ns, last) + "loadrt ethercat config=" + file +
+                  "\naddf ethercat.0.receive servo\naddf ethercat.0.transmit servo\n");
     runtime.session.threads().start();
     const auto value = [&](const char* name) { return runtime.session.values().read({name}).at(0).value().value; };
     const std::int64_t began = link::monotonic_ns();
-    while (!value("ethercat.0.all-op").bit && link::monotonic_ns() < began + 20'000 * period_ns) sleep_until(link::monotonic_ns() + 10 * period_ns);
+    while (!value("ethercat.0.all-op").bit && link::monotonic_ns() < began + 20'000 * period_ns)
+        sleep_until(link::monotonic_ns() + 10 * period_ns);
     if (!value("ethercat.0.all-op").bit) return report.note("the 5 drives did not become operational within 20 s");
     sleep_until(link::monotonic_ns() + 3000 * period_ns);
     const auto before = runtime.session.reports().threads()[0];
@@ -204,9 +209,12 @@ void reference_clock(const Options& options, Report& report, const std::string& 
         phases.push_back(static_cast<double>(value("ethercat.0.pll-err").s32) / 1000);
     }
     const auto after = runtime.session.reports().threads()[0];
-    report.row({.what = "phase of the thread to a reference clock 100 ppm fast, trimmed rms", .unit = "us", .ours = trimmed_rms(phases), .goal = limit(2)});
-    report.note(fmt::format("{} cycles, {} missed, {} in which a drive got no data before its SYNC0", after.cycles - before.cycles, after.missed - before.missed,
-                            value("ethercat.0.cycles-incomplete").u64 - incomplete));
+    report.row({.what = "phase of the thread to a reference clock 100 ppm fast, trimmed rms",
+                .unit = "us",
+                .ours = trimmed_rms(phases),
+                .goal = limit(2)});
+    report.note(fmt::format("{} cycles, {} missed, {} in which a drive got no data before its SYNC0", after.cycles - before.cycles,
+                            after.missed - before.missed, value("ethercat.0.cycles-incomplete").u64 - incomplete));
 }
 
 void on_veth(const Options& options, Report& report) {

@@ -68,9 +68,15 @@ Soem soem(const Options& options, const std::string& here, const std::string& th
     Slaves slaves(there, line);
     slaves.start(Slaves::Mode::emulated, other);
     const TemporaryFolder folder;
-    Child child({{taskset, "-c", std::to_string(last), chrt, "-f", std::to_string(priority), python, folder.file("soem.py", soem_program), here}, {}, static_cast<uid_t>(-1), true}, true);
+    Child child(
+        {{taskset, "-c", std::to_string(last), chrt, "-f", std::to_string(priority), python, folder.file("soem.py", soem_program), here},
+         {},
+         static_cast<uid_t>(-1),
+         true},
+        true);
     const auto first = child.line(60'000);
-    if (!first || *first == "missing") return without(first ? "pysoem is not installed (pip install pysoem)" : "it did not bring them to OP");
+    if (!first || *first == "missing")
+        return without(first ? "pysoem is not installed (pip install pysoem)" : "it did not bring them to OP");
     Soem result;
     if (double ms = 0; std::sscanf(first->c_str(), "ready %lf", &ms) == 1) result.start_ms = ms;
     slaves.start(Slaves::Mode::null, last);

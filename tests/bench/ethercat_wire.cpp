@@ -39,7 +39,8 @@ std::size_t RawSocket::receive(std::span<std::uint8_t> frame) noexcept {
 
 void RawSocket::send(std::span<const std::uint8_t> frame) noexcept { (void)!::send(socket_.get(), frame.data(), frame.size(), 0); }
 
-Slaves::Slaves(const std::string& interface, const std::string& line) : interface_(interface), devices_(devices::make_line(devices::read_line(line))) {
+Slaves::Slaves(const std::string& interface, const std::string& line)
+    : interface_(interface), devices_(devices::make_line(devices::read_line(line))) {
     for (devices::Device& d : devices_) line_.add({.controller = {.dc = d.dc}, .sii = d.sii, .application = d.firmware.get()});
     line_.power_on(link::monotonic_ns());
 }
@@ -119,7 +120,8 @@ void Slaves::answer(std::span<std::uint8_t> frame) noexcept {
         const auto found = answers_.find({static_cast<std::uint8_t>(d->command), d->address, d->length});
         if (found == answers_.end() || found->second.wkc == 0) continue;
         d->set_wkc(found->second.wkc);
-        const bool is_read = d->command != Command::apwr && d->command != Command::fpwr && d->command != Command::bwr && d->command != Command::lwr;
+        const bool is_read =
+            d->command != Command::apwr && d->command != Command::fpwr && d->command != Command::bwr && d->command != Command::lwr;
         if (is_read && d->length <= found->second.data.size()) std::memcpy(d->data, found->second.data.data(), d->length);
     }
 }

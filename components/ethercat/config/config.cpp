@@ -13,8 +13,8 @@ namespace {
 
 class ConfigFile {
 public:
-    ConfigFile(std::string_view text, const std::string& path, const ReadFile& read) : sections_(split(text, report_)), descriptions_(read,
-        path) {
+    ConfigFile(std::string_view text, const std::string& path, const ReadFile& read)
+        : sections_(split(text, report_)), descriptions_(read, path) {
         out_.buses.resize(1);
     }
 
@@ -28,11 +28,10 @@ public:
         if (reference_ != nullptr) reference();
         for (const auto& [name, s] : types_)
             if (!used_types_.contains(name))
-                report_.warning(Topic::line, s->at, "unused type '" + name + "'", "write type = " + name +
-                    " below a [slave …], or delete the section");
+                report_.warning(Topic::line, s->at, "unused type '" + name + "'",
+                                "write type = " + name + " below a [slave …], or delete the section");
         if (slaves_.empty() && bus_ != nullptr)
-            report_.error(Topic::line, bus_->at, "the configuration has no slave",
-                "write [slave 0 NAME] and below it esi = FILE");
+            report_.error(Topic::line, bus_->at, "the configuration has no slave", "write [slave 0 NAME] and below it esi = FILE");
         check_bus(out_.buses[0], report_);
         out_.messages = std::move(report_.all);
         text::sort(out_.messages);  // a line of a type is read once for each slave of it
@@ -42,15 +41,16 @@ public:
 private:
     void sort(Section& s) {
         const std::string kind = s.words.empty() ? "" : lower(s.words[0].text);
-        const auto expect = [&](std::size_t words, const char* form) {
+        const auto        expect = [&](std::size_t words, const char* form) {
             if (s.words.size() == words) return true;
             report_.error(Topic::line, s.at, "invalid section name: expected " + std::string(form));
             return false;
         };
         const auto once = [&](Section*& to, const char* form) {
             if (!expect(1, form)) return;
-            if (to != nullptr) report_.error(Topic::line, s.at, "duplicate section " + std::string(form), "first in line " +
-                std::to_string(to->at.line), "duplicate");
+            if (to != nullptr)
+                report_.error(Topic::line, s.at, "duplicate section " + std::string(form), "first in line " + std::to_string(to->at.line),
+                              "duplicate");
             else to = &s;
         };
         if (kind == "bus") once(bus_, "[bus]");
@@ -58,7 +58,7 @@ private:
         else if (kind == "type") {
             if (expect(2, "[type NAME]") && !types_.emplace(s.words[1].text, &s).second)
                 report_.error(Topic::line, s.words[1].at, "duplicate type '" + s.words[1].text + "'", "rename or delete one of them",
-                    "duplicate");
+                              "duplicate");
         } else if (kind == "domain") {
             if (expect(2, "[domain NAME]")) domains_.push_back(&s);
         } else if (kind == "slave") slaves_.push_back(&s);
@@ -71,8 +71,9 @@ private:
 
     void unknown_keys(const Keys& keys, const char* where, const std::vector<std::string>& all) {
         for (const Line* line : keys.all())
-            if (!line->used) report_.error(Topic::line, line->key.at, "unknown key '" + line->key.text + "' in " + where,
-                suggestion(line->key.text, all, "the keys are"));
+            if (!line->used)
+                report_.error(Topic::line, line->key.at, "unknown key '" + line->key.text + "' in " + where,
+                              suggestion(line->key.text, all, "the keys are"));
     }
 
     void read_bus() {
@@ -97,12 +98,12 @@ private:
         }
         if (!bus.backup.empty() && bus.backup == bus.link)
             report_.error(Topic::value, keys.find("backup")->value.at, "the backup is the link itself: '" + bus.link + "'",
-                "write the address of the second port, which closes the ring");
+                          "write the address of the second port, which closes the ring");
         unknown_keys(keys, "[bus]", {"link", "backup", "cycle", "clock", "reference", "frame-timeout", "sync-window", "other-slaves"});
     }
 
     void domain(Section& s) {
-        auto& domains = out_.buses[0].setup.domains;
+        auto&          domains = out_.buses[0].setup.domains;
         master::Domain d;
         d.name = s.words[1].text;
         Keys keys(report_);
@@ -113,8 +114,9 @@ private:
         unknown_keys(keys, "[domain]", {"every"});
         for (std::size_t i = 0; i < domains.size(); ++i) {
             if (domains[i].name != d.name) continue;
-            if (i != 0 || default_given_) return report_.error(Topic::line, s.words[1].at, "duplicate domain '" + d.name + "'",
-                "rename or delete one of them", "duplicate");
+            if (i != 0 || default_given_)
+                return report_.error(Topic::line, s.words[1].at, "duplicate domain '" + d.name + "'", "rename or delete one of them",
+                                     "duplicate");
             default_given_ = true, domains[0] = d;
             return;
         }
@@ -122,18 +124,18 @@ private:
     }
 
     void slave(Section& s) {
-        Bus& bus = out_.buses[0];
+        Bus&          bus = out_.buses[0];
         master::Slave slave;
-        SlaveInfo info;
+        SlaveInfo     info;
         info.at = s.at, slave.line = s.at.line;
-        const Word where = s.words.size() >= 2 ? s.words[1] : Word{"", s.at};
+        const Word        where = s.words.size() >= 2 ? s.words[1] : Word{"", s.at};
         const std::size_t equals = where.text.find('=');
         const std::string by = equals == std::string::npos ? "" : lower(std::string_view(where.text).substr(0, equals));
-        const auto number = parse_natural(equals == std::string::npos ? std::string_view(where.text)
-            : std::string_view(where.text).substr(equals + 1));
+        const auto        number =
+            parse_natural(equals == std::string::npos ? std::string_view(where.text) : std::string_view(where.text).substr(equals + 1));
         if (!number || *number > 65535 || s.words.size() > 3 || (!by.empty() && by != "alias" && by != "id"))
             return report_.error(Topic::line, where.at, "invalid slave section: expected a position of 0..65535 and a name",
-                "write [slave 0 NAME], [slave alias=5 NAME] or [slave id=5 NAME]");
+                                 "write [slave 0 NAME], [slave alias=5 NAME] or [slave id=5 NAME]");
         const auto value = static_cast<std::uint16_t>(*number);
         if (by == "alias" && value == 0)
             return report_.error(Topic::line, where.at, "alias 0 means that a slave has none", "write its position, as in [slave 0 NAME]");
@@ -156,7 +158,9 @@ private:
                 for (const auto& t : types_) names.push_back(t.first);
                 const std::string near = did_you_mean(type, names);
                 report_.error(Topic::line, line.value.at, "unknown type '" + type + "'",
-                              !near.empty() ? near : names.empty() ? "write [type " + type + "]" : "the types are: " + listed(names));
+                              !near.empty()   ? near
+                              : names.empty() ? "write [type " + type + "]"
+                                              : "the types are: " + listed(names));
                 return;
             }
         keys.take(s);
@@ -165,7 +169,7 @@ private:
     }
 
     void reference() {
-        auto& setup = out_.buses[0].setup;
+        auto&                    setup = out_.buses[0].setup;
         std::vector<std::string> names;
         for (std::size_t i = 0; i < setup.slaves.size(); ++i) {
             names.push_back(setup.slaves[i].name);
@@ -173,19 +177,19 @@ private:
         }
         if (!setup.reference_slave)
             report_.error(Topic::slave, reference_->value.at, "unknown slave '" + reference_->value.text + "'",
-                suggestion(reference_->value.text, names, "the slaves are"));
+                          suggestion(reference_->value.text, names, "the slaves are"));
     }
 
-    Report report_;
-    std::vector<Section> sections_;
-    Descriptions descriptions_;
-    Section *bus_ = nullptr, *defaults_ = nullptr;
+    Report                          report_;
+    std::vector<Section>            sections_;
+    Descriptions                    descriptions_;
+    Section *                       bus_ = nullptr, *defaults_ = nullptr;
     std::map<std::string, Section*> types_;
-    std::set<std::string> used_types_;
-    std::vector<Section*> slaves_, domains_;
-    const Line* reference_ = nullptr;
-    bool default_given_ = false;
-    Reading out_;
+    std::set<std::string>           used_types_;
+    std::vector<Section*>           slaves_, domains_;
+    const Line*                     reference_ = nullptr;
+    bool                            default_given_ = false;
+    Reading                         out_;
 };
 
 }  // namespace
@@ -199,11 +203,11 @@ const PinInfo* SlaveInfo::find(std::string_view pin) const {
 const esi::File* Descriptions::get(const Word& file, Report& report) {
     auto [at, fresh] = known_.try_emplace(file.text);
     if (fresh) {
-        std::string bytes;
+        std::string       bytes;
         const std::string path = file.text.starts_with('/') ? file.text : folder_ + file.text;
         if (!read_(path, bytes)) {
             report.error(Topic::value, file.at, "cannot read '" + path + "': " + bytes,
-                "write the path of an ESI file, relative to this file");
+                         "write the path of an ESI file, relative to this file");
         } else {
             esi::File read = esi::read(bytes);
             for (const esi::Message& m : read.messages)
@@ -219,10 +223,11 @@ namespace {
 
 /// The outputs of a slave must arrive before its watchdog ends: 100 ms, unless it is set.
 void check_watchdog(const Bus& bus, std::size_t n, Report& report) {
-    const master::Slave& s = bus.setup.slaves[n];
-    constexpr std::int64_t unit_ns = 40;  // of the divider, which counts from 2
+    const master::Slave&    s = bus.setup.slaves[n];
+    constexpr std::int64_t  unit_ns = 40;  // of the divider, which counts from 2
     constexpr std::uint16_t usual_divider = 2498, usual_intervals = 1000;
-    const std::int64_t watchdog_ns = unit_ns * (s.watchdog.divider.value_or(usual_divider) + 2) * s.watchdog.intervals.value_or(usual_intervals);
+    const std::int64_t      watchdog_ns =
+        unit_ns * (s.watchdog.divider.value_or(usual_divider) + 2) * s.watchdog.intervals.value_or(usual_intervals);
     const bool watched = std::any_of(s.sync_managers.begin(), s.sync_managers.end(), [](const master::SyncManager& sm) {
         return sm.output && sm.watchdog && (sm.control == 0 || (sm.control & 0x40) != 0) && !sm.pdos.empty();
     });
@@ -235,8 +240,10 @@ void check_watchdog(const Bus& bus, std::size_t n, Report& report) {
         return std::string(text);
     };
     report.error(Topic::slave, bus.slaves[n].at,
-                 "the outputs of '" + s.name + "' are sent every " + milliseconds(every_ns) + ", but its watchdog ends after " + milliseconds(watchdog_ns),
-                 "write watchdog = " + milliseconds(std::min<std::int64_t>(5 * every_ns, 6553'000'000)) + " in its section, watchdog = none, or a shorter cycle");
+                 "the outputs of '" + s.name + "' are sent every " + milliseconds(every_ns) + ", but its watchdog ends after " +
+                     milliseconds(watchdog_ns),
+                 "write watchdog = " + milliseconds(std::min<std::int64_t>(5 * every_ns, 6553'000'000)) +
+                     " in its section, watchdog = none, or a shorter cycle");
 }
 
 }  // namespace
@@ -247,8 +254,8 @@ void check_bus(const Bus& bus, Report& report) {
     for (std::size_t i = 0; i < slaves.size(); ++i)
         for (std::size_t j = 0; j < i; ++j) {
             const std::string first = "first in line " + std::to_string(bus.slaves[j].at.line);
-            const auto &a = slaves[i], &b = slaves[j];
-            const auto by_position = [](const master::Slave& s) { return !s.identity.alias && !s.identity.device_id; };
+            const auto &      a = slaves[i], &b = slaves[j];
+            const auto        by_position = [](const master::Slave& s) { return !s.identity.alias && !s.identity.device_id; };
             if (a.name == b.name) report.error(Topic::slave, bus.slaves[i].at, "duplicate slave name '" + a.name + "'", first, "duplicate");
             if (by_position(a) && by_position(b) && a.position == b.position)
                 report.error(Topic::slave, bus.slaves[i].at, "duplicate position " + std::to_string(a.position), first, "duplicate");
@@ -256,7 +263,7 @@ void check_bus(const Bus& bus, Report& report) {
                 report.error(Topic::slave, bus.slaves[i].at, "duplicate alias " + std::to_string(*a.identity.alias), first, "duplicate");
             if (a.identity.device_id && a.identity.device_id == b.identity.device_id)
                 report.error(Topic::slave, bus.slaves[i].at, "duplicate device ID " + std::to_string(*a.identity.device_id), first,
-                    "duplicate");
+                             "duplicate");
         }
 }
 
@@ -264,7 +271,7 @@ bool read_from_disk(const std::string& path, std::string& bytes) { return read_r
 
 Reading read(std::string_view text, const std::string& path, const ReadFile& read_file) {
     return trimmed(text).starts_with('<') || trimmed(text).starts_with("\xef\xbb\xbf<") ? read_lcec(text, path, read_file)
-        : ConfigFile(text, path, read_file).read();
+                                                                                        : ConfigFile(text, path, read_file).read();
 }
 
 std::string to_string(const Reading& reading, const std::string& path) { return text::errors_text(reading.messages, path); }

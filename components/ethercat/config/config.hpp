@@ -24,10 +24,10 @@ using text::Span;
 
 /// Subject of a message: its diagnostic code.
 enum class Topic : std::uint8_t {
-    line,    ///< an invalid line, section, key or element
-    value,   ///< an invalid value
+    line,  ///< an invalid line, section, key or element
+    value,  ///< an invalid value
     object,  ///< an unknown object, or one that a PDO cannot carry
-    slave,   ///< conflicting or incomplete slaves
+    slave,  ///< conflicting or incomplete slaves
 };
 /// Returns "ethercat-line" and the like: the diagnostic's code.
 const char* code_of(Topic);
@@ -41,29 +41,29 @@ struct PinInfo {
 
 /// A slave as the user sees it; the slave of the same number in the setup is how the master sees it.
 struct SlaveInfo {
-    std::string type;          ///< order code or name of its device, for messages and lists
-    std::string description;   ///< path of its ESI; empty: none
-    unsigned cia402_axes = 0;  ///< drives of CiA 402
+    std::string                                  type;  ///< order code or name of its device, for messages and lists
+    std::string                                  description;  ///< path of its ESI; empty: none
+    unsigned                                     cia402_axes = 0;  ///< drives of CiA 402
     std::vector<std::pair<std::string, PinInfo>> pins;  ///< by name
-    Span at{};
-    const PinInfo* find(std::string_view pin) const;
+    Span                                         at{};
+    const PinInfo*                               find(std::string_view pin) const;
 };
 
 /// One bus with its master.
 struct Bus {
-    std::string name;                 ///< of its pins in LinuxCNC's format; empty in a `.ethercat` file
-    std::string link = "sim:ethercat", backup;  ///< link addresses; a backup closes a ring
-    bool cycle_given = false;         ///< setup.cycle_ns is from the file; else it is that of the thread
-    master::Setup setup;
-    std::vector<SlaveInfo> slaves;    ///< as many as in setup.slaves
-    Span at{};
+    std::string            name;  ///< of its pins in LinuxCNC's format; empty in a `.ethercat` file
+    std::string            link = "sim:ethercat", backup;  ///< link addresses; a backup closes a ring
+    bool                   cycle_given = false;  ///< setup.cycle_ns is from the file; else it is that of the thread
+    master::Setup          setup;
+    std::vector<SlaveInfo> slaves;  ///< as many as in setup.slaves
+    Span                   at{};
 };
 
 struct Reading {
-    std::vector<Bus> buses;           ///< one for a `.ethercat` file
-    bool lcec = false;                ///< LinuxCNC's format: pins are named lcec.MASTER.SLAVE.PIN
-    std::vector<Message> messages;    ///< in order of place
-    bool good() const { return text::good(messages); }
+    std::vector<Bus>     buses;  ///< one for a `.ethercat` file
+    bool                 lcec = false;  ///< LinuxCNC's format: pins are named lcec.MASTER.SLAVE.PIN
+    std::vector<Message> messages;  ///< in order of place
+    bool                 good() const { return text::good(messages); }
 };
 
 /// Reads a whole file. Returns false and sets `bytes` to the reason.
@@ -78,14 +78,14 @@ std::string to_string(const Reading&, const std::string& path);
 
 /// A slave as found on a bus or described in an ESI, for write().
 struct Found {
-    std::string name;                   ///< of its section; empty: slave-POSITION
-    std::string device;                 ///< name or order code, for a comment
-    std::string esi;                    ///< path of its description; empty: none
-    std::uint32_t vendor = 0, product = 0, revision = 0;
-    std::uint16_t alias = 0;
-    std::vector<sii::Pdo> rx, tx;       ///< of the SII; those with a sync manager are assigned
+    std::string                   name;  ///< of its section; empty: slave-POSITION
+    std::string                   device;  ///< name or order code, for a comment
+    std::string                   esi;  ///< path of its description; empty: none
+    std::uint32_t                 vendor = 0, product = 0, revision = 0;
+    std::uint16_t                 alias = 0;
+    std::vector<sii::Pdo>         rx, tx;  ///< of the SII; those with a sync manager are assigned
     std::vector<sii::SyncManager> sync_managers;
-    std::uint16_t assign_activate = 0;  ///< 0: without SYNC
+    std::uint16_t                 assign_activate = 0;  ///< 0: without SYNC
 };
 /// Returns the text of a `.ethercat` file for these slaves in order of position. It can be read without errors.
 std::string write(const std::string& link, std::int64_t cycle_ns, const std::vector<Found>& slaves);

@@ -12,10 +12,11 @@ namespace {
 constexpr std::uint32_t most_lines = 20'000;
 
 using master::Type;
-constexpr TypeWord type_list[] = {{"bit", "BOOL", Type::bit, 1},       {"u8", "USINT", Type::u8, 8},     {"u16", "UINT", Type::u16, 16},
-                                  {"u32", "UDINT", Type::u32, 32},     {"u64", "ULINT", Type::u64, 64},  {"s8", "SINT", Type::s8, 8},
-                                  {"s16", "INT", Type::s16, 16},       {"s32", "DINT", Type::s32, 32},   {"s64", "LINT", Type::s64, 64},
-                                  {"real32", "REAL", Type::real32, 32}, {"real64", "LREAL", Type::real64, 64}};
+constexpr TypeWord type_list[] = {
+    {"bit", "BOOL", Type::bit, 1},        {"u8", "USINT", Type::u8, 8},         {"u16", "UINT", Type::u16, 16},
+    {"u32", "UDINT", Type::u32, 32},      {"u64", "ULINT", Type::u64, 64},      {"s8", "SINT", Type::s8, 8},
+    {"s16", "INT", Type::s16, 16},        {"s32", "DINT", Type::s32, 32},       {"s64", "LINT", Type::s64, 64},
+    {"real32", "REAL", Type::real32, 32}, {"real64", "LREAL", Type::real64, 64}};
 
 }  // namespace
 
@@ -27,15 +28,15 @@ const char* code_of(Topic topic) {
 std::vector<Section> split(std::string_view file, Report& report) {
     using Kind = text::IniLine::Kind;
     std::vector<Section> sections;
-    text::Lines lines(file);
+    text::Lines          lines(file);
     while (const auto whole = lines.next()) {
         if (whole->at.line > most_lines) {
             report.error(Topic::line, whole->at, "the file has more than " + std::to_string(most_lines) + " lines",
-                "is it the right file?");
+                         "is it the right file?");
             break;
         }
         const text::IniLine ini = text::ini_line(whole->text);
-        const auto word = [&](std::string_view of) {
+        const auto          word = [&](std::string_view of) {
             const auto begin = static_cast<std::size_t>(of.data() - whole->text.data());
             return text::part(*whole, begin, begin + of.size());
         };
@@ -43,8 +44,7 @@ std::vector<Section> split(std::string_view file, Report& report) {
             report.error(Topic::line, word(ini.value).at, "unexpected text after the section name", "a comment begins with #");
         else if (ini.kind == Kind::open_section)
             report.error(Topic::line, whole->at, "section name without ']'", "write [bus], [type NAME] or [slave 0 NAME]", "missing ']'");
-        else if (ini.kind == Kind::section)
-            sections.push_back({words_of(word(ini.name)), whole->at, {}});
+        else if (ini.kind == Kind::section) sections.push_back({words_of(word(ini.name)), whole->at, {}});
         else if (ini.kind != Kind::entry)
             report.error(Topic::line, whole->at, "invalid line: neither a [section] nor KEY = VALUE", "a comment begins with #");
         else if (ini.value.empty())
@@ -71,7 +71,7 @@ std::optional<Address> address(std::string_view text) {
         return static_cast<unsigned>(*value);
     };
     const std::size_t colon = std::min(text.find(':'), text.size());
-    Address out;
+    Address           out;
     out.has_sub = colon < text.size();
     const auto index = hex(text.substr(0, colon), 0xffff, 4);
     const auto sub = out.has_sub ? hex(text.substr(colon + 1), 0xff, 2) : std::optional<unsigned>(0);
@@ -108,7 +108,7 @@ std::optional<std::vector<std::uint8_t>> value_bytes(std::string_view value, con
         const auto real = parse_real(value);
         if (!real) return problem = "a number, as in 1.5", std::nullopt;
         if (type.type == Type::real32) {
-            const auto single = static_cast<float>(*real);
+            const auto    single = static_cast<float>(*real);
             std::uint32_t bits = 0;
             std::memcpy(&bits, &single, sizeof bits);
             raw = bits;
@@ -116,10 +116,10 @@ std::optional<std::vector<std::uint8_t>> value_bytes(std::string_view value, con
             std::memcpy(&raw, &*real, sizeof raw);
         }
     } else {
-        const bool negative = value.starts_with('-');
-        const auto natural = parse_natural(negative ? value.substr(1) : value);
-        const bool hexadecimal = value.starts_with("0x");
-        const unsigned bits = type.bits;
+        const bool          negative = value.starts_with('-');
+        const auto          natural = parse_natural(negative ? value.substr(1) : value);
+        const bool          hexadecimal = value.starts_with("0x");
+        const unsigned      bits = type.bits;
         const std::uint64_t all = bits == 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << bits) - 1;
         const std::uint64_t highest = is_signed(type.type) && !hexadecimal ? all >> 1 : all;
         if (!natural || (negative && (!is_signed(type.type) || *natural > (all >> 1) + 1)) || (!negative && *natural > highest)) {

@@ -40,21 +40,31 @@ private:
     static bool is_cause(master::Event event) noexcept {
         using master::Event;
         switch (event) {
-        case Event::no_mailbox: case Event::too_few_fmmus: case Event::too_few_sync_managers: case Event::state_refused: case Event::state_timeout:
-        case Event::startup_write_failed: case Event::mapping_failed: case Event::mapping_differs: case Event::too_many_entries:
-        case Event::fixed_size: case Event::dc_unsupported: case Event::dc_timeout: case Event::dc_not_set: case Event::start_up_failed:
-            return true;
+        case Event::no_mailbox:
+        case Event::too_few_fmmus:
+        case Event::too_few_sync_managers:
+        case Event::state_refused:
+        case Event::state_timeout:
+        case Event::startup_write_failed:
+        case Event::mapping_failed:
+        case Event::mapping_differs:
+        case Event::too_many_entries:
+        case Event::fixed_size:
+        case Event::dc_unsupported:
+        case Event::dc_timeout:
+        case Event::dc_not_set:
+        case Event::start_up_failed: return true;
         default: return false;
         }
     }
     struct Cause {
         master::Event event = master::Event::scanned;  // is none
-        std::int64_t first = 0, second = 0;
-        friend bool operator==(const Cause&, const Cause&) = default;
+        std::int64_t  first = 0, second = 0;
+        friend bool   operator==(const Cause&, const Cause&) = default;
     };
     struct Slave {
         std::array<Cause, 4> known{};
-        unsigned count = 0;
+        unsigned             count = 0;
     };
     std::vector<Slave> slaves_;
 };

@@ -50,8 +50,8 @@ std::string configured_words(std::int64_t code, const master::Slave& slave) {
         std::size_t bits = 0;
         for (const auto& pdo : sm.pdos)
             for (const auto& e : pdo.entries) bits += e.bits;
-        list += (list.empty() ? "" : " and ") + bytes_words((bits + 7) / 8) + (sm.output ? " of outputs" : " of inputs") + " in sync manager " +
-                std::to_string(sm.number);
+        list += (list.empty() ? "" : " and ") + bytes_words((bits + 7) / 8) + (sm.output ? " of outputs" : " of inputs") +
+                " in sync manager " + std::to_string(sm.number);
     }
     return ", which has " + (list.empty() ? "no process data" : list);
 }
@@ -59,7 +59,8 @@ std::string configured_words(std::int64_t code, const master::Slave& slave) {
 /// What was written at start: `sdo`, `idn` and `register` lines, commands of the description.
 std::string write_words(std::int64_t object, std::int64_t code, const master::Slave& slave) {
     using Protocol = master::StartupWrite::Protocol;
-    const auto at = std::find_if(slave.startup.begin(), slave.startup.end(), [&](const auto& w) { return (w.index << 8 | w.sub) == object; });
+    const auto at =
+        std::find_if(slave.startup.begin(), slave.startup.end(), [&](const auto& w) { return (w.index << 8 | w.sub) == object; });
     if (at == slave.startup.end()) return "rejects the start-up write of " + object_words(object) + ": " + abort_words(code);
     std::string what = object_words(object), why = abort_words(code);
     if (at->protocol == Protocol::soe) {
@@ -71,10 +72,12 @@ std::string write_words(std::int64_t object, std::int64_t code, const master::Sl
     }
     std::uint64_t number = 0;
     for (std::size_t n = std::min<std::size_t>(at->data.size(), 8); n-- > 0;) number = number << 8 | at->data[n];
-    const std::string value = at->complete || at->data.size() > 8 ? bytes_words(at->data.size())
-                                                                  : hex(static_cast<std::int64_t>(number), static_cast<int>(2 * at->data.size()));
+    const std::string value = at->complete || at->data.size() > 8
+                                  ? bytes_words(at->data.size())
+                                  : hex(static_cast<std::int64_t>(number), static_cast<int>(2 * at->data.size()));
     return "rejects " + value + " for " + what + ": " + why + "; " +
-           (at->line != 0 ? "correct or delete line " + std::to_string(at->line) + " of the configuration" : "its description asks for it: check its `esi`");
+           (at->line != 0 ? "correct or delete line " + std::to_string(at->line) + " of the configuration"
+                          : "its description asks for it: check its `esi`");
 }
 
 /// A value that was written to a mapping (16xxh, 1Axxh) or an assignment (1C12h, 1C13h).
@@ -83,18 +86,24 @@ std::string mapped_words(std::int64_t value, std::int64_t object) {
     if ((object & 0xff) == 0 && value == 0) return index >= 0x1c10 ? "clearing the assignment" : "clearing the mapping";
     if ((object & 0xff) == 0) return std::to_string(value & 0xff) + (index >= 0x1c10 ? " PDOs" : " entries");
     if (index >= 0x1c10) return "PDO " + hex(value & 0xffff, 4);
-    return "object " + hex(value >> 16 & 0xffff, 4) + ":" + std::to_string(value >> 8 & 0xff) + " with " + std::to_string(value & 0xff) + " bits";
+    return "object " + hex(value >> 16 & 0xffff, 4) + ":" + std::to_string(value >> 8 & 0xff) + " with " + std::to_string(value & 0xff) +
+           " bits";
 }
 
 std::string rejected_mapping_words(std::int64_t first, std::int64_t code) {
     const std::int64_t value = first >> 24, object = first & 0xff'ffff, entry = object & 0xff, index = object >> 8;
-    std::string text = "rejects " + mapped_words(value, object) + " at " + object_words(object) + ": " + abort_words(code);
+    std::string        text = "rejects " + mapped_words(value, object) + " at " + object_words(object) + ": " + abort_words(code);
     if (code == 0) return text + "; power-cycle it";
     const bool assignment = index >= 0x1c00, input = index >= 0x1a00;
-    text += std::string("; correct `") + (assignment ? "outputs` or `inputs` or their `sync-manager" : input ? "inputs" : "outputs") + "` in its section";
+    text += std::string("; correct `") +
+            (assignment ? "outputs` or `inputs` or their `sync-manager"
+             : input    ? "inputs"
+                        : "outputs") +
+            "` in its section";
     const auto number = static_cast<std::uint32_t>(code);
     // Slaves report a full PDO in several ways; few entries fit into any.
-    const bool full = number == coe::abort::pdo_too_long || (entry == 0 && (number == coe::abort::range || number == coe::abort::too_high)) ||
+    const bool full = number == coe::abort::pdo_too_long ||
+                      (entry == 0 && (number == coe::abort::range || number == coe::abort::too_high)) ||
                       (entry > 4 && number == coe::abort::no_sub);
     const std::int64_t fits = entry == 0 ? (value & 0xff) - 1 : entry - 1;
     if (full && !assignment && fits > 0) text += ", or, if the PDO is full, write `entries-per-pdo = " + std::to_string(fits) + "`";
@@ -117,11 +126,10 @@ std::string identity_words(const char* what, std::int64_t found, std::int64_t ex
 /// What happened to one slave; it follows the slave's name.
 std::string of_slave(const Happened& w, const master::Setup& setup) {
     static const master::Slave unnamed;
-    const master::Slave& slave = w.slave < setup.slaves.size() ? setup.slaves[w.slave] : unnamed;
-    const auto first = w.first, second = w.second;
+    const master::Slave&       slave = w.slave < setup.slaves.size() ? setup.slaves[w.slave] : unnamed;
+    const auto                 first = w.first, second = w.second;
     switch (w.event) {
-    case Event::slave_missing:
-        return "is not on the bus; check its supply and cable, or write `optional = yes` in its section";
+    case Event::slave_missing: return "is not on the bus; check its supply and cable, or write `optional = yes` in its section";
     case Event::unknown_slave:
         return "is not in the configuration (vendor " + hex(first, 8) + ", product " + hex(second, 8) + "); add [slave " +
                std::to_string(w.slave - Events::of_position) + " NAME], or write `other-slaves = accept` in [bus]";
@@ -133,8 +141,7 @@ std::string of_slave(const Happened& w, const master::Setup& setup) {
         return "is not unique: the slave at position " + std::to_string(second) + " has the " +
                (slave.identity.device_id ? "device ID " : "alias ") + std::to_string(first) +
                " too; neither is started: give each its own, power-cycle both and load the master again";
-    case Event::sii_failed:
-        return "has an unreadable EEPROM (status " + hex(first, 4) + " at word " + hex(second, 2) + "); power-cycle it";
+    case Event::sii_failed: return "has an unreadable EEPROM (status " + hex(first, 4) + " at word " + hex(second, 2) + "); power-cycle it";
     case Event::no_mailbox:
         return "has no mailbox, but the configuration writes " + object_words(first) + " at start; delete its `sdo` and `idn` lines";
     case Event::too_few_fmmus:
@@ -144,7 +151,8 @@ std::string of_slave(const Happened& w, const master::Setup& setup) {
                std::to_string(second) + "; correct `outputs.sync-manager` or `inputs.sync-manager` in its section, which count from 0";
     case Event::state_refused: return "rejects " + state_words(first) + " with " + al_words(second) + configured_words(second, slave);
     case Event::state_timeout:
-        return "did not reach " + state_words(first) + " in time; it is in " + state_words(second) + ": raise its time-out, or power-cycle it";
+        return "did not reach " + state_words(first) + " in time; it is in " + state_words(second) +
+               ": raise its time-out, or power-cycle it";
     case Event::fell_back: return "left its state and is in " + state_words(first) + ", " + al_words(second);
     case Event::startup_write_failed: return write_words(first, second, slave);
     case Event::mapping_failed: return rejected_mapping_words(first, second);
@@ -155,7 +163,8 @@ std::string of_slave(const Happened& w, const master::Setup& setup) {
         return "does not take " + std::to_string(second) + " entries in PDO " + hex(first, 4) + "; spread them over several PDOs";
     case Event::fixed_size:
         return "has no mailbox to change its PDO mapping: sync manager " + std::to_string(first >> 16) + " has " + std::to_string(second) +
-               (second == 1 ? " byte" : " bytes") + ", the configuration needs " + std::to_string(first & 0xffff) + "; list all of its own objects";
+               (second == 1 ? " byte" : " bytes") + ", the configuration needs " + std::to_string(first & 0xffff) +
+               "; list all of its own objects";
     case Event::slave_lost: return "does not answer; check its supply and the cable to it";
     case Event::slave_returned: return "answers again";
     case Event::slave_operational: return "is operational after " + std::to_string(second) + " ms";
@@ -167,8 +176,8 @@ std::string of_slave(const Happened& w, const master::Setup& setup) {
         return "deviates by " + microseconds(first) + " from the reference clock, more than the window of " + microseconds(second) +
                "; it is not started: check the cycle of the thread, or raise `sync-window`";
     case Event::dc_lost:
-        return "is operational, but its clock deviates by " + microseconds(first) + " from the reference clock, more than " + microseconds(second) +
-               "; check that the thread misses no cycles, and its manual for what it does without synchronisation";
+        return "is operational, but its clock deviates by " + microseconds(first) + " from the reference clock, more than " +
+               microseconds(second) + "; check that the thread misses no cycles, and its manual for what it does without synchronisation";
     case Event::ring_broken:
         if (w.slave == Events::bus) return {};
         return "is the last that the primary port reaches: the ring is broken behind it; all slaves still exchange data, repair the cable";
@@ -222,9 +231,9 @@ std::string slave_words(std::uint32_t slave, const master::Setup& setup) {
     if (slave >= Events::of_position && slave != Events::bus) return "slave at position " + std::to_string(slave - Events::of_position);
     if (slave >= setup.slaves.size()) return "slave " + std::to_string(slave);
     const master::Slave& s = setup.slaves[slave];
-    const std::string where = s.identity.device_id ? "id=" + std::to_string(*s.identity.device_id)
-                              : s.identity.alias   ? "alias=" + std::to_string(*s.identity.alias)
-                                                   : std::to_string(s.position);
+    const std::string    where = s.identity.device_id ? "id=" + std::to_string(*s.identity.device_id)
+                                 : s.identity.alias   ? "alias=" + std::to_string(*s.identity.alias)
+                                                      : std::to_string(s.position);
     return "slave " + where + (s.name.empty() ? "" : " (" + s.name + ")");
 }
 

@@ -24,25 +24,26 @@ public:
     Reading read() {
         out_.lcec = true;
         pugi::xml_document document;
-        const auto result = document.load_buffer(text_.data(), text_.size());
+        const auto         result = document.load_buffer(text_.data(), text_.size());
         if (!result) {
             const auto at = std::min(static_cast<std::size_t>(std::max<std::ptrdiff_t>(result.offset, 0)), text_.size());
-            const auto line = static_cast<std::uint32_t>(1 + std::count(text_.begin(), text_.begin() + static_cast<std::ptrdiff_t>(at),
-                '\n'));
+            const auto line =
+                static_cast<std::uint32_t>(1 + std::count(text_.begin(), text_.begin() + static_cast<std::ptrdiff_t>(at), '\n'));
             report_.error(Topic::line, {line, 1, static_cast<std::uint32_t>(at), 0}, "invalid XML: " + lower(result.description()),
-                "the file begins with <masters>");
+                          "the file begins with <masters>");
             return finish();
         }
         const Xml root = document.document_element();
         if (std::string_view(root.name()) != "masters") {
             report_.error(Topic::line, esi::span_of(root, text_), "the root element is '" + std::string(root.name()) + "', not masters",
-                "the file begins with <masters>");
+                          "the file begins with <masters>");
             return finish();
         }
         attributes(root, {});
         children(root, {"master"}, [&](const Xml& node) { master_of(node); });
-        if (out_.buses.empty()) report_.error(Topic::line, esi::span_of(root, text_), "the file has no master",
-            "write <master idx=\"0\" appTimePeriod=\"1000000\">");
+        if (out_.buses.empty())
+            report_.error(Topic::line, esi::span_of(root, text_), "the file has no master",
+                          "write <master idx=\"0\" appTimePeriod=\"1000000\">");
         for (const Bus& bus : out_.buses) check_bus(bus, report_);
         return finish();
     }
@@ -55,8 +56,8 @@ private:
     }
 
     void error(Topic topic, const Xml& at, std::string sentence, std::string help = {}) {
-        if (!report_.failed() || report_.all.size() <= text::most_errors) report_.error(topic, esi::span_of(at, text_),
-            std::move(sentence), std::move(help));
+        if (!report_.failed() || report_.all.size() <= text::most_errors)
+            report_.error(topic, esi::span_of(at, text_), std::move(sentence), std::move(help));
     }
     /// Reports attributes that the element does not have.
     void attributes(const Xml& node, const std::vector<std::string>& known) {
@@ -69,17 +70,19 @@ private:
         for (const Xml child : node.children()) {
             if (child.type() != pugi::node_element) continue;
             if (std::find(known.begin(), known.end(), child.name()) != known.end()) read(child);
-            else error(Topic::line, child, "unknown element <" + std::string(child.name()) + "> in <" + node.name() + ">",
-                       known.empty() ? "the element is empty" : suggestion(child.name(), known, "the elements are"));
+            else
+                error(Topic::line, child, "unknown element <" + std::string(child.name()) + "> in <" + node.name() + ">",
+                      known.empty() ? "the element is empty" : suggestion(child.name(), known, "the elements are"));
         }
     }
 
     std::optional<std::int64_t> number(const Xml& node, const char* name, std::int64_t least, std::int64_t most, bool hexadecimal = false,
-        bool required = false) {
+                                       bool required = false) {
         const std::string_view value = trimmed(node.attribute(name).value());
         if (!node.attribute(name)) {
-            if (required) error(Topic::value, node, "missing attribute '" + std::string(name) + "' of <" + node.name() + ">", "write " +
-                std::string(name) + "=\"" + (hexadecimal ? "6040" : "0") + "\"");
+            if (required)
+                error(Topic::value, node, "missing attribute '" + std::string(name) + "' of <" + node.name() + ">",
+                      "write " + std::string(name) + "=\"" + (hexadecimal ? "6040" : "0") + "\"");
             return {};
         }
         const bool prefixed = value.starts_with("0x") || value.starts_with("0X") || !hexadecimal;
@@ -87,17 +90,18 @@ private:
         if (n && *n >= least && *n <= most) return n;
         char range[96];
         std::snprintf(range, sizeof range, hexadecimal ? "a hexadecimal number of %llX..%llX" : "a number of %lld..%lld",
-            static_cast<long long>(least), static_cast<long long>(most));
-        error(Topic::value, node, "invalid " + std::string(name) + " '" + std::string(value) + "' of <" + node.name() + ">", "write " +
-            std::string(range));
+                      static_cast<long long>(least), static_cast<long long>(most));
+        error(Topic::value, node, "invalid " + std::string(name) + " '" + std::string(value) + "' of <" + node.name() + ">",
+              "write " + std::string(range));
         return {};
     }
     bool flag(const Xml& node, const char* name, bool otherwise) {
         const std::string_view value = node.attribute(name).value();
         if (value.empty()) return otherwise;
         if (same_word(value, "true") || value == "1") return true;
-        if (!same_word(value, "false") && value != "0") error(Topic::value, node, "invalid " + std::string(name) + " '" +
-            std::string(value) + "' of <" + node.name() + ">", "write true or false");
+        if (!same_word(value, "false") && value != "0")
+            error(Topic::value, node, "invalid " + std::string(name) + " '" + std::string(value) + "' of <" + node.name() + ">",
+                  "write true or false");
         return false;
     }
     /// A time in ns, or `*N`: N cycles.
@@ -105,11 +109,11 @@ private:
         const std::string_view value = node.attribute(name).value();
         if (value.empty()) return {};
         if (value.starts_with('*'))
-            if (const auto n = parse_natural(value.substr(1)); n && *n >= 1 &&
-                *n <= 1000) return static_cast<std::int64_t>(*n) * bus_->setup.cycle_ns;
+            if (const auto n = parse_natural(value.substr(1)); n && *n >= 1 && *n <= 1000)
+                return static_cast<std::int64_t>(*n) * bus_->setup.cycle_ns;
         if (const auto n = parse_natural(value); n && *n <= 1'000'000'000) return static_cast<std::int64_t>(*n);
         error(Topic::value, node, "invalid " + std::string(name) + " '" + std::string(value) + "' of <" + node.name() + ">",
-            "write a time in ns, or *1 for one cycle");
+              "write a time in ns, or *1 for one cycle");
         return {};
     }
 
@@ -126,7 +130,7 @@ private:
         const bool follow = flag(node, "syncToRefClock", sync < 0);
         if (node.attribute("syncToRefClock") && node.attribute("refClockSyncCycles") && sync != 0 && follow != (sync < 0))
             error(Topic::value, node, "syncToRefClock contradicts the sign of refClockSyncCycles",
-                "delete syncToRefClock; refClockSyncCycles=\"-1\" synchronises the thread to the reference clock");
+                  "delete syncToRefClock; refClockSyncCycles=\"-1\" synchronises the thread to the reference clock");
         bus.setup.lead = follow ? master::ClockLead::reference : sync > 0 ? master::ClockLead::thread : master::ClockLead::none;
         const auto reference = number(node, "refClockSlaveIdx", -1, 65535).value_or(-1);
         bus_ = &bus;
@@ -134,8 +138,8 @@ private:
         for (std::size_t i = 0; i < bus.setup.slaves.size(); ++i)
             if (bus.setup.slaves[i].position == reference) bus.setup.reference_slave = static_cast<std::uint16_t>(i);
         for (const Bus& other : out_.buses)
-            if (other.name == bus.name) error(Topic::slave, node, "duplicate master '" + bus.name + "'", "first in line " +
-                std::to_string(other.at.line));
+            if (other.name == bus.name)
+                error(Topic::slave, node, "duplicate master '" + bus.name + "'", "first in line " + std::to_string(other.at.line));
         out_.buses.push_back(std::move(bus));
     }
 
@@ -150,24 +154,23 @@ private:
         s.name = node.attribute("name") ? node.attribute("name").value() : std::to_string(s.position);
         const bool generic = info_.type == "generic", drive = info_.type == "basic_cia402";
         if (!generic && !drive)
-            error(Topic::slave, node, info_.type.empty() ? "missing attribute 'type' of <slave>" : "unsupported slave type '" + info_.type +
-                "'",
+            error(Topic::slave, node,
+                  info_.type.empty() ? "missing attribute 'type' of <slave>" : "unsupported slave type '" + info_.type + "'",
                   "write type=\"generic\" with the PDOs of the device, or type=\"basic_cia402\"");
-        if (const auto vid = number(node, "vid", 0, 0xffffffff, true, generic ||
-            drive)) s.identity.vendor = static_cast<std::uint32_t>(*vid);
-        if (const auto pid = number(node, "pid", 0, 0xffffffff, true, generic ||
-            drive)) s.identity.product = static_cast<std::uint32_t>(*pid);
+        if (const auto vid = number(node, "vid", 0, 0xffffffff, true, generic || drive))
+            s.identity.vendor = static_cast<std::uint32_t>(*vid);
+        if (const auto pid = number(node, "pid", 0, 0xffffffff, true, generic || drive))
+            s.identity.product = static_cast<std::uint32_t>(*pid);
         configure_ = flag(node, "configPdos", false);
-        if (const std::string unit = node.attribute("syncUnit").value(); !unit.empty() || node.attribute("syncUnitCycle")) domain(node, s,
-            unit.empty() ? "default" : unit);
+        if (const std::string unit = node.attribute("syncUnit").value(); !unit.empty() || node.attribute("syncUnitCycle"))
+            domain(node, s, unit.empty() ? "default" : unit);
         children(node, {"dcConf", "watchdog", "sdoConfig", "idnConfig", "initCmds", "modParam", "syncManager"}, [&](const Xml& child) {
             const std::string_view name = child.name();
             if (name == "dcConf") dc(child, s);
             else if (name == "watchdog") watchdog(child, s);
             else if (name == "sdoConfig") sdo(child, s);
             else if (name == "idnConfig") idn(child, s);
-            else if (name == "initCmds")
-                error(Topic::line, child, "<initCmds> is unsupported", "write an <sdoConfig> for each object");
+            else if (name == "initCmds") error(Topic::line, child, "<initCmds> is unsupported", "write an <sdoConfig> for each object");
             else if (name == "modParam") parameter(child, drive);
             else if (generic) sync_manager(child, s);
             else error(Topic::line, child, "<syncManager> applies only to type=\"generic\"", "delete it, or write type=\"generic\"");
@@ -181,12 +184,12 @@ private:
     }
 
     void domain(const Xml& node, master::Slave& s, const std::string& unit) {
-        auto& domains = bus_->setup.domains;
+        auto&              domains = bus_->setup.domains;
         const std::int64_t time = cycles(node, "syncUnitCycle").value_or(bus_->setup.cycle_ns);
         if (time == 0 || time % bus_->setup.cycle_ns != 0)
             return error(Topic::value, node, "syncUnitCycle is not a multiple of appTimePeriod", "write *1, *2, …");
         const auto every = static_cast<unsigned>(time / bus_->setup.cycle_ns);
-        auto at = std::find_if(domains.begin(), domains.end(), [&](const master::Domain& d) { return d.name == unit; });
+        auto       at = std::find_if(domains.begin(), domains.end(), [&](const master::Domain& d) { return d.name == unit; });
         if (at == domains.end()) at = domains.insert(at, {unit, every});
         else if (node.attribute("syncUnitCycle")) at->every = every;
         s.domain = static_cast<std::uint16_t>(at - domains.begin());
@@ -225,35 +228,39 @@ private:
         w.sub = static_cast<std::uint8_t>(number(node, "drive", 0, 7).value_or(0));
         const std::string_view name = trimmed(node.attribute("idn").value()), state = trimmed(node.attribute("state").value());
         if (const auto parsed = master::parse_idn(name)) w.index = *parsed;
-        else error(Topic::value, node, name.empty() ? "missing attribute 'idn' of <idnConfig>" : "invalid idn '" + std::string(name) +
-            "' of <idnConfig>", "write idn=\"S-0-15\" or idn=\"P-0-150\"");
+        else
+            error(Topic::value, node,
+                  name.empty() ? "missing attribute 'idn' of <idnConfig>" : "invalid idn '" + std::string(name) + "' of <idnConfig>",
+                  "write idn=\"S-0-15\" or idn=\"P-0-150\"");
         if (state == "SAFEOP") w.before = State::op;
-        else if (!state.empty() && state != "PREOP") error(Topic::value, node, "invalid state '" + std::string(state) +
-            "' of <idnConfig>", "write state=\"PREOP\" or state=\"SAFEOP\", the state in which the IDN is written");
+        else if (!state.empty() && state != "PREOP")
+            error(Topic::value, node, "invalid state '" + std::string(state) + "' of <idnConfig>",
+                  "write state=\"PREOP\" or state=\"SAFEOP\", the state in which the IDN is written");
         w.data = raw_data(node, "idnDataRaw");
         if (!w.data.empty()) s.startup.push_back(std::move(w));
     }
     /// Returns the bytes of the elements `name`; reports when there are none.
     std::vector<std::uint8_t> raw_data(const Xml& node, const char* name) {
         std::vector<std::uint8_t> bytes;
-        bool valid = true;
+        bool                      valid = true;
         children(node, {name}, [&](const Xml& raw) {
             attributes(raw, {"data"});
             const auto data = esi::hex_bytes(raw.attribute("data").value());
             if (data) return void(bytes.insert(bytes.end(), data->begin(), data->end()));
             valid = false;
             error(Topic::value, raw, "invalid data '" + std::string(raw.attribute("data").value()) + "'",
-                "write hexadecimal bytes in the order of the wire, as in data=\"E8 03\"");
+                  "write hexadecimal bytes in the order of the wire, as in data=\"E8 03\"");
         });
-        if (bytes.empty() && valid) error(Topic::value, node, "<" + std::string(node.name()) + "> has no data", "write <" + std::string(name) +
-            " data=\"E8 03\"/> in it");
+        if (bytes.empty() && valid)
+            error(Topic::value, node, "<" + std::string(node.name()) + "> has no data",
+                  "write <" + std::string(name) + " data=\"E8 03\"/> in it");
         return bytes;
     }
     void parameter(const Xml& node, bool drive) {
         attributes(node, {"name", "value"});
         const std::string name = node.attribute("name").value();
         if (!drive) return error(Topic::line, node, "<modParam> applies only to drivers such as basic_cia402", "delete it");
-        const auto known = cia402_parameters();
+        const auto               known = cia402_parameters();
         std::vector<std::string> names;
         for (const auto& p : known) names.emplace_back(p);
         if (std::find(names.begin(), names.end(), name) == names.end())
@@ -266,8 +273,9 @@ private:
         master::SyncManager sm;
         sm.number = static_cast<std::uint8_t>(number(node, "idx", 0, 15, false, true).value_or(2));
         const std::string dir = node.attribute("dir").value();
-        if (dir != "in" && dir != "out") error(Topic::value, node, "invalid dir '" + dir + "' of <syncManager>",
-            "write dir=\"in\" for what the slave sends, or dir=\"out\"");
+        if (dir != "in" && dir != "out")
+            error(Topic::value, node, "invalid dir '" + dir + "' of <syncManager>",
+                  "write dir=\"in\" for what the slave sends, or dir=\"out\"");
         sm.output = dir == "out";
         sm.write_assignment = configure_;
         children(node, {"pdo"}, [&](const Xml& pdo) {
@@ -291,17 +299,19 @@ private:
             children(node, {}, [](const Xml&) {});
             return typed(node, sm, e, bits, to);
         }
-        if (node.attribute("halPin")) error(Topic::value, node, "an entry of halType complex has no pin of its own",
-            "write halPin in its <complexEntry> elements");
-        unsigned used = 0;
+        if (node.attribute("halPin"))
+            error(Topic::value, node, "an entry of halType complex has no pin of its own", "write halPin in its <complexEntry> elements");
+        unsigned          used = 0;
         const std::size_t first = to.entries.size();
         children(node, {"complexEntry"}, [&](const Xml& part) {
             attributes(part, {"bitLen", "halType", "halPin", "scale", "offset"});
             const auto length = static_cast<std::uint16_t>(number(part, "bitLen", 1, 32, false, true).value_or(1));
             used += length;
             if (used <= bits) typed(part, sm, e, length, to);
-            else error(Topic::value, part, "the <complexEntry> elements have more bits than their <pdoEntry>, which has " +
-                std::to_string(bits), "correct bitLen");
+            else
+                error(Topic::value, part,
+                      "the <complexEntry> elements have more bits than their <pdoEntry>, which has " + std::to_string(bits),
+                      "correct bitLen");
         });
         if (used < bits) {
             master::Entry rest = e;
@@ -319,34 +329,37 @@ private:
             const auto value = node.attribute(name) ? parse_real(trimmed(node.attribute(name).value())) : std::optional<double>(otherwise);
             if (value && (std::string_view(name) != "scale" || *value != 0)) return *value;
             error(Topic::value, node, "invalid " + std::string(name) + " '" + node.attribute(name).value() + "'",
-                "write a number other than 0");
+                  "write a number other than 0");
             return otherwise;
         };
         const bool is_float = type == "float" || type == "float-unsigned" || type == "float-ieee" || type == "float-double-ieee";
-        if ((node.attribute("scale") || node.attribute("offset")) && !is_float) error(Topic::value, node,
-            "scale and offset apply only to the float types", "write halType=\"float\"");
+        if ((node.attribute("scale") || node.attribute("offset")) && !is_float)
+            error(Topic::value, node, "scale and offset apply only to the float types", "write halType=\"float\"");
         if (type == "bit") e.type = Type::bit;
         else if (type == "s32") e.type = type_of(std::max<unsigned>(bits, 2), true);
         else if (type == "u32" || type.empty()) e.type = type_of(std::max<unsigned>(bits, 2), false);
         else if (is_float) {
-            e.type = type == "float-ieee" ? Type::real32 : type == "float-double-ieee" ? Type::real64 : type_of(std::max<unsigned>(bits,
-                2), type == "float");
+            e.type = type == "float-ieee"          ? Type::real32
+                     : type == "float-double-ieee" ? Type::real64
+                                                   : type_of(std::max<unsigned>(bits, 2), type == "float");
             e.scaled = true, e.scale = real("scale", 1), e.offset = real("offset", 0);
             // Written values are (pin + offset) * scale.
             if (sm.output) e.scale = 1 / e.scale, e.offset = -e.offset;
             const unsigned width = type == "float-ieee" ? 32 : type == "float-double-ieee" ? 64 : bits;
-            if (bits != width) error(Topic::value, node, "halType " + type + " has " + std::to_string(width) + " bits, not " +
-                std::to_string(bits), "correct bitLen");
+            if (bits != width)
+                error(Topic::value, node, "halType " + type + " has " + std::to_string(width) + " bits, not " + std::to_string(bits),
+                      "correct bitLen");
         } else {
-            error(Topic::value, node, "unknown halType '" + type + "'", suggestion(type, {"bit", "s32", "u32", "float", "float-unsigned",
-                "float-ieee", "float-double-ieee", "complex"}, "the types are"));
+            error(Topic::value, node, "unknown halType '" + type + "'",
+                  suggestion(type, {"bit", "s32", "u32", "float", "float-unsigned", "float-ieee", "float-double-ieee", "complex"},
+                             "the types are"));
         }
         e.is_signed = is_signed(e.type);
         if (pin.empty() || e.index == 0) return void(to.entries.push_back(std::move(e)));
         if (type.empty()) error(Topic::value, node, "pin '" + pin + "' has no halType", "write halType=\"u32\"");
         if (e.type != Type::bit || bits == 1) {
-            if (bits > 32 && e.type != Type::real64) error(Topic::value, node, "pin '" + pin + "' has " + std::to_string(bits) +
-                " bits; 32 are possible", "delete halPin");
+            if (bits > 32 && e.type != Type::real64)
+                error(Topic::value, node, "pin '" + pin + "' has " + std::to_string(bits) + " bits; 32 are possible", "delete halPin");
             e.name = pin;
             if (!pins_.insert(pin).second) error(Topic::slave, node, "duplicate pin '" + pin + "' of this slave", "choose another halPin");
             info_.pins.push_back({pin, {"", address_text(e.index, e.sub)}});
@@ -356,20 +369,20 @@ private:
             master::Entry bit = e;
             bit.bits = 1, bit.part = i != 0;
             if (i < 32) bit.name = pin + "-" + std::to_string(i), info_.pins.push_back({bit.name, {"", address_text(e.index, e.sub)}});
-            if (i < 32 && !pins_.insert(bit.name).second) error(Topic::slave, node, "duplicate pin '" + bit.name + "' of this slave",
-                "choose another halPin");
+            if (i < 32 && !pins_.insert(bit.name).second)
+                error(Topic::slave, node, "duplicate pin '" + bit.name + "' of this slave", "choose another halPin");
             to.entries.push_back(std::move(bit));
         }
     }
 
-    std::string_view text_;
-    Report report_;
-    Reading out_;
-    Bus* bus_ = nullptr;
-    SlaveInfo info_;
-    std::set<std::string> pins_;
+    std::string_view                   text_;
+    Report                             report_;
+    Reading                            out_;
+    Bus*                               bus_ = nullptr;
+    SlaveInfo                          info_;
+    std::set<std::string>              pins_;
     std::map<std::string, std::string> parameters_;
-    bool configure_ = false;
+    bool                               configure_ = false;
 };
 
 }  // namespace

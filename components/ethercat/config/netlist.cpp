@@ -12,11 +12,11 @@ using master::Entry;
 using master::Type;
 
 /// Pins that a drive on the bus and the component cia402 have under the same name.
-constexpr const char* drive_inputs[] = {"statusword", "modes-of-operation-display", "position-actual-value", "velocity-actual-value",
-                                        "torque-actual-value", "error-code"};
-constexpr const char* drive_outputs[] = {"controlword", "modes-of-operation", "target-position", "target-velocity", "target-torque",
-                                         "velocity-offset", "torque-offset", "profile-velocity", "profile-acceleration",
-                                         "profile-deceleration"};
+constexpr const char* drive_inputs[] = {
+    "statusword", "modes-of-operation-display", "position-actual-value", "velocity-actual-value", "torque-actual-value", "error-code"};
+constexpr const char* drive_outputs[] = {"controlword",          "modes-of-operation",  "target-position", "target-velocity",
+                                         "target-torque",        "velocity-offset",     "torque-offset",   "profile-velocity",
+                                         "profile-acceleration", "profile-deceleration"};
 
 const char* type_of_pin(const Entry& e) {
     if (e.scaled || e.type == Type::real32 || e.type == Type::real64) return "float";
@@ -43,7 +43,10 @@ class Axis {
 public:
     Axis(const master::Slave& slave, unsigned number, unsigned axes)
         : name_(axes > 1 ? slave.name + "-axis-" + std::to_string(number + 1) : slave.name),
-          slave_(slave.name), first_(number == 0), bus_("ethercat.0." + slave.name + "."), prefix_(axes > 1 ? "axis-" + std::to_string(number + 1) + "-" : "") {
+          slave_(slave.name),
+          first_(number == 0),
+          bus_("ethercat.0." + slave.name + "."),
+          prefix_(axes > 1 ? "axis-" + std::to_string(number + 1) + "-" : "") {
         for_each_pin(slave, [&](bool, const Entry& e) { mapped_.insert(e.name); });
     }
     const std::string& name() const { return name_; }
@@ -51,12 +54,15 @@ public:
     bool complete() const { return has("controlword") && has("statusword"); }
     /// Returns the settings and the nets; `linked` receives the pins of the bus that they use.
     std::string lines(std::set<std::string>& linked) const {
-        std::string text = "# --- axis " + name_ + " ---\nsetp " + name_ + ".position-scale 1      # counts per unit: see the manual of the drive\n";
+        std::string text =
+            "# --- axis " + name_ + " ---\nsetp " + name_ + ".position-scale 1      # counts per unit: see the manual of the drive\n";
         if (has("target-velocity"))
             text += "setp " + name_ + ".mode 9                # cyclic synchronous velocity: " + name_ + ".velocity-cmd in units/s\n";
         else if (has("target-position"))
-            text += "setp " + name_ + ".mode 8                # cyclic synchronous position: " + name_ + ".position-cmd in units\n"
-                    "setp " + name_ + ".max-step 1000         # units; the axis is not enabled while position-cmd is farther from position-fb\n";
+            text += "setp " + name_ + ".mode 8                # cyclic synchronous position: " + name_ +
+                    ".position-cmd in units\n"
+                    "setp " +
+                    name_ + ".max-step 1000         # units; the axis is not enabled while position-cmd is farther from position-fb\n";
         else if (has("target-torque"))
             text += "setp " + name_ + ".mode 10               # cyclic synchronous torque: " + name_ + ".torque-cmd\n";
         text += net(slave_ + "-operational", first_ ? bus_ + "operational" : "", name_ + ".operational");
@@ -68,7 +74,7 @@ public:
     }
 
 private:
-    bool has(const char* pin) const { return mapped_.count(prefix_ + pin) != 0; }
+    bool        has(const char* pin) const { return mapped_.count(prefix_ + pin) != 0; }
     std::string from_bus(const char* pin, std::set<std::string>& linked) const {
         linked.insert(bus_ + prefix_ + pin);
         return bus_ + prefix_ + pin;
@@ -77,9 +83,9 @@ private:
         return "net " + padded(signal, name_.size() + 28) + padded(from, bus_.size() + prefix_.size() + 26) + " => " + to + "\n";
     }
 
-    std::string name_, slave_;
-    bool first_;
-    std::string bus_, prefix_;
+    std::string           name_, slave_;
+    bool                  first_;
+    std::string           bus_, prefix_;
     std::set<std::string> mapped_;
 };
 
@@ -97,8 +103,10 @@ std::string netlist(const Bus& bus, const std::string& file, const std::string& 
         for (unsigned axis = 0; axis < bus.slaves[n].cia402_axes; ++axis)
             if (Axis one(bus.setup.slaves[n], axis, bus.slaves[n].cia402_axes); one.complete()) axes.push_back(std::move(one));
 
-    std::string text = "# The master of " + file + " and what is on its bus: a start. See docs/ethercat-configuration.md.\n\n"
-                       "loadrt threads name1=servo-thread period1=" + std::to_string(bus.setup.cycle_ns) + "\n\n";
+    std::string text = "# The master of " + file +
+                       " and what is on its bus: a start. See docs/ethercat-configuration.md.\n\n"
+                       "loadrt threads name1=servo-thread period1=" +
+                       std::to_string(bus.setup.cycle_ns) + "\n\n";
     if (!segment.empty()) text += "loadrt ethercat_segment devices=\"" + segment + "\" link=" + bus.link + "\n";
     text += "loadrt ethercat config=" + file + "\n";
     if (!axes.empty()) text += "loadrt cia402 names=";
@@ -110,7 +118,8 @@ std::string netlist(const Bus& bus, const std::string& file, const std::string& 
     std::string others;
     for (const auto& slave : bus.setup.slaves)
         for_each_pin(slave, [&](bool output, const Entry& e) {
-            if (linked.count("ethercat.0." + slave.name + "." + e.name) == 0) others += "#   " + pin_line(e, output, "ethercat.0." + slave.name);
+            if (linked.count("ethercat.0." + slave.name + "." + e.name) == 0)
+                others += "#   " + pin_line(e, output, "ethercat.0." + slave.name);
         });
     if (!others.empty()) text += "# Pins that are not linked yet. in: written by the netlist, out: read by it\n" + others + "\n";
 

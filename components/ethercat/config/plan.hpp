@@ -18,22 +18,22 @@ struct PlanOptions {
 
 struct PlannedDatagram {
     std::string domain;
-    unsigned every = 1;
+    unsigned    every = 1;
     std::size_t output_bytes = 0, input_bytes = 0;
-    bool lrw = true;
-    unsigned expected_wkc = 0;
+    bool        lrw = true;
+    unsigned    expected_wkc = 0;
 };
 
 struct Plan {
     std::vector<PlannedDatagram> domains;
-    std::size_t frames = 0, frame_bytes = 0;      ///< of a cycle in which all domains are exchanged; without check sequence
-    std::int64_t wire_ns = 0, propagation_ns = 0; ///< sending all frames; through all slaves and back
-    std::int64_t cycle_ns = 0;
-    double load = 0;                              ///< wire time per cycle time
-    std::int64_t shortest_cycle_ns = 0;           ///< wire time, propagation and master
-    std::int64_t input_to_output_ns = 0;          ///< worst case: from an input change to the output that answers it
-    bool fits = true;
-    std::string text;                             ///< the arithmetic, a line each
+    std::size_t                  frames = 0, frame_bytes = 0;  ///< of a cycle in which all domains are exchanged; without check sequence
+    std::int64_t                 wire_ns = 0, propagation_ns = 0;  ///< sending all frames; through all slaves and back
+    std::int64_t                 cycle_ns = 0;
+    double                       load = 0;  ///< wire time per cycle time
+    std::int64_t                 shortest_cycle_ns = 0;  ///< wire time, propagation and master
+    std::int64_t                 input_to_output_ns = 0;  ///< worst case: from an input change to the output that answers it
+    bool                         fits = true;
+    std::string                  text;  ///< the arithmetic, a line each
 };
 
 /// Computes the plan of a bus. [setup]

@@ -10,31 +10,50 @@ using master::Type;
 
 struct ProfileObject {
     std::uint16_t index;
-    std::uint8_t sub;
-    Type type;
-    const char* name;
+    std::uint8_t  sub;
+    Type          type;
+    const char*   name;
 };
 constexpr ProfileObject profile_objects[] = {
-    {0x603f, 0, Type::u16, "error-code"}, {0x6040, 0, Type::u16, "controlword"}, {0x6041, 0, Type::u16, "statusword"},
-    {0x6060, 0, Type::s8, "modes-of-operation"}, {0x6061, 0, Type::s8, "modes-of-operation-display"}, {0x6064, 0, Type::s32,
-        "position-actual-value"},
-    {0x6065, 0, Type::u32, "following-error-window"}, {0x606c, 0, Type::s32, "velocity-actual-value"}, {0x6071, 0, Type::s16,
-        "target-torque"},
-    {0x6072, 0, Type::u16, "max-torque"}, {0x6077, 0, Type::s16, "torque-actual-value"}, {0x607a, 0, Type::s32, "target-position"},
-    {0x607c, 0, Type::s32, "home-offset"}, {0x607d, 1, Type::s32, "min-position-limit"}, {0x607d, 2, Type::s32, "max-position-limit"},
-    {0x6080, 0, Type::u32, "max-motor-speed"}, {0x6081, 0, Type::u32, "profile-velocity"}, {0x6083, 0, Type::u32, "profile-acceleration"},
-    {0x6084, 0, Type::u32, "profile-deceleration"}, {0x6085, 0, Type::u32, "quick-stop-deceleration"}, {0x6098, 0, Type::s8,
-        "homing-method"},
-    {0x6099, 1, Type::u32, "homing-speed-switch"}, {0x6099, 2, Type::u32, "homing-speed-zero"}, {0x609a, 0, Type::u32,
-        "homing-acceleration"},
-    {0x60b0, 0, Type::s32, "position-offset"}, {0x60b1, 0, Type::s32, "velocity-offset"}, {0x60b2, 0, Type::s16, "torque-offset"},
-    {0x60b8, 0, Type::u16, "touch-probe-function"}, {0x60b9, 0, Type::u16, "touch-probe-status"}, {0x60ba, 0, Type::s32,
-        "touch-probe-1-positive"},
-    {0x60bb, 0, Type::s32, "touch-probe-1-negative"}, {0x60c2, 1, Type::u8, "interpolation-time-value"}, {0x60c2, 2, Type::s8,
-        "interpolation-time-index"},
-    {0x60f4, 0, Type::s32, "following-error"}, {0x60fd, 0, Type::u32, "digital-inputs"}, {0x60fe, 1, Type::u32, "digital-outputs"},
-    {0x60fe, 2, Type::u32, "digital-outputs-mask"}, {0x60ff, 0, Type::s32, "target-velocity"}, {0x6502, 0, Type::u32,
-        "supported-drive-modes"},
+    {0x603f, 0, Type::u16, "error-code"},
+    {0x6040, 0, Type::u16, "controlword"},
+    {0x6041, 0, Type::u16, "statusword"},
+    {0x6060, 0, Type::s8, "modes-of-operation"},
+    {0x6061, 0, Type::s8, "modes-of-operation-display"},
+    {0x6064, 0, Type::s32, "position-actual-value"},
+    {0x6065, 0, Type::u32, "following-error-window"},
+    {0x606c, 0, Type::s32, "velocity-actual-value"},
+    {0x6071, 0, Type::s16, "target-torque"},
+    {0x6072, 0, Type::u16, "max-torque"},
+    {0x6077, 0, Type::s16, "torque-actual-value"},
+    {0x607a, 0, Type::s32, "target-position"},
+    {0x607c, 0, Type::s32, "home-offset"},
+    {0x607d, 1, Type::s32, "min-position-limit"},
+    {0x607d, 2, Type::s32, "max-position-limit"},
+    {0x6080, 0, Type::u32, "max-motor-speed"},
+    {0x6081, 0, Type::u32, "profile-velocity"},
+    {0x6083, 0, Type::u32, "profile-acceleration"},
+    {0x6084, 0, Type::u32, "profile-deceleration"},
+    {0x6085, 0, Type::u32, "quick-stop-deceleration"},
+    {0x6098, 0, Type::s8, "homing-method"},
+    {0x6099, 1, Type::u32, "homing-speed-switch"},
+    {0x6099, 2, Type::u32, "homing-speed-zero"},
+    {0x609a, 0, Type::u32, "homing-acceleration"},
+    {0x60b0, 0, Type::s32, "position-offset"},
+    {0x60b1, 0, Type::s32, "velocity-offset"},
+    {0x60b2, 0, Type::s16, "torque-offset"},
+    {0x60b8, 0, Type::u16, "touch-probe-function"},
+    {0x60b9, 0, Type::u16, "touch-probe-status"},
+    {0x60ba, 0, Type::s32, "touch-probe-1-positive"},
+    {0x60bb, 0, Type::s32, "touch-probe-1-negative"},
+    {0x60c2, 1, Type::u8, "interpolation-time-value"},
+    {0x60c2, 2, Type::s8, "interpolation-time-index"},
+    {0x60f4, 0, Type::s32, "following-error"},
+    {0x60fd, 0, Type::u32, "digital-inputs"},
+    {0x60fe, 1, Type::u32, "digital-outputs"},
+    {0x60fe, 2, Type::u32, "digital-outputs-mask"},
+    {0x60ff, 0, Type::s32, "target-velocity"},
+    {0x6502, 0, Type::u32, "supported-drive-modes"},
 };
 constexpr unsigned width_of(Type t) {
     constexpr unsigned widths[] = {1, 8, 16, 32, 64, 8, 16, 32, 64, 32, 64};
@@ -44,8 +63,8 @@ constexpr unsigned width_of(Type t) {
 }  // namespace
 
 Known profile_object(std::uint16_t index, std::uint8_t sub, unsigned axes) {
-    if (index >= 0x1c32 && index <= 0x1c33 && sub >= 1 && sub <= 6) return sub == 1 || sub == 4 ? Known{"", Type::u16, 16} : Known{"",
-        Type::u32, 32};
+    if (index >= 0x1c32 && index <= 0x1c33 && sub >= 1 && sub <= 6)
+        return sub == 1 || sub == 4 ? Known{"", Type::u16, 16} : Known{"", Type::u32, 32};
     for (unsigned axis = 0; axis < axes; ++axis)
         for (const ProfileObject& o : profile_objects)
             if (o.index + 0x800U * axis == index && o.sub == sub)

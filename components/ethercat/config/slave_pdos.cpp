@@ -12,9 +12,9 @@ Known SlavePdos::known(std::uint16_t index, std::uint8_t sub) const {
         if (const esi::Object* o = device_->find(index))
             if (const esi::Value* v = o->find(sub); v != nullptr && v->bits != 0) {
                 const TypeWord* type = type_named(v->type);
-                std::string name = o->name;
-                if (o->values.size() > 1) name += v->name.empty() || v->name.starts_with("SubIndex") ? " " + std::to_string(sub) : " " +
-                    v->name;
+                std::string     name = o->name;
+                if (o->values.size() > 1)
+                    name += v->name.empty() || v->name.starts_with("SubIndex") ? " " + std::to_string(sub) : " " + v->name;
                 return {dashed(name), type != nullptr ? type->type : type_of(v->bits, v->type.starts_with("INT")), v->bits};
             }
         for (const auto* pdos : {&device_->rx, &device_->tx})
@@ -22,8 +22,8 @@ Known SlavePdos::known(std::uint16_t index, std::uint8_t sub) const {
                 for (const esi::Entry& e : p.entries)
                     if (e.index == index && e.sub == sub) {
                         const TypeWord* type = type_named(e.type);
-                        return {dashed(e.name), type != nullptr && type->bits == e.bits ? type->type : type_of(e.bits,
-                            e.type.starts_with("INT")), e.bits};
+                        return {dashed(e.name),
+                                type != nullptr && type->bits == e.bits ? type->type : type_of(e.bits, e.type.starts_with("INT")), e.bits};
                     }
     }
     if (device_ != nullptr && !device_->objects.empty()) return {};  // a description with a dictionary has all objects
@@ -42,15 +42,15 @@ void SlavePdos::read() {
 }
 
 void SlavePdos::direction(bool output) {
-    const std::string key = output ? "outputs" : "inputs";
-    Keys& keys = in_.keys;
+    const std::string   key = output ? "outputs" : "inputs";
+    Keys&               keys = in_.keys;
     master::SyncManager sm;
     sm.output = output;
-    std::uint64_t number = output ? 2 : 3;
+    std::uint64_t     number = output ? 2 : 3;
     const sii::SmType type = output ? sii::SmType::outputs : sii::SmType::inputs;
     if (device_ != nullptr) {
         const auto& list = device_->sync_managers;
-        const auto at = std::find_if(list.begin(), list.end(), [&](const esi::SyncManager& s) { return s.type == type; });
+        const auto  at = std::find_if(list.begin(), list.end(), [&](const esi::SyncManager& s) { return s.type == type; });
         if (at != list.end()) number = static_cast<std::uint64_t>(at - list.begin());
     }
     keys.take_number((key + ".sync-manager").c_str(), number, 0, 15);
@@ -70,14 +70,14 @@ void SlavePdos::direction(bool output) {
         if (same_word(line->value.text, "mapping-first")) sm.assignment_first = false;
         else if (!same_word(line->value.text, "assignment-first")) keys.reject(*line, "assignment-first or mapping-first");
     }
-    const Line* line = keys.find(key);
+    const Line*                      line = keys.find(key);
     std::vector<master::SyncManager> more;  // of a default that uses several
     if (line != nullptr && !same_word(line->value.text, "default")) {
         if (!same_word(line->value.text, "none")) list(*line, sm);
     } else {
         if (line != nullptr && device_ == nullptr)
             keys.report().error(Topic::object, line->value.at, "'" + key + " = default' needs a description of the device",
-                "write esi = FILE, or list the objects");
+                                "write esi = FILE, or list the objects");
         for (const esi::Pdo& p : described(output)) {
             if (!p.sync_manager) continue;
             if (*p.sync_manager == number) {
@@ -108,8 +108,8 @@ void SlavePdos::assign(const esi::Pdo& from, master::SyncManager& to) {
         entry.index = e.index, entry.sub = e.sub, entry.bits = e.bits;
         if (e.index != 0) {
             const TypeWord* type = type_named(e.type);
-            entry.type = type != nullptr && type->bits == e.bits ? type->type : type_of(e.bits, e.type.starts_with("INT") ||
-                e.type.starts_with("DINT"));
+            entry.type = type != nullptr && type->bits == e.bits ? type->type
+                                                                 : type_of(e.bits, e.type.starts_with("INT") || e.type.starts_with("DINT"));
             entry.is_signed = is_signed(entry.type);
             entry.name = dashed(e.name);
             if (entry.name.empty()) entry.name = known(e.index, e.sub).name;
@@ -128,21 +128,20 @@ void SlavePdos::check_exclusions(const Line* line, const master::SyncManager& sm
         for (const master::Pdo& other : sm.pdos)
             if (std::find(described_pdo->exclude.begin(), described_pdo->exclude.end(), other.index) != described_pdo->exclude.end())
                 in_.keys.report().error(Topic::object, line->value.at,
-                                        "PDOs " + address_text(p.index, 0).substr(0, 4) + " and " + address_text(other.index, 0).substr(0,
-                                            4) +
-                                            " of '" + in_.info.type + "' exclude each other",
+                                        "PDOs " + address_text(p.index, 0).substr(0, 4) + " and " +
+                                            address_text(other.index, 0).substr(0, 4) + " of '" + in_.info.type + "' exclude each other",
                                         "assign only one of them");
     }
 }
 
 void SlavePdos::list(const Line& line, master::SyncManager& sm) {
     std::vector<master::Entry> entries;
-    const text::Word spaced = line.value;
+    const text::Word           spaced = line.value;
     // Objects are separated by commas or blanks; a type or a number of bits follows its object.
     std::vector<Word> items;
     for (const Word& word : words_of(spaced, ",")) {
-        const bool follows = !items.empty() && (type_named(word.text) != nullptr || (items.back().text == "gap" &&
-            parse_natural(word.text)));
+        const bool follows =
+            !items.empty() && (type_named(word.text) != nullptr || (items.back().text == "gap" && parse_natural(word.text)));
         if (follows) items.back().text += " " + word.text;
         else items.push_back(word);
     }
@@ -150,7 +149,7 @@ void SlavePdos::list(const Line& line, master::SyncManager& sm) {
         const auto at = address(item.text);
         if (at && !at->has_sub && ((at->index >= 0x1600 && at->index <= 0x17ff) || (at->index >= 0x1a00 && at->index <= 0x1bff))) {
             const auto& pdos = described(sm.output);
-            const auto found = std::find_if(pdos.begin(), pdos.end(), [&](const esi::Pdo& p) { return p.index == at->index; });
+            const auto  found = std::find_if(pdos.begin(), pdos.end(), [&](const esi::Pdo& p) { return p.index == at->index; });
             if (found != pdos.end()) {
                 assign(*found, sm);
                 continue;
@@ -158,8 +157,9 @@ void SlavePdos::list(const Line& line, master::SyncManager& sm) {
             std::vector<std::string> names;
             for (const esi::Pdo& p : pdos) names.push_back(address_text(p.index, 0).substr(0, 4));
             in_.keys.report().error(Topic::object, item.at, "unknown PDO '" + item.text + "'",
-                                    device_ == nullptr ? "write esi = FILE, or list the objects" : names.empty()
-                                        ? "the description has none in this direction" : "the PDOs are: " + listed(names));
+                                    device_ == nullptr ? "write esi = FILE, or list the objects"
+                                    : names.empty()    ? "the description has none in this direction"
+                                                       : "the PDOs are: " + listed(names));
             continue;
         }
         for (const Word& one : range(item)) {
@@ -172,9 +172,11 @@ void SlavePdos::list(const Line& line, master::SyncManager& sm) {
 }
 
 std::vector<Word> SlavePdos::range(const Word& item) {
-    const std::size_t dots = item.text.find(".."), colon = item.text.rfind(':', dots), blank = std::min(item.text.find(' '), item.text.size());
+    const std::size_t dots = item.text.find(".."), colon = item.text.rfind(':', dots),
+                      blank = std::min(item.text.find(' '), item.text.size());
     if (dots > blank || colon == std::string::npos) return {item};
-    const auto first = address(item.text.substr(0, dots)), last = address(item.text.substr(0, colon + 1) + item.text.substr(dots + 2, blank - dots - 2));
+    const auto first = address(item.text.substr(0, dots)),
+               last = address(item.text.substr(0, colon + 1) + item.text.substr(dots + 2, blank - dots - 2));
     if (!first || !last || first->sub > last->sub) {
         in_.keys.report().error(Topic::object, item.at, "invalid range '" + item.text.substr(0, blank) + "'",
                                 "write the first and the last sub-index in hexadecimal, as in 6000:1..10 bit");
@@ -187,12 +189,12 @@ std::vector<Word> SlavePdos::range(const Word& item) {
 }
 
 bool SlavePdos::entry(const Word& item, master::SyncManager& sm, master::Entry& e) {
-    Report& report = in_.keys.report();
+    Report&    report = in_.keys.report();
     const auto words = words_of(item);
     if (words[0].text == "gap") {
         const auto bits = words.size() == 2 ? parse_natural(words[1].text) : std::nullopt;
-        if (!bits || *bits < 1 || *bits > 255) return report.error(Topic::value, item.at, "invalid gap",
-            "write gap 8 for 8 bits, at most 255"), false;
+        if (!bits || *bits < 1 || *bits > 255)
+            return report.error(Topic::value, item.at, "invalid gap", "write gap 8 for 8 bits, at most 255"), false;
         e.bits = static_cast<std::uint16_t>(*bits);
         return true;
     }
@@ -206,24 +208,25 @@ bool SlavePdos::entry(const Word& item, master::SyncManager& sm, master::Entry& 
     if (words.size() > 1) {
         const TypeWord* type = type_named(words[1].text);
         if (k.bits != 0 && k.bits != type->bits && device_ != nullptr)
-            report.error(Topic::object, item.at, "object " + address_text(e.index, e.sub) + " of '" + in_.info.type + "' has " +
-                std::to_string(k.bits) + " bits, not " +
-                                                     std::to_string(type->bits),
+            report.error(Topic::object, item.at,
+                         "object " + address_text(e.index, e.sub) + " of '" + in_.info.type + "' has " + std::to_string(k.bits) +
+                             " bits, not " + std::to_string(type->bits),
                          "leave out the type");
         k.type = type->type, k.bits = type->bits;
     }
     if (k.bits == 0) {
         const std::string label = address_text(e.index, e.sub);
         return report.error(Topic::object, item.at,
-                            device_ != nullptr ? "object " + label + " is not in the description of '" + in_.info.type + "'" : "object " +
-                                label + " has no known type",
+                            device_ != nullptr ? "object " + label + " is not in the description of '" + in_.info.type + "'"
+                                               : "object " + label + " has no known type",
                             "write its type, as in " + words[0].text + " u16; the types are " + std::string(type_words)),
                false;
     }
     for (const auto& p : sm.pdos)
         for (const auto& other : p.entries)
-            if (other.index == e.index && other.sub == e.sub) return report.error(Topic::object, item.at, "duplicate object " +
-                address_text(e.index, e.sub), "delete one of them"), false;
+            if (other.index == e.index && other.sub == e.sub)
+                return report.error(Topic::object, item.at, "duplicate object " + address_text(e.index, e.sub), "delete one of them"),
+                       false;
     e.bits = static_cast<std::uint16_t>(std::min(k.bits, 65535U)), e.type = k.type, e.is_signed = is_signed(k.type);
     e.name = k.bits > 64 ? "" : k.name;
     if (e.name.empty() && k.bits <= 64) {
@@ -234,13 +237,12 @@ bool SlavePdos::entry(const Word& item, master::SyncManager& sm, master::Entry& 
 }
 
 void SlavePdos::place(const Line& line, master::SyncManager& sm, std::vector<master::Entry>& entries) {
-    Keys& keys = in_.keys;
+    Keys&       keys = in_.keys;
     const auto& pdos = described(sm.output);
     for (const esi::Pdo& p : pdos) {  // exactly one of the description: nothing has to be written
-        const bool same = p.entries.size() == entries.size() && std::equal(entries.begin(), entries.end(), p.entries.begin(),
-            [](const auto& a, const auto& b) {
-                              return a.index == b.index && a.sub == b.sub && a.bits == b.bits;
-                          });
+        const bool same = p.entries.size() == entries.size() &&
+                          std::equal(entries.begin(), entries.end(), p.entries.begin(),
+                                     [](const auto& a, const auto& b) { return a.index == b.index && a.sub == b.sub && a.bits == b.bits; });
         if (same && sm.pdos.empty()) {
             sm.pdos.push_back({p.index, std::move(entries), false});
             return;
@@ -249,8 +251,8 @@ void SlavePdos::place(const Line& line, master::SyncManager& sm, std::vector<mas
     if (device_ != nullptr && !(device_->mailbox && device_->mailbox->coe)) {
         std::vector<std::string> names;
         for (const esi::Pdo& p : pdos) names.push_back(address_text(p.index, 0).substr(0, 4));
-        return keys.report().error(Topic::object, line.value.at, "the PDOs of '" + in_.info.type +
-            "' are fixed: it has no CoE mailbox to map objects with",
+        return keys.report().error(Topic::object, line.value.at,
+                                   "the PDOs of '" + in_.info.type + "' are fixed: it has no CoE mailbox to map objects with",
                                    names.empty() ? "delete the line" : "delete the line, or assign PDOs: " + listed(names));
     }
     std::vector<std::uint16_t> free;
@@ -259,7 +261,7 @@ void SlavePdos::place(const Line& line, master::SyncManager& sm, std::vector<mas
             if (!p.fixed && p.sync_manager.has_value() == (pass == 0)) free.push_back(p.index);
     if (!pdos.empty() && free.empty())
         return keys.report().error(Topic::object, line.value.at, "all PDOs of '" + in_.info.type + "' in this direction are fixed",
-            "assign one of them, as in " + line.key.text + " = " + address_text(pdos[0].index, 0).substr(0, 4));
+                                   "assign one of them, as in " + line.key.text + " = " + address_text(pdos[0].index, 0).substr(0, 4));
     const std::string key = line.key.text + ".pdo";
     if (Line* chosen = keys.find(key)) {
         const auto at = address(chosen->value.text);
@@ -267,7 +269,7 @@ void SlavePdos::place(const Line& line, master::SyncManager& sm, std::vector<mas
         free.assign(1, at->index);
     }
     std::uint16_t next = free.empty() ? (sm.output ? 0x1600 : 0x1a00) : free[0];
-    std::size_t used = 0;
+    std::size_t   used = 0;
     for (std::size_t i = 0; i < entries.size();) {
         master::Pdo p;
         p.index = used < free.size() ? free[used] : static_cast<std::uint16_t>(next + used);
@@ -301,16 +303,16 @@ void SlavePdos::pin_options() {
     for (auto& sm : in_.slave.sync_managers)
         for (auto& p : sm.pdos)
             for (auto& e : p.entries)
-                if (!e.name.empty() && in_.info.find(e.name) == nullptr) in_.info.pins.push_back({e.name, {"", address_text(e.index,
-                    e.sub)}});
+                if (!e.name.empty() && in_.info.find(e.name) == nullptr)
+                    in_.info.pins.push_back({e.name, {"", address_text(e.index, e.sub)}});
 }
 
 void SlavePdos::option(const Line& line) {
-    Report& report = in_.keys.report();
-    const std::size_t dot = line.key.text.rfind('.');
-    const std::string object = line.key.text.substr(0, dot), property = line.key.text.substr(dot + 1);
-    const auto at = address(object);
-    master::Entry* entry = nullptr;
+    Report&                  report = in_.keys.report();
+    const std::size_t        dot = line.key.text.rfind('.');
+    const std::string        object = line.key.text.substr(0, dot), property = line.key.text.substr(dot + 1);
+    const auto               at = address(object);
+    master::Entry*           entry = nullptr;
     std::vector<std::string> names;
     for (auto& sm : in_.slave.sync_managers)
         for (auto& p : sm.pdos)
@@ -319,27 +321,27 @@ void SlavePdos::option(const Line& line) {
                 if (e.index != 0 && ((at && e.index == at->index && e.sub == at->sub) || e.name == object)) entry = &e;
             }
     if (entry == nullptr)
-        return report.error(Topic::object, line.key.at, "no PDO of this slave has an object '" + object + "'", suggestion(object, names,
-            "the objects are"));
+        return report.error(Topic::object, line.key.at, "no PDO of this slave has an object '" + object + "'",
+                            suggestion(object, names, "the objects are"));
     auto info = std::find_if(in_.info.pins.begin(), in_.info.pins.end(), [&](const auto& p) { return p.first == entry->name; });
     if (info == in_.info.pins.end()) info = in_.info.pins.insert(info, {entry->name, {"", address_text(entry->index, entry->sub)}});
     const std::string& value = line.value.text;
-    const auto reject = [&](const std::string& instead) { in_.keys.reject(line, instead); };
+    const auto         reject = [&](const std::string& instead) { in_.keys.reject(line, instead); };
     if (property == "scale" || property == "offset") {  // object = pin * scale + offset; the setup has the inverse
         const std::size_t slash = std::min(value.find('/'), value.size());
-        const auto over = parse_real(trimmed(std::string_view(value).substr(0, slash)));
-        const auto below = slash < value.size() ? parse_real(trimmed(std::string_view(value).substr(slash + 1)))
-            : std::optional<double>(1.0);
-        if (!over || !below || *below == 0 || (property == "scale" &&
-            *over == 0)) return reject("a number other than 0, or a fraction such as 65536/360");
+        const auto        over = parse_real(trimmed(std::string_view(value).substr(0, slash)));
+        const auto        below =
+            slash < value.size() ? parse_real(trimmed(std::string_view(value).substr(slash + 1))) : std::optional<double>(1.0);
+        if (!over || !below || *below == 0 || (property == "scale" && *over == 0))
+            return reject("a number other than 0, or a fraction such as 65536/360");
         const double object_scale = property == "scale" ? *over / *below : 1 / entry->scale;
         const double object_offset = property == "offset" ? *over / *below : -entry->offset / entry->scale;
         entry->scale = 1 / object_scale, entry->offset = -object_offset / object_scale, entry->scaled = true;
     } else if (property == "name") {
         const std::string name = dashed(value) == value ? value : "";
         if (name.empty()) return reject("a name of lower-case letters, digits and dashes");
-        if (std::find(names.begin(), names.end(), name) != names.end() && name != entry->name) return report.error(Topic::slave,
-            line.value.at, "duplicate pin name '" + name + "'", "choose another one");
+        if (std::find(names.begin(), names.end(), name) != names.end() && name != entry->name)
+            return report.error(Topic::slave, line.value.at, "duplicate pin name '" + name + "'", "choose another one");
         entry->name = name, info->first = name;
     } else if (property == "unit") {
         info->second.unit = value, entry->scaled = true;
@@ -353,8 +355,8 @@ void SlavePdos::option(const Line& line) {
             return reject("float, or one of " + std::string(type_words) + " with at least " + counted(entry->bits, "bit"));
         entry->type = type->type, entry->is_signed = is_signed(type->type);
     } else {
-        report.error(Topic::line, line.key.at, "unknown property '" + property + "' of an object", suggestion(property, {"scale", "offset",
-            "name", "unit", "type"}, "the properties are"));
+        report.error(Topic::line, line.key.at, "unknown property '" + property + "' of an object",
+                     suggestion(property, {"scale", "offset", "name", "unit", "type"}, "the properties are"));
     }
 }
 

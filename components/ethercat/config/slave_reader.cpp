@@ -39,13 +39,13 @@ private:
     bool describe() {
         const Line* const esi = keys_.find("esi");
         const Line* const name = keys_.find("device");
-        std::uint64_t axes = 1;
-        const bool axes_given = keys_.take_number("axes", axes, 1, 8);
+        std::uint64_t     axes = 1;
+        const bool        axes_given = keys_.take_number("axes", axes, 1, 8);
         if (esi == nullptr) {
             if (name == nullptr) return true;
             if (!same_word(name->value.text, "cia402")) {
                 report_.error(Topic::slave, name->value.at, "unknown device '" + name->value.text + "'",
-                    "write device = cia402, or esi = FILE for a device with a description");
+                              "write device = cia402, or esi = FILE for a device with a description");
                 return false;
             }
             in_.info.type = "cia402", in_.info.cia402_axes = static_cast<unsigned>(axes);
@@ -68,19 +68,21 @@ private:
             for (const esi::Device& d : file_->devices)
                 if (std::find(names.begin(), names.end(), d.order) == names.end()) names.push_back(d.order);
             if (name != nullptr)
-                report_.error(Topic::slave, name->value.at, "'" + esi->value.text + "' does not describe a device '" + name->value.text +
-                    "'", suggestion(name->value.text, names, "the devices are"));
+                report_.error(Topic::slave, name->value.at,
+                              "'" + esi->value.text + "' does not describe a device '" + name->value.text + "'",
+                              suggestion(name->value.text, names, "the devices are"));
             else if (const Line* product = keys_.find("product"))
-                report_.error(Topic::slave, product->value.at, "'" + esi->value.text + "' does not describe a product " + product->value.text,
-                    "the devices are: " + listed(names));
+                report_.error(Topic::slave, product->value.at,
+                              "'" + esi->value.text + "' does not describe a product " + product->value.text,
+                              "the devices are: " + listed(names));
             else
                 report_.error(Topic::slave, esi->value.at, "'" + esi->value.text + "' describes several devices",
-                    "write device = NAME; the devices are: " + listed(names));
+                              "write device = NAME; the devices are: " + listed(names));
             return false;
         }
         in_.info.type = device_->order;
-        if (device_->profile == 402 || axes_given || (name != nullptr && same_word(name->value.text,
-            "cia402"))) in_.info.cia402_axes = static_cast<unsigned>(axes);
+        if (device_->profile == 402 || axes_given || (name != nullptr && same_word(name->value.text, "cia402")))
+            in_.info.cia402_axes = static_cast<unsigned>(axes);
         modules();
         return true;
     }
@@ -94,23 +96,24 @@ private:
     }
 
     void modules() {
-        const Line* line = keys_.find("modules");
+        const Line*                line = keys_.find("modules");
         std::vector<std::uint32_t> idents;
         if (line == nullptr) {
             for (const esi::Slot& s : device_->slots) idents.push_back(s.default_module);
             if (std::all_of(idents.begin(), idents.end(), [](std::uint32_t i) { return i == 0; })) return;
         } else {
             for (const Word& word : list_of(line->value)) {
-                const auto found = std::find_if(file_->modules.begin(), file_->modules.end(), [&](const esi::Module& m) {
+                const auto               found = std::find_if(file_->modules.begin(), file_->modules.end(), [&](const esi::Module& m) {
                     return same_word(m.type, word.text) || same_word(m.name, word.text) ||
-                        parse_natural(word.text) == std::optional<std::uint64_t>(m.ident);
+                           parse_natural(word.text) == std::optional<std::uint64_t>(m.ident);
                 });
                 std::vector<std::string> names;
                 for (const esi::Module& m : file_->modules) names.push_back(m.type);
                 if (word.text == "-") idents.push_back(0);
                 else if (found != file_->modules.end()) idents.push_back(found->ident);
-                else report_.error(Topic::slave, word.at, "unknown module '" + word.text + "'", suggestion(word.text, names,
-                    "the modules are"));
+                else
+                    report_.error(Topic::slave, word.at, "unknown module '" + word.text + "'",
+                                  suggestion(word.text, names, "the modules are"));
             }
         }
         modular_ = esi::with_modules(*file_, *device_, idents);
@@ -160,8 +163,8 @@ private:
         keys_.take_flag("complete-access", slave_.complete_access);
         std::uint64_t entries = 0;
         if (keys_.take_number("entries-per-pdo", entries, 1, 255)) slave_.entries_per_pdo = static_cast<unsigned>(entries);
-        const std::pair<const char*, std::uint32_t*> times[] = {{"preop-timeout", &slave_.timeouts.to_preop}, {"op-timeout",
-            &slave_.timeouts.to_safeop_op},
+        const std::pair<const char*, std::uint32_t*> times[] = {{"preop-timeout", &slave_.timeouts.to_preop},
+                                                                {"op-timeout", &slave_.timeouts.to_safeop_op},
                                                                 {"mailbox-timeout", &slave_.timeouts.mailbox_response}};
         for (const auto& [key, to] : times)
             if (std::int64_t time = 0; keys_.take_time(key, time, ms, 600 * second)) *to = static_cast<std::uint32_t>(time / ms);
@@ -174,46 +177,47 @@ private:
             } else keys_.reject(*line, "none, or a time of 100us..6553ms");
         }
         if (Line* line = keys_.find("state")) {
-            constexpr std::pair<const char*, State> states[] = {{"op", State::op}, {"safeop", State::safeop}, {"preop", State::preop},
-                {"init", State::init}};
-            const auto at = std::find_if(std::begin(states), std::end(states), [&](const auto& s) { return same_word(line->value.text,
-                s.first); });
+            constexpr std::pair<const char*, State> states[] = {
+                {"op", State::op}, {"safeop", State::safeop}, {"preop", State::preop}, {"init", State::init}};
+            const auto at =
+                std::find_if(std::begin(states), std::end(states), [&](const auto& s) { return same_word(line->value.text, s.first); });
             if (at != std::end(states)) slave_.target = at->second;
             else keys_.reject(*line, "op, safeop, preop or init");
         }
         if (Line* line = keys_.find("domain")) {
             const auto& domains = in_.bus.setup.domains;
-            const auto at = std::find_if(domains.begin(), domains.end(), [&](const master::Domain& d) { return d.name == line->value.text;
-                });
+            const auto  at =
+                std::find_if(domains.begin(), domains.end(), [&](const master::Domain& d) { return d.name == line->value.text; });
             std::vector<std::string> names;
             for (const auto& d : domains) names.push_back(d.name);
             if (at != domains.end()) slave_.domain = static_cast<std::uint16_t>(at - domains.begin());
-            else report_.error(Topic::slave, line->value.at, "unknown domain '" + line->value.text + "'", "write [domain " +
-                line->value.text + "] and below it every = 4; the domains are: " + listed(names));
+            else
+                report_.error(Topic::slave, line->value.at, "unknown domain '" + line->value.text + "'",
+                              "write [domain " + line->value.text + "] and below it every = 4; the domains are: " + listed(names));
         }
     }
 
     /// `sync0`, `sync0 250us`, `sync0+sync1`, the name of an operation mode, `clock`, `none`.
     void clocks() {
-        Line* line = keys_.find("dc");
+        Line*      line = keys_.find("dc");
         master::Dc dc;
         if (line == nullptr || same_word(line->value.text, "none")) {
             for (const char* key : {"sync0-cycle", "sync1-cycle", "sync1-shift", "assign-activate"})
                 if (const Line* other = keys_.find(key))
                     report_.error(Topic::value, other->key.at, std::string("'") + key + "' applies only with distributed clocks",
-                        "write dc = sync0");
+                                  "write dc = sync0");
             return;
         }
-        const auto words = words_of(line->value);
-        const std::string& mode = words[0].text;
-        const bool both = same_word(mode, "sync0+sync1");
-        const esi::OpMode* chosen = nullptr;
+        const auto               words = words_of(line->value);
+        const std::string&       mode = words[0].text;
+        const bool               both = same_word(mode, "sync0+sync1");
+        const esi::OpMode*       chosen = nullptr;
         std::vector<std::string> names{"sync0", "sync0+sync1", "clock", "none"};
         if (device_ != nullptr) {
             for (const esi::OpMode& m : device_->op_modes) {
                 names.push_back(m.name);
-                const bool fits = same_word(mode, "sync0") ? (m.assign_activate & 0x700) == 0x300 : both &&
-                    (m.assign_activate & 0x700) == 0x700;
+                const bool fits =
+                    same_word(mode, "sync0") ? (m.assign_activate & 0x700) == 0x300 : both && (m.assign_activate & 0x700) == 0x700;
                 if (chosen == nullptr && (fits || same_word(m.name, mode))) chosen = &m;
             }
             if (!device_->has_dc)
@@ -222,10 +226,10 @@ private:
         if (chosen != nullptr) {
             const std::int64_t cycle = in_.bus.setup.cycle_ns;
             dc.assign_activate = chosen->assign_activate;
-            dc.sync0_cycle_ns = chosen->sync0_cycle_ns != 0   ? chosen->sync0_cycle_ns
-                                : chosen->sync0_factor > 1    ? cycle * chosen->sync0_factor
-                                : chosen->sync0_factor < -1   ? cycle / -std::int64_t{chosen->sync0_factor}
-                                                              : 0;
+            dc.sync0_cycle_ns = chosen->sync0_cycle_ns != 0 ? chosen->sync0_cycle_ns
+                                : chosen->sync0_factor > 1  ? cycle * chosen->sync0_factor
+                                : chosen->sync0_factor < -1 ? cycle / -std::int64_t{chosen->sync0_factor}
+                                                            : 0;
             const std::int64_t base = dc.sync0_cycle_ns != 0 ? dc.sync0_cycle_ns : cycle;
             dc.sync1_cycle_ns = chosen->sync1_cycle_ns != 0 ? chosen->sync1_cycle_ns : base * chosen->sync1_factor;
             dc.sync0_shift_ns = chosen->sync0_shift_ns, dc.sync1_shift_ns = chosen->sync1_shift_ns;
@@ -267,8 +271,8 @@ private:
     void writes(const SlavePdos& pdos) {
         for (Line* line : keys_.all()) {
             const auto words = words_of({line->key.text, line->key.at});
-            if (line->used || words.size() < 2 || (words[0].text != "sdo" && words[0].text != "register" &&
-                words[0].text != "idn")) continue;
+            if (line->used || words.size() < 2 || (words[0].text != "sdo" && words[0].text != "register" && words[0].text != "idn"))
+                continue;
             line->used = true;
             if (words[0].text == "idn") idn(*line, words);
             else sdo(*line, words, pdos);
@@ -280,8 +284,8 @@ private:
         const bool is_register = words[0].text == "register";
         const auto at = address(words[1].text);
         if (!at || words.size() > 3)
-            return report_.error(Topic::value, line.key.at, "invalid " + words[0].text + " '" + line.key.text.substr(words[0].text.size() +
-                1) + "'",
+            return report_.error(Topic::value, line.key.at,
+                                 "invalid " + words[0].text + " '" + line.key.text.substr(words[0].text.size() + 1) + "'",
                                  is_register ? "write register 0420 u16 = 1000" : "write sdo 6060 = 8, or with a type: sdo 2000:1 u16 = 5");
         StartupWrite w = write(at->index, at->sub, {}, State::safeop);
         w.line = line.key.at.line;
@@ -294,21 +298,22 @@ private:
             slave_.startup.push_back(std::move(w));
             return;
         }
-        Known known = is_register ? Known{} : pdos.known(at->index, at->sub);
+        Known           known = is_register ? Known{} : pdos.known(at->index, at->sub);
         const TypeWord* type = how.empty() ? nullptr : type_named(how);
-        if (!how.empty() && type == nullptr) return report_.error(Topic::value, words[2].at, "unknown type '" + how + "'",
-            "the types are " + std::string(type_words) + ", complete and raw");
+        if (!how.empty() && type == nullptr)
+            return report_.error(Topic::value, words[2].at, "unknown type '" + how + "'",
+                                 "the types are " + std::string(type_words) + ", complete and raw");
         const std::string label = is_register ? "register " + words[1].text : "object " + address_text(at->index, at->sub);
         if (type == nullptr && known.bits == 0)
             return report_.error(Topic::object, line.key.at,
                                  device() != nullptr && !is_register ? label + " is not in the description of '" + in_.info.type + "'"
-                                     : label + " has no known type",
+                                                                     : label + " has no known type",
                                  "write its type, as in " + words[0].text + " " + words[1].text + " u16 = " + line.value.text);
-        TypeWord own{"", "", known.type, static_cast<std::uint8_t>(std::min(known.bits, 64U))};
+        TypeWord    own{"", "", known.type, static_cast<std::uint8_t>(std::min(known.bits, 64U))};
         std::string problem;
-        const auto data = value_bytes(line.value.text, type != nullptr ? *type : own, problem);
-        if (!data) return report_.error(Topic::value, line.value.at, "invalid value '" + line.value.text + "' of " + label, "write " +
-            problem);
+        const auto  data = value_bytes(line.value.text, type != nullptr ? *type : own, problem);
+        if (!data)
+            return report_.error(Topic::value, line.value.at, "invalid value '" + line.value.text + "' of " + label, "write " + problem);
         w.data = *data;
         slave_.startup.push_back(std::move(w));
     }
@@ -316,40 +321,65 @@ private:
     /// `idn S-0-15 = 07 00`, `idn P-0-150 1 = 01 00`: hexadecimal bytes; the number after it is the drive's.
     void idn(const Line& line, const std::vector<Word>& words) {
         const std::string& text = words[1].text;  // lower case
-        const auto parts = list_of({text, line.key.at}, '-');
-        const auto set = parts.size() == 3 ? parse_natural(parts[1].text) : std::nullopt, number = parts.size() == 3
-            ? parse_natural(parts[2].text) : std::nullopt;
+        const auto         parts = list_of({text, line.key.at}, '-');
+        const auto         set = parts.size() == 3 ? parse_natural(parts[1].text) : std::nullopt,
+                   number = parts.size() == 3 ? parse_natural(parts[2].text) : std::nullopt;
         const auto drive = words.size() == 3 ? parse_natural(words[2].text) : std::optional<std::uint64_t>(0);
         if (!set || *set > 7 || !number || *number > 4095 || (parts[0].text != "s" && parts[0].text != "p") || !drive || *drive > 7 ||
             words.size() > 3)
             return report_.error(Topic::value, line.key.at, "invalid IDN '" + text + "'",
-                "write idn S-0-15 = 07 00, or idn P-0-150 1 = 07 00 for drive 1");
+                                 "write idn S-0-15 = 07 00, or idn P-0-150 1 = 07 00 for drive 1");
         const auto data = esi::hex_bytes(line.value.text);
         if (!data || data->empty()) return keys_.reject(line, "hexadecimal bytes in the order of the wire, as in 07 00");
         StartupWrite w = write(static_cast<std::uint16_t>((parts[0].text == "p" ? 0x8000U : 0U) | *set << 12 | *number),
-            static_cast<std::uint8_t>(*drive), *data, State::safeop);
+                               static_cast<std::uint8_t>(*drive), *data, State::safeop);
         w.protocol = StartupWrite::Protocol::soe, w.line = line.key.at.line;
         slave_.startup.push_back(std::move(w));
     }
 
     void leftover() {
-        const std::vector<std::string> all{"type", "esi", "device", "axes", "modules", "vendor", "product", "revision", "serial",
-            "optional", "lrw", "complete-access",
-                                           "entries-per-pdo", "preop-timeout", "op-timeout", "mailbox-timeout", "watchdog", "state",
-                                               "domain", "dc", "sync0-cycle",
-                                           "sync1-cycle", "sync1-shift", "assign-activate", "outputs", "inputs", "pdo-order", "sdo", "idn",
-                                               "register"};
+        const std::vector<std::string> all{"type",
+                                           "esi",
+                                           "device",
+                                           "axes",
+                                           "modules",
+                                           "vendor",
+                                           "product",
+                                           "revision",
+                                           "serial",
+                                           "optional",
+                                           "lrw",
+                                           "complete-access",
+                                           "entries-per-pdo",
+                                           "preop-timeout",
+                                           "op-timeout",
+                                           "mailbox-timeout",
+                                           "watchdog",
+                                           "state",
+                                           "domain",
+                                           "dc",
+                                           "sync0-cycle",
+                                           "sync1-cycle",
+                                           "sync1-shift",
+                                           "assign-activate",
+                                           "outputs",
+                                           "inputs",
+                                           "pdo-order",
+                                           "sdo",
+                                           "idn",
+                                           "register"};
         for (const Line* line : keys_.all())
-            if (!line->used) report_.error(Topic::line, line->key.at, "unknown key '" + line->key.text + "' of a slave",
-                suggestion(line->key.text, all, "the keys are"));
+            if (!line->used)
+                report_.error(Topic::line, line->key.at, "unknown key '" + line->key.text + "' of a slave",
+                              suggestion(line->key.text, all, "the keys are"));
     }
 
-    SlaveInput in_;
-    Keys& keys_;
-    Report& report_;
-    master::Slave& slave_;
-    const esi::File* file_ = nullptr;
-    const esi::Device* device_ = nullptr;
+    SlaveInput                 in_;
+    Keys&                      keys_;
+    Report&                    report_;
+    master::Slave&             slave_;
+    const esi::File*           file_ = nullptr;
+    const esi::Device*         device_ = nullptr;
     std::optional<esi::Device> modular_;
 };
 

@@ -80,24 +80,25 @@ private:
     }
     void append(std::string item) { items_.push_back(std::move(item)), range_ = false; }
 
-    unsigned axes_;
+    unsigned                 axes_;
     std::vector<std::string> items_;
-    std::set<unsigned> listed_;
-    bool range_ = false;
-    sii::Entry first_{}, last_{};
-    std::string word_;
+    std::set<unsigned>       listed_;
+    bool                     range_ = false;
+    sii::Entry               first_{}, last_{};
+    std::string              word_;
 };
 
 /// Returns "KEY = 6040, 607A s32" for the assigned PDOs and adds where they are to `options`; empty if there are none.
 std::string objects(const std::string& key, const std::vector<sii::Pdo>& pdos, unsigned axes, std::string& options) {
-    ObjectList list(axes);
+    ObjectList      list(axes);
     const sii::Pdo* first = nullptr;
     for_each_assigned(pdos, [&](const sii::Pdo& p) {
         if (first == nullptr) first = &p;
         for (const sii::Entry& e : p.entries) list.add(e);
     });
     if (list.text().empty()) return {};
-    options += key + ".sync-manager = " + std::to_string(first->sync_manager) + "\n" + key + ".pdo = " + address_text(first->index, 0).substr(0, 4) + "\n";
+    options += key + ".sync-manager = " + std::to_string(first->sync_manager) + "\n" + key +
+               ".pdo = " + address_text(first->index, 0).substr(0, 4) + "\n";
     return key + (key == "inputs" ? "  = " : " = ") + list.text() + "\n";
 }
 
@@ -109,7 +110,8 @@ std::string modes(const Found& s, unsigned axes) {
         if (has(s.rx, 0x6060 + offset)) continue;
         const bool velocity = has(s.rx, 0x60ff + offset);
         if (!velocity && !has(s.rx, 0x607a + offset)) continue;
-        text += "sdo " + hex(0x6060 + offset).substr(2) + " = " + (velocity ? "9  # cyclic synchronous velocity\n" : "8  # cyclic synchronous position\n");
+        text += "sdo " + hex(0x6060 + offset).substr(2) + " = " +
+                (velocity ? "9  # cyclic synchronous velocity\n" : "8  # cyclic synchronous position\n");
     }
     return text;
 }
@@ -136,11 +138,13 @@ std::string one_line(const std::string& text) {
 }  // namespace
 
 std::string write(const std::string& link, std::int64_t cycle_ns, const std::vector<Found>& slaves) {
-    std::string out = "[bus]\nlink  = " + link + "\ncycle = " + (cycle_ns % 1'000'000 == 0 ? std::to_string(cycle_ns / 1'000'000) + "ms\n" : std::to_string(cycle_ns / 1000) + "us\n");
+    std::string out =
+        "[bus]\nlink  = " + link + "\ncycle = " +
+        (cycle_ns % 1'000'000 == 0 ? std::to_string(cycle_ns / 1'000'000) + "ms\n" : std::to_string(cycle_ns / 1000) + "us\n");
     std::map<std::string, unsigned> names;
     for (std::size_t i = 0; i < slaves.size(); ++i) {
         const Found& s = slaves[i];
-        std::string name = dashed(s.name);
+        std::string  name = dashed(s.name);
         if (name.empty()) name = "slave-" + std::to_string(i);
         if (const unsigned n = names[name]++; n != 0) name += "-" + std::to_string(i);
         out += "\n[slave " + std::to_string(i) + " " + name + "]" + (s.device.empty() ? "" : "  # " + one_line(s.device)) + "\n";
@@ -152,10 +156,10 @@ std::string write(const std::string& link, std::int64_t cycle_ns, const std::vec
             const unsigned axes = axes_of(s);
             if (axes != 0) out += "device  = cia402\n";
             if (axes > 1) out += "axes    = " + std::to_string(axes) + "\n";
-            std::string options;
+            std::string       options;
             const std::string outputs = objects("outputs", s.rx, axes, options), inputs = objects("inputs", s.tx, axes, options);
             out += outputs + inputs + options + modes(s, axes);
-            std::size_t most = 0;  // a slave with a fixed assignment keeps it
+            std::size_t       most = 0;  // a slave with a fixed assignment keeps it
             const std::size_t each = std::max(entries_each(s.rx, most), entries_each(s.tx, most));
             if (each != 0 && most == each) out += "entries-per-pdo = " + std::to_string(each) + "\n";
         }

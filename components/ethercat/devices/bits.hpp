@@ -16,7 +16,7 @@ inline void copy_bits(std::uint8_t* to, std::size_t to_bit, const std::uint8_t* 
     }
     for (std::size_t i = 0; i < bits; ++i) {
         const unsigned bit = from[(from_bit + i) / 8] >> ((from_bit + i) % 8) & 1U;
-        std::uint8_t& byte = to[(to_bit + i) / 8];
+        std::uint8_t&  byte = to[(to_bit + i) / 8];
         const unsigned mask = 1U << ((to_bit + i) % 8);
         byte = static_cast<std::uint8_t>(bit != 0 ? byte | mask : byte & ~mask);
     }

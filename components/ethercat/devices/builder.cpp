@@ -29,7 +29,7 @@ DesignBuilder::DesignBuilder(std::string name, std::uint32_t product, std::uint3
 
 void DesignBuilder::mailbox(std::size_t bytes, std::uint16_t protocols, bool boot) {
     mailbox_bytes_ = bytes;
-    auto& s = design_.sii;
+    auto&      s = design_.sii;
     const auto size = static_cast<std::uint16_t>(bytes);
     s.mailboxes = {{0x1000, size}, {static_cast<std::uint16_t>(0x1000 + size), size}};
     if (boot) s.boot = s.mailboxes;
@@ -50,13 +50,13 @@ void DesignBuilder::mailbox(std::size_t bytes, std::uint16_t protocols, bool boo
 void DesignBuilder::pdo(bool output, std::uint16_t index, std::string name, const std::vector<PdoEntry>& entries, bool assigned,
                         unsigned most) {
     namespace access = coe::access;
-    auto& pdos = output ? design_.sii.rx : design_.sii.tx;
+    auto&     pdos = output ? design_.sii.rx : design_.sii.tx;
     sii::Pdo& pdo = pdos.emplace_back();
     pdo.index = index, pdo.name = name, pdo.flags = most == 0 ? sii::pdo_fixed : std::uint16_t{0};
     pdo.sync_manager = assigned ? std::uint8_t{0} : std::uint8_t{0xff};  // the number follows in finish()
-    const std::uint16_t rights = most == 0 ? access::read : access::read | access::write_preop;
-    auto& d = dictionary();
-    const auto count = static_cast<std::uint8_t>(entries.size());
+    const std::uint16_t        rights = most == 0 ? access::read : access::read | access::write_preop;
+    auto&                      d = dictionary();
+    const auto                 count = static_cast<std::uint8_t>(entries.size());
     std::vector<std::uint32_t> raw;
     for (const auto& e : entries) {
         std::uint8_t bits = 0, type = 0;
@@ -77,7 +77,7 @@ void DesignBuilder::pdo(bool output, std::uint16_t index, std::string name, cons
 
 void DesignBuilder::dc(bool required, bool sync1) {
     design_.dc = true, design_.dc_required = required;
-    auto& s = design_.sii;
+    auto&       s = design_.sii;
     sii::DcMode mode;
     mode.sync0_factor = 1, mode.assign_activate = 0x0300, mode.name = "DC", mode.description = "SYNC0";
     s.dc.push_back(mode);
@@ -88,8 +88,8 @@ void DesignBuilder::dc(bool required, bool sync1) {
 
 void DesignBuilder::assignment(bool output, std::uint16_t sm) {
     namespace access = coe::access;
-    auto& pdos = output ? design_.sii.rx : design_.sii.tx;
-    const bool writable = std::any_of(pdos.begin(), pdos.end(), [](const auto& p) { return (p.flags & sii::pdo_fixed) == 0; });
+    auto&               pdos = output ? design_.sii.rx : design_.sii.tx;
+    const bool          writable = std::any_of(pdos.begin(), pdos.end(), [](const auto& p) { return (p.flags & sii::pdo_fixed) == 0; });
     const std::uint16_t rights = writable ? access::read | access::write_preop : access::read;
     std::vector<std::uint16_t> assigned;
     for (auto& pdo : pdos)
@@ -98,7 +98,7 @@ void DesignBuilder::assignment(bool output, std::uint16_t sm) {
                         static_cast<std::uint8_t>(assigned.size()), coe::ObjectCode::array, rights, coe::type::u16);
     for (std::size_t n = 1; n <= pdos.size(); ++n)
         dictionary().sub(static_cast<std::uint8_t>(n), "PDO " + std::to_string(n), coe::type::u16, rights,
-            n <= assigned.size() ? assigned[n - 1] : 0);
+                         n <= assigned.size() ? assigned[n - 1] : 0);
 }
 
 Design DesignBuilder::finish(std::uint16_t alias, std::uint32_t serial, std::size_t most_output_bytes, std::size_t most_input_bytes) {

@@ -15,8 +15,8 @@ inline constexpr std::uint32_t vendor = 0x00ffffff;
 
 struct PdoEntry {
     std::uint16_t index = 0;
-    std::uint8_t sub = 0;
-    std::string name{};
+    std::uint8_t  sub = 0;
+    std::string   name{};
 };
 
 /// Everything here is [setup].
@@ -24,7 +24,7 @@ class DesignBuilder {
 public:
     DesignBuilder(std::string name, std::uint32_t product, std::uint32_t revision = 1);
     Dictionary& dictionary() noexcept { return *design_.dictionary; }
-    Design& design() noexcept { return design_; }
+    Design&     design() noexcept { return design_; }
 
     /// Adds the mailbox with its sync managers 0 and 1; `bytes` for both directions.
     void mailbox(std::size_t bytes, std::uint16_t protocols, bool boot = false);
@@ -39,7 +39,7 @@ public:
 private:
     void assignment(bool output, std::uint16_t sm);
 
-    Design design_;
+    Design      design_;
     std::size_t mailbox_bytes_ = 0;
 };
 

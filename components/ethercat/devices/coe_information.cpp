@@ -36,10 +36,11 @@ void CoeServer::information(std::span<const std::uint8_t> payload, Outbox& out) 
         list_.active = true;
         const auto& all = dictionary_.objects();
         if (word == 0) list_.count = 5;
-        else list_.count = static_cast<std::size_t>(std::count_if(all.begin(), all.end(), [&](const auto& o) { return in_list(o,
-            list_.list); }));
-        const std::size_t bytes = 2 + list_.count * 2, capacity = (out.mailbox() - mailbox_header_bytes - coe::information_header_bytes) &
-            ~std::size_t{1};
+        else
+            list_.count =
+                static_cast<std::size_t>(std::count_if(all.begin(), all.end(), [&](const auto& o) { return in_list(o, list_.list); }));
+        const std::size_t bytes = 2 + list_.count * 2,
+                          capacity = (out.mailbox() - mailbox_header_bytes - coe::information_header_bytes) & ~std::size_t{1};
         list_.fragments_left = static_cast<std::uint16_t>((bytes + capacity - 1) / capacity - 1);
         pump(out);
         return;
@@ -54,18 +55,18 @@ void CoeServer::information(std::span<const std::uint8_t> payload, Outbox& out) 
 
 void CoeServer::pump(Outbox& out) noexcept {
     if (!list_.active) return;
-    std::uint8_t* to = out.payload();
+    std::uint8_t*     to = out.payload();
     const std::size_t end = (out.mailbox() - mailbox_header_bytes) & ~std::size_t{1};
     coe::write_information(to, {coe::Information::list_response, list_.fragments_left != 0, list_.fragments_left});
     std::size_t length = coe::information_header_bytes;
-    const auto add = [&](std::size_t value) { put(to + length, static_cast<std::uint16_t>(value)), length += 2; };
+    const auto  add = [&](std::size_t value) { put(to + length, static_cast<std::uint16_t>(value)), length += 2; };
     const auto& all = dictionary_.objects();
-    const bool first = list_.at == 0;
+    const bool  first = list_.at == 0;
     if (list_.list == coe::List::lengths) {
         add(0);
         for (std::uint16_t n = 1; n <= 5; ++n)
-            add(static_cast<std::size_t>(std::count_if(all.begin(), all.end(), [&](const auto& o) { return in_list(o,
-                static_cast<coe::List>(n)); })));
+            add(static_cast<std::size_t>(
+                std::count_if(all.begin(), all.end(), [&](const auto& o) { return in_list(o, static_cast<coe::List>(n)); })));
         list_.active = false;
         out.send(MailboxType::coe, length);
         return;

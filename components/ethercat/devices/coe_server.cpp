@@ -58,8 +58,8 @@ void CoeServer::upload(const coe::Sdo& r, State state, Outbox& out) noexcept {
         return respond(static_cast<std::uint8_t>(coe::expedited_command(sdo::upload_response, length_) | bit), value, out);
     }
     const std::size_t first = std::min(length_, coe::normal_capacity(out.mailbox()));
-    std::uint8_t* to = out.payload();
-    const auto command = static_cast<std::uint8_t>(sdo::upload_response | sdo::size_given | bit);
+    std::uint8_t*     to = out.payload();
+    const auto        command = static_cast<std::uint8_t>(sdo::upload_response | sdo::size_given | bit);
     coe::write_sdo(to, coe::Service::sdo_response, {command, index_, sub_, static_cast<std::uint32_t>(length_)});
     std::memcpy(to + coe::sdo_bytes, buffer_.data(), first);
     out.send(MailboxType::coe, coe::sdo_bytes + first);
@@ -70,11 +70,11 @@ void CoeServer::upload(const coe::Sdo& r, State state, Outbox& out) noexcept {
 void CoeServer::upload_segment(std::uint8_t command, Outbox& out) noexcept {
     if (transfer_ != Transfer::upload) return abort(coe::abort::command, out);
     if (((command & sdo::toggle) != 0) != toggle_) return abort(coe::abort::toggle, out);
-    const std::size_t n = std::min(length_ - at_, coe::segment_capacity(out.mailbox()));
-    const bool last = at_ + n == length_;
+    const std::size_t                   n = std::min(length_ - at_, coe::segment_capacity(out.mailbox()));
+    const bool                          last = at_ + n == length_;
     const std::span<const std::uint8_t> data(buffer_.data() + at_, n);
-    out.send(MailboxType::coe, coe::write_segment(out.payload(), coe::Service::sdo_response, sdo::upload_segment_response, toggle_, last,
-        data));
+    out.send(MailboxType::coe,
+             coe::write_segment(out.payload(), coe::Service::sdo_response, sdo::upload_segment_response, toggle_, last, data));
     at_ += n, toggle_ = !toggle_;
     if (last) transfer_ = Transfer::none;
 }
@@ -108,7 +108,7 @@ void CoeServer::download_segment(std::uint8_t command, std::span<const std::uint
     if (!data.empty()) std::memcpy(buffer_.data() + at_, data.data(), data.size());
     at_ += data.size(), toggle_ = !toggle_;
     if ((command & sdo::last_segment) != 0) return finish_download(state, out, true, toggle);
-    const auto response = static_cast<std::uint8_t>(sdo::download_segment_response | (toggle ? sdo::toggle : 0));
+    const auto    response = static_cast<std::uint8_t>(sdo::download_segment_response | (toggle ? sdo::toggle : 0));
     std::uint8_t* to = out.payload();
     std::memset(to, 0, coe::sdo_bytes);
     coe::write_header(to, coe::Service::sdo_response);

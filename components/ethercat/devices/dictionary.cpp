@@ -24,10 +24,16 @@ std::uint16_t bits_of(std::uint16_t type) noexcept {
     namespace t = coe::type;
     switch (type) {
     case t::boolean: return 1;
-    case t::s8: case t::u8: return 8;
-    case t::s16: case t::u16: return 16;
-    case t::s32: case t::u32: case t::real32: return 32;
-    case t::s64: case t::u64: case t::real64: return 64;
+    case t::s8:
+    case t::u8: return 8;
+    case t::s16:
+    case t::u16: return 16;
+    case t::s32:
+    case t::u32:
+    case t::real32: return 32;
+    case t::s64:
+    case t::u64:
+    case t::real64: return 64;
     default: return type >= t::bit1 && type < t::bit1 + 8 ? static_cast<std::uint16_t>(type - t::bit1 + 1) : 0;
     }
 }
@@ -165,11 +171,11 @@ std::uint32_t Dictionary::write_entry(const DictionaryObject& o, const Dictionar
 }
 
 std::uint32_t Dictionary::write_complete(const DictionaryObject& o, std::uint8_t sub, State state,
-    std::span<const std::uint8_t> from) noexcept {
-    const auto& sub0 = o.entries.front();
-    std::size_t bit = 0;
+                                         std::span<const std::uint8_t> from) noexcept {
+    const auto&  sub0 = o.entries.front();
+    std::size_t  bit = 0;
     std::uint8_t count_after = 0;
-    const bool sets_count = sub == 0 && (sub0.access & coe::access::write) != 0;
+    const bool   sets_count = sub == 0 && (sub0.access & coe::access::write) != 0;
     if (sub == 0) {
         if (from.size() < 2) return coe::abort::too_short;
         count_after = from[0], bit = 16;
@@ -200,8 +206,8 @@ std::uint32_t Dictionary::write(std::uint16_t index, std::uint8_t sub, bool comp
                                 std::span<const std::uint8_t> from) noexcept {
     const auto* o = find(index);
     if (o == nullptr) return coe::abort::no_object;
-    if (complete && o->code != coe::ObjectCode::variable) return sub > 1 ? coe::abort::no_complete_access : write_complete(*o, sub, state,
-        from);
+    if (complete && o->code != coe::ObjectCode::variable)
+        return sub > 1 ? coe::abort::no_complete_access : write_complete(*o, sub, state, from);
     const auto* e = find(index, sub);
     return e == nullptr ? coe::abort::no_sub : write_entry(*o, *e, state, from);
 }

@@ -19,21 +19,21 @@
 namespace hal::ethercat::devices {
 
 struct DictionaryEntry {
-    std::uint8_t sub = 0;
+    std::uint8_t  sub = 0;
     std::uint16_t type = 0, bits = 0, access = 0;
     std::uint32_t offset = 0;      ///< of its data
-    std::string name;
-    bool limited = false;
-    std::int64_t low = 0, high = 0;
+    std::string   name;
+    bool          limited = false;
+    std::int64_t  low = 0, high = 0;
 
     std::size_t bytes() const noexcept { return (bits + 7U) / 8U; }
-    bool text() const noexcept { return type == coe::type::visible_string || type == coe::type::octet_string; }
+    bool        text() const noexcept { return type == coe::type::visible_string || type == coe::type::octet_string; }
 };
 
 struct DictionaryObject {
-    std::uint16_t index = 0, type = 0;
-    coe::ObjectCode code{};
-    std::string name;
+    std::uint16_t                index = 0, type = 0;
+    coe::ObjectCode              code{};
+    std::string                  name;
     std::vector<DictionaryEntry> entries;  ///< by sub-index
 };
 
@@ -65,12 +65,12 @@ public:
     void finish();
 
     // Run time.
-    void power_on() noexcept;  ///< Restores the initial values. [realtime]
+    void                                 power_on() noexcept;  ///< Restores the initial values. [realtime]
     const std::vector<DictionaryObject>& objects() const noexcept { return objects_; }
-    const DictionaryObject* find(std::uint16_t index) const noexcept;                          ///< nullptr: missing. [realtime]
-    const DictionaryEntry* find(std::uint16_t index, std::uint8_t sub) const noexcept;         ///< nullptr: missing. [realtime]
-    std::uint8_t* data(const DictionaryEntry& e) noexcept { return memory_.data() + e.offset; }  ///< [realtime]
-    const std::uint8_t* data(const DictionaryEntry& e) const noexcept { return memory_.data() + e.offset; }
+    const DictionaryObject*              find(std::uint16_t index) const noexcept;  ///< nullptr: missing. [realtime]
+    const DictionaryEntry*               find(std::uint16_t index, std::uint8_t sub) const noexcept;  ///< nullptr: missing. [realtime]
+    std::uint8_t*                        data(const DictionaryEntry& e) noexcept { return memory_.data() + e.offset; }  ///< [realtime]
+    const std::uint8_t*                  data(const DictionaryEntry& e) const noexcept { return memory_.data() + e.offset; }
     /// Returns the data of an entry; nullptr: missing. [realtime]
     std::uint8_t* at(std::uint16_t index, std::uint8_t sub) noexcept;
     /// Returns the value of sub-index 0, a count. [realtime]
@@ -83,16 +83,16 @@ public:
     std::uint32_t write(std::uint16_t index, std::uint8_t sub, bool complete, State state, std::span<const std::uint8_t> from) noexcept;
     /// Returns the abort code that a write of `bytes` would have before its data is known. [realtime]
     std::uint32_t check_write(std::uint16_t index, std::uint8_t sub, bool complete, State state, std::size_t bytes) const noexcept;
-    void guard_with(DictionaryGuard* guard) noexcept { guard_ = guard; }  ///< [setup]
+    void          guard_with(DictionaryGuard* guard) noexcept { guard_ = guard; }  ///< [setup]
 
 private:
     DictionaryEntry& add(DictionaryObject&, std::uint8_t sub, std::string name, std::uint16_t type, std::size_t bits, std::uint16_t access);
-    std::uint32_t write_entry(const DictionaryObject&, const DictionaryEntry&, State, std::span<const std::uint8_t> from) noexcept;
-    std::uint32_t write_complete(const DictionaryObject&, std::uint8_t sub, State, std::span<const std::uint8_t> from) noexcept;
+    std::uint32_t    write_entry(const DictionaryObject&, const DictionaryEntry&, State, std::span<const std::uint8_t> from) noexcept;
+    std::uint32_t    write_complete(const DictionaryObject&, std::uint8_t sub, State, std::span<const std::uint8_t> from) noexcept;
 
     std::vector<DictionaryObject> objects_;
-    std::vector<std::uint8_t> memory_, initial_;
-    DictionaryGuard* guard_ = nullptr;
+    std::vector<std::uint8_t>     memory_, initial_;
+    DictionaryGuard*              guard_ = nullptr;
 };
 
 /// Returns the bits of a basic type; 0 for texts and unknown types. [any]

@@ -44,8 +44,8 @@ void Firmware::receive_mail(esc::Pdi& pdi) noexcept {
     if (message->type == MailboxType::error) return;
     if (coe_ && message->type == MailboxType::coe && state_ != State::boot) return coe_->take(*message, state_, outbox_);
     for (auto& s : design_.services)
-        if (s->type() == message->type && (state_ != State::boot || s->type() == MailboxType::foe)) return s->take(*message, state_,
-            outbox_);
+        if (s->type() == message->type && (state_ != State::boot || s->type() == MailboxType::foe))
+            return s->take(*message, state_, outbox_);
     refuse(MailboxError::protocol_not_supported);
 }
 
@@ -55,7 +55,7 @@ void Firmware::send_mail(esc::Pdi& pdi) noexcept {
         return;
     }
     if (outbox_.empty() || now_ns_ < answer_at_ns_) return;
-    auto message = outbox_.front();
+    auto               message = outbox_.front();
     const std::uint8_t counter = next_mailbox_counter(counter_);
     message[5] = static_cast<std::uint8_t>((message[5] & 0x0f) | counter << 4);
     if (!pdi.write_sync_manager(1, message)) return;

@@ -38,10 +38,11 @@ void Firmware::change(esc::Pdi& pdi, State to) noexcept {
     if (!known) return fail(pdi, state_, 0x0012);
     const bool up = rank(to) > rank(state_);
     const bool valid = to == state_ || to == State::init || (to == State::boot && state_ == State::init) ||
-                       (state_ != State::boot && (!up ? to != State::boot : to == State::boot ? false
-                                                        : to == State::preop   ? state_ == State::init
-                                                        : to == State::safeop  ? state_ == State::preop
-                                                                               : state_ == State::safeop));
+                       (state_ != State::boot && (!up                   ? to != State::boot
+                                                  : to == State::boot   ? false
+                                                  : to == State::preop  ? state_ == State::init
+                                                  : to == State::safeop ? state_ == State::preop
+                                                                        : state_ == State::safeop));
     if (!valid) return fail(pdi, state_, 0x0011);
     if (to == state_) return error_ ? void() : pdi.set_al_status(static_cast<std::uint16_t>(state_), 0);
     if (const auto code = faults_.reject[to].load(std::memory_order_relaxed)) return fail(pdi, state_, code);
@@ -88,7 +89,7 @@ std::uint16_t Firmware::check_process_data(esc::Pdi& pdi) noexcept {
 
 std::uint16_t Firmware::check_sync(esc::Pdi& pdi) const noexcept {
     const std::uint8_t activation = *pdi.memory(registers::dc_activation);
-    const bool requested = (activation & 1) != 0;
+    const bool         requested = (activation & 1) != 0;
     if (!requested) return design_.dc_required ? std::uint16_t{0x0027} : std::uint16_t{0};
     if (!design_.dc) return 0x0028;
     if ((activation & 2) == 0) return 0x0030;

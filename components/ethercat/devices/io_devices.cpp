@@ -6,8 +6,8 @@ namespace hal::ethercat::devices {
 IoBehaviour::IoBehaviour(std::shared_ptr<Dictionary> dictionary, std::uint16_t index, unsigned channels, bool output, bool digital)
     : dictionary_(std::move(dictionary)), channels_(channels), output_(output), digital_(digital) {
     for (unsigned n = 0; n < channels; ++n)
-        data_[n] = digital ? dictionary_->at(index, static_cast<std::uint8_t>(n + 1)) : dictionary_->at(static_cast<std::uint16_t>(index +
-            0x10 * n), 1);
+        data_[n] = digital ? dictionary_->at(index, static_cast<std::uint8_t>(n + 1))
+                           : dictionary_->at(static_cast<std::uint16_t>(index + 0x10 * n), 1);
 }
 
 void IoBehaviour::power_on() noexcept {
@@ -36,10 +36,10 @@ Parts make_coupler(const DeviceOptions& o) {
 
 Parts make_digital(const DeviceOptions& o, bool output) {
     namespace access = coe::access;
-    DesignBuilder b(output ? "digital_out" : "digital_in", (output ? 0x0d0000U : 0x0d1000U) + o.bits);
+    DesignBuilder       b(output ? "digital_out" : "digital_in", (output ? 0x0d0000U : 0x0d1000U) + o.bits);
     const std::uint16_t index = output ? 0x7000 : 0x6000;
     const auto rights = static_cast<std::uint16_t>(output ? access::read_write | access::rx_mappable : access::read | access::tx_mappable);
-    auto& d = b.dictionary();
+    auto&      d = b.dictionary();
     d.record(index, output ? "Outputs" : "Inputs", static_cast<std::uint8_t>(o.bits));
     std::vector<PdoEntry> entries;
     for (unsigned n = 1; n <= o.bits; ++n) {
@@ -58,7 +58,7 @@ Parts make_analog(const DeviceOptions& o, bool output) {
     b.mailbox(128, sii::coe);
     const std::uint16_t base = output ? 0x7000 : 0x6000;
     const auto rights = static_cast<std::uint16_t>(output ? access::read_write | access::rx_mappable : access::read | access::tx_mappable);
-    auto& d = b.dictionary();
+    auto&      d = b.dictionary();
     for (unsigned n = 0; n < o.channels; ++n) {
         d.record(static_cast<std::uint16_t>(base + 0x10 * n), "Channel " + std::to_string(n + 1), 1);
         d.sub(1, "Value", coe::type::s16, rights);

@@ -19,17 +19,18 @@ public:
     IoBehaviour(std::shared_ptr<Dictionary>, std::uint16_t index, unsigned channels, bool output, bool digital);
     void step(Step&) noexcept override;
     void power_on() noexcept override;
-    void set_input(unsigned channel, std::int32_t value) noexcept { values_[channel % most_channels].store(value,
-        std::memory_order_relaxed); }
+    void set_input(unsigned channel, std::int32_t value) noexcept {
+        values_[channel % most_channels].store(value, std::memory_order_relaxed);
+    }
     std::int32_t output(unsigned channel) const noexcept { return values_[channel % most_channels].load(std::memory_order_relaxed); }
-    unsigned channels() const noexcept { return channels_; }
+    unsigned     channels() const noexcept { return channels_; }
 
 private:
-    std::shared_ptr<Dictionary> dictionary_;
-    std::array<std::uint8_t*, most_channels> data_{};
+    std::shared_ptr<Dictionary>                          dictionary_;
+    std::array<std::uint8_t*, most_channels>             data_{};
     std::array<std::atomic<std::int32_t>, most_channels> values_{};
-    unsigned channels_;
-    bool output_, digital_;
+    unsigned                                             channels_;
+    bool                                                 output_, digital_;
 };
 
 /// A coupler: neither mailbox nor process data.
@@ -40,16 +41,16 @@ public:
 
 /// Options of a device in a line description.
 struct DeviceOptions {
-    unsigned bits = 8, channels = 4, axes = 1;
+    unsigned      bits = 8, channels = 4, axes = 1;
     std::uint16_t alias = 0;
     std::uint32_t serial = 0;
-    bool dc_required = false;
+    bool          dc_required = false;
     std::uint32_t modes = 0x3a5;  ///< of a servo (6502h)
 };
 
 /// A device: its description and its behaviour.
 struct Parts {
-    Design design;
+    Design                     design;
     std::unique_ptr<Behaviour> behaviour;
 };
 Parts make_coupler(const DeviceOptions&);                  ///< [setup]

@@ -80,8 +80,8 @@ void SoeServer::read(const soe::Header& h, Outbox& out) noexcept {
     if ((h.elements & soe::element::minimum) != 0 && idn->low == idn->high) return refuse(h, soe::error::no_minimum, out);
     if ((h.elements & soe::element::maximum) != 0 && idn->low == idn->high) return refuse(h, soe::error::no_maximum, out);
     std::size_t n = 0;
-    const auto bytes = [&](const void* from, std::size_t length) { std::memcpy(buffer_.data() + n, from, length), n += length; };
-    const auto list = [&](const void* from, std::size_t length, std::size_t most) {
+    const auto  bytes = [&](const void* from, std::size_t length) { std::memcpy(buffer_.data() + n, from, length), n += length; };
+    const auto  list = [&](const void* from, std::size_t length, std::size_t most) {
         const std::uint16_t lengths[2] = {static_cast<std::uint16_t>(length), static_cast<std::uint16_t>(most)};
         bytes(lengths, 4), bytes(from, length);
     };
@@ -105,7 +105,7 @@ void SoeServer::read(const soe::Header& h, Outbox& out) noexcept {
 void SoeServer::pump(Outbox& out) noexcept {
     if (left_ == 0) return;
     const std::size_t capacity = soe::capacity(out.mailbox()), n = std::min(left_, capacity);
-    soe::Header h = answer_;
+    soe::Header       h = answer_;
     h.incomplete = left_ > n;
     if (h.incomplete) h.idn = static_cast<std::uint16_t>((left_ + capacity - 1) / capacity - 1);
     soe::write(out.payload(), h);
@@ -121,7 +121,7 @@ void SoeServer::write(const soe::Header& h, std::span<const std::uint8_t> data, 
     written_ += data.size();
     if (h.incomplete) return;
     const std::size_t length = std::exchange(written_, 0);
-    Idn* idn = find(h.idn);
+    Idn*              idn = find(h.idn);
     if (idn == nullptr) return refuse(h, soe::error::no_idn, out);
     if (h.elements != soe::element::value) return refuse(h, h.elements == 0 ? soe::error::no_element : soe::error::name_read_only, out);
     const unsigned phase = state == State::op ? 2 : state == State::safeop ? 1 : 0;
@@ -152,9 +152,9 @@ void AoeServer::take(const MailboxMessage& message, State state, Outbox& out) no
     const auto h = aoe::read(message.payload);
     if (!h) return out.send(MailboxType::error, write_mailbox_error(out.payload(), MailboxError::too_short));
     if (h->response()) return;
-    const auto data = message.payload.subspan(aoe::header_bytes, h->length);
+    const auto    data = message.payload.subspan(aoe::header_bytes, h->length);
     std::uint8_t* to = out.payload() + aoe::header_bytes;
-    const auto respond = [&](std::size_t length, std::uint32_t error = 0) {
+    const auto    respond = [&](std::size_t length, std::uint32_t error = 0) {
         aoe::write(out.payload(), aoe::response_to(*h, static_cast<std::uint32_t>(length), error));
         out.send(MailboxType::aoe, aoe::header_bytes + length);
     };
@@ -163,15 +163,15 @@ void AoeServer::take(const MailboxMessage& message, State state, Outbox& out) no
         if (get<std::uint32_t>(data.data()) != aoe::group_sdo) return put(to, aoe::error::group), respond(4);
         const auto offset = get<std::uint32_t>(data.data() + 4);
         work(static_cast<std::uint16_t>(offset >> 16), static_cast<std::uint8_t>(offset), (offset & 0x100) != 0,
-            get<std::uint32_t>(data.data() + 8));
+             get<std::uint32_t>(data.data() + 8));
     };
     switch (h->command) {
     case aoe::Command::read:
         return sdo([&](std::uint16_t index, std::uint8_t sub, bool complete, std::uint32_t most) {
-            std::size_t n = 0;
-            const std::size_t space = out.mailbox() - mailbox_header_bytes - aoe::header_bytes - aoe::read_response_bytes;
+            std::size_t                   n = 0;
+            const std::size_t             space = out.mailbox() - mailbox_header_bytes - aoe::header_bytes - aoe::read_response_bytes;
             const std::span<std::uint8_t> space_for(to + aoe::read_response_bytes, std::min<std::size_t>(space, most));
-            const auto code = dictionary_->read(index, sub, complete, state, space_for, n);
+            const auto                    code = dictionary_->read(index, sub, complete, state, space_for, n);
             put(to, code), put(to + 4, static_cast<std::uint32_t>(n));
             respond(aoe::read_response_bytes + n);
         });

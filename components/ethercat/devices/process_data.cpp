@@ -40,8 +40,8 @@ void ProcessData::build() noexcept {
             if (e.sub == 0 || e.sub > dictionary_->count(*pdo)) continue;
             const auto mapping = coe::Mapping::of(get<std::uint32_t>(dictionary_->data(e)));
             if (mapping.index != 0 && used_ < copies_.size())
-                if (auto* data = dictionary_->at(mapping.index, mapping.sub)) copies_[used_++] = {data, static_cast<std::uint32_t>(bits_),
-                    mapping.bits};
+                if (auto* data = dictionary_->at(mapping.index, mapping.sub))
+                    copies_[used_++] = {data, static_cast<std::uint32_t>(bits_), mapping.bits};
             bits_ += mapping.bits;
         }
     }
@@ -49,8 +49,8 @@ void ProcessData::build() noexcept {
 
 void ProcessData::unpack(std::span<const std::uint8_t> from) noexcept {
     for (std::size_t i = 0; i < used_; ++i)
-        if (copies_[i].bit + copies_[i].bits <= from.size() * 8) copy_bits(copies_[i].data, 0, from.data(), copies_[i].bit,
-            copies_[i].bits);
+        if (copies_[i].bit + copies_[i].bits <= from.size() * 8)
+            copy_bits(copies_[i].data, 0, from.data(), copies_[i].bit, copies_[i].bits);
 }
 
 void ProcessData::pack(std::span<std::uint8_t> to) const noexcept {
@@ -87,8 +87,8 @@ std::uint32_t ProcessData::check(const DictionaryObject& o, const DictionaryEntr
     else
         for (const auto& slot : o.entries)
             if (slot.sub != 0 && slot.sub <= count)
-                if (const auto* pdo = dictionary_->find(get<std::uint16_t>(dictionary_->data(slot)))) bits += pdo_bits(*pdo,
-                    dictionary_->count(*pdo));
+                if (const auto* pdo = dictionary_->find(get<std::uint16_t>(dictionary_->data(slot))))
+                    bits += pdo_bits(*pdo, dictionary_->count(*pdo));
     return (bits + 7) / 8 > most_bytes_ ? coe::abort::pdo_too_long : 0;
 }
 

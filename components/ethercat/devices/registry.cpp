@@ -32,8 +32,8 @@ const DeviceRow* device_row(std::string_view name) {
 }
 
 bool offers(const DeviceRow& row, std::string_view option) {
-    return option == "alias" || option == "serial" || (" " + std::string(row.options) + " ").find(" " + std::string(option) + " ") !=
-        std::string::npos;
+    return option == "alias" || option == "serial" ||
+           (" " + std::string(row.options) + " ").find(" " + std::string(option) + " ") != std::string::npos;
 }
 
 std::string list_of_names() {
@@ -49,12 +49,17 @@ std::string set_option(DeviceOptions& o, std::string_view key, std::string_view 
         o.dc_required = value == "required";
         return {};
     }
-    const std::uint64_t most = key == "bits" ? 64 : key == "channels" ? 16 : key == "axes" ? 8 : key == "modes" ? 0x3ff : key == "alias" ? 0xffff : 0xffffffff;
+    const std::uint64_t most = key == "bits"       ? 64
+                               : key == "channels" ? 16
+                               : key == "axes"     ? 8
+                               : key == "modes"    ? 0x3ff
+                               : key == "alias"    ? 0xffff
+                                                   : 0xffffffff;
     const std::uint64_t least = key == "alias" || key == "serial" ? 0 : 1;
-    const auto number = parse_natural(value);
+    const auto          number = parse_natural(value);
     if (!number || *number < least || *number > most)
         return "invalid value '" + std::string(value) + "' of " + std::string(key) + "; use " + std::to_string(least) + ".." +
-            std::to_string(most);
+               std::to_string(most);
     if (key == "bits") o.bits = static_cast<unsigned>(*number);
     else if (key == "channels") o.channels = static_cast<unsigned>(*number);
     else if (key == "modes") o.modes = static_cast<std::uint32_t>(*number);
@@ -75,7 +80,7 @@ std::vector<std::string_view> names() {
 std::optional<Device> make(std::string_view name, const DeviceOptions& options) {
     const auto* row = device_row(name);
     if (row == nullptr) return std::nullopt;
-    Parts parts = row->make(options);
+    Parts  parts = row->make(options);
     Device device;
     device.name = std::string(name);
     device.sii = sii::build(parts.design.sii);
@@ -85,21 +90,21 @@ std::optional<Device> make(std::string_view name, const DeviceOptions& options) 
 }
 
 LineDescription read_line(std::string_view text) {
-    LineDescription out;
+    LineDescription           out;
     text::Messages<LineTopic> messages;
     for (text::Lines lines(text); auto line = lines.next();) {
-        const auto words = text::words_of(*line);
+        const auto  words = text::words_of(*line);
         const auto* row = device_row(words[0].text);
         if (row == nullptr) {
             messages.error(LineTopic::device, words[0].at, "unknown device '" + words[0].text + "'", "use one of: " + list_of_names());
             continue;
         }
         LineDescription::Slave slave{words[0].text, {}, words[0].at};
-        bool good = true;
+        bool                   good = true;
         for (std::size_t n = 1; n < words.size(); ++n) {
-            const auto equals = words[n].text.find('=');
+            const auto        equals = words[n].text.find('=');
             const std::string key = words[n].text.substr(0, equals);
-            std::string problem;
+            std::string       problem;
             if (equals == std::string::npos && device_row(words[n].text) != nullptr)
                 problem = "'" + words[n].text + "' is a device of its own; write it on the next line, or after a comma";
             else if (equals == std::string::npos) problem = "option '" + key + "' has no value; write " + key + "=VALUE";
@@ -107,14 +112,14 @@ LineDescription read_line(std::string_view text) {
             else problem = set_option(slave.options, key, std::string_view(words[n].text).substr(equals + 1));
             if (problem.empty()) continue;
             good = false;
-            messages.error(LineTopic::option, words[n].at, problem,
-                           "options of " + words[0].text + ": " + std::string(row->options) + (row->options.empty() ? "" : " ") +
-                           "alias serial");
+            messages.error(
+                LineTopic::option, words[n].at, problem,
+                "options of " + words[0].text + ": " + std::string(row->options) + (row->options.empty() ? "" : " ") + "alias serial");
         }
         if (good) out.slaves.push_back(std::move(slave));
     }
-    if (out.slaves.empty() && !messages.failed()) messages.error(LineTopic::device, {}, "the line has no device",
-        "write one device per line");
+    if (out.slaves.empty() && !messages.failed())
+        messages.error(LineTopic::device, {}, "the line has no device", "write one device per line");
     for (std::size_t i = 0; i < out.slaves.size(); ++i)
         for (std::size_t k = 0; k < i; ++k)
             if (out.slaves[i].options.alias != 0 && out.slaves[i].options.alias == out.slaves[k].options.alias)

@@ -22,11 +22,11 @@ namespace hal::ethercat::devices {
 
 /// An emulated slave: its firmware, and what its controller needs.
 struct Device {
-    std::string name;                   ///< as in the registry
+    std::string               name;                   ///< as in the registry
     std::unique_ptr<Firmware> firmware;
     std::vector<std::uint8_t> sii;      ///< contents of its EEPROM
-    unsigned ports = 2;
-    bool dc = false;                    ///< the controller has distributed clocks
+    unsigned                  ports = 2;
+    bool                      dc = false;                    ///< the controller has distributed clocks
 };
 
 /// Makes a device; nullopt for an unknown name.
@@ -38,11 +38,11 @@ enum class LineTopic : std::uint8_t { device, option };
 /// A line as its description has it.
 struct LineDescription {
     struct Slave {
-        std::string device;
+        std::string   device;
         DeviceOptions options;
-        text::Span at;
+        text::Span    at;
     };
-    std::vector<Slave> slaves;
+    std::vector<Slave>                    slaves;
     std::vector<text::Message<LineTopic>> messages;
 };
 /// Reads the description of a line; invalid lines are reported in `messages` and left out.

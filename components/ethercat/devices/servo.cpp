@@ -22,14 +22,36 @@ double limited_step(double from, double to, double most) noexcept { return from 
 
 ServoAxis::ServoAxis(Dictionary& d, unsigned axis) {
     const auto at = [&](std::uint16_t index, std::uint8_t sub = 0) { return d.at(canopen::cia402::of_axis(index, axis), sub); };
-    d_ = {at(o402::controlword), at(o402::statusword), at(o402::modes_of_operation), at(o402::modes_of_operation_display),
-    at(o402::position_actual),
-          at(o402::velocity_actual), at(o402::torque_actual), at(o402::target_position), at(o402::target_velocity), at(o402::target_torque),
-          at(o402::velocity_offset), at(o402::position_offset), at(o402::error_code), at(o402::following_error_actual),
-          at(o402::following_error_window), at(o402::profile_velocity), at(o402::profile_acceleration), at(o402::profile_deceleration),
-          at(o402::quick_stop_deceleration), at(o402::max_profile_velocity), at(o402::software_position_limit, 1),
-          at(o402::software_position_limit, 2), at(o402::homing_method), at(o402::homing_speeds, 1), at(o402::home_offset),
-          at(o402::digital_inputs), at(o402::digital_outputs, 1), at(o402::max_torque), at(o402::position_demand), at(o402::supported_modes)};
+    d_ = {at(o402::controlword),
+          at(o402::statusword),
+          at(o402::modes_of_operation),
+          at(o402::modes_of_operation_display),
+          at(o402::position_actual),
+          at(o402::velocity_actual),
+          at(o402::torque_actual),
+          at(o402::target_position),
+          at(o402::target_velocity),
+          at(o402::target_torque),
+          at(o402::velocity_offset),
+          at(o402::position_offset),
+          at(o402::error_code),
+          at(o402::following_error_actual),
+          at(o402::following_error_window),
+          at(o402::profile_velocity),
+          at(o402::profile_acceleration),
+          at(o402::profile_deceleration),
+          at(o402::quick_stop_deceleration),
+          at(o402::max_profile_velocity),
+          at(o402::software_position_limit, 1),
+          at(o402::software_position_limit, 2),
+          at(o402::homing_method),
+          at(o402::homing_speeds, 1),
+          at(o402::home_offset),
+          at(o402::digital_inputs),
+          at(o402::digital_outputs, 1),
+          at(o402::max_torque),
+          at(o402::position_demand),
+          at(o402::supported_modes)};
 }
 
 void ServoAxis::power_on() noexcept {
@@ -52,11 +74,11 @@ void ServoAxis::fault(std::uint16_t code, Step& s) noexcept {
 
 void ServoAxis::walk(const Step& s) noexcept {
     const std::uint16_t word = s.outputs_valid ? get<std::uint16_t>(d_.control) : std::uint16_t{0};
-    const bool reset = (word & control::fault_reset) != 0 && (control_ & control::fault_reset) == 0;
+    const bool          reset = (word & control::fault_reset) != 0 && (control_ & control::fault_reset) == 0;
     control_ = word;
     const unsigned command = word & 0x0fU;
-    const bool voltage = (command & 2) != 0, quick = voltage && (command & 4) == 0;
-    const bool shutdown = (command & 7) == 6, on = (command & 15) == 7, enable = (command & 15) == 15;
+    const bool     voltage = (command & 2) != 0, quick = voltage && (command & 4) == 0;
+    const bool     shutdown = (command & 7) == 6, on = (command & 15) == 7, enable = (command & 15) == 15;
     switch (state_) {
     case DriveState::fault:
         if (reset) state_ = DriveState::switch_on_disabled, put<std::uint16_t>(d_.error_code, 0), following_fault_ = false;
@@ -98,16 +120,16 @@ double ServoAxis::toward(double target, double dt) noexcept {
     }
     const double braking = std::sqrt(2 * deceleration * std::abs(distance));
     const double wanted = std::copysign(std::min({most, braking, std::abs(distance) / dt}), distance);
-    const bool brakes = std::abs(wanted) < std::abs(velocity_);
+    const bool   brakes = std::abs(wanted) < std::abs(velocity_);
     return limited_step(velocity_, wanted, (brakes ? 4 * deceleration : acceleration) * dt);
 }
 
 double ServoAxis::homing_velocity(double dt) noexcept {
-    const int method = static_cast<std::int8_t>(*d_.homing_method);
+    const int  method = static_cast<std::int8_t>(*d_.homing_method);
     const bool start = (control_ & control::start_homing) != 0;
     if (!start) homing_ = false;
-    else if (!homing_ && !homed_) homing_ = true, home_at_ = method == 37 || method == 35 ? position_ : std::floor(position_ / 10'000) *
-        10'000;
+    else if (!homing_ && !homed_)
+        homing_ = true, home_at_ = method == 37 || method == 35 ? position_ : std::floor(position_ / 10'000) * 10'000;
     if (!homing_ || homed_) return 0;
     const double speed = get<std::uint32_t>(d_.homing_speed);
     const double distance = home_at_ - position_;
@@ -129,7 +151,7 @@ double ServoAxis::wanted_velocity(double dt, bool operational) noexcept {
     };
     switch (static_cast<Mode>(mode_)) {
     case Mode::cyclic_position: {
-        double target = get<std::int32_t>(d_.target_position) + static_cast<double>(get<std::int32_t>(d_.position_offset));
+        double       target = get<std::int32_t>(d_.target_position) + static_cast<double>(get<std::int32_t>(d_.position_offset));
         const double low = get<std::int32_t>(d_.low_limit), high = get<std::int32_t>(d_.high_limit);
         if (low < high) {
             limited_ = target < low || target > high;
@@ -138,8 +160,8 @@ double ServoAxis::wanted_velocity(double dt, bool operational) noexcept {
         demand_ = target - offset_;
         return limit((demand_ - position_) / dt);
     }
-    case Mode::cyclic_velocity: return limit(get<std::int32_t>(d_.target_velocity) +
-        static_cast<double>(get<std::int32_t>(d_.velocity_offset)));
+    case Mode::cyclic_velocity:
+        return limit(get<std::int32_t>(d_.target_velocity) + static_cast<double>(get<std::int32_t>(d_.velocity_offset)));
     case Mode::profile_velocity: {
         const double target = (control_ & control::halt) != 0 ? 0.0 : limit(get<std::int32_t>(d_.target_velocity));
         const double rate = get<std::uint32_t>(std::abs(target) > std::abs(velocity_) ? d_.profile_acceleration : d_.profile_deceleration);
@@ -181,10 +203,13 @@ std::uint16_t ServoAxis::status_bits() const noexcept {
     if (reached_) word |= status::target_reached;
     if (following_fault_) word |= status::following_error;
     if (state_ == DriveState::operation_enabled) switch (static_cast<Mode>(mode_)) {
-        case Mode::cyclic_position: case Mode::cyclic_velocity: case Mode::cyclic_torque: word |= status::follows_command; break;
+        case Mode::cyclic_position:
+        case Mode::cyclic_velocity:
+        case Mode::cyclic_torque: word |= status::follows_command; break;
         case Mode::profile_position: word |= acknowledged_ ? status::set_point_acknowledge : 0U; break;
         case Mode::profile_velocity: word |= velocity_ == 0.0 ? status::speed_is_zero : 0U; break;
-        case Mode::homing: word |= homed_ ? status::homing_attained | status::target_reached : homing_ ? 0U : status::target_reached + 0U;
+        case Mode::homing:
+            word |= homed_ ? status::homing_attained | status::target_reached : homing_ ? 0U : status::target_reached + 0U;
             break;
         default: break;
         }
@@ -221,7 +246,7 @@ void ServoAxis::step(Step& s) noexcept {
         }
     }
     const double error = enabled && static_cast<Mode>(mode_) == Mode::cyclic_position ? demand_ - position_ : 0;
-    const auto window = get<std::uint32_t>(d_.following_window);
+    const auto   window = get<std::uint32_t>(d_.following_window);
     if (window != 0xffffffff && std::abs(error) > window) following_fault_ = true, fault(canopen::cia402::error::following_error, s);
     const auto shown = [](double v) { return static_cast<std::int32_t>(static_cast<std::int64_t>(std::llround(v))); };
     put(d_.position, shown(position_ + offset_)), put(d_.velocity, shown(velocity_)), put(d_.demand, shown(demand_ + offset_));

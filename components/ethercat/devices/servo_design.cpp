@@ -13,7 +13,7 @@ void add_axis(Dictionary& d, unsigned axis, std::uint32_t modes) {
     namespace t = coe::type;
     namespace access = coe::access;
     constexpr std::uint16_t ro = access::read | access::tx_mappable, rw = access::read_write, rx = rw | access::rx_mappable,
-        both = rx | access::tx_mappable;
+                            both = rx | access::tx_mappable;
     const auto at = [&](std::uint16_t index) { return canopen::cia402::of_axis(index, axis); };
     const auto add = [&](std::uint16_t index, const char* name, std::uint16_t type, std::uint16_t rights, std::int64_t initial = 0) {
         d.variable(at(index), name, type, rights, static_cast<std::uint64_t>(initial));
@@ -26,8 +26,8 @@ void add_axis(Dictionary& d, unsigned axis, std::uint32_t modes) {
     d.limit(0, std::bit_width(modes & 0x3a5U));
     add(o402::modes_of_operation_display, "Modes of operation display", t::s8, ro);
     add(o402::position_demand, "Position demand value", t::s32, ro), add(o402::position_actual, "Position actual value", t::s32, ro);
-    add(o402::following_error_window, "Following error window", t::u32, rw, 0xffffffff), add(o402::following_error_timeout,
-        "Following error timeout", t::u16, rw);
+    add(o402::following_error_window, "Following error window", t::u32, rw, 0xffffffff),
+        add(o402::following_error_timeout, "Following error timeout", t::u16, rw);
     add(o402::velocity_actual, "Velocity actual value", t::s32, ro), add(o402::target_torque, "Target torque", t::s16, rx);
     add(o402::max_torque, "Max torque", t::u16, rx, 3000), add(o402::motor_rated_torque, "Motor rated torque", t::u32, rw, 1000);
     add(o402::torque_actual, "Torque actual value", t::s16, ro), add(o402::target_position, "Target position", t::s32, both);
@@ -35,8 +35,8 @@ void add_axis(Dictionary& d, unsigned axis, std::uint32_t modes) {
     d.record(at(o402::software_position_limit), "Software position limit", 2, coe::ObjectCode::array);
     d.sub(1, "Min position limit", t::s32, rw, 0), d.sub(2, "Max position limit", t::s32, rw, 0);
     add(o402::max_profile_velocity, "Max profile velocity", t::u32, rx, 2'000'000);
-    add(o402::profile_velocity, "Profile velocity", t::u32, rx, 100'000), add(o402::profile_acceleration, "Profile acceleration", t::u32,
-        rx, 1'000'000);
+    add(o402::profile_velocity, "Profile velocity", t::u32, rx, 100'000),
+        add(o402::profile_acceleration, "Profile acceleration", t::u32, rx, 1'000'000);
     add(o402::profile_deceleration, "Profile deceleration", t::u32, rx, 1'000'000);
     add(o402::quick_stop_deceleration, "Quick stop deceleration", t::u32, rw, 10'000'000);
     add(o402::motion_profile_type, "Motion profile type", t::s16, rw), add(o402::homing_method, "Homing method", t::s8, rx, 37);
@@ -74,16 +74,22 @@ Parts make_servo(const DeviceOptions& options) {
     add_sync(d, 0x1c32, "SM output parameter", true), add_sync(d, 0x1c33, "SM input parameter", false);
     for (unsigned n = 0; n < options.axes; ++n) add_axis(d, n, options.modes);
     for (unsigned n = 0; n < options.axes; ++n) {
-        const auto at = [&](std::uint16_t index) { return canopen::cia402::of_axis(index, n); };
+        const auto        at = [&](std::uint16_t index) { return canopen::cia402::of_axis(index, n); };
         const std::string axis = options.axes == 1 ? "" : " axis " + std::to_string(n + 1);
         b.pdo(true, static_cast<std::uint16_t>(coe::rx_pdo + 0x10 * n), "Outputs" + axis,
-              {{at(o402::controlword), 0, "Controlword"}, {at(o402::modes_of_operation), 0, "Modes of operation"},
-               {at(o402::target_position), 0, "Target position"}, {at(o402::target_velocity), 0, "Target velocity"},
-               {at(o402::target_torque), 0, "Target torque"}}, true, 12);
+              {{at(o402::controlword), 0, "Controlword"},
+               {at(o402::modes_of_operation), 0, "Modes of operation"},
+               {at(o402::target_position), 0, "Target position"},
+               {at(o402::target_velocity), 0, "Target velocity"},
+               {at(o402::target_torque), 0, "Target torque"}},
+              true, 12);
         b.pdo(false, static_cast<std::uint16_t>(coe::tx_pdo + 0x10 * n), "Inputs" + axis,
-              {{at(o402::statusword), 0, "Statusword"}, {at(o402::modes_of_operation_display), 0, "Modes of operation display"},
-               {at(o402::position_actual), 0, "Position actual value"}, {at(o402::velocity_actual), 0, "Velocity actual value"},
-               {at(o402::torque_actual), 0, "Torque actual value"}}, true, 12);
+              {{at(o402::statusword), 0, "Statusword"},
+               {at(o402::modes_of_operation_display), 0, "Modes of operation display"},
+               {at(o402::position_actual), 0, "Position actual value"},
+               {at(o402::velocity_actual), 0, "Velocity actual value"},
+               {at(o402::torque_actual), 0, "Torque actual value"}},
+              true, 12);
     }
     b.dc(options.dc_required);
     b.design().sii.general.ds402_channels = static_cast<std::uint8_t>(options.axes);

@@ -14,11 +14,11 @@ std::int64_t Clock::at(std::int64_t now_ns) const noexcept {
 static constexpr std::int64_t never_ns = 1'000'000'000'000'000'000;
 
 std::int64_t Clock::time_of(std::int64_t local_ns) const noexcept {
-    const double       rate = drift_ + correction_;
-    const auto         left = static_cast<std::int64_t>(static_cast<std::uint64_t>(local_ns) - static_cast<std::uint64_t>(base_local_));
+    const double rate = drift_ + correction_;
+    const auto   left = static_cast<std::int64_t>(static_cast<std::uint64_t>(local_ns) - static_cast<std::uint64_t>(base_local_));
     if (left > never_ns || left < -never_ns) return INT64_MAX;
-    const double       ahead = (static_cast<double>(left) * rate + fraction_) / (1.0 + rate);
-    std::int64_t       now = base_now_ + left - static_cast<std::int64_t>(std::floor(ahead));
+    const double ahead = (static_cast<double>(left) * rate + fraction_) / (1.0 + rate);
+    std::int64_t now = base_now_ + left - static_cast<std::int64_t>(std::floor(ahead));
     for (int i = 0; i < 4 && at(now) < local_ns; ++i) ++now;
     for (int i = 0; i < 4 && at(now - 1) >= local_ns; ++i) --now;
     return now;

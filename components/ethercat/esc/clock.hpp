@@ -23,14 +23,14 @@ public:
 
     std::int64_t at(std::int64_t now_ns) const noexcept;         ///< Returns the local time, ns.
     std::int64_t time_of(std::int64_t local_ns) const noexcept;  ///< Returns the first segment time at which at() reaches `local_ns`.
-    double drift_ppm() const noexcept { return drift_ * 1e6; }
-    double correction() const noexcept { return correction_; }
+    double       drift_ppm() const noexcept { return drift_ * 1e6; }
+    double       correction() const noexcept { return correction_; }
 
 private:
     void rebase(std::int64_t now_ns) noexcept;
 
     std::int64_t base_now_ = 0, base_local_ = 0;
-    double fraction_ = 0, drift_ = 0, correction_ = 0;
+    double       fraction_ = 0, drift_ = 0, correction_ = 0;
 };
 
 }  // namespace hal::ethercat::esc

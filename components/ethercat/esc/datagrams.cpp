@@ -73,7 +73,8 @@ void Controller::physical(const DatagramView& d, bool reads, bool writes, bool b
         if (writes && write(address, data, nullptr)) wkc = static_cast<std::uint16_t>(wkc + 2);
         if (accepted) {
             ++wkc;
-            if (broadcast) for (std::size_t i = 0; i < data.size(); ++i) data[i] |= old[i];
+            if (broadcast)
+                for (std::size_t i = 0; i < data.size(); ++i) data[i] |= old[i];
             else std::copy(old.begin(), old.end(), data.begin());
         }
         touched_ |= !broadcast;
@@ -119,7 +120,7 @@ struct Part {
         in_memory = u.physical_bit + first - u.first_bit;
     }
     std::uint32_t address() const noexcept { return static_cast<std::uint32_t>(in_memory / 8); }
-    std::size_t bytes() const noexcept { return static_cast<std::size_t>((in_memory + bits + 7) / 8 - in_memory / 8); }
+    std::size_t   bytes() const noexcept { return static_cast<std::size_t>((in_memory + bits + 7) / 8 - in_memory / 8); }
 };
 
 bool bit(const std::uint8_t* from, std::uint64_t at) noexcept { return (from[at / 8] >> at % 8 & 1) != 0; }
@@ -154,8 +155,8 @@ bool Controller::write_logical(const Fmmus::Unit& unit, const DatagramView& d, c
         logical_bits::set_bit(bytes.data(), shift + i, logical_bits::bit(data, part.in_frame + i));
         logical_bits::set_bit(mask.data(), shift + i, true);
     }
-    const bool outputs = part.address() >= datagram_facts::digital_outputs &&
-                         part.address() + part.bytes() <= datagram_facts::digital_outputs_end;
+    const bool outputs =
+        part.address() >= datagram_facts::digital_outputs && part.address() + part.bytes() <= datagram_facts::digital_outputs_end;
     return write(part.address(), {bytes.data(), part.bytes()}, settings_.bit_writes || outputs ? mask.data() : nullptr);
 }
 

@@ -24,8 +24,7 @@ void DistributedClock::reset(std::int64_t now_ns, std::int64_t local_ns) noexcep
 
 void DistributedClock::arrive(unsigned port, std::int64_t now_ns, std::uint64_t number) noexcept {
     seen_[port] = {number, now_ns};
-    if (number == latched_frame_)
-        put(memory_ + registers::dc_receive_time + 4 * port, static_cast<std::uint32_t>(clock_.at(now_ns)));
+    if (number == latched_frame_) put(memory_ + registers::dc_receive_time + 4 * port, static_cast<std::uint32_t>(clock_.at(now_ns)));
 }
 
 void DistributedClock::latch_receive_times(std::int64_t unit_ns, std::uint64_t number) noexcept {
@@ -88,7 +87,7 @@ void DistributedClock::clear_filters(std::int64_t now_ns) noexcept {
 void DistributedClock::clock_changed(std::int64_t now_ns) noexcept {
     if (!sync0_on_) return;
     const std::int64_t time = system_time(now_ns), cycle = sync_.sync0_cycle_ns;
-    const auto behind = [&](std::int64_t pulse) {
+    const auto         behind = [&](std::int64_t pulse) {
         return static_cast<std::int64_t>(static_cast<std::uint64_t>(time) - static_cast<std::uint64_t>(pulse));
     };
     const bool skips = cycle > 0 && sync0_dc_ != INT64_MAX && behind(sync0_dc_) > cycle;  // after a jump
@@ -99,7 +98,7 @@ void DistributedClock::clock_changed(std::int64_t now_ns) noexcept {
 
 void DistributedClock::activate(std::int64_t now_ns) noexcept {
     if (!present_) return;
-    const std::uint8_t activation = memory_[registers::dc_activation];
+    const std::uint8_t      activation = memory_[registers::dc_activation];
     constexpr std::uint32_t shortest_cycle_ns = 10'000;
     sync_.sync0_cycle_ns = get<std::uint32_t>(memory_ + registers::dc_sync0_cycle);
     if (sync_.sync0_cycle_ns != 0) sync_.sync0_cycle_ns = std::max(sync_.sync0_cycle_ns, shortest_cycle_ns);

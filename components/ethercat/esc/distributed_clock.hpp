@@ -35,10 +35,10 @@ public:
     void clear_filters(std::int64_t now_ns) noexcept;
 
     /// Takes a write to 0981h: starts or stops SYNC0 and SYNC1.
-    void activate(std::int64_t now_ns) noexcept;
+    void         activate(std::int64_t now_ns) noexcept;
     std::int64_t next_pulse_ns() const noexcept { return next_ns_; }  ///< Returns the time of the next pulse; INT64_MAX: none.
     /// Generates the pulse that is due. Returns the AL event bits (0220h) that it sets.
-    std::uint32_t pulse() noexcept;
+    std::uint32_t    pulse() noexcept;
     const Pdi::Sync& sync() const noexcept { return sync_; }
 
     /// Latches an edge of input 0 or 1.
@@ -50,17 +50,20 @@ private:
     void find_next() noexcept;
 
     std::uint8_t* memory_ = nullptr;
-    bool present_ = false, wide_ = true;
-    Clock clock_;
-    struct Seen { std::uint64_t number = 0; std::int64_t time_ns = 0; };
+    bool          present_ = false, wide_ = true;
+    Clock         clock_;
+    struct Seen {
+        std::uint64_t number = 0;
+        std::int64_t  time_ns = 0;
+    };
     std::array<Seen, 4> seen_;
-    std::uint64_t latched_frame_ = 0;
+    std::uint64_t       latched_frame_ = 0;
 
     std::int64_t last_step_ns_ = INT64_MIN;  ///< local time of the last step of the control loop
-    double filtered_ = 0, speed_ = 0;
+    double       filtered_ = 0, speed_ = 0;
 
-    Pdi::Sync sync_;
-    bool sync0_on_ = false, sync1_on_ = false;
+    Pdi::Sync    sync_;
+    bool         sync0_on_ = false, sync1_on_ = false;
     std::int64_t sync0_dc_ = INT64_MAX, sync1_dc_ = INT64_MAX;  ///< system time of the next pulses
     std::int64_t next_ns_ = INT64_MAX;
 };

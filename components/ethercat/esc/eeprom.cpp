@@ -30,11 +30,10 @@ void Eeprom::load(std::int64_t) noexcept {
 void Eeprom::reload(bool power_on) noexcept {
     constexpr std::uint16_t ignored_checksum = 0x88a4, pulse_length = 0x0982;
     constexpr std::size_t   checksum_at = 14;
-    auto status = get<std::uint16_t>(memory_ + registers::eeprom_control);
+    auto                    status = get<std::uint16_t>(memory_ + registers::eeprom_control);
     status &= static_cast<std::uint16_t>(~(eeprom_bits::bad_checksum | eeprom_bits::not_loaded));
     loaded_ = content_.size() > checksum_at + 1 && !damaged_ &&
-              (get<std::uint16_t>(&content_[checksum_at]) == ignored_checksum ||
-               content_[checksum_at] == sii::checksum(content_));
+              (get<std::uint16_t>(&content_[checksum_at]) == ignored_checksum || content_[checksum_at] == sii::checksum(content_));
     if (loaded_) {
         std::copy_n(&content_[0], 2, memory_ + registers::pdi_control);
         std::copy_n(&content_[2], 2, memory_ + registers::pdi_control + 0x10);

@@ -28,15 +28,15 @@ public:
     void damage(bool damaged) noexcept { damaged_ = damaged; }
 
 private:
-    void execute(bool write_enabled, std::int64_t now_ns) noexcept;
-    void reload(bool power_on) noexcept;
+    void         execute(bool write_enabled, std::int64_t now_ns) noexcept;
+    void         reload(bool power_on) noexcept;
     std::uint8_t byte(std::size_t at) const noexcept { return at < content_.size() ? content_[at] : 0xff; }
 
-    std::uint8_t* memory_ = nullptr;
+    std::uint8_t*             memory_ = nullptr;
     std::vector<std::uint8_t> content_;
-    std::int64_t read_ns_ = 0, write_ns_ = 0, busy_until_ns_ = INT64_MIN, chip_busy_until_ns_ = INT64_MIN;
-    unsigned failures_ = 0;
-    bool loaded_ = false, damaged_ = false, reads_8_ = true;
+    std::int64_t              read_ns_ = 0, write_ns_ = 0, busy_until_ns_ = INT64_MIN, chip_busy_until_ns_ = INT64_MIN;
+    unsigned                  failures_ = 0;
+    bool                      loaded_ = false, damaged_ = false, reads_8_ = true;
 };
 
 }  // namespace hal::ethercat::esc

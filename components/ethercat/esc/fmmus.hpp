@@ -16,8 +16,8 @@ public:
     struct Unit {
         std::uint64_t first_bit = 0, bits = 0;  ///< logical, in bits
         std::uint32_t physical_bit = 0;
-        bool reads = false, writes = false;
-        bool bytes = false;                     ///< whole bytes on both sides
+        bool          reads = false, writes = false;
+        bool          bytes = false;                     ///< whole bytes on both sides
     };
 
     void connect(const std::uint8_t* memory, unsigned count) noexcept { memory_ = memory, count_ = count; }
@@ -26,17 +26,17 @@ public:
     void configure() noexcept;
 
     /// Returns whether an active FMMU maps a part of a datagram. Logical addresses in bytes.
-    bool hit(std::uint64_t address, std::size_t length) const noexcept { return address < end_ && address + length > first_; }
+    bool        hit(std::uint64_t address, std::size_t length) const noexcept { return address < end_ && address + length > first_; }
     const Unit* begin() const noexcept { return units_.data(); }
     const Unit* end() const noexcept { return units_.data() + used_; }
-    bool overlap() const noexcept { return overlap_; }  ///< Returns whether a byte is both read and written.
+    bool        overlap() const noexcept { return overlap_; }  ///< Returns whether a byte is both read and written.
 
 private:
-    const std::uint8_t* memory_ = nullptr;
-    unsigned count_ = 0, used_ = 0;
+    const std::uint8_t*    memory_ = nullptr;
+    unsigned               count_ = 0, used_ = 0;
     std::array<Unit, most> units_;  ///< active ones
-    std::uint64_t first_ = ~std::uint64_t{0}, end_ = 0;
-    bool overlap_ = false;
+    std::uint64_t          first_ = ~std::uint64_t{0}, end_ = 0;
+    bool                   overlap_ = false;
 };
 
 }  // namespace hal::ethercat::esc

@@ -8,7 +8,7 @@
 namespace hal::ethercat::esc {
 
 namespace line_facts {
-constexpr std::int64_t smallest_frame = 60, overhead = 4;  ///< bytes; overhead: the check sequence
+constexpr std::int64_t  smallest_frame = 60, overhead = 4;  ///< bytes; overhead: the check sequence
 constexpr std::uint16_t circulating = 0x4000;
 /// Returns the port that follows in a controller: 0, 3, 1, 2.
 constexpr unsigned next_port(unsigned port) noexcept { return std::array{3U, 2U, 0U, 1U}[port]; }
@@ -113,12 +113,12 @@ std::uint64_t Line::hits(int number) const noexcept {
 
 struct Line::Walk {
     std::span<std::uint8_t> frame;
-    Controller::Frame content;
-    std::int64_t time_ns = 0;
-    bool ethercat = false;   ///< a frame with datagrams
-    bool corrupted = false, marked = false;  ///< marked: a controller has seen the wrong check sequence
-    unsigned copies = 1;
-    Passage out;
+    Controller::Frame       content;
+    std::int64_t            time_ns = 0;
+    bool                    ethercat = false;   ///< a frame with datagrams
+    bool                    corrupted = false, marked = false;  ///< marked: a controller has seen the wrong check sequence
+    unsigned                copies = 1;
+    Passage                 out;
 };
 
 void Line::advance(std::int64_t now_ns) noexcept {

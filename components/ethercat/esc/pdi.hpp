@@ -29,9 +29,9 @@ public:
     /// Settings of a sync manager as the master wrote them.
     struct SyncManager {
         std::uint16_t start = 0, length = 0;
-        std::uint8_t control = 0;
-        bool enabled = false;
-        bool repeat_request = false;  ///< 0806h bit 1
+        std::uint8_t  control = 0;
+        bool          enabled = false;
+        bool          repeat_request = false;  ///< 0806h bit 1
     };
     virtual SyncManager sync_manager(unsigned number) const noexcept = 0;  ///< Returns the settings of a sync manager. [realtime]
 
@@ -48,14 +48,14 @@ public:
 
     /// State of the distributed clock unit.
     struct Sync {
-        bool active = false;              ///< SYNC0 is generated (0981h bits 0 and 1)
+        bool          active = false;  ///< SYNC0 is generated (0981h bits 0 and 1)
         std::uint32_t sync0_cycle_ns = 0, sync1_cycle_ns = 0;
-        std::uint64_t pulses = 0;         ///< SYNC0 pulses so far
-        std::int64_t last_pulse_ns = 0;   ///< time of the newest SYNC0 pulse, on the clock of run()
+        std::uint64_t pulses = 0;  ///< SYNC0 pulses so far
+        std::int64_t  last_pulse_ns = 0;  ///< time of the newest SYNC0 pulse, on the clock of run()
         std::uint64_t last_pulse_dc_ns = 0;  ///< the same, system time
     };
-    virtual Sync sync() const noexcept = 0;                          ///< Returns the state of SYNC0 and SYNC1. [realtime]
-    virtual std::int64_t last_frame_ns() const noexcept = 0;         ///< Returns when the newest process data frame passed. [realtime]
+    virtual Sync         sync() const noexcept = 0;  ///< Returns the state of SYNC0 and SYNC1. [realtime]
+    virtual std::int64_t last_frame_ns() const noexcept = 0;  ///< Returns when the newest process data frame passed. [realtime]
     /// Reads or writes a register or memory of the controller, without the rules of sync managers. [realtime]
     virtual std::uint8_t* memory(std::uint16_t address) noexcept = 0;
 };

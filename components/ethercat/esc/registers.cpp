@@ -14,19 +14,24 @@ namespace register_facts {
 
 struct Range {
     std::uint16_t first, length;
-    bool touched(std::uint32_t address, std::size_t count) const noexcept {
+    bool          touched(std::uint32_t address, std::size_t count) const noexcept {
         return address < first + std::uint32_t{length} && address + count > first;
     }
 };
 /// Registers that only keep what the master writes.
-constexpr Range plain[]{{registers::station_address, 2}, {registers::dl_control, 4}, {registers::ecat_event_mask, 2},
-                        {registers::watchdog_divider, 2}, {registers::pdi_watchdog, 2}, {registers::process_data_watchdog, 2},
-                        {registers::dc_system_time_offset, 8}, {registers::dc_system_time_delay, 4},
-                        {registers::dc_speed_counter_start, 2}, {registers::dc_filter_depth, 2}, {registers::dc_cyclic_unit_control, 2},
-                        {registers::dc_start_time, 8}, {registers::dc_sync0_cycle, 8}, {0x09a8, 2}};
+constexpr Range plain[]{{registers::station_address, 2},        {registers::dl_control, 4},
+                        {registers::ecat_event_mask, 2},        {registers::watchdog_divider, 2},
+                        {registers::pdi_watchdog, 2},           {registers::process_data_watchdog, 2},
+                        {registers::dc_system_time_offset, 8},  {registers::dc_system_time_delay, 4},
+                        {registers::dc_speed_counter_start, 2}, {registers::dc_filter_depth, 2},
+                        {registers::dc_cyclic_unit_control, 2}, {registers::dc_start_time, 8},
+                        {registers::dc_sync0_cycle, 8},         {0x09a8, 2}};
 /// Counters that a write to any of their bytes clears.
-constexpr Range counters[]{{registers::rx_errors, 12}, {registers::processing_unit_errors, 1}, {registers::pdi_errors, 1},
-                           {registers::lost_links, 4}, {registers::process_data_watchdog_counter, 2}};
+constexpr Range counters[]{{registers::rx_errors, 12},
+                           {registers::processing_unit_errors, 1},
+                           {registers::pdi_errors, 1},
+                           {registers::lost_links, 4},
+                           {registers::process_data_watchdog_counter, 2}};
 constexpr Range dl_control{registers::dl_control, 4}, dl_status{registers::dl_status, 2}, al_status{registers::al_status, 2},
     al_control{registers::al_control, 2}, eeprom_block{registers::eeprom_configuration, 16}, eeprom_status{registers::eeprom_control, 2},
     fmmus{registers::fmmu, 0x100}, sync_managers{registers::sync_manager, 0x80}, receive_time{registers::dc_receive_time, 1},
@@ -98,7 +103,10 @@ void Controller::write_registers(std::uint16_t address, std::span<const std::uin
     const auto covers = [&](const Range& range) { return range.touched(address, from.size()); };
     const auto byte = [&](unsigned reg) { return reg >= address && reg < address + from.size() ? from[reg - address] : memory_[reg]; };
     // The part of the written bytes that falls into a range, and where it starts.
-    struct Part { std::uint16_t address; std::span<const std::uint8_t> bytes; };
+    struct Part {
+        std::uint16_t                 address;
+        std::span<const std::uint8_t> bytes;
+    };
     const auto part = [&](const Range& range) {
         const std::size_t first = std::max<std::size_t>(range.first, address);
         const std::size_t end = std::min<std::size_t>(range.first + range.length, address + from.size());

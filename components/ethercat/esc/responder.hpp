@@ -26,14 +26,14 @@ public:
 private:
     struct Side final : ethernet::Responder {
         LineOnSegments* owner = nullptr;
-        End end = End::primary;
-        void arrived(std::span<std::uint8_t> frame, std::int64_t first_bit_ns) noexcept override;
+        End             end = End::primary;
+        void            arrived(std::span<std::uint8_t> frame, std::int64_t first_bit_ns) noexcept override;
     };
 
-    Line& line_;
+    Line&           line_;
     ethernet::Port* ports_[2];
-    Side sides_[2];
-    bool connected_ = false;
+    Side            sides_[2];
+    bool            connected_ = false;
 };
 
 /// What changes a line while serve() works it.

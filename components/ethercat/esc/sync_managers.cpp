@@ -11,7 +11,7 @@
 namespace hal::ethercat::esc {
 
 namespace sm_bytes {
-constexpr unsigned size = 8, control = 4, status = 5, activate = 6, pdi_control = 7;
+constexpr unsigned    size = 8, control = 4, status = 5, activate = 6, pdi_control = 7;
 constexpr std::size_t memory_size = 0x10000;
 }  // namespace sm_bytes
 
@@ -49,7 +49,7 @@ void SyncManagers::activate(unsigned number, bool on) noexcept {
     const std::size_t buffers = u.mailbox || u.length == 1 ? 1 : 3;
     u.enabled = on;
     constexpr unsigned first_memory = 0x0f00;  // registers of digital outputs are process data too
-    const bool fits = on && u.length > 0 && u.start >= first_memory && u.start + buffers * u.length <= sm_bytes::memory_size;
+    const bool         fits = on && u.length > 0 && u.start >= first_memory && u.start + buffers * u.length <= sm_bytes::memory_size;
     units_[number] = u;
     enabled_ = fits ? enabled_ | 1U << number : enabled_ & ~(1U << number);
 }

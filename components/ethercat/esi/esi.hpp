@@ -24,60 +24,60 @@ using Message = text::Message<Topic>;
 
 struct Entry {
     std::uint16_t index = 0;  ///< 0: a gap
-    std::uint8_t sub = 0;
+    std::uint8_t  sub = 0;
     std::uint16_t bits = 0;
-    std::string name, type;   ///< data type, such as "UINT"
+    std::string   name, type;   ///< data type, such as "UINT"
 };
 
 struct Pdo {
-    std::uint16_t index = 0;
-    std::string name;
+    std::uint16_t               index = 0;
+    std::string                 name;
     std::optional<std::uint8_t> sync_manager;  ///< set: assigned by default
-    bool fixed = false, mandatory = false;
-    std::vector<std::uint16_t> exclude;        ///< PDOs that cannot be assigned together with this one
-    std::vector<Entry> entries;
-    unsigned bits() const;
+    bool                        fixed = false, mandatory = false;
+    std::vector<std::uint16_t>  exclude;        ///< PDOs that cannot be assigned together with this one
+    std::vector<Entry>          entries;
+    unsigned                    bits() const;
 };
 
 struct SyncManager {
-    sii::SmType type{};
+    sii::SmType   type{};
     std::uint16_t start = 0, default_size = 0, min_size = 0, max_size = 0;
-    std::uint8_t control = 0, enable = 0;
+    std::uint8_t  control = 0, enable = 0;
 };
 
 /// A write at a transition.
 struct InitCmd {
     enum class Protocol : std::uint8_t { coe, soe } protocol = Protocol::coe;
-    std::vector<std::string> transitions;  ///< "IP", "PS", "SO", …
-    std::uint16_t index = 0;               ///< object or IDN
-    std::uint8_t sub = 0;                  ///< sub-index, or the drive number of SoE
-    bool complete = false;
+    std::vector<std::string>  transitions;  ///< "IP", "PS", "SO", …
+    std::uint16_t             index = 0;               ///< object or IDN
+    std::uint8_t              sub = 0;                  ///< sub-index, or the drive number of SoE
+    bool                      complete = false;
     std::vector<std::uint8_t> data;
-    std::string comment;
+    std::string               comment;
 };
 
 struct OpMode {
-    std::string name, description;
+    std::string   name, description;
     std::uint16_t assign_activate = 0;
-    std::int64_t sync0_cycle_ns = 0, sync1_cycle_ns = 0;  ///< 0: the master's cycle times the factor, if that is not 0
-    int sync0_factor = 1, sync1_factor = 0;
-    std::int64_t sync0_shift_ns = 0, sync1_shift_ns = 0;
+    std::int64_t  sync0_cycle_ns = 0, sync1_cycle_ns = 0;  ///< 0: the master's cycle times the factor, if that is not 0
+    int           sync0_factor = 1, sync1_factor = 0;
+    std::int64_t  sync0_shift_ns = 0, sync1_shift_ns = 0;
 };
 
 /// One value of the object dictionary.
 struct Value {
-    std::uint8_t sub = 0;
-    std::string name, type;
-    unsigned bits = 0;
+    std::uint8_t              sub = 0;
+    std::string               name, type;
+    unsigned                  bits = 0;
     std::vector<std::uint8_t> initial;  ///< as on the wire; may be empty
-    bool readable = true, writable = false, rx_mappable = false, tx_mappable = false;
+    bool                      readable = true, writable = false, rx_mappable = false, tx_mappable = false;
 };
 struct Object {
     enum class Code : std::uint8_t { variable = 7, array = 8, record = 9 } code = Code::variable;
-    std::uint16_t index = 0;
-    std::string name, type;
+    std::uint16_t      index = 0;
+    std::string        name, type;
     std::vector<Value> values;  ///< by sub-index
-    const Value* find(std::uint8_t sub) const;
+    const Value*       find(std::uint8_t sub) const;
 };
 
 struct Mailbox {
@@ -91,52 +91,52 @@ struct Timeouts {  ///< ms
 };
 
 struct Slot {
-    std::string name;
-    std::uint32_t default_module = 0;
+    std::string                name;
+    std::uint32_t              default_module = 0;
     std::vector<std::uint32_t> modules;
 };
 
 struct Device {
-    std::string order, name, group, physics;   ///< physics: Y MII, K EBUS, one letter per port
-    std::uint32_t product = 0, revision = 0, serial = 0;
-    Timeouts timeouts;
-    std::vector<sii::FmmuUse> fmmus;
-    std::vector<SyncManager> sync_managers;
-    std::vector<Pdo> rx, tx;
-    std::optional<Mailbox> mailbox;
-    std::vector<InitCmd> init_commands;
-    std::vector<OpMode> op_modes;              ///< the first is the default; empty: no distributed clocks
-    bool has_dc = false;
-    std::vector<Object> objects;               ///< by index
-    std::uint16_t profile = 0;                 ///< 402 for a drive
-    std::vector<Slot> slots;
-    unsigned slot_pdo_increment = 1, slot_index_increment = 0;
-    std::vector<std::uint8_t> eeprom;          ///< whole image, if the file has one
-    std::vector<std::uint8_t> config_data, bootstrap;
-    std::size_t eeprom_bytes = 0;
+    std::string                     order, name, group, physics;   ///< physics: Y MII, K EBUS, one letter per port
+    std::uint32_t                   product = 0, revision = 0, serial = 0;
+    Timeouts                        timeouts;
+    std::vector<sii::FmmuUse>       fmmus;
+    std::vector<SyncManager>        sync_managers;
+    std::vector<Pdo>                rx, tx;
+    std::optional<Mailbox>          mailbox;
+    std::vector<InitCmd>            init_commands;
+    std::vector<OpMode>             op_modes;              ///< the first is the default; empty: no distributed clocks
+    bool                            has_dc = false;
+    std::vector<Object>             objects;               ///< by index
+    std::uint16_t                   profile = 0;                 ///< 402 for a drive
+    std::vector<Slot>               slots;
+    unsigned                        slot_pdo_increment = 1, slot_index_increment = 0;
+    std::vector<std::uint8_t>       eeprom;          ///< whole image, if the file has one
+    std::vector<std::uint8_t>       config_data, bootstrap;
+    std::size_t                     eeprom_bytes = 0;
     std::vector<sii::OtherCategory> categories;
-    text::Span at;
+    text::Span                      at;
 
     const Object* find(std::uint16_t index) const;
-    const Value* find(std::uint16_t index, std::uint8_t sub) const;
-    const Pdo* find_pdo(std::uint16_t index) const;
+    const Value*  find(std::uint16_t index, std::uint8_t sub) const;
+    const Pdo*    find_pdo(std::uint16_t index) const;
 };
 
 /// A module of a modular device (ETG.5001).
 struct Module {
-    std::uint32_t ident = 0;
-    std::string type, name;
-    std::vector<Pdo> rx, tx;                   ///< for slot 1; those of slot n have numbers higher by (n - 1) increments
+    std::uint32_t        ident = 0;
+    std::string          type, name;
+    std::vector<Pdo>     rx, tx;                   ///< for slot 1; those of slot n have numbers higher by (n - 1) increments
     std::vector<InitCmd> init_commands;
-    std::vector<bool> rx_depends, tx_depends;  ///< of each PDO: its indices depend on the slot
-    std::vector<Object> objects;
+    std::vector<bool>    rx_depends, tx_depends;  ///< of each PDO: its indices depend on the slot
+    std::vector<Object>  objects;
 };
 
 struct File {
-    std::uint32_t vendor = 0;
-    std::string vendor_name;
-    std::vector<Device> devices;
-    std::vector<Module> modules;
+    std::uint32_t        vendor = 0;
+    std::string          vendor_name;
+    std::vector<Device>  devices;
+    std::vector<Module>  modules;
     std::vector<Message> messages;
 
     bool good() const { return text::good(messages); }

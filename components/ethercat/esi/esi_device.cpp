@@ -21,8 +21,8 @@ const Value* Object::find(std::uint8_t sub) const {
 }
 
 const Object* Device::find(std::uint16_t index) const {
-    const auto found = std::lower_bound(objects.begin(), objects.end(), index, [](const Object& o, std::uint16_t i) { return o.index < i;
-        });
+    const auto found =
+        std::lower_bound(objects.begin(), objects.end(), index, [](const Object& o, std::uint16_t i) { return o.index < i; });
     return found != objects.end() && found->index == index ? &*found : nullptr;
 }
 
@@ -58,8 +58,8 @@ const Device* File::find(std::string_view name) const {
 Device with_modules(const File& file, const Device& device, const std::vector<std::uint32_t>& idents) {
     Device out = device;
     for (std::size_t slot = 0; slot < idents.size(); ++slot) {
-        const auto module = std::find_if(file.modules.begin(), file.modules.end(), [&](const Module& m) { return m.ident == idents[slot];
-            });
+        const auto module =
+            std::find_if(file.modules.begin(), file.modules.end(), [&](const Module& m) { return m.ident == idents[slot]; });
         if (idents[slot] == 0 || module == file.modules.end()) continue;
         const auto add = [&](const std::vector<Pdo>& from, const std::vector<bool>& depends, std::vector<Pdo>& to) {
             for (std::size_t i = 0; i < from.size(); ++i) {
@@ -75,8 +75,9 @@ Device with_modules(const File& file, const Device& device, const std::vector<st
         for (Object o : module->objects) {
             o.index = static_cast<std::uint16_t>(o.index + slot * device.slot_index_increment);
             if (out.find(o.index) != nullptr) continue;
-            out.objects.insert(std::upper_bound(out.objects.begin(), out.objects.end(), o, [](const Object& a, const Object& b) {
-                return a.index < b.index; }), o);
+            out.objects.insert(std::upper_bound(out.objects.begin(), out.objects.end(), o,
+                                                [](const Object& a, const Object& b) { return a.index < b.index; }),
+                               o);
         }
     }
     return out;
@@ -91,7 +92,7 @@ void add_pdos(const std::vector<Pdo>& from, std::vector<sii::Pdo>& to) {
         out.sync_manager = p.sync_manager.value_or(0xff);
         out.flags = static_cast<std::uint16_t>((p.mandatory ? sii::pdo_mandatory : 0) | (p.fixed ? sii::pdo_fixed : 0));
         for (const Entry& e : p.entries) {
-            unsigned bits = e.bits;  // one entry holds 255 bits at most: the rest follows as gaps
+            unsigned   bits = e.bits;  // one entry holds 255 bits at most: the rest follows as gaps
             sii::Entry first{e.index, e.sub, e.name, e.index == 0 ? std::uint8_t{0} : sii::type_number(e.type), 0, 0};
             do {
                 first.bits = static_cast<std::uint8_t>(bits > 255 ? 248 : bits);
@@ -108,8 +109,8 @@ void add_pdos(const std::vector<Pdo>& from, std::vector<sii::Pdo>& to) {
 
 sii::Contents sii_contents(const File& file, const Device& d) {
     sii::Contents out;
-    for (std::size_t i = 0; i + 1 < d.config_data.size() && i < 14;
-        i += 2) out.configuration[i / 2] = get<std::uint16_t>(d.config_data.data() + i);
+    for (std::size_t i = 0; i + 1 < d.config_data.size() && i < 14; i += 2)
+        out.configuration[i / 2] = get<std::uint16_t>(d.config_data.data() + i);
     out.vendor = file.vendor, out.product = d.product, out.revision = d.revision, out.serial = d.serial;
     if (d.bootstrap.size() >= 8) {
         const std::uint8_t* b = d.bootstrap.data();
@@ -125,22 +126,20 @@ sii::Contents sii_contents(const File& file, const Device& d) {
     add_pdos(d.tx, out.tx), add_pdos(d.rx, out.rx);
     for (const OpMode& m : d.op_modes)
         out.dc.push_back({static_cast<std::uint32_t>(m.sync0_cycle_ns), static_cast<std::int32_t>(m.sync0_shift_ns),
-            static_cast<std::int32_t>(m.sync1_shift_ns),
-                          static_cast<std::int16_t>(m.sync1_factor), static_cast<std::int16_t>(m.sync0_factor), m.assign_activate, m.name,
-                              m.description});
+                          static_cast<std::int32_t>(m.sync1_shift_ns), static_cast<std::int16_t>(m.sync1_factor),
+                          static_cast<std::int16_t>(m.sync0_factor), m.assign_activate, m.name, m.description});
     out.has_general = true;
     sii::General& g = out.general;
     g.group = d.group, g.order = d.order, g.name = d.name;
     if (d.mailbox) {
         const Mailbox& m = *d.mailbox;
-        const auto bit = [](bool set, unsigned value) { return set ? value : 0U; };
-        out.protocols = static_cast<std::uint16_t>(bit(m.aoe, sii::aoe) | bit(m.eoe, sii::eoe) | bit(m.coe, sii::coe) | bit(m.foe,
-            sii::foe) |
-                                                   bit(m.soe, sii::soe) | bit(m.voe, sii::voe));
-        g.coe_details = static_cast<std::uint8_t>(bit(m.coe, sii::coe_sdo) | bit(m.sdo_info, sii::coe_sdo_info) | bit(m.pdo_assign,
-            sii::coe_pdo_assign) |
-                                                  bit(m.pdo_config, sii::coe_pdo_config) | bit(m.pdo_upload, sii::coe_upload_at_start) |
-                                                  bit(m.complete_access, sii::coe_complete_access));
+        const auto     bit = [](bool set, unsigned value) { return set ? value : 0U; };
+        out.protocols = static_cast<std::uint16_t>(bit(m.aoe, sii::aoe) | bit(m.eoe, sii::eoe) | bit(m.coe, sii::coe) |
+                                                   bit(m.foe, sii::foe) | bit(m.soe, sii::soe) | bit(m.voe, sii::voe));
+        g.coe_details =
+            static_cast<std::uint8_t>(bit(m.coe, sii::coe_sdo) | bit(m.sdo_info, sii::coe_sdo_info) |
+                                      bit(m.pdo_assign, sii::coe_pdo_assign) | bit(m.pdo_config, sii::coe_pdo_config) |
+                                      bit(m.pdo_upload, sii::coe_upload_at_start) | bit(m.complete_access, sii::coe_complete_access));
         g.foe = m.foe, g.eoe = m.eoe, g.soe_channels = m.soe_channels;
     }
     if (d.profile == 402) g.ds402_channels = 1;

@@ -16,7 +16,7 @@ struct Flags {
 
 Flags flags_of(const Xml& item) {
     const Xml flags = item.child("Flags");
-    Flags out;
+    Flags     out;
     if (!flags) return out;
     const std::string access = lower(trimmed(flags.child_value("Access"))), mapping = lower(trimmed(flags.child_value("PdoMapping")));
     out.given = true;
@@ -27,16 +27,16 @@ Flags flags_of(const Xml& item) {
 }
 
 struct SubItem {
-    int sub = -1;  ///< none: elements of an array
+    int         sub = -1;  ///< none: elements of an array
     std::string name, type;
-    unsigned bits = 0;
-    Flags flags;
+    unsigned    bits = 0;
+    Flags       flags;
 };
 struct DataType {
-    std::string base;
-    unsigned bits = 0;
-    bool array = false;
-    unsigned first = 0, elements = 0;
+    std::string          base;
+    unsigned             bits = 0;
+    bool                 array = false;
+    unsigned             first = 0, elements = 0;
     std::vector<SubItem> items;
 };
 
@@ -91,10 +91,10 @@ private:
     }
 
     void value(Object& o, unsigned sub, const std::string& name, const std::string& type, unsigned bits, const Flags& flags,
-        const Flags& otherwise) {
+               const Flags& otherwise) {
         if (sub > 255 || o.find(static_cast<std::uint8_t>(sub)) != nullptr) return;
         const Flags& f = flags.given ? flags : otherwise;
-        Value v;
+        Value        v;
         v.sub = static_cast<std::uint8_t>(sub), v.name = name, v.type = basic(type);
         v.bits = type_bits(v.type) != 0 ? type_bits(v.type) : bits;
         v.readable = f.readable, v.writable = f.writable, v.rx_mappable = f.rx, v.tx_mappable = f.tx;
@@ -109,20 +109,21 @@ private:
     }
 
     void add(const Xml& node) {
-        Object o;
+        Object             o;
         const std::int64_t index = context_.child<std::int64_t>(node, "Index", -1);
         if (index < 0 || index > 0xffff) return;
         o.index = static_cast<std::uint16_t>(index);
         o.name = text_of(node, "Name"), o.type = trimmed(node.child_value("Type"));
         const Flags flags = flags_of(node);
-        const auto at = types_.find(o.type);
+        const auto  at = types_.find(o.type);
         if (at != types_.end() && !at->second.items.empty()) {
             o.code = Object::Code::record;
             for (const SubItem& s : at->second.items) {
                 const auto inner = types_.find(s.type);
                 if (inner != types_.end() && inner->second.array) o.code = Object::Code::array, array(o, inner->second, s.flags, flags);
-                else value(o, s.sub < 0 ? static_cast<unsigned>(o.values.size()) : static_cast<unsigned>(s.sub), s.name, s.type, s.bits,
-                    s.flags, flags);
+                else
+                    value(o, s.sub < 0 ? static_cast<unsigned>(o.values.size()) : static_cast<unsigned>(s.sub), s.name, s.type, s.bits,
+                          s.flags, flags);
             }
         } else if (at != types_.end() && at->second.array) {
             o.code = Object::Code::array;
@@ -144,8 +145,8 @@ private:
         std::size_t i = 0;
         for (const Xml item : info.children("SubItem")) {
             if (i == o.values.size()) break;
-            if (const std::string name = text_of(item, "Name"); o.code == Object::Code::array && !name.empty() &&
-                i != 0) o.values[i].name = name;
+            if (const std::string name = text_of(item, "Name"); o.code == Object::Code::array && !name.empty() && i != 0)
+                o.values[i].name = name;
             set(item.child("Info"), o.values[i++]);
         }
         Value& count = o.values.front();
@@ -172,10 +173,10 @@ private:
         }
     }
 
-    Context& context_;
+    Context&                        context_;
     std::map<std::string, DataType> types_;
     std::map<std::uint16_t, Object> objects_;
-    std::size_t values_ = 0;
+    std::size_t                     values_ = 0;
 };
 
 }  // namespace
@@ -188,14 +189,13 @@ std::vector<Object> dictionary(Context& context, const Xml& profile) {
 unsigned type_bits(std::string_view type) {
     struct Basic {
         std::string_view name;
-        unsigned bits;
+        unsigned         bits;
     };
-    constexpr Basic basics[] = {{"BOOL", 1},    {"BIT", 1},     {"BYTE", 8},    {"WORD", 16},   {"DWORD", 32},  {"LWORD", 64},  {"SINT", 8},
-                                {"INT", 16},    {"DINT", 32},   {"LINT", 64},   {"USINT", 8},   {"UINT", 16},   {"UDINT", 32},  {"ULINT",
-                                    64},
-                                {"INT24", 24},  {"INT40", 40},  {"INT48", 48},  {"INT56", 56},  {"UINT24", 24}, {"UINT40", 40}, {"UINT48",
-                                    48},
-                                {"UINT56", 56}, {"REAL", 32},   {"LREAL", 64},  {"BITARR8", 8}, {"BITARR16", 16}, {"BITARR32", 32}};
+    constexpr Basic basics[] = {{"BOOL", 1},    {"BIT", 1},       {"BYTE", 8},     {"WORD", 16},   {"DWORD", 32}, {"LWORD", 64},
+                                {"SINT", 8},    {"INT", 16},      {"DINT", 32},    {"LINT", 64},   {"USINT", 8},  {"UINT", 16},
+                                {"UDINT", 32},  {"ULINT", 64},    {"INT24", 24},   {"INT40", 40},  {"INT48", 48}, {"INT56", 56},
+                                {"UINT24", 24}, {"UINT40", 40},   {"UINT48", 48},  {"UINT56", 56}, {"REAL", 32},  {"LREAL", 64},
+                                {"BITARR8", 8}, {"BITARR16", 16}, {"BITARR32", 32}};
     for (const Basic& b : basics)
         if (b.name == type) return b.bits;
     if (type.starts_with("BIT") && type.size() <= 5)

@@ -12,19 +12,19 @@ public:
 
     File read() {
         pugi::xml_document document;
-        const auto result = document.load_buffer(context_.text.data(), context_.text.size());
+        const auto         result = document.load_buffer(context_.text.data(), context_.text.size());
         if (!result) {
             const auto at = std::min(static_cast<std::size_t>(std::max<std::ptrdiff_t>(result.offset, 0)), context_.text.size());
             text::Span span{1, 1, static_cast<std::uint32_t>(at), 0};
-            span.line += static_cast<std::uint32_t>(std::count(context_.text.begin(), context_.text.begin() +
-                static_cast<std::ptrdiff_t>(at), '\n'));
+            span.line += static_cast<std::uint32_t>(
+                std::count(context_.text.begin(), context_.text.begin() + static_cast<std::ptrdiff_t>(at), '\n'));
             context_.report.error(Topic::file, span, "invalid XML: " + lower(result.description()), "is it a device description?");
             return finish();
         }
         const Xml root = document.child("EtherCATInfo");
         if (!root) {
-            context_.report.error(Topic::file, {1, 1, 0, 0}, "the root element is '" + std::string(document.document_element().name()) +
-                "', not EtherCATInfo",
+            context_.report.error(Topic::file, {1, 1, 0, 0},
+                                  "the root element is '" + std::string(document.document_element().name()) + "', not EtherCATInfo",
                                   "give the ESI file of the device, an XML file from its maker");
             return finish();
         }
@@ -49,8 +49,8 @@ private:
         d.at = span_of(node, context_.text);
         const Xml type = node.child("Type");
         d.order = trimmed(type.child_value());
-        d.product = context_.attribute<std::uint32_t>(type, "ProductCode"), d.revision = context_.attribute<std::uint32_t>(type,
-            "RevisionNo");
+        d.product = context_.attribute<std::uint32_t>(type, "ProductCode"),
+        d.revision = context_.attribute<std::uint32_t>(type, "RevisionNo");
         d.serial = context_.attribute<std::uint32_t>(type, "SerialNo");
         d.name = text_of(node, "Name"), d.group = text_of(node, "GroupType");
         d.physics = node.attribute("Physics").value();
@@ -60,12 +60,14 @@ private:
         t.preop = context_.child(state, "PreopTimeout", t.preop), t.safeop_op = context_.child(state, "SafeopOpTimeout", t.safeop_op);
         t.back_to_init = context_.child(state, "BackToInitTimeout", t.back_to_init);
         t.back_to_safeop = context_.child(state, "BackToSafeopTimeout", t.back_to_safeop);
-        t.request = context_.child(mailbox, "RequestTimeout", t.request), t.response = context_.child(mailbox, "ResponseTimeout",
-            t.response);
+        t.request = context_.child(mailbox, "RequestTimeout", t.request),
+        t.response = context_.child(mailbox, "ResponseTimeout", t.response);
         for (const Xml f : node.children("Fmmu")) {
             const std::string use = lower(trimmed(f.child_value()));
-            d.fmmus.push_back(use == "outputs" ? sii::FmmuUse::outputs : use == "inputs" ? sii::FmmuUse::inputs
-                              : use == "mboxstate" ? sii::FmmuUse::mailbox_state : sii::FmmuUse::unused);
+            d.fmmus.push_back(use == "outputs"     ? sii::FmmuUse::outputs
+                              : use == "inputs"    ? sii::FmmuUse::inputs
+                              : use == "mboxstate" ? sii::FmmuUse::mailbox_state
+                                                   : sii::FmmuUse::unused);
         }
         for (const Xml s : node.children("Sm")) sync_manager(s, d);
         pdos(node, "RxPdo", d.rx), pdos(node, "TxPdo", d.tx);
@@ -88,15 +90,15 @@ private:
     }
 
     void sync_manager(const Xml& node, Device& d) {
-        SyncManager s;
+        SyncManager       s;
         const std::string type = lower(trimmed(node.child_value()));
         s.type = type == "mboxout"   ? sii::SmType::mailbox_out
                  : type == "mboxin"  ? sii::SmType::mailbox_in
                  : type == "outputs" ? sii::SmType::outputs
                  : type == "inputs"  ? sii::SmType::inputs
                                      : sii::SmType::unused;
-        s.start = context_.attribute<std::uint16_t>(node, "StartAddress"), s.default_size = context_.attribute<std::uint16_t>(node,
-            "DefaultSize");
+        s.start = context_.attribute<std::uint16_t>(node, "StartAddress"),
+        s.default_size = context_.attribute<std::uint16_t>(node, "DefaultSize");
         s.min_size = context_.attribute<std::uint16_t>(node, "MinSize"), s.max_size = context_.attribute<std::uint16_t>(node, "MaxSize");
         s.control = context_.attribute<std::uint8_t>(node, "ControlByte"), s.enable = context_.attribute<std::uint8_t>(node, "Enable");
         d.sync_managers.push_back(s);
@@ -120,8 +122,8 @@ private:
                 if (entry.bits == 0) context_.warn(e, "the entry has no BitLen; it is ignored");
                 else pdo.entries.push_back(std::move(entry));
             }
-            const bool known = pdo.index != 0 && std::any_of(to.begin(), to.end(), [&](const Pdo& other) {
-                return other.index == pdo.index; });
+            const bool known =
+                pdo.index != 0 && std::any_of(to.begin(), to.end(), [&](const Pdo& other) { return other.index == pdo.index; });
             if (pdo.index == 0) continue;  // a module's PDO by reference
             if (known) {
                 context_.warn(p, "duplicate PDO index; the first one is used");
@@ -146,8 +148,8 @@ private:
         m.foe = node.child("FoE"), m.eoe = node.child("EoE"), m.aoe = node.child("AoE"), m.voe = node.child("VoE");
         if (const Xml coe = node.child("CoE")) {
             m.coe = true;
-            m.sdo_info = Context::flag(coe, "SdoInfo"), m.pdo_assign = Context::flag(coe, "PdoAssign"), m.pdo_config = Context::flag(coe,
-                "PdoConfig");
+            m.sdo_info = Context::flag(coe, "SdoInfo"), m.pdo_assign = Context::flag(coe, "PdoAssign"),
+            m.pdo_config = Context::flag(coe, "PdoConfig");
             m.pdo_upload = Context::flag(coe, "PdoUpload"), m.complete_access = Context::flag(coe, "CompleteAccess");
             m.segmented_sdo = Context::flag(coe, "SegmentedSdo", true);
             init_commands(coe, InitCmd::Protocol::coe, d.init_commands);
@@ -178,12 +180,12 @@ private:
         OpMode m;
         m.name = text_of(node, "Name"), m.description = text_of(node, "Desc");
         m.assign_activate = context_.child<std::uint16_t>(node, "AssignActivate");
-        m.sync0_cycle_ns = context_.child<std::int64_t>(node, "CycleTimeSync0"), m.sync1_cycle_ns = context_.child<std::int64_t>(node,
-            "CycleTimeSync1");
+        m.sync0_cycle_ns = context_.child<std::int64_t>(node, "CycleTimeSync0"),
+        m.sync1_cycle_ns = context_.child<std::int64_t>(node, "CycleTimeSync1");
         m.sync0_factor = context_.attribute<int>(node.child("CycleTimeSync0"), "Factor", 1);
         m.sync1_factor = context_.attribute<int>(node.child("CycleTimeSync1"), "Factor", 0);
-        m.sync0_shift_ns = context_.child<std::int64_t>(node, "ShiftTimeSync0"), m.sync1_shift_ns = context_.child<std::int64_t>(node,
-            "ShiftTimeSync1");
+        m.sync0_shift_ns = context_.child<std::int64_t>(node, "ShiftTimeSync0"),
+        m.sync1_shift_ns = context_.child<std::int64_t>(node, "ShiftTimeSync1");
         d.op_modes.push_back(std::move(m));
     }
 
@@ -215,22 +217,23 @@ private:
         d.config_data = context_.bytes(node.child("ConfigData")), d.bootstrap = context_.bytes(node.child("BootStrap"));
         for (const Xml c : node.children("Category")) {
             sii::OtherCategory category{context_.child<std::uint16_t>(c, "CatNo"), {}};
-            const auto value = [&](const char* name, unsigned bytes) {
+            const auto         value = [&](const char* name, unsigned bytes) {
                 const auto n = context_.child<std::uint64_t>(c, name);
                 for (unsigned i = 0; i < bytes; ++i) category.data.push_back(static_cast<std::uint8_t>(n >> (8 * i)));
             };
             if (c.child("Data")) category.data = context_.bytes(c.child("Data"));
             else if (c.child("DataUINT")) value("DataUINT", 2);
             else if (c.child("DataUDINT")) value("DataUDINT", 4);
-            else for (const char letter
-                : std::string_view(c.child_value("DataString"))) category.data.push_back(static_cast<std::uint8_t>(letter));
-            if (category.data.size() <= 0xffff && category.type > 60 &&
-                category.type != 0xffff) d.categories.push_back(std::move(category));
+            else
+                for (const char letter : std::string_view(c.child_value("DataString")))
+                    category.data.push_back(static_cast<std::uint8_t>(letter));
+            if (category.data.size() <= 0xffff && category.type > 60 && category.type != 0xffff)
+                d.categories.push_back(std::move(category));
         }
     }
 
     Context context_;
-    File out_;
+    File    out_;
 };
 
 }  // namespace
@@ -251,10 +254,10 @@ std::optional<std::int64_t> number(std::string_view text) {
 
 std::optional<std::vector<std::uint8_t>> hex_bytes(std::string_view text) {
     std::vector<std::uint8_t> out;
-    int high = -1;
+    int                       high = -1;
     for (const char c : text) {
         const char l = lower(c);
-        const int digit = l >= '0' && l <= '9' ? l - '0' : l >= 'a' && l <= 'f' ? l - 'a' + 10 : -1;
+        const int  digit = l >= '0' && l <= '9' ? l - '0' : l >= 'a' && l <= 'f' ? l - 'a' + 10 : -1;
         if (is_blank(c) || c == '\r' || c == '\n') continue;
         if (digit < 0) return {};
         if (high < 0) high = digit;

@@ -15,10 +15,10 @@ using Xml = pugi::xml_node;
 
 /// Returns the span of the element's name.
 inline text::Span span_of(const Xml& node, std::string_view text) {
-    const auto debug = node.offset_debug();
+    const auto        debug = node.offset_debug();
     const std::size_t at = debug < 0 ? 0 : std::min(static_cast<std::size_t>(debug), text.size());
     const std::size_t start = text.substr(0, at).rfind('\n') + 1;  // npos + 1 is 0
-    text::Span out{1, 1, static_cast<std::uint32_t>(at), static_cast<std::uint32_t>(std::string_view(node.name()).size())};
+    text::Span        out{1, 1, static_cast<std::uint32_t>(at), static_cast<std::uint32_t>(std::string_view(node.name()).size())};
     out.line += static_cast<std::uint32_t>(std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at), '\n'));
     out.column += characters(text.substr(start, at - start));
     return out;
@@ -26,7 +26,7 @@ inline text::Span span_of(const Xml& node, std::string_view text) {
 
 /// Reads the numbers and flags of one file, and reports invalid ones.
 struct Context {
-    std::string_view text{};
+    std::string_view           text{};
     hal::text::Messages<Topic> report{};
 
     void warn(const Xml& at, std::string sentence) {
@@ -36,8 +36,8 @@ struct Context {
     std::int64_t number_of(const Xml& at, std::string_view name, std::string_view value, std::int64_t otherwise) {
         if (trimmed(value).empty()) return otherwise;
         if (const auto n = number(value)) return *n;
-        warn(at, "invalid " + std::string(name) + " '" + std::string(trimmed(value).substr(0, 60)) +
-            "': expected a number, as in 12 or #x1F");
+        warn(at,
+             "invalid " + std::string(name) + " '" + std::string(trimmed(value).substr(0, 60)) + "': expected a number, as in 12 or #x1F");
         return otherwise;
     }
     template <class T>

@@ -6,19 +6,24 @@
 namespace hal::ethercat::master {
 
 Bus::Bus(Setup setup_, const std::array<std::uint8_t, 6>& source, Events& events_, CoeAccess& coe_)
-    : setup(std::move(setup_)), image(setup, source), engine(image, status, setup), events(events_), coe(coe_),
-        device_of(setup.slaves.size(), -1),
-      absent(setup.slaves.size()), wkc_seen(image.domain_count(), WkcState::none) {
+    : setup(std::move(setup_)),
+      image(setup, source),
+      engine(image, status, setup),
+      events(events_),
+      coe(coe_),
+      device_of(setup.slaves.size(), -1),
+      absent(setup.slaves.size()),
+      wkc_seen(image.domain_count(), WkcState::none) {
     constexpr std::size_t spare = 64;
-    const std::size_t capacity = setup.most_slaves != 0 ? setup.most_slaves : setup.slaves.size() + spare;
+    const std::size_t     capacity = setup.most_slaves != 0 ? setup.most_slaves : setup.slaves.size() + spare;
     for (std::size_t n = 0; n < capacity; ++n) {
         devices.push_back(std::make_unique<Device>());
         devices[n]->slave.number = static_cast<std::uint16_t>(n);
         devices[n]->slave.station = static_cast<std::uint16_t>(first_station + n);
     }
     by_position.reserve(capacity);
-    status.expected = static_cast<std::uint16_t>(std::count_if(setup.slaves.begin(), setup.slaves.end(),
-        [](const Slave& s) { return !s.optional; }));
+    status.expected =
+        static_cast<std::uint16_t>(std::count_if(setup.slaves.begin(), setup.slaves.end(), [](const Slave& s) { return !s.optional; }));
     for (const auto& d : devices) engine.add(d->channel);
     engine.add(watch_channel);
     engine.add(bus_channel);  // last: it sees what the others did in the same cycle
@@ -54,7 +59,7 @@ void Bus::leave(Device& d) noexcept {
 
 void Bus::update_status() noexcept {
     State lowest = State::op;
-    bool all = status.scanned, any = false;
+    bool  all = status.scanned, any = false;
     for (std::size_t n = 0; n < device_of.size(); ++n) {
         const Device* d = device_of[n] >= 0 ? devices[static_cast<std::size_t>(device_of[n])].get() : nullptr;
         if (d == nullptr || !d->slave.present) {

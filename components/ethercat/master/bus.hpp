@@ -21,23 +21,23 @@
 namespace hal::ethercat::master {
 
 inline constexpr std::uint16_t first_station = 0x1001;
-inline constexpr std::int64_t millisecond = 1'000'000, tolerable_deviation_ns = 10'000;
+inline constexpr std::int64_t  millisecond = 1'000'000, tolerable_deviation_ns = 10'000;
 
 /// A place for a slave on the bus.
 struct Device {
-    BusSlave slave;
-    SlaveStatus status;
-    Channel channel;
-    bool identified = false;   ///< the registers and the SII were read
-    bool refused = false;      ///< is not the slave that the setup names; stays in INIT
-    bool times_read = false;   ///< its receive times are those of the newest latch
-    bool clock_set = false;    ///< offset and delay are written
-    bool synchronised = false; ///< its clock was within the window
-    bool drifted = false;      ///< its clock is far beyond the window, while it is operational
-    bool helping = false;      ///< the task on its channel works for that of the bus
-    std::int64_t began_ns = 0; ///< of the newest start-up
+    BusSlave     slave;
+    SlaveStatus  status;
+    Channel      channel;
+    bool         identified = false;  ///< the registers and the SII were read
+    bool         refused = false;  ///< is not the slave that the setup names; stays in INIT
+    bool         times_read = false;  ///< its receive times are those of the newest latch
+    bool         clock_set = false;  ///< offset and delay are written
+    bool         synchronised = false;  ///< its clock was within the window
+    bool         drifted = false;  ///< its clock is far beyond the window, while it is operational
+    bool         helping = false;  ///< the task on its channel works for that of the bus
+    std::int64_t began_ns = 0;  ///< of the newest start-up
     std::int64_t sync_begins_ns = 0;  ///< when its SYNC signals begin, on the clock of the cycle; 0: it has none
-    unsigned attempts = 0;     ///< start-ups in a row that failed
+    unsigned     attempts = 0;  ///< start-ups in a row that failed
     std::array<std::array<std::uint8_t, 4>, 4> last_errors{};  ///< counters of 0300h as last read, per port
 };
 
@@ -45,32 +45,32 @@ struct Device {
 struct Bus {
     Bus(Setup setup_, const std::array<std::uint8_t, 6>& source, Events& events_, CoeAccess& coe_);
 
-    Setup setup;
-    ProcessImage image;
-    BusStatus status;
-    WireEngine engine;
-    Events& events;
-    CoeAccess& coe;
+    Setup                                setup;
+    ProcessImage                         image;
+    BusStatus                            status;
+    WireEngine                           engine;
+    Events&                              events;
+    CoeAccess&                           coe;
     std::vector<std::unique_ptr<Device>> devices;  ///< capacity of the bus; the number is that of the station address
-    std::vector<int> device_of;                    ///< by index of Setup::slaves; -1: none
-    std::vector<SlaveStatus> absent;               ///< status of the slaves of the setup that have no device
-    Channel bus_channel{32 * 1024}, watch_channel;
-    std::vector<std::uint16_t> by_position;        ///< device numbers along the line
-    std::vector<WkcState> wkc_seen;                ///< of the domains, as last reported
-    unsigned known = 0;                            ///< slaves on the bus after the newest scan
-    State target = State::op;                      ///< no slave goes beyond this state
-    bool outputs_valid = true;                     ///< the slaves may go to OP
-    bool exchange = false;                         ///< process data frames are sent
-    bool suspicious = true;                        ///< look at the slaves now
-    bool resting = false;                          ///< the supervision waits; Master wakes it when `suspicious` is set
-    int reference = -1;                            ///< device with the reference clock
-    std::int64_t epoch_ns = 0;                     ///< system time of the clocks minus the clock of the cycle
-    std::int64_t skew_ns = 0;                      ///< system time minus the clock of the cycle, by the newest frame; 0: not known
-    std::uint32_t unknown_product = 0;             ///< of the slave last reported as unknown, so that it is reported once
-    std::bitset<1024> unreadable;                  ///< positions of slaves whose EEPROM was reported as unreadable, so that it is reported once
-    bool reported_empty = false;
-    unsigned reported_many = 0;                    ///< slaves that were reported as too many
-    bool ring_changed = false;                     ///< the newest broadcast found the ring in another state
+    std::vector<int>                     device_of;  ///< by index of Setup::slaves; -1: none
+    std::vector<SlaveStatus>             absent;  ///< status of the slaves of the setup that have no device
+    Channel                              bus_channel{32 * 1024}, watch_channel;
+    std::vector<std::uint16_t>           by_position;  ///< device numbers along the line
+    std::vector<WkcState>                wkc_seen;  ///< of the domains, as last reported
+    unsigned                             known = 0;  ///< slaves on the bus after the newest scan
+    State                                target = State::op;  ///< no slave goes beyond this state
+    bool                                 outputs_valid = true;  ///< the slaves may go to OP
+    bool                                 exchange = false;  ///< process data frames are sent
+    bool                                 suspicious = true;  ///< look at the slaves now
+    bool                                 resting = false;  ///< the supervision waits; Master wakes it when `suspicious` is set
+    int                                  reference = -1;  ///< device with the reference clock
+    std::int64_t                         epoch_ns = 0;  ///< system time of the clocks minus the clock of the cycle
+    std::int64_t                         skew_ns = 0;  ///< system time minus the clock of the cycle, by the newest frame; 0: not known
+    std::uint32_t                        unknown_product = 0;  ///< of the slave last reported as unknown, so that it is reported once
+    std::bitset<1024> unreadable;  ///< positions of slaves whose EEPROM was reported as unreadable, so that it is reported once
+    bool              reported_empty = false;
+    unsigned          reported_many = 0;  ///< slaves that were reported as too many
+    bool              ring_changed = false;  ///< the newest broadcast found the ring in another state
 
     const Slave* config(const Device& d) const noexcept {
         return d.slave.configured < 0 ? nullptr : &setup.slaves[static_cast<std::size_t>(d.slave.configured)];
@@ -87,10 +87,10 @@ struct Bus {
         d.channel.set_now(engine.now_ns());
         d.channel.start(make);
     }
-    bool clocks_missing() const noexcept;   ///< Returns whether a slave has a clock that is not set, or the reference clock is lost.
+    bool clocks_missing() const noexcept;  ///< Returns whether a slave has a clock that is not set, or the reference clock is lost.
     std::uint64_t dc_now() const noexcept;  ///< Returns the system time at the start of the cycle, as well as it is known.
-    void leave(Device&) noexcept;           ///< Takes a slave out of the working counters and the list of those present.
-    void update_status() noexcept;          ///< Derives the state of the bus from those of the slaves.
+    void          leave(Device&) noexcept;  ///< Takes a slave out of the working counters and the list of those present.
+    void          update_status() noexcept;  ///< Derives the state of the bus from those of the slaves.
 };
 
 // Registers of one slave. The data stays in channel.data().
@@ -114,42 +114,42 @@ inline Channel::Exchange clear_all(Channel& c, std::uint16_t address, std::uint1
 }
 
 // scan.cpp
-Task<bool> scan(Channel&, Bus&) noexcept;                     ///< Finds and identifies all slaves. False: none, or too many.
-Task<bool> identify(Channel&, Bus&, BusSlave&) noexcept;      ///< Reads the registers and the SII of the slave at its station address.
+Task<bool> scan(Channel&, Bus&) noexcept;  ///< Finds and identifies all slaves. False: none, or too many.
+Task<bool> identify(Channel&, Bus&, BusSlave&) noexcept;  ///< Reads the registers and the SII of the slave at its station address.
 Task<void> scan_one(Channel&, Bus&, Device&) noexcept;
 /// Returns whether a slave is the one that the setup names.
 bool matches(Bus&, const Slave&, const BusSlave&, Device* to_report) noexcept;
 bool is_at_its_place(const Slave&, const BusSlave&) noexcept;  ///< Compares alias, device identification, or position.
-void assign(Bus&) noexcept;                                   ///< Finds the slaves of the setup among those on the bus.
+void assign(Bus&) noexcept;  ///< Finds the slaves of the setup among those on the bus.
 
 // slave_boot.cpp
-Task<void> boot(Channel&, Bus&, Device&) noexcept;            ///< Brings a slave to its target state; repeats it until that is reached.
+Task<void> boot(Channel&, Bus&, Device&) noexcept;  ///< Brings a slave to its target state; repeats it until that is reached.
 Task<bool> request_state(Channel&, Bus&, Device&, State, std::uint32_t timeout_ms) noexcept;
-Task<bool> read_state(Channel&, Bus&, Device&) noexcept;      ///< Reads AL status into the slave. False: no answer.
+Task<bool> read_state(Channel&, Bus&, Device&) noexcept;  ///< Reads AL status into the slave. False: no answer.
 
 // slave_setup.cpp
-Task<bool> set_mailbox(Channel&, Bus&, Device&) noexcept;     ///< Sync managers 0 and 1.
-Task<bool> set_process_data(Channel&, Bus&, Device&) noexcept;///< Sync managers 2.., FMMUs, watchdog.
+Task<bool> set_mailbox(Channel&, Bus&, Device&) noexcept;  ///< Sync managers 0 and 1.
+Task<bool> set_process_data(Channel&, Bus&, Device&) noexcept;  ///< Sync managers 2.., FMMUs, watchdog.
 Task<bool> clear_settings(Channel&, Bus&, Device&) noexcept;  ///< Disables sync managers, FMMUs and SYNC signals.
-Task<void> clear_process_data(Channel&, Bus&, Device&) noexcept;///< Disables the FMMUs.
+Task<void> clear_process_data(Channel&, Bus&, Device&) noexcept;  ///< Disables the FMMUs.
 Task<bool> startup_writes(Channel&, Bus&, Device&, State before) noexcept;
 
 // pdo_mapping.cpp
-Task<bool> map_process_data(Channel&, Bus&, Device&) noexcept;///< Writes what differs of mapping and assignment.
+Task<bool> map_process_data(Channel&, Bus&, Device&) noexcept;  ///< Writes what differs of mapping and assignment.
 
 // distributed_clocks.cpp
-Task<void> start_clocks(Channel&, Bus&) noexcept;             ///< Measures delays; sets offset and delay of the clocks that have none.
-Task<bool> synchronise(Channel&, Bus&, Device&) noexcept;     ///< Waits for a clock to be within the window.
+Task<void> start_clocks(Channel&, Bus&) noexcept;  ///< Measures delays; sets offset and delay of the clocks that have none.
+Task<bool> synchronise(Channel&, Bus&, Device&) noexcept;  ///< Waits for a clock to be within the window.
 Task<bool> start_sync_signals(Channel&, Bus&, Device&) noexcept;
-void take_clock(Bus&) noexcept;                               ///< Takes the time of the reference clock that the newest frame carried.
+void       take_clock(Bus&) noexcept;  ///< Takes the time of the reference clock that the newest frame carried.
 
 // supervision.cpp
 Task<void> supervise(Channel&, Bus&) noexcept;
 Task<void> watch(Channel&, Bus&) noexcept;
 Task<void> check(Channel&, Bus&, Device&) noexcept;
-void judge_counters(Bus&) noexcept;                           ///< Reports changes of the working counters.
+void       judge_counters(Bus&) noexcept;  ///< Reports changes of the working counters.
 
 // redundancy.cpp
-void judge_ring(Bus&, unsigned responding) noexcept;          ///< Finds the break of a ring, by how far the primary port reaches.
+void judge_ring(Bus&, unsigned responding) noexcept;  ///< Finds the break of a ring, by how far the primary port reaches.
 
 }  // namespace hal::ethercat::master

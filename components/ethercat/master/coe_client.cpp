@@ -43,16 +43,16 @@ Task<SdoResult> CoeClient::upload(Channel& channel, BusSlave& slave, std::uint16
     SlaveMailbox* mailbox = mailboxes_.find(slave);
     if (mailbox == nullptr) co_return refused();
     SlaveMailbox::Hold hold = co_await mailbox->hold(channel);
-    coe::Sdo request;
+    coe::Sdo           request;
     request.command = static_cast<std::uint8_t>(coe::command::upload | (complete ? coe::command::complete : 0));
     request.index = index, request.sub = sub;
     if (mailbox->body(slave).size() < coe::sdo_bytes) co_return refused();
     const std::size_t length = coe::write_sdo(mailbox->body(slave).data(), coe::Service::sdo_request, request);
-    SdoResult result = co_await mailbox->exchange(channel, slave, MailboxType::coe, length,
-                                                {accepts_sdo, index, sub, coe::command::upload_response});
+    SdoResult         result =
+        co_await mailbox->exchange(channel, slave, MailboxType::coe, length, {accepts_sdo, index, sub, coe::command::upload_response});
     if (!result) co_return result;
 
-    const auto payload = mailbox->reply().payload;
+    const auto     payload = mailbox->reply().payload;
     const coe::Sdo sdo = *coe::read_sdo(payload);
     if (sdo.command == coe::command::abort) co_return aborted(sdo.value);
     if (sdo.expedited()) {
@@ -77,7 +77,7 @@ Task<SdoResult> CoeClient::download(Channel& channel, BusSlave& slave, std::uint
     SlaveMailbox* mailbox = mailboxes_.find(slave);
     if (mailbox == nullptr) co_return refused();
     SlaveMailbox::Hold hold = co_await mailbox->hold(channel);
-    const auto body = mailbox->body(slave);
+    const auto         body = mailbox->body(slave);
     if (body.size() < coe::sdo_bytes) co_return refused();
     coe::Sdo request;
     request.index = index, request.sub = sub;
@@ -87,16 +87,16 @@ Task<SdoResult> CoeClient::download(Channel& channel, BusSlave& slave, std::uint
         std::memcpy(&request.value, from.data(), from.size());
         first = from.size();
     } else {
-        request.command = static_cast<std::uint8_t>(coe::command::download | coe::command::size_given |
-                                                    (complete ? coe::command::complete : 0));
+        request.command =
+            static_cast<std::uint8_t>(coe::command::download | coe::command::size_given | (complete ? coe::command::complete : 0));
         request.value = static_cast<std::uint32_t>(from.size());
         first = std::min(from.size(), body.size() - coe::sdo_bytes);
         if (first != 0) std::memcpy(body.data() + coe::sdo_bytes, from.data(), first);
         length += first;
     }
     coe::write_sdo(body.data(), coe::Service::sdo_request, request);
-    SdoResult result = co_await mailbox->exchange(channel, slave, MailboxType::coe, length,
-                                                {accepts_sdo, index, sub, coe::command::download_response});
+    SdoResult result =
+        co_await mailbox->exchange(channel, slave, MailboxType::coe, length, {accepts_sdo, index, sub, coe::command::download_response});
     if (!result) co_return result;
     const coe::Sdo sdo = *coe::read_sdo(mailbox->reply().payload);
     if (sdo.command == coe::command::abort) co_return aborted(sdo.value);

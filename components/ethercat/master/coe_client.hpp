@@ -14,19 +14,19 @@ namespace hal::ethercat::master {
 
 /// Entry of an object as SDO information describes it.
 struct ObjectDescription {
-    std::uint16_t type = 0;
-    std::uint8_t largest_sub = 0;
+    std::uint16_t   type = 0;
+    std::uint8_t    largest_sub = 0;
     coe::ObjectCode code{};
-    std::size_t name_length = 0;  ///< bytes of the name in the buffer of the call
+    std::size_t     name_length = 0;  ///< bytes of the name in the buffer of the call
 };
 struct EntryDescription {
     std::uint16_t type = 0, bits = 0, access = 0;  ///< access: coe::access
-    std::size_t name_length = 0;
+    std::size_t   name_length = 0;
 };
 
 /// An emergency and its sender.
 struct EmergencyEvent {
-    std::uint16_t slave = 0;  ///< BusSlave::number
+    std::uint16_t  slave = 0;  ///< BusSlave::number
     coe::Emergency emergency;
 };
 
@@ -40,12 +40,12 @@ public:
     }
     bool take(const BusSlave&, const MailboxMessage&) noexcept override;
     /// Removes the oldest emergency; false: none. [any] one reader
-    bool pop(EmergencyEvent& event) noexcept { return queue_.pop(event); }
+    bool          pop(EmergencyEvent& event) noexcept { return queue_.pop(event); }
     std::uint32_t lost() const noexcept { return lost_; }  ///< Returns the number of emergencies that found the queue full.
 
 private:
     Queue<EmergencyEvent> queue_;
-    std::uint32_t lost_ = 0;
+    std::uint32_t         lost_ = 0;
 };
 
 /// Returns whether the payload aborts a transfer of an object. [realtime]
@@ -57,7 +57,7 @@ public:
     explicit CoeClient(Mailboxes& mailboxes) noexcept : mailboxes_(mailboxes) {}
 
     Task<SdoResult> upload(Channel&, BusSlave&, std::uint16_t index, std::uint8_t sub, bool complete,
-        std::span<std::uint8_t> to) noexcept override;
+                           std::span<std::uint8_t> to) noexcept override;
     Task<SdoResult> download(Channel&, BusSlave&, std::uint16_t index, std::uint8_t sub, bool complete,
                              std::span<const std::uint8_t> from) noexcept override;
     Task<SdoResult> write_other(Channel&, BusSlave&, const StartupWrite&) noexcept override;  ///< An IDN: by SoE.
@@ -71,17 +71,16 @@ public:
                               std::span<char> name) noexcept;
 
 private:
-    Task<SdoResult> upload_segments(Channel&, BusSlave&, SlaveMailbox&, std::uint16_t index, std::uint8_t sub, std::size_t size,
-        std::size_t first,
-                                    std::span<std::uint8_t> to) noexcept;
-    Task<SdoResult> download_segments(Channel&, BusSlave&, SlaveMailbox&, std::uint16_t index, std::uint8_t sub,
-                                      std::span<const std::uint8_t> rest) noexcept;
-    Task<> send_abort(Channel&, BusSlave&, SlaveMailbox&, std::uint16_t index, std::uint8_t sub, std::uint32_t code) noexcept;
+    Task<SdoResult>     upload_segments(Channel&, BusSlave&, SlaveMailbox&, std::uint16_t index, std::uint8_t sub, std::size_t size,
+                                        std::size_t first, std::span<std::uint8_t> to) noexcept;
+    Task<SdoResult>     download_segments(Channel&, BusSlave&, SlaveMailbox&, std::uint16_t index, std::uint8_t sub,
+                                          std::span<const std::uint8_t> rest) noexcept;
+    Task<>              send_abort(Channel&, BusSlave&, SlaveMailbox&, std::uint16_t index, std::uint8_t sub, std::uint32_t code) noexcept;
     Task<MailboxResult> information(Channel&, BusSlave&, coe::Information request, std::uint32_t what, std::size_t what_bytes,
                                     std::span<std::uint8_t> head, std::span<std::uint8_t> to) noexcept;
 
     Mailboxes& mailboxes_;
-    SoeClient soe_{mailboxes_};
+    SoeClient  soe_{mailboxes_};
 };
 
 }  // namespace hal::ethercat::master

@@ -40,7 +40,7 @@ Task<MailboxResult> CoeClient::information(Channel& channel, BusSlave& slave, co
     SlaveMailbox* mailbox = mailboxes_.find(slave);
     if (mailbox == nullptr) co_return refused();
     SlaveMailbox::Hold hold = co_await mailbox->hold(channel);
-    const auto body = mailbox->body(slave);
+    const auto         body = mailbox->body(slave);
     if (body.size() < coe::sdo_bytes) co_return refused();
     coe::write_information(body.data(), {request, false, 0});
     std::memcpy(body.data() + coe::information_header_bytes, &what, what_bytes);
@@ -48,17 +48,17 @@ Task<MailboxResult> CoeClient::information(Channel& channel, BusSlave& slave, co
     if (!result) co_return result;
 
     // Each fragment announces how many follow, which distinguishes a duplicate from the next one.
-    const auto response = static_cast<coe::Information>(static_cast<unsigned>(request) + 1);
+    const auto  response = static_cast<coe::Information>(static_cast<unsigned>(request) + 1);
     std::size_t used = 0;
-    bool first = true;
-    Expected expected{accepts_first_fragment, static_cast<std::uint32_t>(response), what, static_cast<std::uint32_t>(what_bytes)};
-    bool overflow = false;
+    bool        first = true;
+    Expected    expected{accepts_first_fragment, static_cast<std::uint32_t>(response), what, static_cast<std::uint32_t>(what_bytes)};
+    bool        overflow = false;
     for (;;) {
         result = co_await mailbox->wait_for(channel, slave, MailboxType::coe, SlaveMailbox::response_timeout_ns(slave), expected);
         if (!result) co_return result;
         const auto payload = mailbox->reply().payload;
         const auto header = *coe::read_information(payload);
-        auto data = payload.subspan(coe::information_header_bytes);
+        auto       data = payload.subspan(coe::information_header_bytes);
         if (header.opcode == coe::Information::error) co_return aborted(get<std::uint32_t>(data.data()));
         if (std::exchange(first, false)) {
             if (data.size() < head.size()) co_return refused();
@@ -78,16 +78,16 @@ Task<MailboxResult> CoeClient::information(Channel& channel, BusSlave& slave, co
 
 Task<MailboxResult> CoeClient::list(Channel& channel, BusSlave& slave, coe::List which, std::span<std::uint8_t> to) noexcept {
     std::array<std::uint8_t, 2> head{};  // the type; following fragments have none
-    const MailboxResult result = co_await information(channel, slave, coe::Information::list_request, static_cast<std::uint16_t>(which),
-        2, head, to);
+    const MailboxResult         result =
+        co_await information(channel, slave, coe::Information::list_request, static_cast<std::uint16_t>(which), 2, head, to);
     co_return result;
 }
 
 Task<MailboxResult> CoeClient::object(Channel& channel, BusSlave& slave, std::uint16_t index, ObjectDescription& description,
                                       std::span<char> name) noexcept {
-    std::array<std::uint8_t, 6> head{};
+    std::array<std::uint8_t, 6>   head{};
     const std::span<std::uint8_t> to{reinterpret_cast<std::uint8_t*>(name.data()), name.size()};
-    const MailboxResult result = co_await information(channel, slave, coe::Information::object_request, index, 2, head, to);
+    const MailboxResult           result = co_await information(channel, slave, coe::Information::object_request, index, 2, head, to);
     if (result) {
         description.type = get<std::uint16_t>(head.data() + 2), description.largest_sub = head[4];
         description.code = static_cast<coe::ObjectCode>(head[5]), description.name_length = result.length;
@@ -96,12 +96,11 @@ Task<MailboxResult> CoeClient::object(Channel& channel, BusSlave& slave, std::ui
 }
 
 Task<MailboxResult> CoeClient::entry(Channel& channel, BusSlave& slave, std::uint16_t index, std::uint8_t sub,
-    EntryDescription& description,
-                                     std::span<char> name) noexcept {
-    std::array<std::uint8_t, 10> head{};
+                                     EntryDescription& description, std::span<char> name) noexcept {
+    std::array<std::uint8_t, 10>  head{};
     const std::span<std::uint8_t> to{reinterpret_cast<std::uint8_t*>(name.data()), name.size()};
-    const std::uint32_t what = index | static_cast<std::uint32_t>(sub) << 16;  // value information 0: only the name
-    const MailboxResult result = co_await information(channel, slave, coe::Information::entry_request, what, 4, head, to);
+    const std::uint32_t           what = index | static_cast<std::uint32_t>(sub) << 16;  // value information 0: only the name
+    const MailboxResult           result = co_await information(channel, slave, coe::Information::entry_request, what, 4, head, to);
     if (result) {
         description.type = get<std::uint16_t>(head.data() + 4), description.bits = get<std::uint16_t>(head.data() + 6);
         description.access = get<std::uint16_t>(head.data() + 8), description.name_length = result.length;

@@ -24,9 +24,9 @@ Task<SdoResult> CoeClient::upload_segments(Channel& channel, BusSlave& slave, Sl
         coe::Sdo request;
         request.command = static_cast<std::uint8_t>(coe::command::upload_segment | toggle);
         const std::size_t length = coe::write_sdo(mailbox.body(slave).data(), coe::Service::sdo_request, request);
-        const SdoResult result = co_await mailbox.exchange(channel, slave, MailboxType::coe, length,
-                                                          {accepts_segment, index, sub,
-                                                              static_cast<std::uint32_t>(coe::command::upload_segment_response | toggle)});
+        const SdoResult   result = co_await mailbox.exchange(
+            channel, slave, MailboxType::coe, length,
+            {accepts_segment, index, sub, static_cast<std::uint32_t>(coe::command::upload_segment_response | toggle)});
         if (!result) co_return result;
         const auto payload = mailbox.reply().payload;
         if (payload[2] == coe::command::abort) co_return aborted(coe::read_sdo(payload)->value);
@@ -48,17 +48,16 @@ Task<SdoResult> CoeClient::upload_segments(Channel& channel, BusSlave& slave, Sl
 }
 
 Task<SdoResult> CoeClient::download_segments(Channel& channel, BusSlave& slave, SlaveMailbox& mailbox, std::uint16_t index,
-    std::uint8_t sub,
-                                             std::span<const std::uint8_t> rest) noexcept {
+                                             std::uint8_t sub, std::span<const std::uint8_t> rest) noexcept {
     const std::size_t capacity = mailbox.body(slave).size() - coe::segment_data;
     for (std::uint8_t toggle = 0; !rest.empty(); toggle ^= coe::command::toggle) {
         const auto data = rest.first(std::min(rest.size(), capacity));
         rest = rest.subspan(data.size());
         const std::size_t length = coe::write_segment(mailbox.body(slave).data(), coe::Service::sdo_request, coe::command::download_segment,
                                                       toggle != 0, rest.empty(), data);
-        const SdoResult result = co_await mailbox.exchange(channel, slave, MailboxType::coe, length,
-                                                          {accepts_segment, index, sub,
-                                                              static_cast<std::uint32_t>(coe::command::download_segment_response | toggle)});
+        const SdoResult   result = co_await mailbox.exchange(
+            channel, slave, MailboxType::coe, length,
+            {accepts_segment, index, sub, static_cast<std::uint32_t>(coe::command::download_segment_response | toggle)});
         if (!result) co_return result;
         const auto payload = mailbox.reply().payload;
         if (payload[2] == coe::command::abort) co_return aborted(coe::read_sdo(payload)->value);

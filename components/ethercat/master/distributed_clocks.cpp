@@ -56,7 +56,8 @@ bool has_valid_delay(const Bus& bus, const Device& d, std::size_t slaves) noexce
     constexpr std::uint32_t longest_ns = 100'000, longest_per_slave_ns = 20'000;  // more: the ports are others than those that were read
     if (bus.engine.redundant()) return d.times_read;
     std::size_t steps = 0;
-    for (int parent = d.slave.parent; parent >= 0 && steps < slaves; parent = bus.devices[static_cast<std::size_t>(parent)]->slave.parent, ++steps) {
+    for (int parent = d.slave.parent; parent >= 0 && steps < slaves;
+         parent = bus.devices[static_cast<std::size_t>(parent)]->slave.parent, ++steps) {
         const Device& before = *bus.devices[static_cast<std::size_t>(parent)];
         if (before.slave.has_dc() && before.slave.present && !before.times_read) return false;
     }
@@ -65,8 +66,8 @@ bool has_valid_delay(const Bus& bus, const Device& d, std::size_t slaves) noexce
 
 int choose_reference(const Bus& bus) noexcept {
     if (bus.setup.reference_slave && *bus.setup.reference_slave < bus.device_of.size())
-        if (const int n = bus.device_of[*bus.setup.reference_slave]; n >= 0 &&
-            bus.devices[static_cast<std::size_t>(n)]->slave.has_dc()) return n;
+        if (const int n = bus.device_of[*bus.setup.reference_slave]; n >= 0 && bus.devices[static_cast<std::size_t>(n)]->slave.has_dc())
+            return n;
     int first = -1;
     for (const std::uint16_t number : bus.by_position) {
         const Device& d = *bus.devices[number];
@@ -108,7 +109,7 @@ Task<void> start_clocks(Channel& c, Bus& bus) noexcept {
         bus.report(Event::reference_clock, d, d.slave.has_dc64() ? 1 : 0);
     }
     std::array<BusSlave*, 1024> line{};
-    std::size_t count = 0, reference = 0;
+    std::size_t                 count = 0, reference = 0;
     for (const std::uint16_t number : bus.by_position) {
         if (count == line.size()) break;
         if (number == bus.reference) reference = count;
@@ -117,16 +118,16 @@ Task<void> start_clocks(Channel& c, Bus& bus) noexcept {
     // On a ring no frame returns to a port, so that nothing can be measured: the usual delay of a hop is taken. The error is some
     // 100 ns for each.
     if (bus.engine.redundant())
-        for (std::size_t n = 0; n < count; ++n) line[n]->delay_ns = n > reference ? static_cast<std::uint32_t>(n - reference) * usual_hop_ns : 0;
-    else
-        find_delays({line.data(), count}, reference);
+        for (std::size_t n = 0; n < count; ++n)
+            line[n]->delay_ns = n > reference ? static_cast<std::uint32_t>(n - reference) * usual_hop_ns : 0;
+    else find_delays({line.data(), count}, reference);
 
     for (const std::uint16_t number : bus.by_position) {
-        Device& d = *bus.devices[number];
+        Device&   d = *bus.devices[number];
         BusSlave& s = d.slave;
         if (!s.present || !s.has_dc() || d.clock_set || !has_valid_delay(bus, d, count)) continue;  // never those of running slaves
         // The frame with the latch passed this slave a delay after it passed the reference clock.
-        const auto system = static_cast<std::uint64_t>(latched_ns + (bus.skew_ns != 0 ? bus.skew_ns : bus.epoch_ns)) + s.delay_ns;
+        const auto          system = static_cast<std::uint64_t>(latched_ns + (bus.skew_ns != 0 ? bus.skew_ns : bus.epoch_ns)) + s.delay_ns;
         const std::uint64_t offset = system - s.local_time;
         co_await start_or_do(c, bus, d, [&d, offset](Channel& on) { return set_clock(on, d, offset); });
     }
@@ -154,9 +155,9 @@ Task<bool> synchronise(Channel& c, Bus& bus, Device& d) noexcept {
         co_return false;
     }
     const std::int64_t until = c.now_ns() + synchronise_timeout_ns;
-    const auto window = static_cast<std::uint32_t>(bus.setup.sync_window_ns);
-    unsigned within = 0;
-    std::uint32_t deviation = UINT32_MAX;
+    const auto         window = static_cast<std::uint32_t>(bus.setup.sync_window_ns);
+    unsigned           within = 0;
+    std::uint32_t      deviation = UINT32_MAX;
     while (within < 3) {
         if (d.clock_set) {
             const Answer a = co_await read(c, d.slave, registers::dc_system_time_difference, 4);
@@ -182,11 +183,11 @@ Task<bool> start_sync_signals(Channel& c, Bus& bus, Device& d) noexcept {
     const Slave& config = *bus.config(d);
     d.sync_begins_ns = 0;
     if (!config.dc || config.dc->assign_activate == 0) co_return true;
-    const Dc& dc = *config.dc;
+    const Dc&  dc = *config.dc;
     const auto cycle = static_cast<std::uint64_t>(dc.sync0_cycle_ns > 0 ? dc.sync0_cycle_ns : bus.setup.cycle_ns);
     co_await write<std::uint8_t>(c, d.slave, registers::dc_activation, 0);
-    if ((dc.assign_activate & 0xff) != 0) co_await write(c, d.slave, registers::dc_cyclic_unit_control,
-        static_cast<std::uint8_t>(dc.assign_activate & 0xff));
+    if ((dc.assign_activate & 0xff) != 0)
+        co_await write(c, d.slave, registers::dc_cyclic_unit_control, static_cast<std::uint8_t>(dc.assign_activate & 0xff));
     put(c.data(), static_cast<std::uint32_t>(cycle));
     put(c.data() + 4, static_cast<std::uint32_t>(dc.sync1_cycle_ns > 0 ? dc.sync1_cycle_ns + dc.sync1_shift_ns : dc.sync1_shift_ns));
     Answer a = co_await c.exchange(Command::fpwr, at_station(d.slave.station, registers::dc_sync0_cycle), 8);
@@ -195,7 +196,7 @@ Task<bool> start_sync_signals(Channel& c, Bus& bus, Device& d) noexcept {
     const auto grid = static_cast<std::int64_t>(cycle);
     const auto shift = static_cast<std::uint64_t>((dc.sync0_shift_ns % grid + grid) % grid);  // of any length: it begins soon
     // Each write takes a cycle, and some are repeated: the start must still be in the future when the unit is activated.
-    const std::int64_t ahead = std::max(sync_start_ns, sync_start_cycles * bus.setup.cycle_ns);
+    const std::int64_t  ahead = std::max(sync_start_ns, sync_start_cycles * bus.setup.cycle_ns);
     const std::uint64_t start = (bus.dc_now() + static_cast<std::uint64_t>(ahead)) / cycle * cycle + cycle + shift;
     d.sync_begins_ns = c.now_ns() + static_cast<std::int64_t>(start - bus.dc_now());
     a = co_await write(c, d.slave, registers::dc_start_time, start);
@@ -209,7 +210,8 @@ void take_clock(Bus& bus) noexcept {
     if (!sample.fresh || bus.reference < 0) return;
     std::uint64_t time = sample.dc_ns;
     if (!bus.devices[static_cast<std::size_t>(bus.reference)]->slave.has_dc64()) {
-        const std::uint64_t guess = bus.status.dc_time_ns != 0 ? bus.status.dc_time_ns : static_cast<std::uint64_t>(bus.engine.now_ns() + bus.epoch_ns);
+        const std::uint64_t guess =
+            bus.status.dc_time_ns != 0 ? bus.status.dc_time_ns : static_cast<std::uint64_t>(bus.engine.now_ns() + bus.epoch_ns);
         const auto step = static_cast<std::int32_t>(static_cast<std::uint32_t>(time) - static_cast<std::uint32_t>(guess));
         time = guess + static_cast<std::uint64_t>(static_cast<std::int64_t>(step));
     }

@@ -52,7 +52,7 @@ void EoeSwitch::pump() noexcept {
 
 bool EoeSwitch::take(const BusSlave& slave, const MailboxMessage& message) noexcept {
     const auto header = eoe::read(message.payload);
-    Port* port = port_of(slave);
+    Port*      port = port_of(slave);
     if (!header || port == nullptr) return false;
     if (header->type == eoe::Type::timestamp) return true;
     if (header->type != eoe::Type::fragment) return false;
@@ -90,7 +90,7 @@ void EoeSwitch::forward(unsigned from, std::span<const std::uint8_t> frame) noex
 
 void EoeSwitch::deliver(unsigned port, std::span<const std::uint8_t> frame) noexcept {
     Queue<EthernetFrame>& queue = port == host ? to_host_ : ports_[port]->queue;
-    EthernetFrame* place = queue.place();
+    EthernetFrame*        place = queue.place();
     if (place == nullptr) {
         if (port != host) ++ports_[port]->counters.lost;
         return;
@@ -102,11 +102,11 @@ void EoeSwitch::deliver(unsigned port, std::span<const std::uint8_t> frame) noex
 
 Task<MailboxResult> EoeSwitch::serve(Channel& channel, BusSlave& slave) noexcept {
     SlaveMailbox* mailbox = mailboxes_.find(slave);
-    Port* port = port_of(slave);
+    Port*         port = port_of(slave);
     if (mailbox == nullptr || port == nullptr) co_return refused();
     const SlaveMailbox::Hold hold = co_await mailbox->hold(channel);
-    const auto body = mailbox->body(slave);
-    const EthernetFrame* frame = port->queue.front();
+    const auto               body = mailbox->body(slave);
+    const EthernetFrame*     frame = port->queue.front();
     if (frame == nullptr) co_return succeeded();
     MailboxResult result = refused();
     if (body.size() >= eoe::header_bytes + 32) {
@@ -125,7 +125,7 @@ Task<MailboxResult> EoeClient::set_ip(Channel& channel, BusSlave& slave, const e
     SlaveMailbox* mailbox = mailboxes_.find(slave);
     if (mailbox == nullptr) co_return refused();
     const SlaveMailbox::Hold hold = co_await mailbox->hold(channel);
-    const auto body = mailbox->body(slave);
+    const auto               body = mailbox->body(slave);
     if (body.size() < eoe::header_bytes + eoe::largest_ip) co_return refused();
     eoe::Ip all = ip;
     all.flags |= eoe::ip_flag::mac | eoe::ip_flag::address | eoe::ip_flag::mask | eoe::ip_flag::gateway | eoe::ip_flag::dns;
@@ -133,8 +133,8 @@ Task<MailboxResult> EoeClient::set_ip(Channel& channel, BusSlave& slave, const e
     eoe::Header header;
     header.type = eoe::Type::set_ip, header.last = true;
     eoe::write(body.data(), header);
-    const std::size_t length = eoe::header_bytes + eoe::write_ip(body.data() + eoe::header_bytes, all);
-    const Expected expected{accepts_eoe, static_cast<std::uint32_t>(eoe::Type::set_ip_response)};
+    const std::size_t   length = eoe::header_bytes + eoe::write_ip(body.data() + eoe::header_bytes, all);
+    const Expected      expected{accepts_eoe, static_cast<std::uint32_t>(eoe::Type::set_ip_response)};
     const MailboxResult result = co_await mailbox->exchange(channel, slave, MailboxType::eoe, length, expected);
     if (!result) co_return result;
     const std::uint16_t code = eoe::read(mailbox->reply().payload)->word;
@@ -146,15 +146,15 @@ Task<MailboxResult> EoeClient::get_ip(Channel& channel, BusSlave& slave, eoe::Ip
     SlaveMailbox* mailbox = mailboxes_.find(slave);
     if (mailbox == nullptr) co_return refused();
     const SlaveMailbox::Hold hold = co_await mailbox->hold(channel);
-    const auto body = mailbox->body(slave);
+    const auto               body = mailbox->body(slave);
     if (body.size() < eoe::header_bytes) co_return refused();
     eoe::Header header;
     header.type = eoe::Type::get_ip, header.last = true;
     eoe::write(body.data(), header);
-    const Expected expected{accepts_eoe, static_cast<std::uint32_t>(eoe::Type::get_ip_response)};
+    const Expected      expected{accepts_eoe, static_cast<std::uint32_t>(eoe::Type::get_ip_response)};
     const MailboxResult result = co_await mailbox->exchange(channel, slave, MailboxType::eoe, eoe::header_bytes, expected);
     if (!result) co_return result;
-    const auto payload = mailbox->reply().payload;
+    const auto          payload = mailbox->reply().payload;
     const std::uint16_t code = eoe::read(payload)->word;
     if (code != 0) co_return aborted(code);
     const auto ip = eoe::read_ip(payload.subspan(eoe::header_bytes));

@@ -17,7 +17,7 @@ namespace hal::ethercat::master {
 
 /// An Ethernet frame from the destination address on, without check sequence.
 struct EthernetFrame {
-    std::uint16_t length = 0;
+    std::uint16_t                                length = 0;
     std::array<std::uint8_t, eoe::largest_frame> bytes{};
 };
 
@@ -40,36 +40,36 @@ public:
     bool pending(const BusSlave& slave) const noexcept;
     /// Sends the oldest frame for a slave. [realtime]
     Task<MailboxResult> serve(Channel&, BusSlave&) noexcept;
-    bool take(const BusSlave&, const MailboxMessage&) noexcept override;
+    bool                take(const BusSlave&, const MailboxMessage&) noexcept override;
 
     Queue<EthernetFrame>& to_host() noexcept { return to_host_; }      ///< Returns the frames for the host; read by its thread. [any]
     Queue<EthernetFrame>& from_host() noexcept { return from_host_; }  ///< Returns the frames of the host; written by its thread. [any]
-    EoeCounters counters(const BusSlave& slave) const noexcept;        ///< [any]
+    EoeCounters           counters(const BusSlave& slave) const noexcept;        ///< [any]
 
 private:
     struct Port {
         explicit Port(std::uint16_t number, std::size_t depth) : slave(number), queue(depth) {}
-        std::uint16_t slave;
+        std::uint16_t        slave;
         Queue<EthernetFrame> queue;
-        eoe::Joiner joiner;
-        EoeCounters counters;
-        std::uint8_t frame = 0;  // number of the next one, modulo 16
+        eoe::Joiner          joiner;
+        EoeCounters          counters;
+        std::uint8_t         frame = 0;  // number of the next one, modulo 16
     };
     struct Learned {
         std::array<std::uint8_t, 6> address{};
-        std::uint16_t port = 0;
-        bool used = false;
+        std::uint16_t               port = 0;
+        bool                        used = false;
     };
-    Port* port_of(const BusSlave& slave) const noexcept;
-    void forward(unsigned from, std::span<const std::uint8_t> frame) noexcept;
+    Port*    port_of(const BusSlave& slave) const noexcept;
+    void     forward(unsigned from, std::span<const std::uint8_t> frame) noexcept;
     Learned& slot_of(const std::uint8_t* address) noexcept;
-    void deliver(unsigned port, std::span<const std::uint8_t> frame) noexcept;
+    void     deliver(unsigned port, std::span<const std::uint8_t> frame) noexcept;
 
-    Mailboxes& mailboxes_;
+    Mailboxes&                         mailboxes_;
     std::vector<std::unique_ptr<Port>> ports_;
-    std::vector<int> port_by_slave_;
-    std::array<Learned, 256> learned_{};
-    Queue<EthernetFrame> to_host_, from_host_;
+    std::vector<int>                   port_by_slave_;
+    std::array<Learned, 256>           learned_{};
+    Queue<EthernetFrame>               to_host_, from_host_;
 };
 
 /// The IP settings of slaves. All functions [realtime]. A result other than ok ends as `aborted` with its code (eoe::Result).

@@ -8,17 +8,22 @@ namespace hal::ethercat::master {
 
 /// In brackets the two numbers. `slave` is an index in Setup::slaves, or of_position + position where the setup does not name the slave.
 enum class Event : std::uint8_t {
-    link_lost, link_restored,      ///< primary or backup port [port 0 or 1, -]
+    link_lost,
+    link_restored,      ///< primary or backup port [port 0 or 1, -]
     no_slaves,                     ///< nothing answers
     scanned,                       ///< [slaves found, slaves expected]
     too_many_slaves,               ///< [found, capacity]
     slave_missing,                 ///< not on the bus at start [position, -]
     unknown_slave,                 ///< not in the setup [vendor, product]
-    wrong_vendor, wrong_product, wrong_revision, wrong_serial,  ///< [found, expected]
+    wrong_vendor,
+    wrong_product,
+    wrong_revision,
+    wrong_serial,  ///< [found, expected]
     duplicate_alias,               ///< alias or device identification [number, position of the second]
     sii_failed,                    ///< EEPROM not readable [0502h, word]
     no_mailbox,                    ///< start-up writes for a slave without mailbox [index << 8 | sub, -]
-    too_few_fmmus, too_few_sync_managers,  ///< [present, needed]
+    too_few_fmmus,
+    too_few_sync_managers,  ///< [present, needed]
     state_reached,                 ///< [State, -]
     state_refused,                 ///< [State requested, AL status code]
     state_timeout,                 ///< [State requested, AL status]
@@ -28,16 +33,19 @@ enum class Event : std::uint8_t {
     mapping_differs,               ///< read back other than written [value << 24 | index << 8 | sub, value read]
     too_many_entries,              ///< [PDO, entries]
     fixed_size,                    ///< no mailbox to change the mapping [sync manager << 16 | bytes of the setup, bytes of the slave]
-    slave_lost, slave_returned,    ///< [position, -]
+    slave_lost,
+    slave_returned,    ///< [position, -]
     slave_operational,             ///< [position, ms since its start-up began]
-    wkc_incomplete, wkc_complete,  ///< of a domain [domain << 16 | counter, expected]
+    wkc_incomplete,
+    wkc_complete,  ///< of a domain [domain << 16 | counter, expected]
     reference_clock,               ///< `slave` leads [64 bit: 1, -]
     dc_unsupported,                ///< configured, but the slave has no clock
     dc_timeout,                    ///< clock not within the window in time [deviation ns, window ns]
     dc_not_set,                    ///< the time of its clock could not be set [ms waited, -]
     dc_lost,                       ///< clock far beyond the window while operational [deviation ns, window ns]
     dc_synchronised,               ///< all slaves [largest deviation ns, -]
-    ring_broken, ring_closed,      ///< `slave` is the one before the break [position, responding to the primary port]
+    ring_broken,
+    ring_closed,      ///< `slave` is the one before the break [position, responding to the primary port]
     topology_changed,              ///< [slaves before, slaves now]
     other_master,                  ///< EtherCAT frames that are not ours [frames in the last second, -]
     start_up_failed,               ///< gives up for now and starts again later [State it was in, seconds to the next try]

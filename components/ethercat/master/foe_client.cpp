@@ -28,9 +28,9 @@ std::size_t write_name(std::span<std::uint8_t> body, foe::Opcode opcode, std::ui
 Task<MailboxResult> FoeClient::exchange(Channel& channel, BusSlave& slave, SlaveMailbox& mailbox, std::size_t length, foe::Opcode answer,
                                         std::uint32_t packet, FoeOptions options, FoeProgress& progress) noexcept {
     const std::int64_t timeout = std::int64_t{options.timeout_ms} * 1'000'000;
-    std::int64_t give_up = channel.now_ns() + std::int64_t{options.busy_ms} * 1'000'000;
-    const Expected expected{accepts_foe, static_cast<std::uint32_t>(answer), packet};
-    MailboxResult result = co_await mailbox.send(channel, slave, MailboxType::foe, length);
+    std::int64_t       give_up = channel.now_ns() + std::int64_t{options.busy_ms} * 1'000'000;
+    const Expected     expected{accepts_foe, static_cast<std::uint32_t>(answer), packet};
+    MailboxResult      result = co_await mailbox.send(channel, slave, MailboxType::foe, length);
     if (!result) co_return result;
     bool busy = false;
     for (;;) {
@@ -66,16 +66,15 @@ Task<MailboxResult> FoeClient::exchange(Channel& channel, BusSlave& slave, Slave
 }
 
 Task<MailboxResult> FoeClient::read(Channel& channel, BusSlave& slave, std::string_view name, FoeOptions options,
-    std::span<std::uint8_t> to,
-                                    FoeProgress& progress) noexcept {
+                                    std::span<std::uint8_t> to, FoeProgress& progress) noexcept {
     SlaveMailbox* mailbox = mailboxes_.find(slave);
     if (mailbox == nullptr) co_return refused();
     const SlaveMailbox::Hold hold = co_await mailbox->hold(channel);
-    const auto body = mailbox->body(slave);
-    const std::size_t in_size = slave.area().in_size;
+    const auto               body = mailbox->body(slave);
+    const std::size_t        in_size = slave.area().in_size;
     if (body.size() < foe::header_bytes + name.size() || in_size <= mailbox_header_bytes + foe::header_bytes) co_return refused();
     const std::size_t capacity = foe::packet_capacity(in_size);
-    std::size_t length = write_name(body, foe::Opcode::read, options.password, name), used = 0;
+    std::size_t       length = write_name(body, foe::Opcode::read, options.password, name), used = 0;
     for (std::uint32_t packet = 1;; ++packet) {
         const MailboxResult result = co_await exchange(channel, slave, *mailbox, length, foe::Opcode::data, packet, options, progress);
         if (!result) co_return result;
@@ -102,10 +101,10 @@ Task<MailboxResult> FoeClient::write(Channel& channel, BusSlave& slave, std::str
     SlaveMailbox* mailbox = mailboxes_.find(slave);
     if (mailbox == nullptr) co_return refused();
     const SlaveMailbox::Hold hold = co_await mailbox->hold(channel);
-    const auto body = mailbox->body(slave);
+    const auto               body = mailbox->body(slave);
     if (body.size() <= foe::header_bytes || body.size() < foe::header_bytes + name.size()) co_return refused();
     const std::size_t capacity = body.size() - foe::header_bytes;
-    std::size_t length = write_name(body, foe::Opcode::write, options.password, name), used = 0, last = capacity;
+    std::size_t       length = write_name(body, foe::Opcode::write, options.password, name), used = 0, last = capacity;
     for (std::uint32_t packet = 0;; ++packet) {  // ends with a packet that is not full, an empty one if need be
         const MailboxResult result = co_await exchange(channel, slave, *mailbox, length, foe::Opcode::ack, packet, options, progress);
         if (!result) co_return result;

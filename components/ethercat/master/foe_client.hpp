@@ -23,7 +23,7 @@ struct FoeOptions {
 struct FoeProgress {
     std::atomic<std::uint32_t> bytes{0};
     std::atomic<std::uint16_t> done{0}, entire{0};  ///< what a busy slave reports, often in percent
-    std::array<char, 64> text{};                    ///< of the slave's error, terminated; often empty
+    std::array<char, 64>       text{};                    ///< of the slave's error, terminated; often empty
 };
 
 /// See the top of this file. All functions [realtime]. The name, the buffers and the progress must outlive the task. An error of the slave
@@ -38,9 +38,8 @@ public:
 private:
     /// Sends the message in the mailbox's body, again while the slave is busy, and waits for the answer to `packet`.
     Task<MailboxResult> exchange(Channel&, BusSlave&, SlaveMailbox&, std::size_t length, foe::Opcode answer, std::uint32_t packet,
-        FoeOptions,
-                                 FoeProgress&) noexcept;
-    Mailboxes& mailboxes_;
+                                 FoeOptions, FoeProgress&) noexcept;
+    Mailboxes&          mailboxes_;
 };
 
 }  // namespace hal::ethercat::master

@@ -42,18 +42,18 @@ int open_socket(int type, const std::string& address, std::uint16_t port, std::s
 }  // namespace
 
 struct Gateway::Sender {
-    sockaddr_in address{};
+    sockaddr_in   address{};
     std::uint32_t client = 0;  // of TCP; 0: UDP
 };
 struct Gateway::Client {
-    int fd = -1;
-    std::uint32_t id = 0;
-    std::size_t used = 0;
+    int                                       fd = -1;
+    std::uint32_t                             id = 0;
+    std::size_t                               used = 0;
     std::array<std::uint8_t, largest_message> bytes{};
 };
 struct Gateway::Pending {
-    MailboxRequest request;
-    Sender sender;
+    MailboxRequest                            request;
+    Sender                                    sender;
     std::array<std::uint8_t, largest_mailbox> bytes{};
 };
 
@@ -62,7 +62,7 @@ Gateway::Gateway(RequestPort& port, GatewaySetup setup, std::string& problem) : 
     udp_ = open_socket(SOCK_DGRAM, setup_.address, setup_.port, problem);
     if (udp_ < 0) return;
     sockaddr_in at{};
-    socklen_t size = sizeof at;
+    socklen_t   size = sizeof at;
     if (getsockname(udp_, reinterpret_cast<sockaddr*>(&at), &size) == 0) number_ = ntohs(at.sin_port);
     if (setup_.tcp) tcp_ = open_socket(SOCK_STREAM, setup_.address, number_, problem);
     if (setup_.tcp && tcp_ < 0) return;
@@ -104,9 +104,9 @@ void Gateway::run() {
 
 void Gateway::read_udp() {
     std::array<std::uint8_t, largest_message + 1> bytes;
-    Sender sender;
+    Sender                                        sender;
     for (unsigned most = 64; most != 0; --most) {
-        socklen_t size = sizeof sender.address;
+        socklen_t  size = sizeof sender.address;
         const auto got = recvfrom(udp_, bytes.data(), bytes.size(), 0, reinterpret_cast<sockaddr*>(&sender.address), &size);
         if (got < 0) return;
         take({bytes.data(), static_cast<std::size_t>(got)}, sender);
@@ -132,7 +132,7 @@ void Gateway::read_tcp(Client& client) {
 
 void Gateway::take(std::span<const std::uint8_t> bytes, const Sender& sender) {
     const std::uint16_t header = bytes.size() < ecat_header_bytes ? 0 : get<std::uint16_t>(bytes.data());
-    const std::size_t length = header & 0x7ffU;
+    const std::size_t   length = header & 0x7ffU;
     const bool fits = header >> 12 == static_cast<unsigned>(Protocol::mailbox_gateway) && ecat_header_bytes + length <= bytes.size() &&
                       length <= largest_mailbox;
     const auto message = fits ? read_mailbox(bytes.subspan(ecat_header_bytes, length)) : std::nullopt;
@@ -148,8 +148,8 @@ void Gateway::take(std::span<const std::uint8_t> bytes, const Sender& sender) {
         else ++dropped_;
         return;
     }
-    const auto slave = std::find_if(setup_.slaves.begin(), setup_.slaves.end(),
-        [&](const auto& s) { return s.station == message->station; });
+    const auto slave =
+        std::find_if(setup_.slaves.begin(), setup_.slaves.end(), [&](const auto& s) { return s.station == message->station; });
     pending->sender = sender;
     MailboxRequest& request = pending->request;
     request.kind = MailboxRequest::Kind::message;
@@ -174,12 +174,12 @@ void Gateway::answer(const Sender& sender, std::span<const std::uint8_t> message
     put(bytes.data(), static_cast<std::uint16_t>(message.size() | static_cast<unsigned>(Protocol::mailbox_gateway) << 12));
     std::copy(message.begin(), message.end(), bytes.begin() + ecat_header_bytes);
     const std::size_t length = ecat_header_bytes + message.size();
-    ssize_t sent = -1;
+    ssize_t           sent = -1;
     if (sender.client == 0) {
         sent = sendto(udp_, bytes.data(), length, 0, reinterpret_cast<const sockaddr*>(&sender.address), sizeof sender.address);
     } else {
-        const auto client = std::find_if(clients_.begin(), clients_.end(), [&](const auto& c) { return c->id == sender.client &&
-            c->fd >= 0; });
+        const auto client =
+            std::find_if(clients_.begin(), clients_.end(), [&](const auto& c) { return c->id == sender.client && c->fd >= 0; });
         if (client != clients_.end()) {
             sent = send((*client)->fd, bytes.data(), length, MSG_NOSIGNAL);
             if (sent != static_cast<ssize_t>(length)) shutdown((*client)->fd, SHUT_RDWR);  // a part would end the framing

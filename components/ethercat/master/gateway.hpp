@@ -24,10 +24,10 @@ struct GatewaySlave {
 };
 
 struct GatewaySetup {
-    std::string address = "127.0.0.1";  ///< of the interface to listen on; "0.0.0.0": all
-    std::uint16_t port = 34980;         ///< 0: any free one
-    bool tcp = true;
-    std::size_t most_clients = 16;      ///< of TCP
+    std::string               address = "127.0.0.1";  ///< of the interface to listen on; "0.0.0.0": all
+    std::uint16_t             port = 34980;         ///< 0: any free one
+    bool                      tcp = true;
+    std::size_t               most_clients = 16;      ///< of TCP
     std::vector<GatewaySlave> slaves;
 };
 
@@ -43,7 +43,7 @@ public:
     Gateway(RequestPort& port, GatewaySetup setup, std::string& problem);
     ~Gateway();
     Gateway(const Gateway&) = delete;
-    Gateway& operator=(const Gateway&) = delete;
+    Gateway&      operator=(const Gateway&) = delete;
     std::uint16_t port() const noexcept { return number_; }  ///< Returns the UDP and TCP port.
     std::uint32_t answered() const noexcept { return answered_; }
     std::uint32_t dropped() const noexcept { return dropped_; }  ///< Returns the number of invalid requests and of those without a reply.
@@ -59,16 +59,16 @@ private:
     void read_tcp(Client& client);
     void collect();
 
-    RequestPort& requests_;
-    GatewaySetup setup_;
-    int udp_ = -1, tcp_ = -1;
-    std::uint16_t number_ = 0;
-    std::vector<std::unique_ptr<Client>> clients_;
+    RequestPort&                          requests_;
+    GatewaySetup                          setup_;
+    int                                   udp_ = -1, tcp_ = -1;
+    std::uint16_t                         number_ = 0;
+    std::vector<std::unique_ptr<Client>>  clients_;
     std::vector<std::unique_ptr<Pending>> pending_;
-    std::uint32_t next_client_ = 1;
-    std::atomic<std::uint32_t> answered_{0}, dropped_{0};
-    std::atomic<bool> stop_{false};
-    std::thread thread_;
+    std::uint32_t                         next_client_ = 1;
+    std::atomic<std::uint32_t>            answered_{0}, dropped_{0};
+    std::atomic<bool>                     stop_{false};
+    std::thread                           thread_;
 };
 
 }  // namespace hal::ethercat::master

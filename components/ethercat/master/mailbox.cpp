@@ -9,8 +9,8 @@
 namespace hal::ethercat::master {
 namespace {
 
-constexpr std::uint8_t sm_full = 0x08, sm_repeat = 0x02;
-constexpr unsigned most_absent = 4;  // answers with WKC 0 in a row after which a slave counts as not on the bus
+constexpr std::uint8_t  sm_full = 0x08, sm_repeat = 0x02;
+constexpr unsigned      most_absent = 4;  // answers with WKC 0 in a row after which a slave counts as not on the bus
 constexpr std::uint16_t status_of(unsigned n) { return static_cast<std::uint16_t>(registers::sync_manager_at(n) + 5); }
 constexpr std::uint16_t activate_of(unsigned n) { return static_cast<std::uint16_t>(registers::sync_manager_at(n) + 6); }
 MailboxResult too_late(bool lost) noexcept { return {lost ? MailboxResult::Outcome::lost : MailboxResult::Outcome::timed_out, 0, 0}; }
@@ -43,10 +43,10 @@ Task<MailboxResult> SlaveMailbox::send(Channel& channel, BusSlave& slave, Mailbo
     if (std::exchange(stale_, false)) co_await poll(channel, slave);
     slave.mailbox_counter = next_mailbox_counter(slave.mailbox_counter);
     write_mailbox_header(request_.data(), length, 0, type, slave.mailbox_counter);
-    const std::int64_t until = channel.now_ns() + std::int64_t{slave.timeouts.mailbox_request} * 1'000'000;
+    const std::int64_t  until = channel.now_ns() + std::int64_t{slave.timeouts.mailbox_request} * 1'000'000;
     const std::uint32_t address = at_station(slave.station, slave.area().out_start);
-    unsigned absent = 0;
-    bool unknown = false;  // a lost datagram may have been executed
+    unsigned            absent = 0;
+    bool                unknown = false;  // a lost datagram may have been executed
     for (;;) {
         std::memcpy(channel.data(), request_.data(), mailbox_header_bytes + length);
         std::memset(channel.data() + mailbox_header_bytes + length, 0, size - mailbox_header_bytes - length);
@@ -91,7 +91,7 @@ Task<MailboxResult> SlaveMailbox::receive(Channel& channel, BusSlave& slave, std
 }
 
 Task<MailboxResult> SlaveMailbox::exchange(Channel& channel, BusSlave& slave, MailboxType type, std::size_t length,
-    Expected expected) noexcept {
+                                           Expected expected) noexcept {
     MailboxResult result = co_await send(channel, slave, type, length);
     if (!result) co_return result;
     result = co_await wait_for(channel, slave, type, response_timeout_ns(slave), expected);
@@ -130,8 +130,8 @@ Task<MailboxResult> SlaveMailbox::poll(Channel& channel, BusSlave& slave) noexce
 
 Task<bool> SlaveMailbox::read(Channel& channel, BusSlave& slave, std::int64_t until_ns) noexcept {
     const std::size_t size = std::min<std::size_t>(slave.area().in_size, largest_mailbox);
-    const Answer answer = co_await channel.exchange(Command::fprd, at_station(slave.station, slave.area().in_start),
-        static_cast<std::uint16_t>(size), 0);
+    const Answer      answer =
+        co_await channel.exchange(Command::fprd, at_station(slave.station, slave.area().in_start), static_cast<std::uint16_t>(size), 0);
     if (!answer) {  // the message may have left the slave
         ++counters_.repeated, ++lost_reads_;
         co_await repeat(channel, slave, until_ns);
@@ -186,8 +186,8 @@ bool SlaveMailbox::accept(const BusSlave& slave, std::size_t size) noexcept {
 // A slave that repeats a message does so with its counter. One that never counts, or always sends the same number, is exempt.
 bool SlaveMailbox::is_duplicate(const MailboxMessage& message) noexcept {
     const std::uint64_t sum = sum_of(message.payload);
-    const bool same_counter = message.counter != 0 && message.counter == last_counter_;
-    const bool same = same_counter && sum == last_sum_;
+    const bool          same_counter = message.counter != 0 && message.counter == last_counter_;
+    const bool          same = same_counter && sum == last_sum_;
     if (same_counter && !same) repeats_counter_ = true;
     if (message.counter != 0 && last_counter_ != 0 && !same_counter) advances_ = true;
     last_counter_ = message.counter, last_sum_ = sum;

@@ -74,7 +74,7 @@ public:
 
     /// Waits until no other task uses the mailbox.
     Task<Hold> hold(Channel&) noexcept;
-    bool held() const noexcept { return held_; }
+    bool       held() const noexcept { return held_; }
 
     /// Returns the space for the payload of the next request.
     std::span<std::uint8_t> body(const BusSlave& slave) noexcept {
@@ -106,7 +106,7 @@ public:
     /// Sets the consumer of unrequested messages of a type; nullptr: none. [setup]
     void set_sink(MailboxType type, MailboxSink* sink) noexcept { sinks_[static_cast<unsigned>(type) % types] = sink; }
     /// Sets the consumer of messages to another station than the master. [setup]
-    void set_router(MailboxSink* router) noexcept { router_ = router; }
+    void                   set_router(MailboxSink* router) noexcept { router_ = router; }
     const MailboxCounters& counters() const noexcept { return counters_; }
     /// Forgets what is under way, after the slave's sync managers were configured anew.
     void reset() noexcept { stale_ = false, advances_ = false, repeats_counter_ = false, last_counter_ = lost_reads_ = 0; }
@@ -120,17 +120,17 @@ private:
     Task<Full> is_full(Channel&, BusSlave&, unsigned sync_manager, unsigned repeats = 2) noexcept;
     Task<bool> read(Channel&, BusSlave&, std::int64_t until_ns) noexcept;   // returns whether a message is in reply_
     Task<bool> repeat(Channel&, BusSlave&, std::int64_t until_ns) noexcept; // has the last message sent again
-    bool accept(const BusSlave&, std::size_t size) noexcept;                // the bytes in reply_bytes_
-    bool is_duplicate(const MailboxMessage&) noexcept;
+    bool       accept(const BusSlave&, std::size_t size) noexcept;                // the bytes in reply_bytes_
+    bool       is_duplicate(const MailboxMessage&) noexcept;
 
     std::array<std::uint8_t, largest_mailbox> request_{}, reply_bytes_{};
-    MailboxMessage reply_;
-    std::array<MailboxSink*, types> sinks_{};
-    MailboxSink* router_ = nullptr;
-    MailboxCounters counters_;
-    std::uint64_t last_sum_ = 0;    // of the last message, to recognise a duplicate
-    std::uint8_t last_counter_ = 0, lost_reads_ = 0;
-    bool advances_ = false;         // the slave counts its messages
+    MailboxMessage                            reply_;
+    std::array<MailboxSink*, types>           sinks_{};
+    MailboxSink*                              router_ = nullptr;
+    MailboxCounters                           counters_;
+    std::uint64_t                             last_sum_ = 0;    // of the last message, to recognise a duplicate
+    std::uint8_t                              last_counter_ = 0, lost_reads_ = 0;
+    bool                                      advances_ = false;         // the slave counts its messages
     bool repeats_counter_ = false;  // it sends different messages with the same counter: not to be relied on
     bool held_ = false, stale_ = false;
 };
@@ -141,20 +141,22 @@ public:
     /// Allocates the mailboxes of slaves 0..count-1. [setup]
     explicit Mailboxes(std::size_t count) : count_(count), mailboxes_(std::make_unique<SlaveMailbox[]>(count)) {}
     /// Returns the mailbox of a slave; nullptr if the slave has none or is unknown. [realtime]
-    SlaveMailbox* find(const BusSlave& slave) noexcept { return slave.number < count_ &&
-        slave.area().usable() ? &mailboxes_[slave.number] : nullptr; }
+    SlaveMailbox* find(const BusSlave& slave) noexcept {
+        return slave.number < count_ && slave.area().usable() ? &mailboxes_[slave.number] : nullptr;
+    }
     /// Returns the mailbox number `n`, below size(). [any]
     SlaveMailbox& at(std::size_t n) noexcept { return mailboxes_[n]; }
-    std::size_t size() const noexcept { return count_; }
+    std::size_t   size() const noexcept { return count_; }
 
 private:
-    std::size_t count_;
+    std::size_t                     count_;
     std::unique_ptr<SlaveMailbox[]> mailboxes_;
 };
 
 /// Returns the result of a rejected request, `code` being a mailbox error or 0. [any]
-constexpr MailboxResult refused(std::uint32_t code = 0, std::size_t length = 0) noexcept { return {MailboxResult::Outcome::refused, code,
-    length}; }
+constexpr MailboxResult refused(std::uint32_t code = 0, std::size_t length = 0) noexcept {
+    return {MailboxResult::Outcome::refused, code, length};
+}
 /// Returns the result of a protocol's own error. [any]
 constexpr MailboxResult aborted(std::uint32_t code) noexcept { return {MailboxResult::Outcome::aborted, code, 0}; }
 /// Returns the result of success. [any]

@@ -7,7 +7,7 @@ namespace hal::ethercat::master {
 
 namespace {
 
-constexpr unsigned acyclic_frames_starting = 8, acyclic_frames_operating = 2;
+constexpr unsigned      acyclic_frames_starting = 8, acyclic_frames_operating = 2;
 constexpr std::uint64_t link_check_cycles = 64;
 
 }  // namespace
@@ -33,7 +33,8 @@ void Master::receive(std::int64_t now_ns) noexcept {
     take_clock(bus);
     judge_counters(bus);
     if (bus.suspicious && bus.resting && bus.bus_channel.stage() == Channel::Stage::sleeping) bus.bus_channel.wake();
-    if (const auto resumed = bus.engine.resumed(); resumed != resumed_) resumed_ = resumed,
+    if (const auto resumed = bus.engine.resumed(); resumed != resumed_)
+        resumed_ = resumed,
         bus.update_status();  // only tasks change states
     if (links_checked_++ % link_check_cycles != 0) return;
     const auto link = [&](ethernet::Port* port, bool& was, std::int64_t number) {
@@ -51,7 +52,8 @@ void Master::transmit(std::int64_t now_ns) noexcept {
     // The time of the reference clock as this frame passes it. It is what slaves get that only the backup port reaches: the clock they follow
     // must not change when a ring breaks.
     const std::int64_t ahead = bus.setup.lead != ClockLead::thread && bus.skew_ns != 0 ? bus.skew_ns : bus.epoch_ns;
-    bus.engine.transmit(now_ns, bus.exchange, !bus.status.operational, bus.status.operational ? acyclic_frames_operating : acyclic_frames_starting,
+    bus.engine.transmit(now_ns, bus.exchange, !bus.status.operational,
+                        bus.status.operational ? acyclic_frames_operating : acyclic_frames_starting,
                         static_cast<std::uint64_t>(now_ns + ahead));
 }
 
@@ -80,10 +82,10 @@ void Master::set_target(State target) noexcept {
 }
 void Master::set_outputs_valid(bool valid) noexcept { bus_->outputs_valid = valid; }
 
-const Setup& Master::setup() const noexcept { return bus_->setup; }
-const BusStatus& Master::status() const noexcept { return bus_->status; }
+const Setup&        Master::setup() const noexcept { return bus_->setup; }
+const BusStatus&    Master::status() const noexcept { return bus_->status; }
 const DomainStatus& Master::domain(std::size_t n) const noexcept { return bus_->image.domain(n); }
-std::uint64_t Master::cycles_incomplete() const noexcept {
+std::uint64_t       Master::cycles_incomplete() const noexcept {
     std::uint64_t sum = 0;
     for (std::size_t n = 0; n < bus_->image.domain_count(); ++n) sum += bus_->image.domain(n).incomplete;
     return sum;
@@ -107,12 +109,12 @@ Master::Phase Master::dc_phase() const noexcept {
 }
 
 std::size_t Master::found() const noexcept { return bus_->by_position.size(); }
-BusSlave& Master::found(std::size_t position) noexcept { return bus_->devices[bus_->by_position[position]]->slave; }
-BusSlave* Master::slave(std::size_t slave) noexcept {
+BusSlave&   Master::found(std::size_t position) noexcept { return bus_->devices[bus_->by_position[position]]->slave; }
+BusSlave*   Master::slave(std::size_t slave) noexcept {
     const int device = bus_->device_of[slave];
     return device < 0 ? nullptr : &bus_->devices[static_cast<std::size_t>(device)]->slave;
 }
 Channel& Master::channel(const BusSlave& slave) noexcept { return bus_->devices[slave.number]->channel; }
-bool Master::idle(const BusSlave& slave) const noexcept { return !bus_->devices[slave.number]->channel.busy(); }
+bool     Master::idle(const BusSlave& slave) const noexcept { return !bus_->devices[slave.number]->channel.busy(); }
 
 }  // namespace hal::ethercat::master

@@ -56,17 +56,17 @@ public:
     /// Forgets all slaves and scans again. [realtime]
     void rescan() noexcept;
 
-    const Setup& setup() const noexcept;                              ///< [any]
-    const BusStatus& status() const noexcept;                         ///< [realtime]
+    const Setup&        setup() const noexcept;                              ///< [any]
+    const BusStatus&    status() const noexcept;                         ///< [realtime]
     const DomainStatus& domain(std::size_t n) const noexcept;         ///< [realtime]
-    std::uint64_t cycles_incomplete() const noexcept;                 ///< Returns DomainStatus::incomplete of all domains. [realtime]
-    void reset_domain(std::size_t n) noexcept;                        ///< Resets least counter and changes. [realtime]
-    const SlaveStatus& slave_status(std::size_t slave) const noexcept;///< Returns the status of `Setup::slaves[slave]`. [realtime]
+    std::uint64_t       cycles_incomplete() const noexcept;  ///< Returns DomainStatus::incomplete of all domains. [realtime]
+    void                reset_domain(std::size_t n) noexcept;  ///< Resets least counter and changes. [realtime]
+    const SlaveStatus&  slave_status(std::size_t slave) const noexcept;  ///< Returns the status of `Setup::slaves[slave]`. [realtime]
 
     /// Error of this cycle's phase: positive when the cycle begins late on the grid of the reference clock, whose cycle times begin at
     /// multiples of Setup::cycle_ns; within half a cycle. Valid when `fresh`. [realtime]
     struct Phase {
-        bool fresh = false;
+        bool         fresh = false;
         std::int64_t error_ns = 0;
     };
     Phase dc_phase() const noexcept;
@@ -74,7 +74,7 @@ public:
     // Slaves as found, for tools and mailbox clients.
     /// Returns the number of slaves on the bus after the scan. [realtime]
     std::size_t found() const noexcept;
-    BusSlave& found(std::size_t position) noexcept;                   ///< Returns the slave at a position below found(). [realtime]
+    BusSlave&   found(std::size_t position) noexcept;  ///< Returns the slave at a position below found(). [realtime]
     /// Returns the slave that is Setup::slaves[slave]; nullptr: missing. [realtime]
     BusSlave* slave(std::size_t slave) noexcept;
     /// Returns the channel of a slave. It belongs to the start-up while idle() is false. [realtime]
@@ -84,10 +84,10 @@ public:
 
 private:
     std::unique_ptr<Bus> bus_;
-    ethernet::Port* primary_ = nullptr;
-    ethernet::Port* backup_ = nullptr;
-    std::uint64_t links_checked_ = 0, resumed_ = 0;
-    bool backup_up_ = true;
+    ethernet::Port*      primary_ = nullptr;
+    ethernet::Port*      backup_ = nullptr;
+    std::uint64_t        links_checked_ = 0, resumed_ = 0;
+    bool                 backup_up_ = true;
 };
 
 }  // namespace hal::ethercat::master

@@ -30,8 +30,8 @@ Task<SdoResult> read_value(Channel& c, Bus& bus, Device& d, std::uint16_t index,
     value = 0;
     SdoResult r = co_await bus.coe.upload(c, d.slave, index, static_cast<std::uint8_t>(sub), false, bytes);
     if (r) value = get<std::uint32_t>(bytes.data());
-    if (!r && r.outcome == SdoResult::Outcome::aborted && sub == 0 &&
-        (r.abort == object_missing || r.abort == sub_missing)) r.outcome = SdoResult::Outcome::done;
+    if (!r && r.outcome == SdoResult::Outcome::aborted && sub == 0 && (r.abort == object_missing || r.abort == sub_missing))
+        r.outcome = SdoResult::Outcome::done;
     co_return r;
 }
 
@@ -39,7 +39,7 @@ Task<SdoResult> read_value(Channel& c, Bus& bus, Device& d, std::uint16_t index,
 template <class Want>
 Task<Compared> compare(Channel& c, Bus& bus, Device& d, std::uint16_t index, std::size_t count, Want want, bool report) noexcept {
     std::uint32_t value = 0;
-    SdoResult r = co_await read_value(c, bus, d, index, 0, value);
+    SdoResult     r = co_await read_value(c, bus, d, index, 0, value);
     if (!r) {
         bus.report(Event::mapping_failed, d, index << 8, r.abort);
         co_return Compared::failed;
@@ -52,7 +52,8 @@ Task<Compared> compare(Channel& c, Bus& bus, Device& d, std::uint16_t index, std
         r = co_await read_value(c, bus, d, index, static_cast<unsigned>(n + 1), value);
         const bool same = r && value == want(n);
         if (same) continue;
-        if (report) bus.report(Event::mapping_differs, d, static_cast<std::int64_t>(want(n)) << 24 | index << 8 | static_cast<int>(n + 1), value);
+        if (report)
+            bus.report(Event::mapping_differs, d, static_cast<std::int64_t>(want(n)) << 24 | index << 8 | static_cast<int>(n + 1), value);
         co_return Compared::differs;
     }
     co_return Compared::same;
@@ -133,7 +134,7 @@ Task<bool> map_manager(Channel& c, Bus& bus, Device& d, const SyncManager& sm, u
 
     // A mapping changes only while its PDO is not assigned, so the assignment is written again after any change.
     const std::uint16_t object = assignment_of(sm.number);
-    bool ok = true;
+    bool                ok = true;
     if (sm.assignment_first) {
         const SdoResult r = co_await write_value<std::uint8_t>(c, bus, d, object, 0, 0);
         if (!r) co_return false;

@@ -20,7 +20,9 @@ constexpr bool overlap(std::uint32_t a, std::uint32_t a_bytes, std::uint32_t b, 
 }  // namespace
 
 ProcessImage::ProcessImage(const Setup& setup, const std::array<std::uint8_t, 6>& source)
-    : slaves_(setup.slaves.size()), domains_(std::max<std::size_t>(setup.domains.size(), 1)), source_(source),
+    : slaves_(setup.slaves.size()),
+      domains_(std::max<std::size_t>(setup.domains.size(), 1)),
+      source_(source),
       write_clock_(setup.lead == ClockLead::thread) {
     lay_out(setup);
     // Each block needs at most two datagrams and one per frame's worth of bytes; each of them could need a frame of its own.
@@ -111,8 +113,8 @@ void ProcessImage::build() noexcept {
 
 void ProcessImage::build_frames(unsigned every) noexcept {
     std::optional<FrameWriter> writer;
-    Frame* frame = nullptr;
-    const auto finish = [&] {
+    Frame*                     frame = nullptr;
+    const auto                 finish = [&] {
         if (frame == nullptr) return;
         frame->last = static_cast<unsigned>(datagrams_used_);
         frame->size = static_cast<std::uint16_t>(writer->finish().size());
@@ -155,7 +157,7 @@ void ProcessImage::build_frames(unsigned every) noexcept {
 }
 
 void ProcessImage::add(FrameWriter& writer, Frame& frame, Command command, std::uint32_t at, std::uint32_t length,
-    const Block& b) noexcept {
+                       const Block& b) noexcept {
     Datagram& d = datagrams_[datagrams_used_++];
     d = {};
     const std::uint8_t* data = writer.add(command, 0, at, static_cast<std::uint16_t>(length));
@@ -172,12 +174,12 @@ void ProcessImage::add(FrameWriter& writer, Frame& frame, Command command, std::
 
 void ProcessImage::recount() noexcept {
     for (std::size_t n = 0; n < datagrams_used_; ++n) {
-        Datagram& d = datagrams_[n];
-        unsigned expected = 0, tolerance = 0;
+        Datagram&      d = datagrams_[n];
+        unsigned       expected = 0, tolerance = 0;
         const unsigned write = d.in_to == 0 ? 1 : 2;  // LWR counts 1, the writing part of LRW 2
         for (std::uint16_t i = d.first_slave; i < d.last_slave; ++i) {
             const SlaveImage& s = slaves_[order_[i]];
-            unsigned count = 0;
+            unsigned          count = 0;
             if (d.out_to != 0 && overlap(d.address, d.out_to, s.out_at, s.out_bytes) && s.writes) count += write;
             if (d.in_to > d.in_from && overlap(d.address + d.in_from, d.in_to - d.in_from, s.in_at, s.in_bytes) && s.reads) count += 1;
             (s.starting ? tolerance : expected) += count;
@@ -219,7 +221,7 @@ void ProcessImage::fill(Frame& frame, std::uint8_t index, std::uint64_t dc_time_
     clock(frame.clock_write);
     clock(frame.clock_read);
     for (unsigned n = frame.first; n < frame.last; ++n) {
-        Datagram& d = datagrams_[n];
+        Datagram&     d = datagrams_[n];
         std::uint8_t* header = &frame.bytes[d.offset];
         header[1] = index;
         if (d.out_to != 0) std::memcpy(header + datagram_header_bytes, &image_[d.address], d.out_to);
@@ -244,15 +246,14 @@ bool ProcessImage::matches(const Frame& frame, std::span<const std::uint8_t> ans
 
 void ProcessImage::take(const Frame& frame, const std::uint8_t* answer) noexcept {
     for (unsigned n = frame.first; n < frame.last; ++n) {
-        Datagram& d = datagrams_[n];
+        Datagram&           d = datagrams_[n];
         const std::uint8_t* data = answer + d.offset + datagram_header_bytes;
         d.wkc = get<std::uint16_t>(data + d.length);
         d.answered = true;
         if (d.in_to <= d.in_from) continue;
         if (d.wkc >= d.expected && d.tolerance == 0)
             std::memcpy(&image_[d.address + d.in_from], data + d.in_from, static_cast<std::size_t>(d.in_to - d.in_from));
-        else
-            copy_present(d, data);
+        else copy_present(d, data);
     }
 }
 
@@ -269,19 +270,20 @@ void ProcessImage::copy_present(const Datagram& d, const std::uint8_t* data) noe
 }
 
 void ProcessImage::merge(const Frame& frame, std::uint8_t* first, const std::uint8_t* second) const noexcept {
-    const auto add_wkc = [&](std::size_t at) { put(first + at,
-        static_cast<std::uint16_t>(get<std::uint16_t>(first + at) + get<std::uint16_t>(second + at))); };
+    const auto add_wkc = [&](std::size_t at) {
+        put(first + at, static_cast<std::uint16_t>(get<std::uint16_t>(first + at) + get<std::uint16_t>(second + at)));
+    };
     const auto clock = [&](std::uint16_t at) {
         if (at == 0) return;
         const std::size_t wkc = at + datagram_header_bytes + clock_bytes;
-        if (get<std::uint16_t>(second + wkc) > get<std::uint16_t>(first + wkc)) std::memcpy(first + at + datagram_header_bytes,
-            second + at + datagram_header_bytes, clock_bytes);
+        if (get<std::uint16_t>(second + wkc) > get<std::uint16_t>(first + wkc))
+            std::memcpy(first + at + datagram_header_bytes, second + at + datagram_header_bytes, clock_bytes);
         add_wkc(wkc);
     };
     clock(frame.clock_write);
     clock(frame.clock_read);
     for (unsigned n = frame.first; n < frame.last; ++n) {
-        const Datagram& d = datagrams_[n];
+        const Datagram&   d = datagrams_[n];
         const std::size_t data = d.offset + datagram_header_bytes;
         for (std::size_t i = d.in_from; i < d.in_to; ++i) first[data + i] |= second[data + i];
         add_wkc(data + d.length);
@@ -303,7 +305,7 @@ void ProcessImage::settle() noexcept {
     for (std::size_t n = 0; n < datagrams_used_; ++n) {
         Datagram& d = datagrams_[n];
         if (!d.sent) continue;
-        DomainStatus& s = domains_[d.domain];
+        DomainStatus&       s = domains_[d.domain];
         const std::uint16_t wkc = d.answered ? d.wkc : std::uint16_t{0};
         s.wkc = static_cast<std::uint16_t>(s.wkc + wkc);
         s.expected = static_cast<std::uint16_t>(s.expected + d.expected);

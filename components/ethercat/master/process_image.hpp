@@ -23,16 +23,16 @@ public:
     /// Process data of one sync manager: one FMMU.
     struct Area {
         std::uint32_t at = 0, bytes = 0;  ///< logical address, which is the offset in the image too
-        bool output = false;
+        bool          output = false;
     };
     struct SlaveImage {
-        std::uint32_t out_at = 0, out_bytes = 0, in_at = 0, in_bytes = 0;  ///< in_bytes with the mailbox status
-        std::int64_t mailbox_status_at = -1;  ///< address of the copy of 080Dh; -1: none
+        std::uint32_t     out_at = 0, out_bytes = 0, in_at = 0, in_bytes = 0;  ///< in_bytes with the mailbox status
+        std::int64_t      mailbox_status_at = -1;  ///< address of the copy of 080Dh; -1: none
         std::vector<Area> areas;              ///< one for each of Slave::sync_managers
-        bool writes = false, reads = false;   ///< its FMMUs are set, so it counts in the working counter
-        bool starting = false;                ///< its FMMUs are being set: it may count or not
-        bool no_lrw = false;
-        std::uint16_t domain = 0;
+        bool              writes = false, reads = false;   ///< its FMMUs are set, so it counts in the working counter
+        bool              starting = false;                ///< its FMMUs are being set: it may count or not
+        bool              no_lrw = false;
+        std::uint16_t     domain = 0;
     };
     struct Datagram {
         std::uint32_t address = 0;
@@ -42,14 +42,14 @@ public:
         std::uint16_t expected = 0, tolerance = 0, wkc = 0;
         std::uint16_t domain = 0;
         std::uint16_t first_slave = 0, last_slave = 0;   ///< in order of the layout
-        bool sent = false, answered = false;             ///< since settle()
+        bool          sent = false, answered = false;             ///< since settle()
     };
     struct Frame {
         std::array<std::uint8_t, largest_frame_bytes> bytes{};
-        std::uint16_t size = 0;
-        unsigned every = 1;
-        unsigned first = 0, last = 0;                    ///< datagrams [first, last)
-        std::uint16_t clock_write = 0, clock_read = 0;   ///< offsets of the datagrams to 0910h; 0: none
+        std::uint16_t                                 size = 0;
+        unsigned                                      every = 1;
+        unsigned                                      first = 0, last = 0;                    ///< datagrams [first, last)
+        std::uint16_t                                 clock_write = 0, clock_read = 0;   ///< offsets of the datagrams to 0910h; 0: none
     };
 
     explicit ProcessImage(const Setup& setup, const std::array<std::uint8_t, 6>& source);
@@ -86,10 +86,10 @@ public:
     /// ORs the inputs of `second` into `first` and adds the working counters: both halves of a broken ring. [realtime]
     void merge(const Frame& frame, std::uint8_t* first, const std::uint8_t* second) const noexcept;
 
-    std::span<const Datagram> datagrams() const noexcept { return {datagrams_.data(), datagrams_used_}; }  ///< [realtime]
+    std::span<const Datagram>      datagrams() const noexcept { return {datagrams_.data(), datagrams_used_}; }  ///< [realtime]
     std::span<const std::uint16_t> order() const noexcept { return order_; }  ///< slaves in order of the layout. [realtime]
-    DomainStatus& domain(std::size_t n) noexcept { return domains_[n]; }      ///< [realtime]
-    std::size_t domain_count() const noexcept { return domains_.size(); }     ///< [realtime]
+    DomainStatus&                  domain(std::size_t n) noexcept { return domains_[n]; }      ///< [realtime]
+    std::size_t                    domain_count() const noexcept { return domains_.size(); }     ///< [realtime]
     /// Sums the counters of the datagrams sent since the last call, per domain; a datagram without answer counts 0. [realtime]
     void settle() noexcept;
 
@@ -98,28 +98,28 @@ private:
         std::uint32_t at = 0, out_bytes = 0, in_bytes = 0;
         std::uint16_t first = 0, last = 0;  ///< in order_
         std::uint16_t domain = 0;
-        unsigned every = 1;
+        unsigned      every = 1;
     };
-    void lay_out(const Setup&);
-    void close(Block&, std::uint32_t& at);
-    void recount() noexcept;
-    void build_frames(unsigned every) noexcept;
-    void add(FrameWriter&, Frame&, Command, std::uint32_t at, std::uint32_t length, const Block&) noexcept;
-    void copy_present(const Datagram&, const std::uint8_t* data) noexcept;
+    void        lay_out(const Setup&);
+    void        close(Block&, std::uint32_t& at);
+    void        recount() noexcept;
+    void        build_frames(unsigned every) noexcept;
+    void        add(FrameWriter&, Frame&, Command, std::uint32_t at, std::uint32_t length, const Block&) noexcept;
+    void        copy_present(const Datagram&, const std::uint8_t* data) noexcept;
     std::size_t room() const noexcept;
 
-    std::vector<SlaveImage> slaves_;
-    std::vector<std::uint16_t> order_;
-    std::vector<Block> blocks_;
-    std::vector<std::uint8_t> image_;
-    std::vector<Datagram> datagrams_;
-    std::vector<Frame> frames_;
-    std::vector<DomainStatus> domains_;
-    std::size_t datagrams_used_ = 0, frames_used_ = 0;
+    std::vector<SlaveImage>     slaves_;
+    std::vector<std::uint16_t>  order_;
+    std::vector<Block>          blocks_;
+    std::vector<std::uint8_t>   image_;
+    std::vector<Datagram>       datagrams_;
+    std::vector<Frame>          frames_;
+    std::vector<DomainStatus>   domains_;
+    std::size_t                 datagrams_used_ = 0, frames_used_ = 0;
     std::array<std::uint8_t, 6> source_;
-    bool write_clock_ = false;
-    std::uint16_t reference_ = 0;
-    bool write_time_ = false;
+    bool                        write_clock_ = false;
+    std::uint16_t               reference_ = 0;
+    bool                        write_time_ = false;
 };
 
 }  // namespace hal::ethercat::master

@@ -9,7 +9,7 @@ namespace hal::ethercat::master {
 void judge_ring(Bus& bus, unsigned responding) noexcept {
     const int at_primary = bus.engine.primary_wkc();
     if (responding == 0) return;
-    const bool broken = at_primary != 0;
+    const bool     broken = at_primary != 0;
     const unsigned reached = at_primary < 0 ? 0 : static_cast<unsigned>(at_primary);
     // A lost copy looks like a break: only what is seen twice counts.
     if (broken == bus.status.ring_broken && (!broken || static_cast<int>(reached) - 1 == bus.status.break_after)) {
@@ -27,8 +27,7 @@ void judge_ring(Bus& bus, unsigned responding) noexcept {
     const Event event = broken ? Event::ring_broken : Event::ring_closed;
     if (broken && reached > 0 && reached <= bus.by_position.size())
         bus.report(event, *bus.devices[bus.by_position[reached - 1]], reached - 1, reached);
-    else
-        bus.report(event, -1, reached);
+    else bus.report(event, -1, reached);
 }
 
 }  // namespace hal::ethercat::master

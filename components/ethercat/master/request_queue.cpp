@@ -45,8 +45,15 @@ void RequestPort::wait(MailboxRequest& request) const noexcept {
 }
 
 RequestServer::RequestServer(Mailboxes& mailboxes, Find find, std::size_t workers)
-    : mailboxes_(mailboxes), find_(std::move(find)), coe_(mailboxes), foe_(mailboxes), soe_(mailboxes), aoe_(mailboxes), eoe_(mailboxes),
-      voe_(mailboxes), slots_(mailboxes.size()) {
+    : mailboxes_(mailboxes),
+      find_(std::move(find)),
+      coe_(mailboxes),
+      foe_(mailboxes),
+      soe_(mailboxes),
+      aoe_(mailboxes),
+      eoe_(mailboxes),
+      voe_(mailboxes),
+      slots_(mailboxes.size()) {
     for (std::size_t i = 0; i < std::max<std::size_t>(workers, 1); ++i) workers_.push_back(std::make_unique<Worker>());
 }
 
@@ -86,18 +93,18 @@ void RequestServer::step(std::int64_t now_ns) noexcept {
         if (worker->channel.busy()) continue;
         for (; at < slots_.size(); ++at) {
             const std::size_t n = (next_slot_ + at) % slots_.size();
-            Slot& slot = slots_[n];
+            Slot&             slot = slots_[n];
             if (slot.busy) continue;
             BusSlave* slave = find_(static_cast<std::uint16_t>(n));
             if (slave == nullptr || mailboxes_.find(*slave) == nullptr) {
-                for (; slot.first != nullptr; ) finish(*std::exchange(slot.first, slot.first->next), slave == nullptr ? nobody : refused());
+                for (; slot.first != nullptr;) finish(*std::exchange(slot.first, slot.first->next), slave == nullptr ? nobody : refused());
                 slot.last = nullptr;
                 continue;
             }
             const bool frames = switch_ != nullptr && switch_->pending(*slave);
             const bool full = slave->mailbox_status != nullptr && (*slave->mailbox_status & 0x08) != 0;
             const bool due = slave->mailbox_status == nullptr && poll_interval_ns_ != 0 && slave->present &&
-                now_ns - slot.polled_ns >= poll_interval_ns_;
+                             now_ns - slot.polled_ns >= poll_interval_ns_;
             if (slot.first == nullptr && !frames && !full && !due) continue;
             if (slot.first == nullptr && mailboxes_.at(n).held()) continue;  // its holder reads the mailbox
             slot.busy = true, slot.polled_ns = now_ns;
@@ -133,7 +140,7 @@ void RequestServer::stop() noexcept {
 }
 
 Task<> RequestServer::serve(Channel& channel, Worker& worker, BusSlave& slave) noexcept {
-    FoeProgress& progress = worker.request->progress != nullptr ? *worker.request->progress : worker.progress;
+    FoeProgress&        progress = worker.request->progress != nullptr ? *worker.request->progress : worker.progress;
     const MailboxResult result = co_await execute(channel, slave, *worker.request, progress);
     slots_[worker.slave].busy = false;
     finish(*std::exchange(worker.request, nullptr), result);
@@ -143,7 +150,7 @@ Task<> RequestServer::serve_unrequested(Channel& channel, Worker& worker, BusSla
     if (frames) {
         co_await switch_->serve(channel, slave);
     } else {
-        SlaveMailbox& mailbox = mailboxes_.at(slave.number);
+        SlaveMailbox&            mailbox = mailboxes_.at(slave.number);
         const SlaveMailbox::Hold hold = co_await mailbox.hold(channel);
         co_await mailbox.poll(channel, slave);
     }
@@ -153,7 +160,7 @@ Task<> RequestServer::serve_unrequested(Channel& channel, Worker& worker, BusSla
 Task<MailboxResult> RequestServer::execute(Channel& channel, BusSlave& slave, MailboxRequest& r, FoeProgress& progress) noexcept {
     using Kind = MailboxRequest::Kind;
     const std::span<char> name{reinterpret_cast<char*>(r.data.data()), r.data.size()};
-    MailboxResult result = refused();
+    MailboxResult         result = refused();
     switch (r.kind) {
     case Kind::sdo_upload: result = co_await coe_.upload(channel, slave, r.index, r.sub, r.complete, r.data); break;
     case Kind::sdo_download: result = co_await coe_.download(channel, slave, r.index, r.sub, r.complete, r.data); break;
@@ -177,18 +184,18 @@ Task<MailboxResult> RequestServer::execute(Channel& channel, BusSlave& slave, Ma
 Task<MailboxResult> RequestServer::pass(Channel& channel, BusSlave& slave, MailboxRequest& r) noexcept {
     const auto request = read_mailbox(r.data.first(std::min(r.length, r.data.size())));
     if (!request) co_return refused();
-    SlaveMailbox& mailbox = mailboxes_.at(slave.number);
+    SlaveMailbox&            mailbox = mailboxes_.at(slave.number);
     const SlaveMailbox::Hold hold = co_await mailbox.hold(channel);
-    const auto body = mailbox.body(slave);
-    const std::size_t length = request->payload.size();
+    const auto               body = mailbox.body(slave);
+    const std::size_t        length = request->payload.size();
     if (length > body.size()) co_return refused(0, length);
     if (length != 0) std::memcpy(body.data(), request->payload.data(), length);
-    const Expected expected{accepts_reply, static_cast<std::uint32_t>(request->type)};
+    const Expected      expected{accepts_reply, static_cast<std::uint32_t>(request->type)};
     const MailboxResult result = co_await mailbox.exchange(channel, slave, request->type, length, expected);
-    const bool fault = result.outcome == MailboxResult::Outcome::refused && result.abort != 0;  // is a reply, too
+    const bool          fault = result.outcome == MailboxResult::Outcome::refused && result.abort != 0;  // is a reply, too
     if (!result && !fault) co_return result;
     const MailboxMessage& reply = mailbox.reply();
-    const std::size_t bytes = mailbox_header_bytes + reply.payload.size();
+    const std::size_t     bytes = mailbox_header_bytes + reply.payload.size();
     if (bytes > r.data.size()) co_return refused(0, bytes);
     write_mailbox_header(r.data.data(), reply.payload.size(), request->station, reply.type, reply.counter);
     if (!reply.payload.empty()) std::memcpy(r.data.data() + mailbox_header_bytes, reply.payload.data(), reply.payload.size());

@@ -34,31 +34,43 @@ namespace hal::ethercat::master {
 /// A request and its result. Belongs to the thread that submits it; until it is finished, only the server may touch it and its buffers.
 struct MailboxRequest {
     enum class Kind : std::uint8_t {
-        sdo_upload, sdo_download, object_list, object, entry, foe_read, foe_write, soe_read, soe_write, aoe_read, aoe_write, voe_send,
-        set_ip, get_ip,
+        sdo_upload,
+        sdo_download,
+        object_list,
+        object,
+        entry,
+        foe_read,
+        foe_write,
+        soe_read,
+        soe_write,
+        aoe_read,
+        aoe_write,
+        voe_send,
+        set_ip,
+        get_ip,
         message,  ///< `data` holds a message with its header, and then its reply; `length` bytes
     } kind = Kind::sdo_upload;
-    std::uint16_t slave = 0;            ///< BusSlave::number
-    std::uint16_t index = 0;            ///< of an object; an IDN; coe::List
-    std::uint8_t sub = 0;               ///< sub-index; drive of an IDN
-    std::uint8_t elements = soe::element::value;
-    bool complete = false;              ///< complete access
+    std::uint16_t           slave = 0;            ///< BusSlave::number
+    std::uint16_t           index = 0;            ///< of an object; an IDN; coe::List
+    std::uint8_t            sub = 0;               ///< sub-index; drive of an IDN
+    std::uint8_t            elements = soe::element::value;
+    bool                    complete = false;              ///< complete access
     std::span<std::uint8_t> data;       ///< is read or written; names of objects
-    std::size_t length = 0;             ///< of a message
-    std::string_view name;              ///< of a file
-    FoeOptions foe;
-    FoeProgress* progress = nullptr;    ///< nullptr: not wanted
-    AoeAddress aoe;
-    std::uint32_t group = 0, offset = 0;
-    VoeHeader voe;
-    eoe::Ip ip;
-    ObjectDescription object;
-    EntryDescription entry;
-    MailboxResult result;               ///< valid when finished
+    std::size_t             length = 0;             ///< of a message
+    std::string_view        name;              ///< of a file
+    FoeOptions              foe;
+    FoeProgress*            progress = nullptr;    ///< nullptr: not wanted
+    AoeAddress              aoe;
+    std::uint32_t           group = 0, offset = 0;
+    VoeHeader               voe;
+    eoe::Ip                 ip;
+    ObjectDescription       object;
+    EntryDescription        entry;
+    MailboxResult           result;               ///< valid when finished
 
     enum class Stage : std::uint8_t { idle, queued, running, finished };
     std::atomic<Stage> stage{Stage::idle};  ///< queued by the submitter, then written by the server until it is finished
-    MailboxRequest* next = nullptr;         ///< of the server
+    MailboxRequest*    next = nullptr;         ///< of the server
 };
 
 /// The way of one thread to the server.
@@ -75,7 +87,7 @@ public:
 private:
     friend class RequestServer;
     Queue<MailboxRequest*> queue_;
-    std::atomic<bool> closed_{false};
+    std::atomic<bool>      closed_{false};
 };
 
 /// See the top of this file.
@@ -88,7 +100,7 @@ public:
     ~RequestServer();
     /// Returns a port for one more thread. [setup]
     RequestPort& open(std::size_t capacity = 16);
-    std::size_t workers() const noexcept { return workers_.size(); }
+    std::size_t  workers() const noexcept { return workers_.size(); }
     /// Returns the channel of a worker, to be added to the engine. [setup]
     Channel& channel(std::size_t n) noexcept { return workers_[n]->channel; }
     /// Serves the frames of a switch too. [setup]
@@ -106,39 +118,39 @@ public:
 
 private:
     struct Worker {
-        Channel channel;
-        std::uint16_t slave = 0;
+        Channel         channel;
+        std::uint16_t   slave = 0;
         MailboxRequest* request = nullptr;
-        FoeProgress progress;
+        FoeProgress     progress;
     };
     struct Slot {  // of a slave
         MailboxRequest* first = nullptr;
         MailboxRequest* last = nullptr;
-        std::int64_t polled_ns = 0;
-        bool busy = false;
+        std::int64_t    polled_ns = 0;
+        bool            busy = false;
     };
-    Task<> serve(Channel&, Worker&, BusSlave&) noexcept;
-    Task<> serve_unrequested(Channel&, Worker&, BusSlave&, bool frames) noexcept;
+    Task<>              serve(Channel&, Worker&, BusSlave&) noexcept;
+    Task<>              serve_unrequested(Channel&, Worker&, BusSlave&, bool frames) noexcept;
     Task<MailboxResult> execute(Channel&, BusSlave&, MailboxRequest&, FoeProgress&) noexcept;
     Task<MailboxResult> pass(Channel&, BusSlave&, MailboxRequest&) noexcept;
-    void collect() noexcept;
-    void finish(Worker&) noexcept;
-    static void finish(MailboxRequest& request, const MailboxResult& result) noexcept;
+    void                collect() noexcept;
+    void                finish(Worker&) noexcept;
+    static void         finish(MailboxRequest& request, const MailboxResult& result) noexcept;
 
-    Mailboxes& mailboxes_;
-    Find find_;
-    CoeClient coe_;
-    FoeClient foe_;
-    SoeClient soe_;
-    AoeClient aoe_;
-    EoeClient eoe_;
-    VoeClient voe_;
-    EoeSwitch* switch_ = nullptr;
-    std::int64_t poll_interval_ns_ = 0;
+    Mailboxes&                                mailboxes_;
+    Find                                      find_;
+    CoeClient                                 coe_;
+    FoeClient                                 foe_;
+    SoeClient                                 soe_;
+    AoeClient                                 aoe_;
+    EoeClient                                 eoe_;
+    VoeClient                                 voe_;
+    EoeSwitch*                                switch_ = nullptr;
+    std::int64_t                              poll_interval_ns_ = 0;
     std::vector<std::unique_ptr<RequestPort>> ports_;
-    std::vector<std::unique_ptr<Worker>> workers_;
-    std::vector<Slot> slots_;
-    std::size_t next_slot_ = 0;
+    std::vector<std::unique_ptr<Worker>>      workers_;
+    std::vector<Slot>                         slots_;
+    std::size_t                               next_slot_ = 0;
 };
 
 }  // namespace hal::ethercat::master

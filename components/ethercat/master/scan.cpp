@@ -11,7 +11,7 @@ namespace hal::ethercat::master {
 namespace {
 
 enum Category : std::uint16_t { general_category = 30, sync_manager_category = 41, end_category = 0xffff };
-constexpr unsigned most_categories = 64;
+constexpr unsigned     most_categories = 64;
 constexpr std::int64_t device_id_timeout_ns = 100 * millisecond;
 
 /// Explicit device identification: AL control with bit 5, the number appears in the AL status code.
@@ -44,7 +44,7 @@ Task<bool> identify(Channel& c, Bus& bus, BusSlave& s) noexcept {
     s.dl_status = get<std::uint16_t>(c.data());
 
     std::uint16_t words[12]{};
-    SiiData sii;
+    SiiData       sii;
     for (std::uint16_t word = 8; word < 0x10; word = static_cast<std::uint16_t>(word + 4)) {
         sii = co_await sii_read(c, s.station, word);
         if (!sii.ok) break;
@@ -71,7 +71,7 @@ Task<bool> identify(Channel& c, Bus& bus, BusSlave& s) noexcept {
         if (area->out_size > Channel::largest || area->in_size > Channel::largest) (area == &s.mailbox ? s.mailbox : s.bootstrap) = {};
 
     s.sii_sync_managers = 0, s.coe_details = 0, s.sii_flags = 0;
-    bool general = false, managers = false;
+    bool          general = false, managers = false;
     std::uint32_t at = 0x40;
     for (unsigned n = 0; n < most_categories && !(general && managers); ++n) {
         sii = co_await sii_read(c, s.station, at);
@@ -174,7 +174,7 @@ Task<bool> scan(Channel& c, Bus& bus) noexcept {
 
 bool matches(Bus& bus, const Slave& want, const BusSlave& have, Device* to_report) noexcept {
     const Identity& id = want.identity;
-    const auto fail = [&](Event event, std::uint32_t found, std::uint32_t expected) {
+    const auto      fail = [&](Event event, std::uint32_t found, std::uint32_t expected) {
         if (to_report != nullptr) bus.report(event, *to_report, found, expected);
         return false;
     };
@@ -195,7 +195,7 @@ void assign(Bus& bus) noexcept {
     for (std::size_t n = 0; n < bus.setup.slaves.size(); ++n) {
         if (bus.device_of[n] >= 0) continue;
         const Slave& want = bus.setup.slaves[n];
-        Device* found = nullptr;
+        Device*      found = nullptr;
         for (const std::uint16_t number : bus.by_position) {
             Device& d = *bus.devices[number];
             if (!d.slave.present || !d.identified || d.slave.configured >= 0) continue;
@@ -204,8 +204,9 @@ void assign(Bus& bus) noexcept {
                 found = &d;
                 continue;
             }
-            if (!d.refused) bus.events.report(Event::duplicate_alias, static_cast<std::uint32_t>(n),
-                want.identity.device_id ? d.slave.device_id : d.slave.alias, d.slave.position);
+            if (!d.refused)
+                bus.events.report(Event::duplicate_alias, static_cast<std::uint32_t>(n),
+                                  want.identity.device_id ? d.slave.device_id : d.slave.alias, d.slave.position);
             d.refused = found->refused = true;  // ambiguous: neither is started
         }
         if (found == nullptr) {
@@ -233,7 +234,8 @@ void assign(Bus& bus) noexcept {
     }
     for (const std::uint16_t number : bus.by_position) {
         Device& d = *bus.devices[number];
-        if (d.slave.present && d.identified && d.slave.configured < 0 && !d.refused && !bus.setup.accept_other_slaves && !bus.setup.slaves.empty())
+        if (d.slave.present && d.identified && d.slave.configured < 0 && !d.refused && !bus.setup.accept_other_slaves &&
+            !bus.setup.slaves.empty())
             bus.report(Event::unknown_slave, d, d.slave.vendor, d.slave.product);
     }
 }

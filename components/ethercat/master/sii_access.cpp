@@ -16,7 +16,7 @@ constexpr std::uint16_t state_and_data = 14;  ///< 0502h to 050Fh
 }  // namespace
 
 Task<SiiData> sii_read(Channel& c, std::uint16_t station, std::uint32_t word) noexcept {
-    SiiData result;
+    SiiData  result;
     unsigned have = 0;
     for (unsigned tries = 0; tries < eeprom_tries && have < 4;) {
         put(c.data(), eeprom_read), put(c.data() + 2, word + have);

@@ -12,8 +12,8 @@ namespace hal::ethercat::master {
 
 /// Four words of the SII.
 struct SiiData {
-    bool ok = false;
-    std::uint16_t control = 0;  ///< 0502h as last read, for messages
+    bool                         ok = false;
+    std::uint16_t                control = 0;  ///< 0502h as last read, for messages
     std::array<std::uint16_t, 4> words{};
 };
 

@@ -13,10 +13,10 @@ constexpr std::int64_t retry_after_ns = 1'000 * millisecond;
 constexpr std::uint16_t code(State state) noexcept { return static_cast<std::uint16_t>(state); }
 
 Task<bool> bring_up(Channel& c, Bus& bus, Device& d) noexcept {
-    const Slave* config = bus.config(d);
-    const State  last = std::min(config != nullptr ? config->target : State::preop, bus.target);
+    const Slave*    config = bus.config(d);
+    const State     last = std::min(config != nullptr ? config->target : State::preop, bus.target);
     const Timeouts& t = d.slave.timeouts;
-    const auto done = [&](State reached) {
+    const auto      done = [&](State reached) {
         if (reached != last) return false;
         d.status.operational = config != nullptr;
         return true;
@@ -81,11 +81,11 @@ Task<bool> request_state(Channel& c, Bus& bus, Device& d, State state, std::uint
     bool answers = co_await read_state(c, bus, d);
     if (answers && d.slave.state == state && !d.slave.al_failed) co_return true;
     // A request for INIT acknowledges whatever went before; other requests start from a state without error.
-    const auto control = static_cast<std::uint16_t>(code(state) | (state == State::init || d.slave.al_failed ? al_error : 0));
+    const auto   control = static_cast<std::uint16_t>(code(state) | (state == State::init || d.slave.al_failed ? al_error : 0));
     const Answer a = co_await write(c, d.slave, registers::al_control, control);
     if (!answers || a.wkc != 1) co_return false;
     const std::int64_t until = c.now_ns() + timeout_ms * millisecond;
-    unsigned silent = 0;
+    unsigned           silent = 0;
     while (c.now_ns() < until && silent < 3) {
         answers = co_await read_state(c, bus, d);
         silent = answers ? 0 : silent + 1;

@@ -7,7 +7,7 @@ namespace hal::ethercat::master {
 namespace {
 
 constexpr std::uint8_t mailbox_out_control = 0x26, mailbox_in_control = 0x22, outputs_control = 0x64, outputs_unwatched = 0x24,
-    inputs_control = 0x20;
+                       inputs_control = 0x20;
 constexpr std::uint8_t fmmu_reads = 1, fmmu_writes = 2;
 
 void put_sync_manager(std::uint8_t* to, std::uint16_t start, std::uint16_t length, std::uint8_t control) noexcept {
@@ -70,26 +70,29 @@ Task<bool> set_process_data(Channel& c, Bus& bus, Device& d) noexcept {
     const Slave& config = *bus.config(d);
     const auto   index = static_cast<std::size_t>(d.slave.configured);
     const auto&  image = bus.image.slave(index);
-    unsigned fmmu = 0;
-    bool writes = false, reads = false;
-    Answer a;
+    unsigned     fmmu = 0;
+    bool         writes = false, reads = false;
+    Answer       a;
     if (config.watchdog.divider) co_await write(c, d.slave, registers::watchdog_divider, *config.watchdog.divider);
     if (config.watchdog.intervals) co_await write(c, d.slave, registers::process_data_watchdog, *config.watchdog.intervals);
     for (std::size_t n = 0; n < config.sync_managers.size(); ++n) {
         const SyncManager& sm = config.sync_managers[n];
-        const auto bytes = static_cast<std::uint16_t>(image.areas[n].bytes);
+        const auto         bytes = static_cast<std::uint16_t>(image.areas[n].bytes);
         if (sm.number >= d.slave.sync_managers) {
             bus.report(Event::too_few_sync_managers, d, d.slave.sync_managers, sm.number + 1);
             co_return false;
         }
-        const std::uint8_t control = sm.control != 0 ? sm.control : !sm.output ? inputs_control : sm.watchdog ? outputs_control : outputs_unwatched;
+        const std::uint8_t control = sm.control != 0 ? sm.control
+                                     : !sm.output    ? inputs_control
+                                     : sm.watchdog   ? outputs_control
+                                                     : outputs_unwatched;
         put_sync_manager(c.data(), start_of(sm, d.slave), bytes, control);
         a = co_await c.exchange(Command::fpwr, at_station(d.slave.station, registers::sync_manager_at(sm.number)), 8);
         if (a.wkc != 1) co_return false;
         (sm.output ? writes : reads) |= bytes != 0;
     }
     const bool status = image.mailbox_status_at >= 0 && d.slave.mailbox.usable();
-    unsigned needed = 0;
+    unsigned   needed = 0;
     for (const auto& area : image.areas) needed += area.bytes != 0 ? 1 : 0;
     if (needed > d.slave.fmmus) {
         bus.report(Event::too_few_fmmus, d, d.slave.fmmus, needed);
@@ -101,7 +104,7 @@ Task<bool> set_process_data(Channel& c, Bus& bus, Device& d) noexcept {
         const auto& area = image.areas[n];
         if (area.bytes == 0) continue;
         put_fmmu(c.data(), area.at, static_cast<std::uint16_t>(area.bytes), start_of(config.sync_managers[n], d.slave),
-            area.output ? fmmu_writes : fmmu_reads);
+                 area.output ? fmmu_writes : fmmu_reads);
         a = co_await c.exchange(Command::fpwr, at_station(d.slave.station, registers::fmmu_at(fmmu++)), 16);
         if (a.wkc != 1) co_return false;
     }
@@ -125,8 +128,8 @@ Task<bool> startup_writes(Channel& c, Bus& bus, Device& d, State before) noexcep
         if (w.protocol == StartupWrite::Protocol::reg) {
             if (w.data.size() > Channel::largest) continue;
             std::memcpy(c.data(), w.data.data(), w.data.size());
-            const Answer a = co_await c.exchange(Command::fpwr, at_station(d.slave.station, w.index),
-                static_cast<std::uint16_t>(w.data.size()));
+            const Answer a =
+                co_await c.exchange(Command::fpwr, at_station(d.slave.station, w.index), static_cast<std::uint16_t>(w.data.size()));
             if (a.wkc == 1) continue;
             bus.report(Event::startup_write_failed, d, object, 0);
             co_return false;
@@ -136,10 +139,8 @@ Task<bool> startup_writes(Channel& c, Bus& bus, Device& d, State before) noexcep
             co_return false;
         }
         SdoResult r;
-        if (w.protocol == StartupWrite::Protocol::coe)
-            r = co_await bus.coe.download(c, d.slave, w.index, w.sub, w.complete, w.data);
-        else
-            r = co_await bus.coe.write_other(c, d.slave, w);
+        if (w.protocol == StartupWrite::Protocol::coe) r = co_await bus.coe.download(c, d.slave, w.index, w.sub, w.complete, w.data);
+        else r = co_await bus.coe.write_other(c, d.slave, w);
         if (r) continue;
         bus.report(Event::startup_write_failed, d, object, r.abort);
         co_return false;

@@ -11,8 +11,8 @@ namespace {
 // Operation and drive << 8, IDN, fragments that the last fragment announced (0: this is the first one).
 bool accepts_soe(const Expected& expected, std::span<const std::uint8_t> payload) noexcept {
     const auto header = soe::read(payload);
-    if (!header || static_cast<std::uint32_t>(header->opcode) != (expected.first & 0xff) ||
-        header->drive != expected.first >> 8) return false;
+    if (!header || static_cast<std::uint32_t>(header->opcode) != (expected.first & 0xff) || header->drive != expected.first >> 8)
+        return false;
     if (header->error) return payload.size() >= soe::header_bytes + 2;
     return header->incomplete ? expected.third == 0 || header->idn < expected.third : header->idn == expected.second;
 }
@@ -39,7 +39,7 @@ std::optional<std::uint16_t> parse_idn(std::string_view text) noexcept {
 
 std::array<char, 12> idn_text(std::uint16_t idn) noexcept {
     std::array<char, 12> text{soe::is_product(idn) ? 'P' : 'S', '-', static_cast<char>('0' + soe::set_of(idn)), '-'};
-    unsigned rest = soe::number_of(idn);
+    unsigned             rest = soe::number_of(idn);
     for (std::size_t i = 8; i-- > 4; rest /= 10) text[i] = static_cast<char>('0' + rest % 10);
     return text;
 }
@@ -58,14 +58,14 @@ Task<MailboxResult> SoeClient::read(Channel& channel, BusSlave& slave, std::uint
     soe::write(mailbox->body(slave).data(), {soe::Opcode::read, false, false, drive, elements, idn});
     MailboxResult result = co_await mailbox->send(channel, slave, MailboxType::soe, soe::header_bytes);
     if (!result) co_return result;
-    Expected expected{accepts_soe, static_cast<std::uint32_t>(soe::Opcode::read_response) | static_cast<std::uint32_t>(drive & 7U) << 8,
-        idn, 0};
+    Expected    expected{accepts_soe, static_cast<std::uint32_t>(soe::Opcode::read_response) | static_cast<std::uint32_t>(drive & 7U) << 8,
+                      idn, 0};
     std::size_t used = 0;
-    bool overflow = false;
+    bool        overflow = false;
     for (;;) {
         result = co_await mailbox->wait_for(channel, slave, MailboxType::soe, SlaveMailbox::response_timeout_ns(slave), expected);
         if (!result) co_return result;
-        const auto payload = mailbox->reply().payload;
+        const auto        payload = mailbox->reply().payload;
         const soe::Header header = *soe::read(payload);
         if (header.error) co_return aborted(soe::error_of(payload));
         const auto data = payload.subspan(soe::header_bytes);
@@ -85,10 +85,10 @@ Task<MailboxResult> SoeClient::write(Channel& channel, BusSlave& slave, std::uin
     SlaveMailbox* mailbox = mailboxes_.find(slave);
     if (mailbox == nullptr) co_return refused();
     const SlaveMailbox::Hold hold = co_await mailbox->hold(channel);
-    const auto body = mailbox->body(slave);
+    const auto               body = mailbox->body(slave);
     if (body.size() <= soe::header_bytes) co_return refused();
     const std::size_t capacity = body.size() - soe::header_bytes;
-    std::size_t left = from.empty() ? 1 : (from.size() + capacity - 1) / capacity;
+    std::size_t       left = from.empty() ? 1 : (from.size() + capacity - 1) / capacity;
     if (left > 0xffff) co_return refused();
     for (std::size_t at = 0; left-- != 0; at += capacity) {
         const std::size_t bytes = std::min(capacity, from.size() - at);
@@ -97,9 +97,9 @@ Task<MailboxResult> SoeClient::write(Channel& channel, BusSlave& slave, std::uin
         const MailboxResult result = co_await mailbox->send(channel, slave, MailboxType::soe, soe::header_bytes + bytes);
         if (!result) co_return result;
     }
-    const Expected expected{accepts_soe,
-        static_cast<std::uint32_t>(soe::Opcode::write_response) | static_cast<std::uint32_t>(drive & 7U) << 8, idn, 0};
-    const std::int64_t timeout = SlaveMailbox::response_timeout_ns(slave);
+    const Expected      expected{accepts_soe,
+                            static_cast<std::uint32_t>(soe::Opcode::write_response) | static_cast<std::uint32_t>(drive & 7U) << 8, idn, 0};
+    const std::int64_t  timeout = SlaveMailbox::response_timeout_ns(slave);
     const MailboxResult result = co_await mailbox->wait_for(channel, slave, MailboxType::soe, timeout, expected);
     if (!result) co_return result;
     const auto payload = mailbox->reply().payload;

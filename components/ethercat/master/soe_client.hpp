@@ -26,7 +26,7 @@ public:
     explicit SoeClient(Mailboxes& mailboxes) noexcept : mailboxes_(mailboxes) {}
     /// Reads elements of an IDN, bits of soe::element; they follow each other in `to`.
     Task<MailboxResult> read(Channel&, BusSlave&, std::uint8_t drive, std::uint16_t idn, std::uint8_t elements,
-        std::span<std::uint8_t> to) noexcept;
+                             std::span<std::uint8_t> to) noexcept;
     /// Writes one element of an IDN.
     Task<MailboxResult> write(Channel&, BusSlave&, std::uint8_t drive, std::uint16_t idn, std::uint8_t element,
                               std::span<const std::uint8_t> from) noexcept;

@@ -17,26 +17,26 @@ enum class WkcState : std::uint8_t {
 };
 
 struct DomainStatus {
-    WkcState state = WkcState::none;
+    WkcState      state = WkcState::none;
     std::uint16_t wkc = 0, expected = 0;  ///< of all datagrams, newest exchange
     std::uint16_t least = 0;              ///< smallest counter since the first complete exchange
     std::uint32_t changes = 0;            ///< of the state, since the first complete exchange
     std::uint32_t bad_cycles = 0;         ///< exchanges in a row that were not complete
     std::uint64_t exchanges = 0, incomplete = 0;
-    bool was_complete = false;            ///< an exchange was complete since the reset
-    bool fresh = false;                   ///< exchanged in the newest cycle
-    bool ok = false;                      ///< all its datagrams were answered with the expected counters
+    bool          was_complete = false;            ///< an exchange was complete since the reset
+    bool          fresh = false;                   ///< exchanged in the newest cycle
+    bool          ok = false;                      ///< all its datagrams were answered with the expected counters
 };
 
 struct BusStatus {
-    State state = State::none;        ///< lowest state of the configured slaves that are present
-    bool link = false;                ///< the primary port has a carrier
-    bool scanned = false;             ///< the slaves are identified
-    bool operational = false;         ///< every slave that is not optional is in its target state
+    State         state = State::none;        ///< lowest state of the configured slaves that are present
+    bool          link = false;                ///< the primary port has a carrier
+    bool          scanned = false;             ///< the slaves are identified
+    bool          operational = false;         ///< every slave that is not optional is in its target state
     std::uint16_t responding = 0;     ///< slaves that answered the newest broadcast
     std::uint16_t expected = 0;       ///< slaves of the setup that are not optional
     std::uint16_t wkc = 0, wkc_expected = 0;
-    WkcState wkc_state = WkcState::none;
+    WkcState      wkc_state = WkcState::none;
     std::uint64_t frames_sent = 0, frames_received = 0;
     std::uint64_t lost = 0;           ///< frames that did not return in time
     std::uint64_t late = 0;           ///< frames that returned after their cycle
@@ -44,13 +44,13 @@ struct BusStatus {
     std::uint64_t foreign = 0;        ///< EtherCAT frames of another master, or damaged ones
     std::uint64_t send_failures = 0;  ///< frames that the port did not take
 
-    bool dc_active = false;           ///< a reference clock is distributed
-    bool dc_synchronised = false;     ///< every slave with a clock is within Setup::sync_window_ns
+    bool          dc_active = false;           ///< a reference clock is distributed
+    bool          dc_synchronised = false;     ///< every slave with a clock is within Setup::sync_window_ns
     std::uint64_t dc_time_ns = 0;     ///< newest time of the reference clock (since 2000-01-01)
     std::uint32_t dc_deviation_ns = 0;///< largest deviation of the slaves, UINT32_MAX: no data
 
-    bool redundant = false;           ///< a backup port is used
-    bool ring_broken = false;
+    bool         redundant = false;           ///< a backup port is used
+    bool         ring_broken = false;
     std::int16_t break_after = -1;    ///< position of the last slave that the primary port reaches, -1: none, or no break
 };
 
@@ -59,13 +59,13 @@ struct PortErrors {
 };
 
 struct SlaveStatus {
-    State state = State::none;
-    std::uint16_t al_code = 0;
-    bool online = false;        ///< answers datagrams
-    bool operational = false;   ///< in its target state, with process data
-    bool al_error = false;
-    std::uint32_t dc_deviation_ns = UINT32_MAX;  ///< magnitude of 092Ch; UINT32_MAX: no data
-    std::uint32_t losses = 0;   ///< how often it was lost
+    State                     state = State::none;
+    std::uint16_t             al_code = 0;
+    bool                      online = false;        ///< answers datagrams
+    bool                      operational = false;   ///< in its target state, with process data
+    bool                      al_error = false;
+    std::uint32_t             dc_deviation_ns = UINT32_MAX;  ///< magnitude of 092Ch; UINT32_MAX: no data
+    std::uint32_t             losses = 0;   ///< how often it was lost
     std::array<PortErrors, 4> ports{};
 };
 

@@ -9,8 +9,8 @@ namespace hal::ethercat::master {
 
 namespace {
 
-constexpr std::int64_t look_every_ns = 10 * millisecond, empty_retry_ns = 100 * millisecond, rediscover_every_ns = 50 * millisecond;
-constexpr std::int64_t counters_every_ns = 1'000 * millisecond;
+constexpr std::int64_t  look_every_ns = 10 * millisecond, empty_retry_ns = 100 * millisecond, rediscover_every_ns = 50 * millisecond;
+constexpr std::int64_t  counters_every_ns = 1'000 * millisecond;
 constexpr std::uint16_t spare_station = 0x0fff;
 constexpr std::uint8_t  counter_high = 0x80;
 constexpr std::uint64_t other_master_frames = 10;  ///< in a second: fewer may be damaged ones
@@ -18,7 +18,7 @@ constexpr std::uint64_t other_master_frames = 10;  ///< in a second: fewer may b
 /// Finds the tree; `changed`: the ports may have changed since the slaves were identified.
 Task<void> find_ports(Channel& c, Bus& bus, bool changed) noexcept {
     std::array<BusSlave*, 1024> line{};
-    std::size_t count = 0;
+    std::size_t                 count = 0;
     for (const std::uint16_t number : bus.by_position) {
         BusSlave& s = bus.devices[number]->slave;
         if (count == line.size()) break;
@@ -52,10 +52,10 @@ Task<int> take_in(Channel& c, Bus& bus, std::uint16_t position) noexcept {
     const bool identified = co_await identify(c, bus, found);
     if (!identified) co_return -1;
     Device* place = nullptr;
-    int configured = -1;
+    int     configured = -1;
     for (std::size_t n = 0; n < bus.setup.slaves.size() && place == nullptr; ++n) {
         const Slave& want = bus.setup.slaves[n];
-        Device* before = bus.device_of[n] >= 0 ? bus.devices[static_cast<std::size_t>(bus.device_of[n])].get() : nullptr;
+        Device*      before = bus.device_of[n] >= 0 ? bus.devices[static_cast<std::size_t>(bus.device_of[n])].get() : nullptr;
         if (before != nullptr && before->slave.present) continue;
         if (!is_at_its_place(want, found) && !(want.optional && !want.identity.alias && !want.identity.device_id)) continue;
         if (!matches(bus, want, found, nullptr)) continue;
@@ -71,10 +71,10 @@ Task<int> take_in(Channel& c, Bus& bus, std::uint16_t position) noexcept {
     if (place == nullptr) {
         for (std::size_t n = 0; n < bus.setup.slaves.size(); ++n) {  // the position is known, the slave is another one
             const int device = bus.device_of[n];
-            if (bus.setup.slaves[n].position != position || (device >= 0 &&
-                bus.devices[static_cast<std::size_t>(device)]->slave.present)) continue;
-            if (device >= 0 && found.product != bus.unknown_product) matches(bus, bus.setup.slaves[n], found,
-                bus.devices[static_cast<std::size_t>(device)].get());
+            if (bus.setup.slaves[n].position != position || (device >= 0 && bus.devices[static_cast<std::size_t>(device)]->slave.present))
+                continue;
+            if (device >= 0 && found.product != bus.unknown_product)
+                matches(bus, bus.setup.slaves[n], found, bus.devices[static_cast<std::size_t>(device)].get());
         }
         if (std::exchange(bus.unknown_product, found.product) != found.product)
             bus.events.report(Event::unknown_slave, Events::of_position + position, found.vendor, found.product);
@@ -98,24 +98,24 @@ Task<int> take_in(Channel& c, Bus& bus, std::uint16_t position) noexcept {
 
 /// Walks along the line after a change, and takes in slaves that are new or returned.
 Task<bool> rediscover(Channel& c, Bus& bus, unsigned count) noexcept {
-    bool returned = false;
+    bool                        returned = false;
     std::vector<std::uint16_t>& line = bus.by_position;
     line.clear();  // capacity: all devices
     for (unsigned n = 0; n < count && n < bus.devices.size(); ++n) {
-        const auto position = static_cast<std::uint16_t>(n);
+        const auto   position = static_cast<std::uint16_t>(n);
         const Answer a = co_await c.exchange(Command::aprd, at_position(n, registers::station_address), 2);
         if (!a.arrived || a.wkc != 1) break;
-        const auto station = get<std::uint16_t>(c.data());
+        const auto  station = get<std::uint16_t>(c.data());
         std::size_t number = static_cast<std::size_t>(station) - first_station;
-        const bool known = station >= first_station && number < bus.devices.size() &&
-            (bus.devices[number]->identified || bus.devices[number]->slave.present) &&
+        const bool  known = station >= first_station && number < bus.devices.size() &&
+                           (bus.devices[number]->identified || bus.devices[number]->slave.present) &&
                            std::find(line.begin(), line.end(), number) == line.end();
         if (!known) {
             const int taken = co_await take_in(c, bus, position);
             if (taken < 0) continue;
             number = static_cast<std::size_t>(taken);
         }
-        Device& d = *bus.devices[number];
+        Device&    d = *bus.devices[number];
         const bool back = !d.slave.present || !known;
         d.slave.position = position;
         line.push_back(static_cast<std::uint16_t>(number));
@@ -140,7 +140,7 @@ void start_returned(Bus& bus) noexcept {
 
 Task<void> check(Channel& c, Bus& bus, Device& d) noexcept {
     unsigned silent = 0;
-    bool here = false;
+    bool     here = false;
     while (!here && silent < 3) {
         here = co_await read_state(c, bus, d);
         if (!here) ++silent;
@@ -181,9 +181,9 @@ Task<void> supervise(Channel& c, Bus& bus) noexcept {
         if (!bus.suspicious) co_await c.sleep(look_every_ns);
         bus.resting = bus.suspicious = false;
         std::memset(c.data(), 0, 6);
-        const Answer a = co_await c.exchange(Command::brd, at_position(0, registers::al_status), 6);
+        const Answer   a = co_await c.exchange(Command::brd, at_position(0, registers::al_status), 6);
         const unsigned count = a.arrived ? a.wkc : 0;
-        const auto states = get<std::uint16_t>(c.data());
+        const auto     states = get<std::uint16_t>(c.data());
         bus.status.responding = static_cast<std::uint16_t>(count);
         if (bus.engine.redundant()) judge_ring(bus, count);
         // On a broken ring the delays are others; they are frozen until it is closed.
@@ -193,14 +193,14 @@ Task<void> supervise(Channel& c, Bus& bus) noexcept {
         }
 
         unsigned present = 0;
-        bool at_rest = true;
+        bool     at_rest = true;
         for (const auto& device : bus.devices) {  // not by position: one that lost its address has none
             const Device& d = *device;
             present += d.slave.present ? 1 : 0;
             at_rest &= !d.slave.present || d.status.operational;
         }
-        const bool all_fine = at_rest && count == bus.known && present == count &&
-            states == static_cast<std::uint16_t>(std::min(State::op, bus.target));
+        const bool all_fine =
+            at_rest && count == bus.known && present == count && states == static_cast<std::uint16_t>(std::min(State::op, bus.target));
         if (all_fine && bus.status.wkc_state != WkcState::part) continue;
 
         for (const auto& device : bus.devices) {
@@ -215,8 +215,8 @@ Task<void> supervise(Channel& c, Bus& bus) noexcept {
         const bool somebody_waits = present < count || bus.status.responding > present;
         if (!somebody_waits || c.now_ns() - rediscovered < rediscover_every_ns) continue;
         rediscovered = c.now_ns();
-        const bool returned = co_await rediscover(c, bus,
-            bus.status.ring_broken ? static_cast<unsigned>(bus.status.break_after + 1) : count);
+        const bool returned =
+            co_await rediscover(c, bus, bus.status.ring_broken ? static_cast<unsigned>(bus.status.break_after + 1) : count);
         if (!returned) continue;
         co_await find_ports(c, bus, true);
         start_returned(bus);
@@ -226,7 +226,7 @@ Task<void> supervise(Channel& c, Bus& bus) noexcept {
 
 /// Reports a slave that is not in step any more although it is in OP.
 static void judge_clock(Bus& bus, Device& d) noexcept {
-    const Slave* config = bus.config(d);
+    const Slave*       config = bus.config(d);
     const std::int64_t window = std::max(bus.setup.sync_window_ns, tolerable_deviation_ns), deviation = d.status.dc_deviation_ns;
     if (config == nullptr || !config->dc || d.slave.number == bus.reference) return;
     if (d.status.operational && !d.drifted && deviation > window) {
@@ -239,14 +239,14 @@ static void judge_clock(Bus& bus, Device& d) noexcept {
 
 Task<void> watch(Channel& c, Bus& bus) noexcept {
     std::uint64_t foreign = bus.status.foreign;
-    bool other = false;
+    bool          other = false;
     while (true) {
-        const std::int64_t began = c.now_ns();
+        const std::int64_t  began = c.now_ns();
         const std::uint64_t more = bus.status.foreign - std::exchange(foreign, bus.status.foreign);
-        const bool was_other = std::exchange(other, more >= other_master_frames);
+        const bool          was_other = std::exchange(other, more >= other_master_frames);
         if (other && !was_other) bus.report(Event::other_master, static_cast<std::int64_t>(more));
         std::uint32_t largest = 0;
-        bool any = false, all = true;
+        bool          any = false, all = true;
         for (const auto& device : bus.devices) {
             Device& d = *device;
             if (!d.slave.present || !d.identified) continue;
@@ -258,10 +258,10 @@ Task<void> watch(Channel& c, Bus& bus) noexcept {
                 std::memcpy(now.data(), c.data(), now.size());
                 bool high = false;
                 for (std::size_t p = 0; p < 4; ++p) {
-                    PortErrors& e = d.status.ports[p];
-                    std::array<std::uint8_t, 4>& last = d.last_errors[p];
+                    PortErrors&                       e = d.status.ports[p];
+                    std::array<std::uint8_t, 4>&      last = d.last_errors[p];
                     const std::array<std::uint8_t, 4> values{now[2 * p], now[2 * p + 1], now[8 + p], now[16 + p]};
-                    const auto add = [&](std::uint64_t& sum, std::size_t n) {
+                    const auto                        add = [&](std::uint64_t& sum, std::size_t n) {
                         sum += values[n] >= last[n] ? values[n] - last[n] : values[n];
                         high |= values[n] > counter_high;
                     };
@@ -302,7 +302,7 @@ void judge_counters(Bus& bus) noexcept {
         part |= d.expected != 0 && d.state != WkcState::complete;
         any |= d.state == WkcState::complete;
         if (!d.fresh || d.expected == 0) continue;
-        WkcState& seen = bus.wkc_seen[n];
+        WkcState&  seen = bus.wkc_seen[n];
         const bool complete = d.state == WkcState::complete;
         if (complete != (seen == WkcState::complete)) {
             if (complete || seen != WkcState::none || d.was_complete)

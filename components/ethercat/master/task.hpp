@@ -37,14 +37,16 @@ public:
         if (used_ > most_) most_ = used_;
         return at;
     }
-    void give_back(std::size_t size) noexcept { used_ -= round(size); }
+    void        give_back(std::size_t size) noexcept { used_ -= round(size); }
     std::size_t most() const noexcept { return most_; }  ///< Returns the largest use so far, in bytes. [any]
 
 private:
     static std::size_t round(std::size_t size) noexcept { return (size + 15) / 16 * 16; }
-    struct alignas(16) Block { std::byte bytes[16]; };
+    struct alignas(16) Block {
+        std::byte bytes[16];
+    };
     std::vector<std::byte> bytes_;
-    std::size_t used_ = 0, most_ = 0;
+    std::size_t            used_ = 0, most_ = 0;
 };
 
 namespace detail {
@@ -64,21 +66,25 @@ struct PromiseBase {
         void await_resume() const noexcept {}
     };
     std::suspend_always initial_suspend() const noexcept { return {}; }
-    Return final_suspend() const noexcept { return {}; }
-    void unhandled_exception() const noexcept { std::terminate(); }  // tasks do not throw
+    Return              final_suspend() const noexcept { return {}; }
+    void                unhandled_exception() const noexcept { std::terminate(); }  // tasks do not throw
 
     /// Header in front of a frame: whose memory it is.
     static constexpr std::size_t header = 16;
-    static void* take(Channel& channel, std::size_t size) noexcept {
+    static void*                 take(Channel& channel, std::size_t size) noexcept {
         TaskMemory& memory = memory_of(channel);
-        auto* at = static_cast<std::byte*>(memory.take(size + header));
+        auto*       at = static_cast<std::byte*>(memory.take(size + header));
         *reinterpret_cast<TaskMemory**>(at) = &memory;
         return at + header;
     }
     template <class... Rest>
-    static void* operator new(std::size_t size, Channel& channel, Rest&&...) { return take(channel, size); }
+    static void* operator new(std::size_t size, Channel& channel, Rest&&...) {
+        return take(channel, size);
+    }
     template <class Self, class... Rest>
-    static void* operator new(std::size_t size, Self&, Channel& channel, Rest&&...) { return take(channel, size); }
+    static void* operator new(std::size_t size, Self&, Channel& channel, Rest&&...) {
+        return take(channel, size);
+    }
     static void operator delete(void* frame, std::size_t size) noexcept {
         auto* at = static_cast<std::byte*>(frame) - header;
         (*reinterpret_cast<TaskMemory**>(at))->give_back(size + header);
@@ -106,7 +112,7 @@ public:
     }
     ~Task() { reset(); }
 
-    bool await_ready() const noexcept { return false; }
+    bool                    await_ready() const noexcept { return false; }
     std::coroutine_handle<> await_suspend(std::coroutine_handle<> caller) noexcept {
         handle_.promise().caller = caller;
         return handle_;
@@ -114,7 +120,7 @@ public:
     T await_resume() noexcept { return handle_.promise().result(); }
 
     bool done() const noexcept { return !handle_ || handle_.done(); }  ///< Returns whether there is no work left. [realtime]
-    T result() noexcept { return handle_.promise().result(); }         ///< Returns the result of finished work. [realtime]
+    T    result() noexcept { return handle_.promise().result(); }         ///< Returns the result of finished work. [realtime]
     void begin() noexcept { handle_.resume(); }                        ///< Runs up to the first wait. [realtime]
     void reset() noexcept {
         if (handle_) std::exchange(handle_, {}).destroy();
@@ -128,16 +134,16 @@ namespace detail {
 
 template <class T>
 struct Promise : PromiseBase {
-    T value{};
+    T       value{};
     Task<T> get_return_object() noexcept { return Task<T>(std::coroutine_handle<Promise>::from_promise(*this)); }
-    void return_value(T v) noexcept { value = std::move(v); }
-    T result() noexcept { return std::move(value); }
+    void    return_value(T v) noexcept { value = std::move(v); }
+    T       result() noexcept { return std::move(value); }
 };
 template <>
 struct Promise<void> : PromiseBase {
     Task<void> get_return_object() noexcept { return Task<void>(std::coroutine_handle<Promise>::from_promise(*this)); }
-    void return_void() const noexcept {}
-    void result() const noexcept {}
+    void       return_void() const noexcept {}
+    void       result() const noexcept {}
 };
 
 }  // namespace detail

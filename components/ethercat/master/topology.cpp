@@ -33,8 +33,8 @@ bool find_tree(std::span<BusSlave* const> line) noexcept {
         bool found = false;
         for (std::size_t p = n; p-- > 0 && !found;) {
             BusSlave& parent = *line[p];
-            for (unsigned port = next_port(parent.dl_status,
-                parent.entry_port); port != parent.entry_port; port = next_port(parent.dl_status, port)) {
+            for (unsigned port = next_port(parent.dl_status, parent.entry_port); port != parent.entry_port;
+                 port = next_port(parent.dl_status, port)) {
                 if (parent.neighbour[port] >= 0) continue;
                 parent.neighbour[port] = s.number;
                 s.neighbour[s.entry_port] = parent.number;
@@ -77,7 +77,7 @@ void find_delays(std::span<BusSlave* const> line, std::size_t reference) noexcep
             }
         const std::uint32_t loop = parent->receive_time[port] - parent->receive_time[before];
         const std::uint32_t earlier = parent->receive_time[before] - parent->receive_time[parent->entry_port];
-        const auto own = static_cast<std::int32_t>(loop - round_trip(s));
+        const auto          own = static_cast<std::int32_t>(loop - round_trip(s));
         s.delay_ns = parent->delay_ns + earlier + static_cast<std::uint32_t>(own > 0 ? own / 2 : 0);
     }
 }

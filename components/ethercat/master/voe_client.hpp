@@ -15,9 +15,9 @@ namespace hal::ethercat::master {
 
 /// A message and its sender.
 struct VoeMessage {
-    std::uint16_t slave = 0;  ///< BusSlave::number
-    std::uint16_t length = 0;
-    VoeHeader header;
+    std::uint16_t                             slave = 0;  ///< BusSlave::number
+    std::uint16_t                             length = 0;
+    VoeHeader                                 header;
     std::array<std::uint8_t, largest_mailbox> data{};
 };
 
@@ -33,7 +33,7 @@ public:
         SlaveMailbox* mailbox = mailboxes_.find(slave);
         if (mailbox == nullptr) co_return refused();
         const SlaveMailbox::Hold hold = co_await mailbox->hold(channel);
-        const auto body = mailbox->body(slave);
+        const auto               body = mailbox->body(slave);
         if (body.size() < voe_header_bytes + data.size()) co_return refused(0, data.size());
         write_voe(body.data(), header);
         if (!data.empty()) std::memcpy(body.data() + voe_header_bytes, data.data(), data.size());
@@ -41,7 +41,7 @@ public:
         co_return result;
     }
     bool take(const BusSlave& slave, const MailboxMessage& message) noexcept override {
-        const auto header = read_voe(message.payload);
+        const auto  header = read_voe(message.payload);
         VoeMessage* to = header ? queue_.place() : nullptr;
         if (to == nullptr) {
             ++lost_;
@@ -55,13 +55,13 @@ public:
     }
     /// Returns the oldest message, valid until drop(), or nullptr. [any] one reader
     const VoeMessage* front() noexcept { return queue_.front(); }
-    void drop() noexcept { queue_.drop(); }
+    void              drop() noexcept { queue_.drop(); }
     std::uint32_t lost() const noexcept { return lost_; }  ///< Returns the number of messages that were too short or found the queue full.
 
 private:
-    Mailboxes& mailboxes_;
+    Mailboxes&        mailboxes_;
     Queue<VoeMessage> queue_;
-    std::uint32_t lost_ = 0;
+    std::uint32_t     lost_ = 0;
 };
 
 }  // namespace hal::ethercat::master

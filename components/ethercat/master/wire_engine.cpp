@@ -10,8 +10,9 @@ namespace hal::ethercat::master {
 
 namespace {
 
-constexpr std::size_t  first_datagram = ethernet_header_bytes + ecat_header_bytes;
-constexpr std::size_t  frame_overhead = 24, datagram_overhead = datagram_header_bytes + 2;  ///< preamble, check sequence, gap; header and counter
+constexpr std::size_t first_datagram = ethernet_header_bytes + ecat_header_bytes;
+constexpr std::size_t frame_overhead = 24,
+                      datagram_overhead = datagram_header_bytes + 2;  ///< preamble, check sequence, gap; header and counter
 constexpr std::int64_t acyclic_timeout_ns = 2'000'000;
 
 constexpr bool counts_positions(Command c) noexcept {
@@ -45,7 +46,7 @@ void WireEngine::ready() {
 int WireEngine::take_index() noexcept {
     for (std::size_t tries = 0; tries < indexes; ++tries) {
         const std::uint8_t index = next_index_++;
-        Flight& f = flights_[index];
+        Flight&            f = flights_[index];
         if (f.kind != Flight::Kind::none && f.kind != Flight::Kind::expired) continue;
         f = {};
         return index;
@@ -59,11 +60,9 @@ bool WireEngine::idle() const noexcept {
 
 std::uint8_t WireEngine::send(std::span<const std::uint8_t> frame, bool backup) noexcept {
     std::uint8_t copies = 0;
-    const auto out = [&](ethernet::Port* port) {
-        if (port->send(frame, {}, now_ns_) == ethernet::Sent::queued)
-            ++copies, ++status_.frames_sent;
-        else
-            ++status_.send_failures;
+    const auto   out = [&](ethernet::Port* port) {
+        if (port->send(frame, {}, now_ns_) == ethernet::Sent::queued) ++copies, ++status_.frames_sent;
+        else ++status_.send_failures;
     };
     out(primary_);
     if (backup && backup_ != nullptr) out(backup_);
@@ -71,7 +70,7 @@ std::uint8_t WireEngine::send(std::span<const std::uint8_t> frame, bool backup) 
 }
 
 void WireEngine::transmit(std::int64_t now_ns, bool process_data, bool all_domains, unsigned acyclic_frames,
-    std::uint64_t dc_time_ns) noexcept {
+                          std::uint64_t dc_time_ns) noexcept {
     sent_after_ns_ = now_ns - cycle_start_ns_;
     now_ns_ = now_ns;
     std::size_t cyclic_bytes = 0;
@@ -117,9 +116,9 @@ void WireEngine::send_acyclic(unsigned frames, std::size_t bytes) noexcept {
 bool WireEngine::pack(AcyclicFrame& frame, std::uint8_t index, bool& backup, std::size_t most, bool first) noexcept {
     FrameWriter writer(frame.bytes, primary_->address());
     frame.count = 0;
-    std::size_t bytes = first_datagram + frame_overhead;
+    std::size_t       bytes = first_datagram + frame_overhead;
     const std::size_t channels = channels_.size();
-    std::size_t at = next_channel_ < channels ? next_channel_ : 0, next = at;
+    std::size_t       at = next_channel_ < channels ? next_channel_ : 0, next = at;
     for (std::size_t seen = 0; seen < channels && frame.count < most_items; ++seen, at = at + 1 == channels ? 0 : at + 1) {
         if (active_[at] == 0) continue;
         Channel& c = *channels_[at];
@@ -163,9 +162,7 @@ void WireEngine::arrived(std::span<const std::uint8_t> bytes, unsigned number) n
     if (bytes.size() < ethernet::smallest_frame || bytes[12] != ethertype >> 8 || bytes[13] != (ethertype & 0xff)) return;
     Flight& f = flights_[bytes[first_datagram + 1]];
     switch (f.kind) {
-    case Flight::Kind::none:
-        f.merged ? ++status_.duplicates : ++status_.foreign;
-        return;
+    case Flight::Kind::none: f.merged ? ++status_.duplicates : ++status_.foreign; return;
     case Flight::Kind::expired: ++status_.late; return;
     case Flight::Kind::cyclic:
         if (!image_.matches(image_.frames()[f.place], bytes)) break;
@@ -195,10 +192,8 @@ void WireEngine::arrived_cyclic(Flight& f, std::span<const std::uint8_t> bytes) 
     const ProcessImage::Frame& frame = image_.frames()[f.place];
     if (backup_ == nullptr) return complete_cyclic(f, bytes.data());
     auto& half = halves_[f.place];
-    if (!f.merged)
-        std::memcpy(half.data(), bytes.data(), frame.size);
-    else
-        image_.merge(frame, half.data(), bytes.data());
+    if (!f.merged) std::memcpy(half.data(), bytes.data(), frame.size);
+    else image_.merge(frame, half.data(), bytes.data());
     f.merged = true;
     if (f.copies == 0) complete_cyclic(f, half.data());
 }
@@ -219,7 +214,7 @@ void WireEngine::complete_cyclic(Flight& f, const std::uint8_t* answer) noexcept
 
 void WireEngine::arrived_acyclic(Flight& f, std::span<const std::uint8_t> bytes, unsigned number) noexcept {
     AcyclicFrame& frame = acyclic_[f.place];
-    const auto same = [&](const Item& item) {
+    const auto    same = [&](const Item& item) {
         const std::size_t at = item.offset - datagram_header_bytes;
         return bytes[at] == frame.bytes[at] && bytes[at + 1] == frame.bytes[at + 1] &&
                get<std::uint16_t>(&bytes[at + 4]) == get<std::uint16_t>(&frame.bytes[at + 4]) &&
@@ -235,24 +230,21 @@ void WireEngine::arrived_acyclic(Flight& f, std::span<const std::uint8_t> bytes,
         for (std::size_t n = 0; n < frame.count; ++n)
             if (const std::uint8_t* d = &bytes[frame.items[n].offset]; d[-10] == static_cast<std::uint8_t>(Command::brd))
                 if (get<std::uint16_t>(d - 6) == registers::al_status) primary_wkc_ = get<std::uint16_t>(d + frame.items[n].length);
-    if (!f.merged)
-        std::memcpy(frame.answer.data(), bytes.data(), frame.size);
-    else
-        merge_acyclic(frame, bytes.data());
+    if (!f.merged) std::memcpy(frame.answer.data(), bytes.data(), frame.size);
+    else merge_acyclic(frame, bytes.data());
     f.merged = true;
     if (f.copies == 0) complete_acyclic(f);
 }
 
 void WireEngine::merge_acyclic(AcyclicFrame& frame, const std::uint8_t* second) noexcept {
     for (std::size_t n = 0; n < frame.count; ++n) {
-        const Item& item = frame.items[n];
+        const Item&         item = frame.items[n];
         std::uint8_t*       to = &frame.answer[item.offset];
         const std::uint8_t* from = second + item.offset;
-        const auto wkc = get<std::uint16_t>(to + item.length), more = get<std::uint16_t>(from + item.length);
+        const auto          wkc = get<std::uint16_t>(to + item.length), more = get<std::uint16_t>(from + item.length);
         if (frame.bytes[item.offset - datagram_header_bytes] == static_cast<std::uint8_t>(Command::brd))
             for (std::size_t i = 0; i < item.length; ++i) to[i] |= from[i];
-        else if (wkc == 0 && more != 0)
-            std::memcpy(to, from, item.length);
+        else if (wkc == 0 && more != 0) std::memcpy(to, from, item.length);
         put(to + item.length, static_cast<std::uint16_t>(wkc + more));
     }
 }
@@ -263,7 +255,7 @@ void WireEngine::complete_acyclic(Flight& f) noexcept {
     --in_flight_;
     for (std::size_t n = 0; n < frame.count; ++n) {
         const Item& item = frame.items[n];
-        Channel& c = *item.channel;
+        Channel&    c = *item.channel;
         if (c.stage() != Channel::Stage::sent || c.generation() != item.generation || c.length() != item.length) continue;
         c.set_now(now_ns_);
         std::memcpy(c.data(), &frame.answer[item.offset], item.length);

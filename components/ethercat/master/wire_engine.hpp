@@ -24,10 +24,10 @@ class WireEngine {
 public:
     /// Time of the reference clock as the newest frame carried it.
     struct ClockSample {
-        bool fresh = false;             ///< came with the newest cycle
+        bool          fresh = false;             ///< came with the newest cycle
         std::uint64_t dc_ns = 0;        ///< when the frame passed the reference clock, its time
-        std::int64_t sent_ns = 0;       ///< when the frame left, on the clock of the cycle
-        std::int64_t sent_after_ns = 0; ///< between the start of that cycle and the sending of the frame
+        std::int64_t  sent_ns = 0;       ///< when the frame left, on the clock of the cycle
+        std::int64_t  sent_after_ns = 0; ///< between the start of that cycle and the sending of the frame
     };
 
     WireEngine(ProcessImage& image, BusStatus& status, const Setup& setup) : image_(image), status_(status), setup_(setup) {}
@@ -42,74 +42,74 @@ public:
     void transmit(std::int64_t now_ns, bool process_data, bool all_domains, unsigned acyclic_frames, std::uint64_t dc_time_ns) noexcept;
 
     const ClockSample& clock() const noexcept { return clock_; }
-    bool redundant() const noexcept { return backup_ != nullptr; }
+    bool               redundant() const noexcept { return backup_ != nullptr; }
     /// Channels may use the backup port: false while positions are counted, true once slaves have station addresses.
-    void use_backup(bool use) noexcept { use_backup_ = use; }
+    void         use_backup(bool use) noexcept { use_backup_ = use; }
     std::int64_t now_ns() const noexcept { return now_ns_; }          ///< Returns the start of the current cycle.
     /// Returns the counter of the newest BRD 0130h copy that arrived at the primary port: 0 on a closed ring, whose slaves count in the copy that
     /// arrives at the backup port; -1: none arrived.
-    int primary_wkc() const noexcept { return primary_wkc_; }
-    std::uint64_t resumed() const noexcept { return resumed_; }       ///< Returns how often a task continued.
-    bool idle() const noexcept;                                       ///< Returns whether no process data is in flight.
+    int           primary_wkc() const noexcept { return primary_wkc_; }
+    std::uint64_t resumed() const noexcept { return resumed_; }  ///< Returns how often a task continued.
+    bool          idle() const noexcept;  ///< Returns whether no process data is in flight.
 
 private:
     struct Item {
-        Channel* channel = nullptr;
+        Channel*      channel = nullptr;
         std::uint32_t generation = 0;
         std::uint16_t offset = 0, length = 0;
     };
     static constexpr std::size_t most_items = 64, most_acyclic = 8, indexes = 256;
     struct AcyclicFrame {
         std::array<std::uint8_t, largest_frame_bytes> bytes{}, answer{};
-        std::array<Item, most_items> items{};
-        std::size_t count = 0;
-        std::uint16_t size = 0;
-        bool free = true;
+        std::array<Item, most_items>                  items{};
+        std::size_t                                   count = 0;
+        std::uint16_t                                 size = 0;
+        bool                                          free = true;
     };
     struct Flight {
         /// complete: its data is taken, the second copy may still arrive
         enum class Kind : std::uint8_t { none, cyclic, complete, acyclic, expired } kind = Kind::none;
-        std::uint8_t copies = 0;     ///< that left and have not arrived
-        std::uint8_t arrivals = 0;   ///< bit mask of the ports at which one arrived
-        bool merged = false;         ///< one copy arrived
-        std::uint16_t place = 0;     ///< frame of the image, or of acyclic_
-        std::int64_t sent_ns = 0;
+        std::uint8_t  copies = 0;  ///< that left and have not arrived
+        std::uint8_t  arrivals = 0;  ///< bit mask of the ports at which one arrived
+        bool          merged = false;  ///< one copy arrived
+        std::uint16_t place = 0;  ///< frame of the image, or of acyclic_
+        std::int64_t  sent_ns = 0;
     };
 
-    void drain(ethernet::Port& port, unsigned number) noexcept;
-    void arrived(std::span<const std::uint8_t> bytes, unsigned number) noexcept;
-    void arrived_cyclic(Flight&, std::span<const std::uint8_t> bytes) noexcept;
-    void arrived_acyclic(Flight&, std::span<const std::uint8_t> bytes, unsigned number) noexcept;
-    bool accept(Flight&, unsigned number) noexcept;
-    void complete_cyclic(Flight&, const std::uint8_t* answer) noexcept;
-    void complete_acyclic(Flight&) noexcept;
-    void merge_acyclic(AcyclicFrame&, const std::uint8_t* second) noexcept;
-    void expire() noexcept;
-    void wake() noexcept;
-    void send_acyclic(unsigned frames, std::size_t bytes) noexcept;
-    bool pack(AcyclicFrame&, std::uint8_t index, bool& backup, std::size_t most, bool first) noexcept;
+    void         drain(ethernet::Port& port, unsigned number) noexcept;
+    void         arrived(std::span<const std::uint8_t> bytes, unsigned number) noexcept;
+    void         arrived_cyclic(Flight&, std::span<const std::uint8_t> bytes) noexcept;
+    void         arrived_acyclic(Flight&, std::span<const std::uint8_t> bytes, unsigned number) noexcept;
+    bool         accept(Flight&, unsigned number) noexcept;
+    void         complete_cyclic(Flight&, const std::uint8_t* answer) noexcept;
+    void         complete_acyclic(Flight&) noexcept;
+    void         merge_acyclic(AcyclicFrame&, const std::uint8_t* second) noexcept;
+    void         expire() noexcept;
+    void         wake() noexcept;
+    void         send_acyclic(unsigned frames, std::size_t bytes) noexcept;
+    bool         pack(AcyclicFrame&, std::uint8_t index, bool& backup, std::size_t most, bool first) noexcept;
     std::uint8_t send(std::span<const std::uint8_t> frame, bool backup) noexcept;
-    int take_index() noexcept;
+    int          take_index() noexcept;
 
-    ProcessImage& image_;
-    BusStatus& status_;
-    const Setup& setup_;
-    ethernet::Port* primary_ = nullptr;
-    ethernet::Port* backup_ = nullptr;
-    std::vector<Channel*> channels_;
-    std::vector<std::uint8_t> active_;  ///< of each channel
-    std::vector<AcyclicFrame> acyclic_;
+    ProcessImage&                                              image_;
+    BusStatus&                                                 status_;
+    const Setup&                                               setup_;
+    ethernet::Port*                                            primary_ = nullptr;
+    ethernet::Port*                                            backup_ = nullptr;
+    std::vector<Channel*>                                      channels_;
+    std::vector<std::uint8_t>                                  active_;  ///< of each channel
+    std::vector<AcyclicFrame>                                  acyclic_;
     std::vector<std::array<std::uint8_t, largest_frame_bytes>> halves_;  ///< first copies of the cyclic frames, with a backup port only
-    std::array<Flight, indexes> flights_{};
-    ClockSample clock_;
-    std::int64_t now_ns_ = 0, cycle_start_ns_ = 0, sent_after_ns_ = 0;
-    std::uint64_t cycle_ = 0, resumed_ = 0;
-    std::size_t next_channel_ = 0;
-    unsigned in_flight_ = 0;
-    int primary_wkc_ = -1;
-    std::size_t wire_bytes_ = SIZE_MAX;  // that fit a cycle, with a reserve
-    std::uint8_t next_index_ = 0;
-    bool use_backup_ = false;
+    std::array<Flight, indexes>                                flights_{};
+    ClockSample                                                clock_;
+    std::int64_t                                               now_ns_ = 0, cycle_start_ns_ = 0, sent_after_ns_ = 0;
+    std::uint64_t                                              cycle_ = 0, resumed_ = 0;
+    std::size_t                                                next_channel_ = 0;
+    unsigned                                                   in_flight_ = 0;
+    int                                                        primary_wkc_ = -1;
+    std::size_t                                                wire_bytes_ = SIZE_MAX;  // that fit a cycle, with a reserve
+    std::uint8_t                                               next_index_ = 0;
+    bool                                                       use_backup_ = false;
 };
 
 }  // namespace hal::ethercat::master

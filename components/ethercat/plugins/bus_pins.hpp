@@ -56,7 +56,8 @@ struct BusPins {
 struct SlavePins {
     SlavePins(Component& c, const Function& f, const std::string& name)
         : online(c, f, (name + ".online").c_str(), "the slave answers"),
-          operational(c, f, (name + ".operational").c_str(), "the slave is in its target state and exchanges process data", {.safe = false}),
+          operational(c, f, (name + ".operational").c_str(), "the slave is in its target state and exchanges process data",
+                      {.safe = false}),
           state(c, f, (name + ".state").c_str(), "1 INIT, 2 PRE-OP, 3 BOOT, 4 SAFE-OP, 8 OP, 0 unknown"),
           al_code(c, f, (name + ".al-status-code").c_str(), "reason of the newest rejected or lost state (0134h); 0: none"),
           dc_deviation(c, f, (name + ".dc-sync-diff").c_str(), "deviation of its clock; 4294967295: no data", {.unit = "ns"}),

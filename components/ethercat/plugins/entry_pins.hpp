@@ -53,7 +53,8 @@ public:
         if (e.name.empty() || e.bits == 0 || e.bits > 64) return;
         const std::string name = prefix + e.name;
         const Place place{area, at, e.bits, e.type, e.is_signed || is_signed(e.type), e.scaled ? e.scale : 1.0, e.scaled ? e.offset : 0.0};
-        if (e.scaled || e.type == master::Type::real32 || e.type == master::Type::real64) return add(name, e, output, place, in_real_, out_real_);
+        if (e.scaled || e.type == master::Type::real32 || e.type == master::Type::real64)
+            return add(name, e, output, place, in_real_, out_real_);
         if (e.type == master::Type::bit && e.bits > 1) {
             for (unsigned bit = 0; bit < e.bits; ++bit) {
                 Place one = place;
@@ -120,7 +121,9 @@ private:
         if (output) ins.emplace_back(component_, takes_, name, about, hal::PinOptions<T>{}, place);
         else outs.emplace_back(component_, shows_, name, about, hal::PinOptions<T>{}, place);
     }
-    static std::uint64_t raw(std::span<const std::span<std::uint8_t>> areas, const Place& p) noexcept { return bits_of(areas[p.area], p.at, p.bits); }
+    static std::uint64_t raw(std::span<const std::span<std::uint8_t>> areas, const Place& p) noexcept {
+        return bits_of(areas[p.area], p.at, p.bits);
+    }
     static void store(std::span<const std::span<std::uint8_t>> areas, const Place& p, std::uint64_t value) noexcept {
         set_bits(areas[p.area], p.at, p.bits, value);
     }
@@ -136,7 +139,7 @@ private:
     static double real_of(std::uint64_t bits, const Place& p) noexcept {
         if (p.type == master::Type::real32) {
             const auto low = static_cast<std::uint32_t>(bits);
-            float value = 0;
+            float      value = 0;
             std::memcpy(&value, &low, sizeof value);
             return std::isfinite(value) ? static_cast<double>(value) : 0.0;
         }

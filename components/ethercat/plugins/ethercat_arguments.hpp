@@ -17,16 +17,23 @@ struct EthercatArguments {
 
     hal::Component&   component_;
     const char*       usual_file_;  ///< without `config`
-    hal::TextArgument file{component_, "config", usual_file_,
+    hal::TextArgument file{component_,
+                           "config",
+                           usual_file_,
                            "configuration file NAME.ethercat, or LinuxCNC's ethercat-conf.xml; a list makes an instance of each",
                            {.per_instance = true}};
-    hal::TextArgument link{component_, "link", "", "link address, overrides the configuration: eth:enp3s0, sim:NAME, …", {.per_instance = true}};
-    hal::TextArgument backup{component_, "backup", "", "link address of the port that closes a ring, overrides the configuration",
-                             {.per_instance = true}};
-    hal::Argument     number{component_, "master", 0, "of a configuration with several masters: which one, from 0", {.per_instance = true, .min = 0, .max = 63}};
+    hal::TextArgument link{
+        component_, "link", "", "link address, overrides the configuration: eth:enp3s0, sim:NAME, …", {.per_instance = true}};
+    hal::TextArgument backup{
+        component_, "backup", "", "link address of the port that closes a ring, overrides the configuration", {.per_instance = true}};
+    hal::Argument number{
+        component_, "master", 0, "of a configuration with several masters: which one, from 0", {.per_instance = true, .min = 0, .max = 63}};
 
-    hal::Argument     cycle{component_, "cycle", 0, "cycle time in ns, overrides the configuration; 0: as there",
-                            {.per_instance = true, .min = 0, .max = 1'000'000'000}};
+    hal::Argument cycle{component_,
+                        "cycle",
+                        0,
+                        "cycle time in ns, overrides the configuration; 0: as there",
+                        {.per_instance = true, .min = 0, .max = 1'000'000'000}};
 
     /// Reads the configuration. Reports every problem with its place in the file where the host can show it. Throws hal::ArgumentError, or the
     /// exception that ends the constructor once the problems are reported. [setup]
@@ -43,15 +50,18 @@ struct EthercatArguments {
         const auto wanted = static_cast<std::size_t>(number);
         if (wanted >= reading.buses.size())
             throw hal::ArgumentError("master", "master=" + std::to_string(wanted) + ": the configuration has " +
-                                                   std::to_string(reading.buses.size()) + (reading.buses.size() == 1 ? " master" : " masters"));
-        config::Bus bus = std::move(reading.buses[wanted]);
+                                                   std::to_string(reading.buses.size()) +
+                                                   (reading.buses.size() == 1 ? " master" : " masters"));
+        config::Bus        bus = std::move(reading.buses[wanted]);
         const std::int64_t cycle_ns = cycle;
         if (cycle_ns != 0 && reading.lcec)
-            throw hal::ArgumentError("cycle", "cycle=" + std::to_string(cycle_ns) + ": the cycle of this format is appTimePeriod; change it in the file");
+            throw hal::ArgumentError(
+                "cycle", "cycle=" + std::to_string(cycle_ns) + ": the cycle of this format is appTimePeriod; change it in the file");
         if (cycle_ns != 0) bus.setup.cycle_ns = cycle_ns;
         if (!link.get().empty()) bus.link = link.get();
         else if (reading.lcec && texts.offered())
-            throw hal::ArgumentError("link", "link= is missing: this format has no interface", "write link=eth:enp3s0, or link=sim:NAME for an emulated line");
+            throw hal::ArgumentError("link", "link= is missing: this format has no interface",
+                                     "write link=eth:enp3s0, or link=sim:NAME for an emulated line");
         if (!backup.get().empty()) bus.backup = backup.get();
         return bus;
     }
@@ -62,8 +72,8 @@ private:
         texts.begin(path, text);
         for (const config::Message& m : reading.messages)
             if (m.severity != hal::Severity::note)
-                texts.report(static_cast<hal_severity>(m.severity), config::code_of(m.topic), m.at.offset, m.at.offset + m.at.length, m.sentence,
-                                m.label, m.help);
+                texts.report(static_cast<hal_severity>(m.severity), config::code_of(m.topic), m.at.offset, m.at.offset + m.at.length,
+                             m.sentence, m.label, m.help);
         if (!reading.good()) hal::Texts::fail();
     }
 };

@@ -20,7 +20,8 @@ using namespace hal::ethercat;
 /// Pins of one emulated slave.
 struct SlavePins {
     SlavePins(hal::Component& c, const hal::Function& f, const std::string& name)
-        : power(c, f, (name + ".power").c_str(), "FALSE: the slave has no power; its settings and volatile objects are lost", {.initial = true}),
+        : power(c, f, (name + ".power").c_str(), "FALSE: the slave has no power; its settings and volatile objects are lost",
+                {.initial = true}),
           cable(c, f, (name + ".cable").c_str(), "FALSE: the cable to the slave before it is broken", {.initial = true}),
           drift(c, f, (name + ".drift").c_str(), "error of its oscillator, at most 100000", {.unit = "ppm"}),
           reject_state(c, f, (name + ".reject-state").c_str(), "state that the slave rejects: 2 PRE-OP, 4 SAFE-OP, 8 OP; 0 none"),
@@ -90,8 +91,7 @@ public:
         if (!backup_.get().empty()) secondary_ = open(backup_.get(), options);
         line_.emplace();
         frames_ = 0, silent_ = 0;
-        for (devices::Device& d : line_devices_)
-            line_->add({.controller = {.dc = d.dc}, .sii = d.sii, .application = d.firmware.get()});
+        for (devices::Device& d : line_devices_) line_->add({.controller = {.dc = d.dc}, .sii = d.sii, .application = d.firmware.get()});
         if (secondary_ && !line_devices_.empty() && !line_->close_ring(static_cast<unsigned>(line_devices_.size() - 1), 1))
             throw std::runtime_error("backup=" + backup_.get() + ": the last device has no second port; put one with two ports at the end");
         const std::int64_t now = primary_->segment()->time_ns();
@@ -111,12 +111,15 @@ public:
         if (!line_) return;
         primary_->receive(cycle.start_ns());  // frames of a master that is gone pass too
         silent_ = line_->frames() == frames_ ? silent_ + 1 : 0, frames_ = line_->frames();
-        if (silent_ >= silent_cycles) line_->advance(cycle.start_ns());  // frames move its time; without them its watchdogs run all the same
+        if (silent_ >= silent_cycles)
+            line_->advance(cycle.start_ns());  // frames move its time; without them its watchdogs run all the same
         for (unsigned n = 0; n < slaves_.size(); ++n) {
             using Kind = esc::LineCommand::Kind;
             SlavePins& pins = slaves_[n];
-            if (pins.power != pins.was_power && line_->post({.kind = Kind::power, .slave = n, .on = pins.power})) pins.was_power = pins.power;
-            if (pins.cable != pins.was_cable && line_->post({.kind = Kind::cable, .slave = n, .port = 0, .on = pins.cable})) pins.was_cable = pins.cable;
+            if (pins.power != pins.was_power && line_->post({.kind = Kind::power, .slave = n, .on = pins.power}))
+                pins.was_power = pins.power;
+            if (pins.cable != pins.was_cable && line_->post({.kind = Kind::cable, .slave = n, .port = 0, .on = pins.cable}))
+                pins.was_cable = pins.cable;
             const double drift = std::isfinite(pins.drift.get()) ? std::clamp(pins.drift.get(), -most_drift, most_drift) : 0.0;
             if (drift != pins.was_drift && line_->post({.kind = Kind::drift, .slave = n, .value = drift})) pins.was_drift = drift;
             set_faults(pins, *line_devices_[n].firmware);
@@ -143,7 +146,7 @@ private:
     static void set_faults(SlavePins& pins, devices::Firmware& firmware) noexcept {
         devices::FirmwareFaults& faults = firmware.faults();
         for (const State state : {State::preop, State::safeop, State::op}) {
-            const bool rejected = pins.reject_state == static_cast<std::uint32_t>(state);
+            const bool          rejected = pins.reject_state == static_cast<std::uint32_t>(state);
             const std::uint32_t code = rejected ? std::clamp<std::uint32_t>(pins.reject_code, 1, 0xffff) : 0U;
             faults.reject[state].store(static_cast<std::uint16_t>(code), std::memory_order_relaxed);
         }
@@ -174,7 +177,8 @@ private:
         } else if (auto* io = dynamic_cast<devices::IoBehaviour*>(&behaviour)) {
             for (unsigned c = 0; c < io->channels(); ++c) {
                 const std::string number = (c < 10 ? "0" : "") + std::to_string(c);
-                if (device.name == "digital_in") digital_in_.emplace_back(*this, update_, name + ".in-" + number, "terminal of the input", *io, c);
+                if (device.name == "digital_in")
+                    digital_in_.emplace_back(*this, update_, name + ".in-" + number, "terminal of the input", *io, c);
                 else if (device.name == "digital_out")
                     digital_out_.emplace_back(*this, update_, name + ".out-" + number, "terminal of the output", *io, c);
                 else if (device.name == "analog_in")
@@ -184,26 +188,27 @@ private:
         }
     }
 
-    hal::TextArgument devices_{*this, "devices", "coupler",
-                               "devices along the line, separated by commas: coupler, digital_in bits=16, digital_out bits=8, analog_in channels=4, "
-                               "analog_out channels=2, servo axes=1, mailbox_device; all take alias= and serial=, a servo dc=required and modes= (6502h)"};
+    hal::TextArgument devices_{
+        *this, "devices", "coupler",
+        "devices along the line, separated by commas: coupler, digital_in bits=16, digital_out bits=8, analog_in channels=4, "
+        "analog_out channels=2, servo axes=1, mailbox_device; all take alias= and serial=, a servo dc=required and modes= (6502h)"};
     hal::TextArgument link_{*this, "link", "sim:ethercat", "segment in memory where the master is"};
     hal::TextArgument backup_{*this, "backup", "", "segment in memory of the master's second port, which closes a ring"};
-    hal::Function     update_{*this, "update", &EthercatSegment::update, "copies values between pins and devices; in the thread of the master"};
+    hal::Function update_{*this, "update", &EthercatSegment::update, "copies values between pins and devices; in the thread of the master"};
 
     std::vector<devices::Device> line_devices_;
     // Deques: a pin may not move once it is declared.
-    std::deque<SlavePins>                        slaves_;
-    std::deque<AxisPins>                         axes_;
-    std::deque<Channel<hal::In<bool>>>           digital_in_;
-    std::deque<Channel<hal::Out<bool>>>          digital_out_;
-    std::deque<Channel<hal::In<std::int32_t>>>   analog_in_;
-    std::deque<Channel<hal::Out<std::int32_t>>>  analog_out_;
-    std::unique_ptr<hal::ethernet::Port>         primary_, secondary_;
-    std::optional<esc::Line>                     line_;
-    std::uint64_t                                frames_ = 0;
-    unsigned                                     silent_ = 0;
-    std::unique_ptr<esc::LineOnSegments>         connection_;
+    std::deque<SlavePins>                       slaves_;
+    std::deque<AxisPins>                        axes_;
+    std::deque<Channel<hal::In<bool>>>          digital_in_;
+    std::deque<Channel<hal::Out<bool>>>         digital_out_;
+    std::deque<Channel<hal::In<std::int32_t>>>  analog_in_;
+    std::deque<Channel<hal::Out<std::int32_t>>> analog_out_;
+    std::unique_ptr<hal::ethernet::Port>        primary_, secondary_;
+    std::optional<esc::Line>                    line_;
+    std::uint64_t                               frames_ = 0;
+    unsigned                                    silent_ = 0;
+    std::unique_ptr<esc::LineOnSegments>        connection_;
 };
 
 }  // namespace

@@ -36,12 +36,12 @@ struct LcecBusPins {
     }
 
     Out<std::uint32_t> responding;
-    Out<bool> init, preop, safeop, op, link_up, all_op;
+    Out<bool>          init, preop, safeop, op, link_up, all_op;
     Out<std::uint32_t> wkc;
-    Out<std::int32_t> wkc_state;
+    Out<std::int32_t>  wkc_state;
     Out<std::uint32_t> dc_deviation;
-    Out<bool> dc_synchronised;
-    Out<std::int32_t> phase;
+    Out<bool>          dc_synchronised;
+    Out<std::int32_t>  phase;
 };
 
 /// Pins of one slave: lcec.MASTER.SLAVE.NAME.

@@ -139,7 +139,7 @@ public:
 
 private:
     static constexpr unsigned tolerated_cycles = 100;  ///< without the other function, while the netlist is loaded
-    static constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
+    static constexpr double   not_a_number = std::numeric_limits<double>::quiet_NaN();
     struct Place {
         std::size_t slave = 0, sync_manager = 0;
     };
@@ -159,7 +159,7 @@ private:
     /// Returns the time of the clocks of the slaves: ns since 2000-01-01. [setup]
     static std::int64_t since_2000_ns() noexcept {
         constexpr std::int64_t year_2000_s = 946'684'800;
-        timespec now{};
+        timespec               now{};
         clock_gettime(CLOCK_REALTIME, &now);
         return (now.tv_sec - year_2000_s) * 1'000'000'000 + now.tv_nsec;
     }
@@ -180,7 +180,7 @@ private:
     /// Takes all slaves to INIT, where outputs are off. [setup]
     void release_slaves() noexcept {
         std::array<std::uint8_t, largest_frame_bytes> buffer{};
-        FrameWriter frame(buffer, primary_->address());
+        FrameWriter                                   frame(buffer, primary_->address());
         if (std::uint8_t* data = frame.add(Command::bwr, 0, at_position(0, registers::al_control), 2))
             put<std::uint16_t>(data, static_cast<std::uint16_t>(State::init) | al_error);
         primary_->send(frame.finish(), {}, simulated_ ? hal::ethernet::unclocked : hal::monotonic_ns());
@@ -223,25 +223,32 @@ private:
         if (event == Event::other_master) raise(other_words_);
     }
 
-    const std::string name_ = hal::own_name(Names::own);
-    EthercatArguments arguments_{*this, Names::file};
-    config::Bus       bus_ = arguments_.read();
-    hal::Function receive_{*this, Names::receive, &MasterComponent::receive, "takes the inputs of the slaves; first in the thread, whose period is the cycle",
-                           {.shared = Names::shared}};
-    hal::Function transmit_{*this, Names::transmit, &MasterComponent::transmit, "sends the outputs of the slaves, starts and watches them; last in the thread",
-                            {.shared = Names::shared}};
-    hal::Emergency emergency_{*this, &MasterComponent::make_safe, "takes the slaves to SAFE-OP, where outputs are off"};
+    const std::string       name_ = hal::own_name(Names::own);
+    EthercatArguments       arguments_{*this, Names::file};
+    config::Bus             bus_ = arguments_.read();
+    hal::Function           receive_{*this,
+                           Names::receive,
+                           &MasterComponent::receive,
+                           "takes the inputs of the slaves; first in the thread, whose period is the cycle",
+                                     {.shared = Names::shared}};
+    hal::Function           transmit_{*this,
+                            Names::transmit,
+                            &MasterComponent::transmit,
+                            "sends the outputs of the slaves, starts and watches them; last in the thread",
+                                      {.shared = Names::shared}};
+    hal::Emergency          emergency_{*this, &MasterComponent::make_safe, "takes the slaves to SAFE-OP, where outputs are off"};
     typename Names::BusPins bus_pins_{*this, receive_};
     std::deque<typename Names::SlavePins> slaves_;
-    EntryPins             entries_{*this, receive_, transmit_};
-    std::vector<Place>    places_;  // of the process data, in the order of areas_
-    std::vector<std::span<std::uint8_t>> areas_;
+    EntryPins                             entries_{*this, receive_, transmit_};
+    std::vector<Place>                    places_;  // of the process data, in the order of areas_
+    std::vector<std::span<std::uint8_t>>  areas_;
     std::vector<std::string> lost_words_, left_words_, clock_words_, identity_words_, missing_words_, ambiguous_words_, failed_words_;
     std::vector<Event>       failed_;  // why a slave is not started, or slave_operational
-    std::string              unknown_words_, nobody_words_, link_words_, period_words_, other_words_, no_transmit_words_, no_receive_words_, apart_words_;
-    config::EventFilter      filter_{0};
-    unsigned                 unsent_ = 0, unreceived_ = 0, apart_ = 0;
-    std::atomic<pthread_t>   receiver_{};
+    std::string              unknown_words_, nobody_words_, link_words_, period_words_, other_words_, no_transmit_words_, no_receive_words_,
+        apart_words_;
+    config::EventFilter    filter_{0};
+    unsigned               unsent_ = 0, unreceived_ = 0, apart_ = 0;
+    std::atomic<pthread_t> receiver_{};
 
     std::unique_ptr<hal::ethernet::Port> primary_, backup_;
     std::unique_ptr<master::Mailboxes>   mailboxes_;
@@ -249,8 +256,9 @@ private:
     std::unique_ptr<Master>              master_;
     std::optional<hal::DisciplinedClock> clock_;
     hal::Discipline                      discipline_;
-    hal::Reporter<config::Happened>      reporter_{name_, [this](const config::Happened& h) { return config::event_words(h, bus_.setup, bus_.link, bus_.backup); }, 256,
-                                                    [](const config::Happened& h) { return std::to_string(static_cast<int>(h.event)) + " " + std::to_string(h.slave); }};
+    hal::Reporter<config::Happened>      reporter_{name_, [this](const config::Happened& h) {
+        return config::event_words(h, bus_.setup, bus_.link, bus_.backup);
+    }, 256, [](const config::Happened& h) { return std::to_string(static_cast<int>(h.event)) + " " + std::to_string(h.slave); }};
     const hal_faults*                    faults_ = nullptr;
     bool                                 unknown_raised_ = false, was_fresh_ = false, simulated_ = false, period_reported_ = false;
 };

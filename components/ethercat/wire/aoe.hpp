@@ -13,28 +13,37 @@
 namespace hal::ethercat::aoe {
 
 inline constexpr std::size_t header_bytes = 32;
-enum class Command : std::uint16_t { device_info = 1, read = 2, write = 3, read_state = 4, write_control = 5, add_notification = 6,
-    delete_notification = 7, notification = 8, read_write = 9 };
+enum class Command : std::uint16_t {
+    device_info = 1,
+    read = 2,
+    write = 3,
+    read_state = 4,
+    write_control = 5,
+    add_notification = 6,
+    delete_notification = 7,
+    notification = 8,
+    read_write = 9
+};
 inline constexpr std::uint16_t request_flags = 0x0004, response_flags = 0x0005;
 
 using NetId = std::array<std::uint8_t, 6>;
 struct Header {
-    NetId target{};
+    NetId         target{};
     std::uint16_t target_port = 0;
-    NetId source{};
+    NetId         source{};
     std::uint16_t source_port = 0;
-    Command command{};
+    Command       command{};
     std::uint16_t flags = request_flags;
     std::uint32_t length = 0;  ///< of the data that follows
     std::uint32_t error = 0;
     std::uint32_t invoke = 0;  ///< id of the request, copied to the response
-    bool response() const noexcept { return (flags & 1) != 0; }
+    bool          response() const noexcept { return (flags & 1) != 0; }
 };
 /// Reads the header; nullopt if the payload is too short for it or its data. [realtime]
 inline std::optional<Header> read(std::span<const std::uint8_t> payload) noexcept {
     if (payload.size() < header_bytes) return std::nullopt;
     const std::uint8_t* at = payload.data();
-    Header h;
+    Header              h;
     std::memcpy(h.target.data(), at, 6), h.target_port = get<std::uint16_t>(at + 6);
     std::memcpy(h.source.data(), at + 8, 6), h.source_port = get<std::uint16_t>(at + 14);
     h.command = static_cast<Command>(get<std::uint16_t>(at + 16)), h.flags = get<std::uint16_t>(at + 18);
@@ -61,7 +70,7 @@ inline Header response_to(const Header& request, std::uint32_t length, std::uint
 // u32
 // result. read_state: response u32 result, u16 ADS state, u16 device state. device_info: response u32 result, u8 major, u8 minor, u16
 // build, 16 characters.
-inline constexpr std::size_t address_bytes = 12, read_response_bytes = 8, write_response_bytes = 4;
+inline constexpr std::size_t   address_bytes = 12, read_response_bytes = 8, write_response_bytes = 4;
 inline constexpr std::uint32_t group_sdo = 0xf302, group_soe = 0xf420;
 /// Returns the offset of an object in group_sdo. [any]
 constexpr std::uint32_t sdo_offset(std::uint16_t index, std::uint8_t sub, bool complete = false) noexcept {
@@ -70,9 +79,8 @@ constexpr std::uint32_t sdo_offset(std::uint16_t index, std::uint8_t sub, bool c
 
 namespace error {
 inline constexpr std::uint32_t none = 0, no_port = 6, no_machine = 7, unknown_command = 8, device = 0x700, unsupported = 0x701,
-    group = 0x702,
-                               offset = 0x703, access = 0x704, size = 0x705, data = 0x706, not_ready = 0x707, busy = 0x708, context = 0x709,
-                               memory = 0x70a, parameter = 0x70b, not_found = 0x70c, timeout = 0x745;
+                               group = 0x702, offset = 0x703, access = 0x704, size = 0x705, data = 0x706, not_ready = 0x707, busy = 0x708,
+                               context = 0x709, memory = 0x70a, parameter = 0x70b, not_found = 0x70c, timeout = 0x745;
 }
 /// Returns the meaning of an ADS error; nullptr for others, which may be SDO abort codes. [any]
 constexpr const char* error_text(std::uint32_t code) noexcept {

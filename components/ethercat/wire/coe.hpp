@@ -15,13 +15,22 @@
 namespace hal::ethercat::coe {
 
 inline constexpr std::size_t header_bytes = 2;
-enum class Service : std::uint8_t { emergency = 1, sdo_request = 2, sdo_response = 3, tx_pdo = 4, rx_pdo = 5, tx_pdo_remote = 6,
-    rx_pdo_remote = 7, sdo_information = 8 };
+enum class Service : std::uint8_t {
+    emergency = 1,
+    sdo_request = 2,
+    sdo_response = 3,
+    tx_pdo = 4,
+    rx_pdo = 5,
+    tx_pdo_remote = 6,
+    rx_pdo_remote = 7,
+    sdo_information = 8
+};
 /// Returns the service of a message; its CoE header must be complete. [realtime]
 inline Service service_of(const std::uint8_t* payload) noexcept { return static_cast<Service>(get<std::uint16_t>(payload) >> 12); }
 /// Writes the CoE header. [realtime]
-inline void write_header(std::uint8_t* to, Service service) noexcept { put(to,
-    static_cast<std::uint16_t>(static_cast<unsigned>(service) << 12)); }
+inline void write_header(std::uint8_t* to, Service service) noexcept {
+    put(to, static_cast<std::uint16_t>(static_cast<unsigned>(service) << 12));
+}
 
 // SDO: CoE header, u8 command, u16 index, u8 sub-index, 4 bytes of data or size; data.
 inline constexpr std::size_t sdo_bytes = 10;                 ///< payload of the short forms
@@ -41,14 +50,14 @@ inline constexpr std::uint8_t size_given = 0x01, expedited = 0x02, complete = 0x
 inline constexpr std::uint8_t download_segment = 0x00, download = 0x20, upload = 0x40, upload_segment = 0x60, abort = 0x80;
 // responses
 inline constexpr std::uint8_t upload_segment_response = 0x00, download_segment_response = 0x20, upload_response = 0x40,
-    download_response = 0x60;
+                              download_response = 0x60;
 }  // namespace command
 
 /// Fields of an SDO that is not a segment.
 struct Sdo {
-    std::uint8_t command = 0;
+    std::uint8_t  command = 0;
     std::uint16_t index = 0;
-    std::uint8_t sub = 0;
+    std::uint8_t  sub = 0;
     std::uint32_t value = 0;  ///< expedited data, size of the whole transfer, or abort code
 
     bool is(std::uint8_t specifier) const noexcept { return (command & command::specifier) == specifier; }
@@ -78,7 +87,7 @@ constexpr std::uint8_t expedited_command(std::uint8_t specifier, std::size_t byt
 }
 /// Writes a segment with its CoE header: data of 0..capacity bytes, padded to 7; returns the length of the payload. [realtime]
 inline std::size_t write_segment(std::uint8_t* to, Service service, std::uint8_t specifier, bool toggle, bool last,
-    std::span<const std::uint8_t> data) noexcept {
+                                 std::span<const std::uint8_t> data) noexcept {
     write_header(to, service);
     const std::size_t unused = data.size() < 7 ? 7 - data.size() : 0;
     to[2] = static_cast<std::uint8_t>(specifier | (toggle ? command::toggle : 0) | unused << 1 | (last ? command::last_segment : 0));
@@ -96,37 +105,41 @@ inline std::span<const std::uint8_t> segment_of(std::span<const std::uint8_t> pa
 
 /// SDO abort codes.
 namespace abort {
-inline constexpr std::uint32_t
-    toggle = 0x05030000, timeout = 0x05040000, command = 0x05040001, memory = 0x05040005, access = 0x06010000, write_only = 0x06010001,
-    read_only = 0x06010002, sub0_not_zero = 0x06010003, no_complete_access = 0x06010004, too_long_for_mailbox = 0x06010005,
-    mapped = 0x06010006,
-    no_object = 0x06020000, not_mappable = 0x06040041, pdo_too_long = 0x06040042, parameter = 0x06040043, internal = 0x06040047,
-    hardware = 0x06060000, length = 0x06070010, too_long = 0x06070012, too_short = 0x06070013, no_sub = 0x06090011, range = 0x06090030,
-    too_high = 0x06090031, too_low = 0x06090032, max_below_min = 0x06090036, general = 0x08000000, store = 0x08000020,
-    local_control = 0x08000021,
-    state = 0x08000022, no_dictionary = 0x08000023;
+inline constexpr std::uint32_t toggle = 0x05030000, timeout = 0x05040000, command = 0x05040001, memory = 0x05040005, access = 0x06010000,
+                               write_only = 0x06010001, read_only = 0x06010002, sub0_not_zero = 0x06010003, no_complete_access = 0x06010004,
+                               too_long_for_mailbox = 0x06010005, mapped = 0x06010006, no_object = 0x06020000, not_mappable = 0x06040041,
+                               pdo_too_long = 0x06040042, parameter = 0x06040043, internal = 0x06040047, hardware = 0x06060000,
+                               length = 0x06070010, too_long = 0x06070012, too_short = 0x06070013, no_sub = 0x06090011, range = 0x06090030,
+                               too_high = 0x06090031, too_low = 0x06090032, max_below_min = 0x06090036, general = 0x08000000,
+                               store = 0x08000020, local_control = 0x08000021, state = 0x08000022, no_dictionary = 0x08000023;
 }
 /// Returns the meaning of an abort code, as in "object does not exist"; "unknown abort code" for others. [any]
 const char* abort_text(std::uint32_t code) noexcept;
 
 // SDO information: CoE header, u8 opcode (bit 7: incomplete), u8 0, u16 fragments left; data.
-inline constexpr std::size_t information_header_bytes = 6;
+inline constexpr std::size_t  information_header_bytes = 6;
 inline constexpr std::uint8_t information_incomplete = 0x80;
 enum class Information : std::uint8_t {
-    list_request = 1, list_response = 2, object_request = 3, object_response = 4, entry_request = 5, entry_response = 6, error = 7
+    list_request = 1,
+    list_response = 2,
+    object_request = 3,
+    object_response = 4,
+    entry_request = 5,
+    entry_response = 6,
+    error = 7
 };
 /// Lists of objects.
 enum class List : std::uint16_t { lengths = 0, all = 1, rx_mappable = 2, tx_mappable = 3, backup = 4, settings = 5 };
 struct InformationHeader {
-    Information opcode{};
-    bool incomplete = false;
+    Information   opcode{};
+    bool          incomplete = false;
     std::uint16_t fragments_left = 0;
 };
 /// Reads the header of SDO information; nullopt if the payload is too short. [realtime]
 inline std::optional<InformationHeader> read_information(std::span<const std::uint8_t> payload) noexcept {
     if (payload.size() < information_header_bytes) return std::nullopt;
     return InformationHeader{static_cast<Information>(payload[2] & 0x7f), (payload[2] & information_incomplete) != 0,
-        get<std::uint16_t>(payload.data() + 4)};
+                             get<std::uint16_t>(payload.data() + 4)};
 }
 /// Writes the CoE header and that of SDO information. [realtime]
 inline void write_information(std::uint8_t* to, InformationHeader h) noexcept {
@@ -140,8 +153,8 @@ enum class ObjectCode : std::uint8_t { variable = 7, array = 8, record = 9 };
 /// Indices of basic data types (ETG.1020).
 namespace type {
 inline constexpr std::uint16_t boolean = 0x0001, s8 = 0x0002, s16 = 0x0003, s32 = 0x0004, u8 = 0x0005, u16 = 0x0006, u32 = 0x0007,
-    real32 = 0x0008,
-                               visible_string = 0x0009, octet_string = 0x000a, real64 = 0x0011, s64 = 0x0015, u64 = 0x001b, bit1 = 0x0030;
+                               real32 = 0x0008, visible_string = 0x0009, octet_string = 0x000a, real64 = 0x0011, s64 = 0x0015, u64 = 0x001b,
+                               bit1 = 0x0030;
 inline constexpr std::uint16_t pdo_mapping = 0x0021, identity = 0x0023, command_parameter = 0x0025, pdo_parameter = 0x0027;
 }  // namespace type
 /// Returns the name of a basic data type, as in "UDINT"; "" for unknown ones. [any]
@@ -149,8 +162,7 @@ const char* type_name(std::uint16_t type) noexcept;
 /// Bits of the access rights of an entry.
 namespace access {
 inline constexpr std::uint16_t read_preop = 0x01, read_safeop = 0x02, read_op = 0x04, write_preop = 0x08, write_safeop = 0x10,
-    write_op = 0x20,
-                               rx_mappable = 0x40, tx_mappable = 0x80, backup = 0x100, setting = 0x200;
+                               write_op = 0x20, rx_mappable = 0x40, tx_mappable = 0x80, backup = 0x100, setting = 0x200;
 inline constexpr std::uint16_t read = 0x07, write = 0x38, read_write = 0x3f;
 }  // namespace access
 // After the header of SDO information:
@@ -163,8 +175,8 @@ inline constexpr std::size_t object_name = information_header_bytes + 6, entry_n
 inline constexpr std::size_t emergency_bytes = 10;
 struct Emergency {
     std::uint16_t code = 0;
-    std::uint8_t error_register = 0;
-    std::uint8_t data[5] = {};
+    std::uint8_t  error_register = 0;
+    std::uint8_t  data[5] = {};
 };
 /// Reads an emergency; nullopt if the payload is too short. [realtime]
 inline std::optional<Emergency> read_emergency(std::span<const std::uint8_t> payload) noexcept {
@@ -184,10 +196,11 @@ inline std::size_t write_emergency(std::uint8_t* to, const Emergency& e) noexcep
 
 /// An entry of a PDO mapping: index << 16 | sub << 8 | bits.
 struct Mapping {
-    std::uint16_t index = 0;
-    std::uint8_t sub = 0, bits = 0;
-    constexpr std::uint32_t raw() const noexcept { return static_cast<std::uint32_t>(index) << 16 | static_cast<std::uint32_t>(sub) << 8 |
-        bits; }
+    std::uint16_t           index = 0;
+    std::uint8_t            sub = 0, bits = 0;
+    constexpr std::uint32_t raw() const noexcept {
+        return static_cast<std::uint32_t>(index) << 16 | static_cast<std::uint32_t>(sub) << 8 | bits;
+    }
     static constexpr Mapping of(std::uint32_t raw) noexcept {
         return {static_cast<std::uint16_t>(raw >> 16), static_cast<std::uint8_t>(raw >> 8), static_cast<std::uint8_t>(raw)};
     }

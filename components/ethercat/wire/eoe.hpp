@@ -16,8 +16,16 @@ namespace hal::ethercat::eoe {
 inline constexpr std::size_t header_bytes = 4;
 inline constexpr std::size_t largest_frame = 1522;  ///< with two VLAN tags, without check sequence
 enum class Type : std::uint8_t {
-    fragment = 0, timestamp = 1, set_ip = 2, set_ip_response = 3, set_filter = 4, set_filter_response = 5, get_ip = 6, get_ip_response = 7,
-    get_filter = 8, get_filter_response = 9
+    fragment = 0,
+    timestamp = 1,
+    set_ip = 2,
+    set_ip_response = 3,
+    set_filter = 4,
+    set_filter_response = 5,
+    get_ip = 6,
+    get_ip_response = 7,
+    get_filter = 8,
+    get_filter_response = 9
 };
 /// Results in the second word of responses.
 enum class Result : std::uint16_t { ok = 0, unspecified = 1, unsupported = 2, no_ip = 0x0201, no_dhcp = 0x0202, no_filter = 0x0401 };
@@ -35,22 +43,22 @@ constexpr const char* to_string(Result result) noexcept {
 }
 
 struct Header {
-    Type type = Type::fragment;
-    std::uint8_t port = 0;  ///< 0: any
-    bool last = false;      ///< last fragment
-    bool timestamp = false, timestamp_requested = false;
+    Type          type = Type::fragment;
+    std::uint8_t  port = 0;  ///< 0: any
+    bool          last = false;      ///< last fragment
+    bool          timestamp = false, timestamp_requested = false;
     std::uint16_t word = 0;  ///< second word: the three fields below, or a result
 
     std::uint8_t fragment() const noexcept { return word & 0x3f; }
     /// Returns the bytes of the whole frame, rounded up (fragment 0), or the offset of a fragment. A hint only.
-    std::size_t bytes() const noexcept { return (word >> 6 & 0x3fU) * 32U; }
+    std::size_t  bytes() const noexcept { return (word >> 6 & 0x3fU) * 32U; }
     std::uint8_t frame() const noexcept { return static_cast<std::uint8_t>(word >> 12); }
 };
 /// Reads the header; nullopt if the payload is too short. [realtime]
 inline std::optional<Header> read(std::span<const std::uint8_t> payload) noexcept {
     if (payload.size() < header_bytes) return std::nullopt;
     const unsigned info = get<std::uint16_t>(payload.data());
-    Header h;
+    Header         h;
     h.type = static_cast<Type>(info & 0x0f), h.port = info >> 4 & 0x0f;
     h.last = (info & 0x100) != 0, h.timestamp = (info & 0x200) != 0, h.timestamp_requested = (info & 0x400) != 0;
     h.word = get<std::uint16_t>(payload.data() + 2);
@@ -58,9 +66,8 @@ inline std::optional<Header> read(std::span<const std::uint8_t> payload) noexcep
 }
 /// Writes the header. [realtime]
 inline void write(std::uint8_t* to, const Header& h) noexcept {
-    put(to, static_cast<std::uint16_t>(static_cast<unsigned>(h.type) | (h.port & 0x0fU) << 4 | (h.last ? 0x100U : 0U) | (h.timestamp ?
-        0x200U : 0U) |
-                                       (h.timestamp_requested ? 0x400U : 0U)));
+    put(to, static_cast<std::uint16_t>(static_cast<unsigned>(h.type) | (h.port & 0x0fU) << 4 | (h.last ? 0x100U : 0U) |
+                                       (h.timestamp ? 0x200U : 0U) | (h.timestamp_requested ? 0x400U : 0U)));
     put(to + 2, h.word);
 }
 /// Returns the second word of a fragment. [any]
@@ -82,7 +89,7 @@ public:
     std::size_t next(std::uint8_t* to) noexcept {
         if (done() || capacity_ == 0) return 0;
         const std::size_t length = std::min(capacity_, frame_.size() - at_);
-        Header h;
+        Header            h;
         h.port = port_, h.last = at_ + length == frame_.size();
         h.word = fragment_word(fragment_, at_ == 0 ? frame_.size() : at_, number_);
         write(to, h);
@@ -93,9 +100,9 @@ public:
 
 private:
     std::span<const std::uint8_t> frame_;
-    std::size_t at_ = 0, capacity_ = 0;
-    unsigned fragment_ = 0, number_ = 0;
-    std::uint8_t port_ = 0;
+    std::size_t                   at_ = 0, capacity_ = 0;
+    unsigned                      fragment_ = 0, number_ = 0;
+    std::uint8_t                  port_ = 0;
 };
 
 /// Joins fragments to a frame. A gap drops the frame.
@@ -124,19 +131,19 @@ public:
 
 private:
     std::array<std::uint8_t, largest_frame> bytes_{};
-    std::size_t used_ = 0;
-    std::uint32_t dropped_ = 0;
-    unsigned expected_ = 0;
-    std::uint8_t frame_ = 0;
-    bool active_ = false;
+    std::size_t                             used_ = 0;
+    std::uint32_t                           dropped_ = 0;
+    unsigned                                expected_ = 0;
+    std::uint8_t                            frame_ = 0;
+    bool                                    active_ = false;
 };
 
 /// Settings of a slave's IP stack. Addresses are u32 in host order: C0A8020Ah is 192.168.2.10, as they travel.
 struct Ip {
-    std::uint32_t flags = 0;  ///< fields that are set, below
+    std::uint32_t               flags = 0;  ///< fields that are set, below
     std::array<std::uint8_t, 6> mac{};
-    std::uint32_t address = 0, mask = 0, gateway = 0, dns = 0;
-    std::array<char, 32> name{};
+    std::uint32_t               address = 0, mask = 0, gateway = 0, dns = 0;
+    std::array<char, 32>        name{};
 };
 namespace ip_flag {
 inline constexpr std::uint32_t mac = 1, address = 2, mask = 4, gateway = 8, dns = 16, name = 32;
@@ -146,7 +153,7 @@ inline constexpr std::size_t largest_ip = 4 + 6 + 16 + 32;  ///< bytes after the
 inline std::size_t write_ip(std::uint8_t* to, const Ip& ip) noexcept {
     put(to, ip.flags);
     std::uint8_t* at = to + 4;
-    const auto word = [&](std::uint32_t flag, std::uint32_t value) {
+    const auto    word = [&](std::uint32_t flag, std::uint32_t value) {
         if ((ip.flags & flag) != 0) put(at, value), at += 4;
     };
     if ((ip.flags & ip_flag::mac) != 0) std::memcpy(at, ip.mac.data(), 6), at += 6;
@@ -159,10 +166,10 @@ inline std::optional<Ip> read_ip(std::span<const std::uint8_t> data) noexcept {
     if (data.size() < 4) return std::nullopt;
     Ip ip;
     ip.flags = get<std::uint32_t>(data.data()) & 0x3f;
-    const bool fixed = data.size() >= largest_ip;  // some masters send all fields, whatever the flags
+    const bool  fixed = data.size() >= largest_ip;  // some masters send all fields, whatever the flags
     std::size_t at = 4;
-    bool ok = true;
-    const auto field = [&](std::uint32_t flag, void* to, std::size_t bytes) {
+    bool        ok = true;
+    const auto  field = [&](std::uint32_t flag, void* to, std::size_t bytes) {
         if ((ip.flags & flag) == 0 && !fixed) return;
         if (at + bytes > data.size()) ok = ok && (ip.flags & flag) == 0;
         else std::memcpy(to, data.data() + at, bytes), at += bytes;

@@ -8,7 +8,7 @@ namespace hal::ethercat {
 const char* to_string(Command command) noexcept {
     static constexpr std::array<const char*, 15> names{"NOP", "APRD", "APWR", "APRW", "FPRD", "FPWR", "FPRW", "BRD",
                                                        "BWR", "BRW",  "LRD",  "LWR",  "LRW",  "ARMW", "FRMW"};
-    const auto number = static_cast<std::size_t>(command);
+    const auto                                   number = static_cast<std::size_t>(command);
     return number < names.size() ? names[number] : "unknown";
 }
 
@@ -60,7 +60,8 @@ std::optional<DatagramView> FrameReader::next() noexcept {
     return d;
 }
 
-FrameWriter::FrameWriter(std::span<std::uint8_t, largest_frame_bytes> buffer, const std::array<std::uint8_t, 6>& source) noexcept : buffer_(buffer) {
+FrameWriter::FrameWriter(std::span<std::uint8_t, largest_frame_bytes> buffer, const std::array<std::uint8_t, 6>& source) noexcept
+    : buffer_(buffer) {
     std::fill_n(buffer_.begin(), 6, std::uint8_t{0xff});
     std::copy(source.begin(), source.end(), buffer_.begin() + 6);
     buffer_[12] = ethertype >> 8, buffer_[13] = ethertype & 0xff;

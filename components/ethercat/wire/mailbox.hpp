@@ -39,10 +39,10 @@ inline constexpr std::uint16_t aoe = 0x01, eoe = 0x02, coe = 0x04, foe = 0x08, s
 
 /// A message of a mailbox. The payload points into the mailbox.
 struct MailboxMessage {
-    std::uint16_t station = 0;  ///< of the sender or, in a gateway, of the receiver; 0: the master
-    std::uint8_t channel = 0, priority = 0;
-    MailboxType type{};
-    std::uint8_t counter = 0;   ///< 1..7, 0: not counted
+    std::uint16_t                 station = 0;  ///< of the sender or, in a gateway, of the receiver; 0: the master
+    std::uint8_t                  channel = 0, priority = 0;
+    MailboxType                   type{};
+    std::uint8_t                  counter = 0;   ///< 1..7, 0: not counted
     std::span<const std::uint8_t> payload;
 };
 
@@ -61,29 +61,35 @@ inline std::optional<MailboxMessage> read_mailbox(std::span<const std::uint8_t> 
 }
 /// Writes the header of a message whose payload of `length` bytes follows it. [realtime]
 inline void write_mailbox_header(std::uint8_t* to, std::size_t length, std::uint16_t station, MailboxType type,
-    std::uint8_t counter) noexcept {
+                                 std::uint8_t counter) noexcept {
     put(to, static_cast<std::uint16_t>(length));
     put(to + 2, station);
     to[4] = 0;
     to[5] = static_cast<std::uint8_t>(static_cast<unsigned>(type) | (counter & 7U) << 4);
 }
 /// Returns the counter of the next message: 1..7. [any]
-constexpr std::uint8_t next_mailbox_counter(std::uint8_t counter) noexcept { return counter >= 7 ? 1 : static_cast<std::uint8_t>(counter +
-    1); }
+constexpr std::uint8_t next_mailbox_counter(std::uint8_t counter) noexcept {
+    return counter >= 7 ? 1 : static_cast<std::uint8_t>(counter + 1);
+}
 
 /// Codes of a mailbox error (type 0). Its payload is u16 1, u16 code.
 enum class MailboxError : std::uint16_t {
-    syntax = 1, protocol_not_supported = 2, invalid_channel = 3, service_not_supported = 4, invalid_header = 5, too_short = 6,
+    syntax = 1,
+    protocol_not_supported = 2,
+    invalid_channel = 3,
+    service_not_supported = 4,
+    invalid_header = 5,
+    too_short = 6,
     no_memory = 7,
-    invalid_size = 8, service_in_work = 9
+    invalid_size = 8,
+    service_in_work = 9
 };
 inline constexpr std::size_t mailbox_error_bytes = 4;
 /// Returns the meaning of a mailbox error, as in "protocol not supported". [any]
 constexpr const char* to_string(MailboxError error) noexcept {
-    constexpr const char* words[] = {"invalid error code", "syntax error", "protocol not supported", "invalid channel",
-        "service not supported",
-                                     "invalid mailbox header", "message too short", "no memory in the slave", "inconsistent size",
-                                     "service already in progress"};
+    constexpr const char* words[] = {
+        "invalid error code",     "syntax error",      "protocol not supported", "invalid channel",   "service not supported",
+        "invalid mailbox header", "message too short", "no memory in the slave", "inconsistent size", "service already in progress"};
     const auto n = static_cast<unsigned>(error);
     return words[n <= 9 ? n : 0];
 }

@@ -15,14 +15,14 @@ constexpr std::size_t most_bytes = 128 * 1024, header_bytes = 4, categories_at =
 /// CoE basic types: number, name.
 struct BasicType {
     std::uint8_t number;
-    const char* name;
+    const char*  name;
 };
 constexpr BasicType basic_types[] = {
-    {0x01, "BOOL"},  {0x02, "SINT"},   {0x03, "INT"},    {0x04, "DINT"},   {0x05, "USINT"},  {0x06, "UINT"},   {0x07, "UDINT"},
-    {0x08, "REAL"},  {0x10, "INT24"},  {0x11, "LREAL"},  {0x12, "INT40"},  {0x13, "INT48"},  {0x14, "INT56"},  {0x15, "LINT"},
-    {0x16, "UINT24"}, {0x18, "UINT40"}, {0x19, "UINT48"}, {0x1a, "UINT56"}, {0x1b, "ULINT"},  {0x1e, "BYTE"},   {0x1f, "WORD"},
-    {0x20, "DWORD"}, {0x30, "BIT1"},   {0x31, "BIT2"},   {0x32, "BIT3"},   {0x33, "BIT4"},   {0x34, "BIT5"},   {0x35, "BIT6"},
-    {0x36, "BIT7"},  {0x37, "BIT8"},
+    {0x01, "BOOL"},  {0x02, "SINT"}, {0x03, "INT"},    {0x04, "DINT"},   {0x05, "USINT"},  {0x06, "UINT"},
+    {0x07, "UDINT"}, {0x08, "REAL"}, {0x10, "INT24"},  {0x11, "LREAL"},  {0x12, "INT40"},  {0x13, "INT48"},
+    {0x14, "INT56"}, {0x15, "LINT"}, {0x16, "UINT24"}, {0x18, "UINT40"}, {0x19, "UINT48"}, {0x1a, "UINT56"},
+    {0x1b, "ULINT"}, {0x1e, "BYTE"}, {0x1f, "WORD"},   {0x20, "DWORD"},  {0x30, "BIT1"},   {0x31, "BIT2"},
+    {0x32, "BIT3"},  {0x33, "BIT4"}, {0x34, "BIT5"},   {0x35, "BIT6"},   {0x36, "BIT7"},   {0x37, "BIT8"},
 };
 
 /// Reads fields up to the end of a category; what lies behind it reads as 0.
@@ -67,14 +67,15 @@ public:
     }
 
 private:
-    std::uint16_t word(std::size_t address) const { return 2 * address + 2 <= image_.size() ? get<std::uint16_t>(image_.data() +
-        2 * address) : std::uint16_t{0}; }
+    std::uint16_t word(std::size_t address) const {
+        return 2 * address + 2 <= image_.size() ? get<std::uint16_t>(image_.data() + 2 * address) : std::uint16_t{0};
+    }
     std::uint32_t number(std::size_t address) const { return word(address) | static_cast<std::uint32_t>(word(address + 1)) << 16; }
-    Mailboxes mailboxes(std::size_t at) const { return {{word(at), word(at + 1)}, {word(at + 2), word(at + 3)}}; }
+    Mailboxes     mailboxes(std::size_t at) const { return {{word(at), word(at + 1)}, {word(at + 2), word(at + 3)}}; }
 
     void configuration() {
-        if (image_.size() < categories_at) out_.problems.push_back("the image has " + std::to_string(image_.size()) +
-            " bytes; at least 128 are expected");
+        if (image_.size() < categories_at)
+            out_.problems.push_back("the image has " + std::to_string(image_.size()) + " bytes; at least 128 are expected");
         for (std::size_t i = 0; i < 7; ++i) out_.configuration[i] = word(i);
         const std::uint16_t stored = word(word_checksum);
         out_.checksum_valid = image_.size() >= 16 && (stored == 0x88a4 || (stored & 0xff) == checksum(image_));
@@ -140,7 +141,7 @@ private:
             while (data.left() >= 8) {
                 SyncManager s{data.take<std::uint16_t>(), data.take<std::uint16_t>(), data.take<std::uint8_t>(),
                               data.take<std::uint8_t>(),  data.take<std::uint8_t>(),  SmType::unused};
-                const auto kind = data.take<std::uint8_t>();
+                const auto  kind = data.take<std::uint8_t>();
                 if (kind <= 4) s.type = static_cast<SmType>(kind);
                 out_.sync_managers.push_back(s);
             }
@@ -211,9 +212,9 @@ private:
     }
 
     std::span<const std::uint8_t> image_;
-    Contents out_;
-    std::vector<std::string> strings_;
-    bool ended_ = false, cut_ = false;
+    Contents                      out_;
+    std::vector<std::string>      strings_;
+    bool                          ended_ = false, cut_ = false;
 };
 
 }  // namespace

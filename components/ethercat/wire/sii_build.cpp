@@ -70,9 +70,7 @@ private:
         return string(text);
     }
 
-    void mailboxes(const Mailboxes& m) {
-        add(m.receive.start), add(m.receive.size), add(m.send.start), add(m.send.size);
-    }
+    void mailboxes(const Mailboxes& m) { add(m.receive.start), add(m.receive.size), add(m.send.start), add(m.send.size); }
     void head() {
         for (const std::uint16_t w : from_.configuration) add(w);
         add<std::uint16_t>(checksum(out_));
@@ -143,12 +141,12 @@ private:
         end();
     }
 
-    const Contents& from_;
-    std::size_t names_;
-    std::vector<std::uint8_t> out_;
-    std::vector<std::string> strings_;
+    const Contents&                     from_;
+    std::size_t                         names_;
+    std::vector<std::uint8_t>           out_;
+    std::vector<std::string>            strings_;
     std::map<std::string, std::uint8_t> numbers_;
-    std::size_t start_ = 0;
+    std::size_t                         start_ = 0;
 };
 
 }  // namespace

@@ -12,9 +12,9 @@ namespace hal::can_timing {
 
 /// A message in a recording.
 struct Recorded {
-    Message message;
+    Message     message;
     std::size_t frames = 0;
-    bool periodic = false;  ///< false: `period` is the shortest distance between two frames
+    bool        periodic = false;  ///< false: `period` is the shortest distance between two frames
 };
 
 /// Returns the messages of a recording, highest priority first, each with the length of its longest frame. A message is periodic if its

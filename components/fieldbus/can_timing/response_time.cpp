@@ -30,8 +30,8 @@ constexpr std::int64_t horizon = 3'600'000'000'000;
 constexpr unsigned error_bits = 31;
 
 struct Item {
-    std::int64_t c = 0, t = 0, j = 0, limit = 0;
-    std::int64_t f = 0;  ///< time in a queue in order of arrival
+    std::int64_t  c = 0, t = 0, j = 0, limit = 0;
+    std::int64_t  f = 0;  ///< time in a queue in order of arrival
     std::uint32_t fifo = 0;
 };
 
@@ -41,7 +41,8 @@ std::int64_t bit_time(const Bus& bus) { return can::duration_ns({1, 0}, bus.bit_
 
 /// The time that errors take, for a message and those of higher priority.
 struct ErrorTime {
-    ErrorTime(const Bus& bus, std::int64_t longest) : errors(bus.errors), each(bus.errors.burst == 0 ? 0 : can::duration_ns({error_bits, 0}, bus.bit_rate) + longest) {}
+    ErrorTime(const Bus& bus, std::int64_t longest)
+        : errors(bus.errors), each(bus.errors.burst == 0 ? 0 : can::duration_ns({error_bits, 0}, bus.bit_rate) + longest) {}
     std::int64_t operator()(std::int64_t t) const {
         if (each == 0) return 0;
         const std::int64_t more = errors.period > 0 ? ceil_div(std::max<std::int64_t>(t, 1), errors.period) - 1 : 0;
@@ -93,8 +94,8 @@ Worst worst_of(const Item& m, std::int64_t blocking, std::span<const Item> busy,
     if (use_of(busy) + errors.load() >= 1.0) return {};
     const std::int64_t t = settle(m.c, blocking, 0, 0, errors, busy, all);
     if (t < 0) return {};
-    const auto above = busy.first(busy.size() - 1);
-    Worst worst;
+    const auto         above = busy.first(busy.size() - 1);
+    Worst              worst;
     const std::int64_t instances = ceil_div(t + m.j, m.t);
     for (std::int64_t q = 0, w = 0; q < instances; ++q) {
         const std::int64_t constant = blocking + q * m.c;
@@ -110,8 +111,12 @@ std::vector<Item> items_of(std::span<const Message> messages, const Bus& bus) {
     for (std::size_t i = 0; i < messages.size(); ++i) {
         const Message& m = messages[i];
         const auto bits = m.bits != 0 ? can::Bits{m.bits, 0} : can::worst_case_bits(m.bytes, m.extended, m.fd, m.bit_rate_switch, m.remote);
-        items[i] = {can::duration_ns(bits, bus.bit_rate, bus.data_rate), std::clamp<std::int64_t>(m.period, 1, horizon),
-                    std::clamp<std::int64_t>(m.jitter, 0, horizon), m.limit(), 0, m.fifo};
+        items[i] = {can::duration_ns(bits, bus.bit_rate, bus.data_rate),
+                    std::clamp<std::int64_t>(m.period, 1, horizon),
+                    std::clamp<std::int64_t>(m.jitter, 0, horizon),
+                    m.limit(),
+                    0,
+                    m.fifo};
     }
     return items;
 }
@@ -156,22 +161,22 @@ public:
 
 private:
     struct Queue {
-        std::size_t last = 0;
+        std::size_t  last = 0;
         std::int64_t most = 0, least = 0, sum = 0, time = 0;
     };
 
     std::int64_t time_in(std::uint32_t number, const Queue& q) const {
-        const auto above = std::span<const Item>(items_).first(q.last + 1);
+        const auto      above = std::span<const Item>(items_).first(q.last + 1);
         const ErrorTime errors(bus_, longest_of(above));
         if (use_of(above) + errors.load() >= 1.0) return -1;
         const std::int64_t constant = std::max(blocking_[q.last], q.most) + q.sum - q.least;
         return settle(constant, constant, bit_time(bus_), q.most, errors, above, [&](const Item& k) { return k.fifo != number; });
     }
     Worst answer(std::size_t rank) const {
-        const Item& m = items_[rank];
-        const auto busy = std::span<const Item>(items_).first(rank + 1);
+        const Item&     m = items_[rank];
+        const auto      busy = std::span<const Item>(items_).first(rank + 1);
         const ErrorTime errors(bus_, longest_of(busy));
-        Worst worst;
+        Worst           worst;
         if (m.fifo != 0) {
             const Queue& q = queues_.at(m.fifo);
             if (q.time >= 0) worst = {m.j + q.time + q.least, q.time, 0, errors(q.time + q.most)};
@@ -183,11 +188,11 @@ private:
         return worst;
     }
 
-    std::vector<Item>& items_;
-    std::span<const std::int64_t> blocking_;
-    const Bus& bus_;
+    std::vector<Item>&             items_;
+    std::span<const std::int64_t>  blocking_;
+    const Bus&                     bus_;
     std::map<std::uint32_t, Queue> queues_;
-    std::vector<Worst> worst_;
+    std::vector<Worst>             worst_;
 };
 
 }  // namespace
@@ -203,19 +208,19 @@ Analysis analyse(std::span<const Message> messages, const Bus& bus) {
     a.responses.resize(messages.size());
     a.fits = bus.bit_rate > 0;
     if (bus.bit_rate == 0) return a;
-    const std::vector<Item> items = items_of(messages, bus);
+    const std::vector<Item>  items = items_of(messages, bus);
     std::vector<std::size_t> order(messages.size());
     std::iota(order.begin(), order.end(), std::size_t{0});
     std::stable_sort(order.begin(), order.end(), [&](std::size_t x, std::size_t y) { return before(messages[x], messages[y]); });
     std::vector<Item> sorted;
     for (const std::size_t i : order) sorted.push_back(items[i]);
     // From the lowest priority upwards, so that the longest frame below is known.
-    std::vector<std::int64_t> blocking(messages.size());
+    std::vector<std::int64_t>  blocking(messages.size());
     std::optional<std::size_t> blocker;
     for (std::size_t rank = order.size(); rank-- > 0;) {
         const std::size_t i = order[rank];
-        const Message& m = messages[i];
-        Response& r = a.responses[i];
+        const Message&    m = messages[i];
+        Response&         r = a.responses[i];
         r.bits = m.bits != 0 ? m.bits : can::worst_case_bits(m.bytes, m.extended, m.fd, m.bit_rate_switch, m.remote).total();
         r.frame = items[i].c;
         r.blocker = blocker;
@@ -223,13 +228,13 @@ Analysis analyse(std::span<const Message> messages, const Bus& bus) {
         a.load += static_cast<double>(items[i].c) / static_cast<double>(items[i].t);
         if (!blocker || items[i].c > items[*blocker].c) blocker = i;
     }
-    const bool queues = std::any_of(messages.begin(), messages.end(), [](const Message& m) { return m.fifo != 0; });
-    WithQueues with_queues(sorted, blocking, bus);
+    const bool               queues = std::any_of(messages.begin(), messages.end(), [](const Message& m) { return m.fifo != 0; });
+    WithQueues               with_queues(sorted, blocking, bus);
     const std::vector<Worst> bounds = queues ? with_queues.compute() : std::vector<Worst>{};
     for (std::size_t rank = 0; rank < order.size(); ++rank) {
         const std::size_t i = order[rank];
-        Response& r = a.responses[i];
-        const Worst worst = queues ? bounds[rank] : worst_of(items[i], r.blocking, std::span(sorted).first(rank + 1), bus);
+        Response&         r = a.responses[i];
+        const Worst       worst = queues ? bounds[rank] : worst_of(items[i], r.blocking, std::span(sorted).first(rank + 1), bus);
         if (queues) r.queue = with_queues.others(rank), r.blocking = std::max(r.blocking, items[i].c);
         r.worst = worst.response, r.queued = worst.queued, r.instance = worst.instance, r.errors = worst.errors;
         // with queues, the bound holds only when a message is sent before the next of its kind
@@ -249,7 +254,7 @@ std::optional<std::uint32_t> sufficient_bit_rate(std::span<const Message> messag
 std::vector<std::size_t> sufficient_order(std::span<const Message> messages, const Bus& bus) {
     if (messages.size() > 256 || bus.bit_rate == 0) return {};
     if (std::any_of(messages.begin(), messages.end(), [](const Message& m) { return m.fifo != 0; })) return {};
-    const std::vector<Item> items = items_of(messages, bus);
+    const std::vector<Item>  items = items_of(messages, bus);
     std::vector<std::size_t> open(messages.size()), order;
     std::iota(open.begin(), open.end(), std::size_t{0});
     std::stable_sort(open.begin(), open.end(),

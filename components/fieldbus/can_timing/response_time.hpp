@@ -21,48 +21,48 @@ namespace hal::can_timing {
 /// A message that is sent again and again. Times in ns; the identifier is the priority.
 struct Message {
     std::uint32_t id = 0;
-    bool extended = false, remote = false, fd = false, bit_rate_switch = false;
-    std::uint8_t bytes = 0;
-    std::int64_t period = 0;    ///< shortest time between two events; above 0
-    std::int64_t deadline = 0;  ///< 0: the period
-    std::int64_t jitter = 0;    ///< longest time from its event until it is queued
+    bool          extended = false, remote = false, fd = false, bit_rate_switch = false;
+    std::uint8_t  bytes = 0;
+    std::int64_t  period = 0;  ///< shortest time between two events; above 0
+    std::int64_t  deadline = 0;  ///< 0: the period
+    std::int64_t  jitter = 0;  ///< longest time from its event until it is queued
     /// Its node sends messages of the same number in the order in which they were queued (one transmit buffer, or a network interface of
     /// Linux with several senders); 0: the node always offers its most urgent message.
     std::uint32_t fifo = 0;
-    std::uint32_t bits = 0;     ///< length with stuff bits and intermission, if it is known to be constant; 0: the longest of its shape
-    std::int64_t limit() const noexcept { return deadline > 0 ? deadline : period; }
+    std::uint32_t bits = 0;  ///< length with stuff bits and intermission, if it is known to be constant; 0: the longest of its shape
+    std::int64_t  limit() const noexcept { return deadline > 0 ? deadline : period; }
 };
 
 /// Frames that are destroyed by errors and sent again: at most `burst` at once, and one more in every `period`.
 struct Errors {
-    std::uint32_t burst = 0;   ///< 0: no errors
-    std::int64_t period = 0;   ///< ns; 0: none after the burst
+    std::uint32_t burst = 0;  ///< 0: no errors
+    std::int64_t  period = 0;  ///< ns; 0: none after the burst
 };
 
 struct Bus {
-    std::uint32_t bit_rate = 0;   ///< bit/s
+    std::uint32_t bit_rate = 0;  ///< bit/s
     std::uint32_t data_rate = 0;  ///< bit/s of FD frames with bit-rate switch; 0: the same
-    Errors errors = {};
+    Errors        errors = {};
 };
 
 /// What is known of one message. Times in ns; indices are those of the list that was analysed.
 struct Response {
-    unsigned bits = 0;             ///< at most, with intermission
-    std::int64_t frame = 0;        ///< their time
-    std::int64_t blocking = 0;     ///< longest frame of lower priority, or of its own queue, that may just have begun
+    unsigned                   bits = 0;  ///< at most, with intermission
+    std::int64_t               frame = 0;  ///< their time
+    std::int64_t               blocking = 0;  ///< longest frame of lower priority, or of its own queue, that may just have begun
     std::optional<std::size_t> blocker;
-    std::int64_t errors = 0;       ///< time that errors take while it waits and is sent
-    std::int64_t queue = 0;        ///< of a queue in order of arrival: time for the other messages in it
-    std::int64_t queued = 0;       ///< longest time from the beginning of the busy period until it starts
-    std::int64_t worst = 0;        ///< worst response time; -1: none, the bus is overloaded for it
-    std::int64_t instance = 0;     ///< number of the instance in the busy period that has it, from 0
-    bool in_time = false;
+    std::int64_t               errors = 0;  ///< time that errors take while it waits and is sent
+    std::int64_t               queue = 0;  ///< of a queue in order of arrival: time for the other messages in it
+    std::int64_t               queued = 0;  ///< longest time from the beginning of the busy period until it starts
+    std::int64_t               worst = 0;  ///< worst response time; -1: none, the bus is overloaded for it
+    std::int64_t               instance = 0;  ///< number of the instance in the busy period that has it, from 0
+    bool                       in_time = false;
 };
 
 struct Analysis {
     std::vector<Response> responses;  ///< one for each message, in the order given
-    double load = 0;                  ///< share of the time of the bus, 0 and more; without errors
-    bool fits = false;                ///< each message meets its deadline
+    double                load = 0;  ///< share of the time of the bus, 0 and more; without errors
+    bool                  fits = false;  ///< each message meets its deadline
 };
 
 /// Computes the response times. A message of a FIFO queue must be sent before the next one of its kind is queued: otherwise it is reported

@@ -42,7 +42,8 @@ Set random_set(std::mt19937& random) {
         Message m;
         m.extended = below(random, 4) == 0;
         do m.id = below(random, m.extended ? 0x20000000 : 0x800);
-        while (std::any_of(set.messages.begin(), set.messages.end(), [&](const Message& o) { return o.id == m.id && o.extended == m.extended; }));
+        while (std::any_of(set.messages.begin(), set.messages.end(),
+                           [&](const Message& o) { return o.id == m.id && o.extended == m.extended; }));
         m.bytes = static_cast<std::uint8_t>(below(random, 9));
         can::Frame f;
         f.id = m.id, f.extended = m.extended, f.length = m.bytes;
@@ -50,7 +51,8 @@ Set random_set(std::mt19937& random) {
         m.bits = can::frame_bits(f).total();
         const std::int64_t frame = can::duration_ns({m.bits, 0}, set.bit_rate);
         // shares of the load differ by a factor of up to 4
-        m.period = static_cast<std::int64_t>(static_cast<double>(frame) * static_cast<double>(count) / load * (0.5 + 0.0015 * below(random, 1000)));
+        m.period = static_cast<std::int64_t>(static_cast<double>(frame) * static_cast<double>(count) / load *
+                                             (0.5 + 0.0015 * below(random, 1000)));
         m.jitter = below(random, 3) == 0 ? static_cast<std::int64_t>(below(random, 1000)) * m.period / 2000 : 0;
         set.messages.push_back(m);
         set.frames.push_back(f);
@@ -92,7 +94,8 @@ std::vector<std::int64_t> played(const Set& set, std::vector<Release> releases, 
     }
     std::vector<std::int64_t> worst(set.messages.size());
     std::vector<std::size_t> seen(set.messages.size());
-    const std::int64_t end = releases.back().queued + 10'000 * ms, intermission = can::duration_ns({can::intermission_bits, 0}, set.bit_rate);
+    const std::int64_t end = releases.back().queued + 10'000 * ms,
+                       intermission = can::duration_ns({can::intermission_bits, 0}, set.bit_rate);
     for (can::Frame f; listener.link->receive(f, end);)
         for (std::size_t i = 0; i < set.messages.size(); ++i)
             if (f.same(set.frames[i])) worst[i] = std::max(worst[i], f.time_ns + intermission - events[i][seen[i]++]);
@@ -127,7 +130,8 @@ std::vector<Release> critical_instant(const Set& set, const Analysis& a, std::si
     for (std::size_t i = 0; i < set.messages.size(); ++i) {
         const Message& m = set.messages[i];
         if (i != message && !before(m, set.messages[message])) continue;
-        for (std::int64_t event = start - m.jitter; event < until; event += m.period) releases.push_back({std::max(event, start), event, i});
+        for (std::int64_t event = start - m.jitter; event < until; event += m.period)
+            releases.push_back({std::max(event, start), event, i});
     }
     return releases;
 }
@@ -154,7 +158,8 @@ TEST(CanResponseTime, Bus_in_memory_never_exceeds_it_and_critical_instants_reach
             later_instances += r.instance > 0;
         }
     }
-    std::printf("%zu sets; critical instants of %zu messages, %zu within 5 %%, %zu of a later instance\n", sets, messages, reached, later_instances);
+    std::printf("%zu sets; critical instants of %zu messages, %zu within 5 %%, %zu of a later instance\n", sets, messages, reached,
+                later_instances);
     EXPECT_GE(reached * 100, messages * 99);
     EXPECT_GT(later_instances, 0U);
 }

@@ -41,9 +41,10 @@ std::vector<Message> car() {
         unsigned bytes;
         std::int64_t period_ms, deadline_ms, jitter_us;
     };
-    constexpr Row rows[] = {{1, 50, 5, 100},    {2, 5, 5, 100},      {1, 5, 5, 100},    {2, 5, 5, 100},         {1, 5, 5, 100},        {2, 5, 5, 100},
-                            {6, 10, 10, 200},   {1, 10, 10, 200},    {2, 10, 10, 200},  {2, 10, 10, 200},       {1, 50, 20, 200},      {4, 100, 100, 300},
-                            {1, 100, 100, 300}, {1, 100, 100, 200},  {3, 1000, 1000, 400}, {1, 1000, 1000, 300}, {1, 1000, 1000, 300}};
+    constexpr Row rows[] = {{1, 50, 5, 100},      {2, 5, 5, 100},      {1, 5, 5, 100},     {2, 5, 5, 100},     {1, 5, 5, 100},
+                            {2, 5, 5, 100},       {6, 10, 10, 200},    {1, 10, 10, 200},   {2, 10, 10, 200},   {2, 10, 10, 200},
+                            {1, 50, 20, 200},     {4, 100, 100, 300},  {1, 100, 100, 300}, {1, 100, 100, 200}, {3, 1000, 1000, 400},
+                            {1, 1000, 1000, 300}, {1, 1000, 1000, 300}};
     std::vector<Message> all;
     for (const Row& r : rows)
         all.push_back(message(static_cast<std::uint32_t>(all.size() + 1), r.bytes, r.period_ms * ms, r.deadline_ms * ms, r.jitter_us * us));
@@ -58,16 +59,21 @@ std::vector<std::int64_t> worst_us(const std::vector<Message>& m, const Bus& bus
 
 TEST(CanResponseTime, Car_at_four_bit_rates) {
     using Expected = std::vector<std::int64_t>;
-    EXPECT_EQ(worst_us(car(), {125'000, 0, {}}), (Expected{1540, 2140, 2660, 3260, 3780, 4380, 5240, 8600, 9200, 9800, 10320, 19420, 19940, 20360, 29400, 29820, 29820}));
-    EXPECT_EQ(worst_us(car(), {250'000, 0, {}}), (Expected{820, 1120, 1380, 1680, 1940, 2240, 2720, 2980, 3280, 3580, 3840, 4280, 4540, 4700, 5160, 5320, 5320}));
-    EXPECT_EQ(worst_us(car(), {500'000, 0, {}}), (Expected{460, 610, 740, 890, 1020, 1170, 1460, 1590, 1740, 1890, 2020, 2290, 2420, 2450, 2780, 2810, 2810}));
-    EXPECT_EQ(worst_us(car(), {1'000'000, 0, {}}), (Expected{280, 355, 420, 495, 560, 635, 830, 895, 970, 1045, 1110, 1295, 1360, 1325, 1590, 1555, 1555}));
+    EXPECT_EQ(worst_us(car(), {125'000, 0, {}}),
+              (Expected{1540, 2140, 2660, 3260, 3780, 4380, 5240, 8600, 9200, 9800, 10320, 19420, 19940, 20360, 29400, 29820, 29820}));
+    EXPECT_EQ(worst_us(car(), {250'000, 0, {}}),
+              (Expected{820, 1120, 1380, 1680, 1940, 2240, 2720, 2980, 3280, 3580, 3840, 4280, 4540, 4700, 5160, 5320, 5320}));
+    EXPECT_EQ(worst_us(car(), {500'000, 0, {}}),
+              (Expected{460, 610, 740, 890, 1020, 1170, 1460, 1590, 1740, 1890, 2020, 2290, 2420, 2450, 2780, 2810, 2810}));
+    EXPECT_EQ(worst_us(car(), {1'000'000, 0, {}}),
+              (Expected{280, 355, 420, 495, 560, 635, 830, 895, 970, 1045, 1110, 1295, 1360, 1325, 1590, 1555, 1555}));
     EXPECT_TRUE(analyse(car(), {125'000, 0, {}}).fits);
 }
 
 TEST(CanResponseTime, Car_with_errors) {
     using Expected = std::vector<std::int64_t>;
-    EXPECT_EQ(worst_us(car(), {250'000, 0, {1, 10 * ms}}), (Expected{1204, 1544, 1804, 2104, 2364, 2664, 3304, 3564, 3864, 4164, 4424, 4864, 5124, 5284, 7164, 7324, 7324}));
+    EXPECT_EQ(worst_us(car(), {250'000, 0, {1, 10 * ms}}),
+              (Expected{1204, 1544, 1804, 2104, 2364, 2664, 3304, 3564, 3864, 4164, 4424, 4864, 5124, 5284, 7164, 7324, 7324}));
     const auto late = [](const Analysis& a) {
         std::vector<std::size_t> ids;
         for (std::size_t i = 0; i < a.responses.size(); ++i)
@@ -98,7 +104,8 @@ TEST(CanResponseTime, Burst_of_one_node_in_order_of_arrival) {
     EXPECT_EQ(by_priority.back(), 12210);
     EXPECT_EQ(worst_us(robot(0), {1'000'000, 0, {1, 10 * ms}}).back(), 5646);
     for (std::size_t i = 10; i < by_arrival.size(); ++i) EXPECT_EQ(by_arrival[i], 12480) << i;
-    EXPECT_EQ(std::vector<std::int64_t>(by_arrival.begin(), by_arrival.begin() + 10), std::vector<std::int64_t>(by_priority.begin(), by_priority.begin() + 10));
+    EXPECT_EQ(std::vector<std::int64_t>(by_arrival.begin(), by_arrival.begin() + 10),
+              std::vector<std::int64_t>(by_priority.begin(), by_priority.begin() + 10));
 }
 
 TEST(CanResponseTime, one_message_alone_needs_its_frame_and_its_jitter) {
@@ -134,8 +141,8 @@ TEST(CanResponseTime, nonsense_is_survived) {
     EXPECT_TRUE(analyse({}, {1'000'000, 0, {}}).fits);
     EXPECT_FALSE(analyse(std::vector{message(1, 8, ms)}, {0, 0, {}}).fits);
     EXPECT_FALSE(analyse(std::vector{message(1, 8, 0), message(1, 255, -5, -5, INT64_MAX)}, {1, 1, {}}).fits);
-    EXPECT_EQ(-1,
-              analyse(std::vector{message(1, 8, INT64_MAX, INT64_MAX, INT64_MAX), message(2, 8, 1)}, {1'000'000, 0, {}}).responses[1].worst);
+    EXPECT_EQ(
+        -1, analyse(std::vector{message(1, 8, INT64_MAX, INT64_MAX, INT64_MAX), message(2, 8, 1)}, {1'000'000, 0, {}}).responses[1].worst);
 }
 
 TEST(CanResponseTime, an_order_is_found_when_there_is_one) {

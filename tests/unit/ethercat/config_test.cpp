@@ -8,8 +8,9 @@
 namespace hal::ethercat::config {
 namespace {
 
-bool read_test_file(const std::string& path, std::string& bytes) { return read_regular_file("tests/unit/ethercat/data/" + path, 1'000'000,
-    bytes); }
+bool read_test_file(const std::string& path, std::string& bytes) {
+    return read_regular_file("tests/unit/ethercat/data/" + path, 1'000'000, bytes);
+}
 
 Bus good(const std::string& text) {
     Reading r = read(text, "m.ethercat", read_test_file);
@@ -20,7 +21,8 @@ std::string errors(const std::string& text) { return to_string(read(text, "m.eth
 
 const char* const servo =
     "[bus]\nlink = sim:line\ncycle = 1ms\nclock = reference\nreference = x\n[domain io]\nevery = 4\n"
-    "[type drive]\nesi = servo.xml\ndevice = SERVO-1\noutputs = 6040 607A 60FE:1 gap 8\ninputs = 6041, 6064\nsdo 60C2:1 = 1\nsdo 60C2:2 = -3\n"
+    "[type drive]\nesi = servo.xml\ndevice = SERVO-1\noutputs = 6040 607A 60FE:1 gap 8\ninputs = 6041, 6064\nsdo 60C2:1 = 1\nsdo 60C2:2 = "
+    "-3\n"
     "dc = sync0 250us\nwatchdog = 50ms\n607A.scale = 65536/360\n607A.unit = deg\nposition-actual-value.name = position\n"
     "[slave 0 x]\ntype = drive\n[slave alias=5 y]\ntype = drive\noptional = yes\n[slave 2]\nesi = servo.xml\ndevice = DIO-8\ndomain = io\n";
 
@@ -78,8 +80,10 @@ TEST(EthercatConfig, Drives_of_a_type_have_its_PDOs_clocks_and_writes) {
 }
 
 TEST(EthercatConfig, Drive_without_a_description_has_the_objects_of_its_profile) {
-    const Bus bus = good("[bus]\n[slave 0 a]\ndevice = cia402\naxes = 2\nproduct = 0x10\nvendor = 1\nrevision = 0x20+\noutputs = 6040 6840 2000:1 u8\n"
-                         "inputs = 6041\nentries-per-pdo = 2\nsdo 6860 = 8\nsdo 8000 complete = 01 00 02\nregister 0420 u16 = 1000\nidn P-0-150 1 = 07 00\n");
+    const Bus bus = good(
+        "[bus]\n[slave 0 a]\ndevice = cia402\naxes = 2\nproduct = 0x10\nvendor = 1\nrevision = 0x20+\noutputs = 6040 6840 2000:1 u8\n"
+        "inputs = 6041\nentries-per-pdo = 2\nsdo 6860 = 8\nsdo 8000 complete = 01 00 02\nregister 0420 u16 = 1000\nidn P-0-150 1 = 07 "
+        "00\n");
     const master::Slave& s = bus.setup.slaves[0];
     ASSERT_EQ(s.sync_managers[0].pdos.size(), 2U);
     EXPECT_EQ(s.sync_managers[0].pdos[1].index, 0x1601);
@@ -99,48 +103,55 @@ TEST(EthercatConfig, Errors_name_the_place_and_what_to_write) {
               "m.ethercat:1:1: error: this line is before the first section; begin the file with [bus]\n"
               "m.ethercat:1:1: error: missing section [bus]; write [bus] and below it link = eth:enp3s0 and cycle = 1ms\n"
               "m.ethercat:2:1: error: unknown section 'slav'; did you mean 'slave'?");
-    EXPECT_EQ(errors("[bus]\n"),
-        "m.ethercat:1:1: error: the configuration has no slave; write [slave 0 NAME] and below it esi = FILE");
-    EXPECT_EQ(errors("[bus]\ncycle = 3\nclock = me\n[slave 0]\nesi = none.xml\n"),
-              "m.ethercat:2:9: error: invalid cycle '3'; write a time of 10us..1s, as in 1ms or 250us\n"
-              "m.ethercat:3:9: error: invalid clock 'me'; write reference, thread or none\n"
-              "m.ethercat:5:7: error: cannot read 'none.xml': No such file or directory; write the path of an ESI file, relative to this file");
+    EXPECT_EQ(errors("[bus]\n"), "m.ethercat:1:1: error: the configuration has no slave; write [slave 0 NAME] and below it esi = FILE");
+    EXPECT_EQ(
+        errors("[bus]\ncycle = 3\nclock = me\n[slave 0]\nesi = none.xml\n"),
+        "m.ethercat:2:9: error: invalid cycle '3'; write a time of 10us..1s, as in 1ms or 250us\n"
+        "m.ethercat:3:9: error: invalid clock 'me'; write reference, thread or none\n"
+        "m.ethercat:5:7: error: cannot read 'none.xml': No such file or directory; write the path of an ESI file, relative to this file");
     EXPECT_EQ(errors("[bus]\n[slave 0 a]\nesi = servo.xml\ndevice = SERVO-2\n"),
               "m.ethercat:4:10: error: 'servo.xml' does not describe a device 'SERVO-2'; did you mean 'SERVO-1'?");
     EXPECT_EQ(errors("[bus]\n[slave 0 a]\nesi = servo.xml\n"),
-        "m.ethercat:3:7: error: 'servo.xml' describes several devices; write device = NAME; the devices are: SERVO-1, DIO-8");
+              "m.ethercat:3:7: error: 'servo.xml' describes several devices; write device = NAME; the devices are: SERVO-1, DIO-8");
     EXPECT_EQ(errors("[bus]\n[slave 0 a]\nesi = servo.xml\nproduct = 9\n"),
-        "m.ethercat:4:11: error: 'servo.xml' does not describe a product 9; the devices are: SERVO-1, DIO-8");
+              "m.ethercat:4:11: error: 'servo.xml' does not describe a product 9; the devices are: SERVO-1, DIO-8");
     const std::string a = "[bus]\n[slave 0 a]\nesi = servo.xml\ndevice = SERVO-1\n";
     EXPECT_EQ(errors(a + "outputs = 6040 6072\n"),
-              "m.ethercat:5:16: error: object 6072:00 is not in the description of 'SERVO-1'; write its type, as in 6072 u16; the types are bit, u8, u16, u32, u64, "
+              "m.ethercat:5:16: error: object 6072:00 is not in the description of 'SERVO-1'; write its type, as in 6072 u16; the types "
+              "are bit, u8, u16, u32, u64, "
               "s8, s16, s32, s64, real32 or real64");
     EXPECT_EQ(errors(a + "outputs = 6040 u32\n"),
-        "m.ethercat:5:11: error: object 6040:00 of 'SERVO-1' has 16 bits, not 32; leave out the type");
+              "m.ethercat:5:11: error: object 6040:00 of 'SERVO-1' has 16 bits, not 32; leave out the type");
     EXPECT_EQ(errors(a + "outputs = 1602\n"), "m.ethercat:5:11: error: unknown PDO '1602'; the PDOs are: 1600, 1601");
     EXPECT_EQ(errors(a + "outputs = 1600 1601\n"),
-        "m.ethercat:5:11: error: PDOs 1600 and 1601 of 'SERVO-1' exclude each other; assign only one of them");
+              "m.ethercat:5:11: error: PDOs 1600 and 1601 of 'SERVO-1' exclude each other; assign only one of them");
     EXPECT_EQ(errors(a + "sdo 6060 = 200\n"),
-        "m.ethercat:5:12: error: invalid value '200' of object 6060:00; write a number of -128..127, decimal or with 0x");
+              "m.ethercat:5:12: error: invalid value '200' of object 6060:00; write a number of -128..127, decimal or with 0x");
     EXPECT_EQ(errors(a + "607b.scale = 2\noutput = 6040\n"),
-              "m.ethercat:5:1: error: no PDO of this slave has an object '607b'; the objects are: controlword, target-position, statusword, position-actual-value\n"
+              "m.ethercat:5:1: error: no PDO of this slave has an object '607b'; the objects are: controlword, target-position, "
+              "statusword, position-actual-value\n"
               "m.ethercat:6:1: error: unknown key 'output' of a slave; did you mean 'outputs'?");
     EXPECT_EQ(errors("[bus]\n[slave 0 a]\nesi = servo.xml\ndevice = DIO-8\noutputs = 7000:1\ndc = sync0\n[slave 0 a]\ndevice = cia402\n"),
-              "m.ethercat:5:11: error: the PDOs of 'DIO-8' are fixed: it has no CoE mailbox to map objects with; delete the line, or assign PDOs: 1600\n"
+              "m.ethercat:5:11: error: the PDOs of 'DIO-8' are fixed: it has no CoE mailbox to map objects with; delete the line, or "
+              "assign PDOs: 1600\n"
               "m.ethercat:6:6: error: 'DIO-8' has no distributed clocks; delete the line\n"
               "m.ethercat:7:1: error: duplicate slave name 'a'; first in line 2\n"
               "m.ethercat:7:1: error: duplicate position 0; first in line 2");
-    EXPECT_EQ(errors(a + "dc = sync0 2ms\n"), "m.ethercat:5:6: error: invalid dc 'sync0 2ms'; write a shift that is shorter than the cycle");
+    EXPECT_EQ(errors(a + "dc = sync0 2ms\n"),
+              "m.ethercat:5:6: error: invalid dc 'sync0 2ms'; write a shift that is shorter than the cycle");
     EXPECT_EQ(errors("[bus]\ncycle = 1ms\nsync-window = 1ns\n[slave alias=0 a]\ndevice = cia402\n"),
               "m.ethercat:3:15: error: invalid sync-window '1ns'; write a time of 10ns..1s, as in 1ms or 250us\n"
               "m.ethercat:4:8: error: alias 0 means that a slave has none; write its position, as in [slave 0 NAME]");
     EXPECT_EQ(errors("[bus]\n[domain slow]\nevery = 100\n[slave 0 a]\ndevice = cia402\ndomain = slow\noutputs = 6040\n"),
-              "m.ethercat:4:1: error: the outputs of 'a' are sent every 100ms, but its watchdog ends after 100ms; write watchdog = 500ms in its section, "
+              "m.ethercat:4:1: error: the outputs of 'a' are sent every 100ms, but its watchdog ends after 100ms; write watchdog = 500ms "
+              "in its section, "
               "watchdog = none, or a shorter cycle");
-    EXPECT_EQ(errors("[bus]\n[domain slow]\nevery = 100\n[slave 0 a]\ndevice = cia402\ndomain = slow\noutputs = 6040\nwatchdog = 500ms\n"), "");
+    EXPECT_EQ(errors("[bus]\n[domain slow]\nevery = 100\n[slave 0 a]\ndevice = cia402\ndomain = slow\noutputs = 6040\nwatchdog = 500ms\n"),
+              "");
     EXPECT_EQ(errors("[bus]\n[slave 0]\ndevice = x\n[slave z]\n[slave 1]\ntype = q\n"),
               "m.ethercat:3:10: error: unknown device 'x'; write device = cia402, or esi = FILE for a device with a description\n"
-              "m.ethercat:4:8: error: invalid slave section: expected a position of 0..65535 and a name; write [slave 0 NAME], [slave alias=5 NAME] or [slave id=5 NAME]\n"
+              "m.ethercat:4:8: error: invalid slave section: expected a position of 0..65535 and a name; write [slave 0 NAME], [slave "
+              "alias=5 NAME] or [slave id=5 NAME]\n"
               "m.ethercat:6:8: error: unknown type 'q'; write [type q]");
 }
 
@@ -160,13 +171,15 @@ TEST(EthercatConfig, Plan_shows_the_arithmetic) {
 TEST(EthercatConfig, Written_file_is_read_again_without_errors) {
     Found drive;
     drive.name = "Axis X", drive.device = "SERVO-1", drive.vendor = 0xcafe, drive.product = 0x402, drive.revision = 0x10001,
-        drive.assign_activate = 0x300;
-    drive.rx = {{0x1601, 2, 0, "", 0, {{0x6040, 0, "", 6, 16, 0}, {0, 0, "", 0, 8, 0}, {0x7000, 1, "", 1, 1, 0}}}, {0x1602, 0xff, 0, "", 0,
-        {{0x6040, 0, "", 6, 16, 0}}}};
+    drive.assign_activate = 0x300;
+    drive.rx = {{0x1601, 2, 0, "", 0, {{0x6040, 0, "", 6, 16, 0}, {0, 0, "", 0, 8, 0}, {0x7000, 1, "", 1, 1, 0}}},
+                {0x1602, 0xff, 0, "", 0, {{0x6040, 0, "", 6, 16, 0}}}};
     drive.tx = {{0x1a00, 3, 0, "", 0, {{0x6064, 0, "", 4, 32, 0}}}};
     const std::string text = write("eth:enp3s0", 1'000'000, {drive, drive});
-    EXPECT_TRUE(text.starts_with("[bus]\nlink  = eth:enp3s0\ncycle = 1ms\n\n[slave 0 axis-x]  # SERVO-1\nvendor   = 0xCAFE\nproduct  = 0x402\nrevision = 0x10001+  # or a higher one\n"
-                                 "outputs = 6040 u16, gap 8, 7000:1 bit\ninputs  = 6064 s32\n"))
+    EXPECT_TRUE(
+        text.starts_with("[bus]\nlink  = eth:enp3s0\ncycle = 1ms\n\n[slave 0 axis-x]  # SERVO-1\nvendor   = 0xCAFE\nproduct  = "
+                         "0x402\nrevision = 0x10001+  # or a higher one\n"
+                         "outputs = 6040 u16, gap 8, 7000:1 bit\ninputs  = 6064 s32\n"))
         << text;
     const Bus bus = good(text);
     ASSERT_EQ(bus.setup.slaves.size(), 2U);

@@ -277,7 +277,8 @@ TEST_F(Devices, Other_protocols_answer) {
 TEST_F(Devices, Servo_reports_switch_on_disabled_in_PRE_OP_on_every_axis) {
     start("servo", {.axes = 2});
     to_preop();
-    for (unsigned axis = 0; axis < 2; ++axis) EXPECT_EQ(dynamic_cast<Servo&>(device.firmware->behaviour()).axis(axis).statusword(), 0x250) << axis;
+    for (unsigned axis = 0; axis < 2; ++axis)
+        EXPECT_EQ(dynamic_cast<Servo&>(device.firmware->behaviour()).axis(axis).statusword(), 0x250) << axis;
     EXPECT_EQ(upload(0x6041, 0) & 0xffff, 0x250U);
     EXPECT_EQ(upload(0x6841, 0) & 0xffff, 0x250U);
 }

@@ -24,11 +24,14 @@ struct Clocks : testing::Test {
     std::array<Firmware, 2> firmware;
     void start(double drift_ppm, bool wide = true) {
         w.line.add({.controller = {.clock_start_ns = 5'000}, .sii = image(), .application = &firmware[0]});
-        w.line.add({.controller = {.dc_64_bit = wide, .drift_ppm = drift_ppm, .clock_start_ns = 900'000}, .sii = image(), .application = &firmware[1]});
+        w.line.add({.controller = {.dc_64_bit = wide, .drift_ppm = drift_ppm, .clock_start_ns = 900'000},
+                    .sii = image(),
+                    .application = &firmware[1]});
         w.line.power_on(0);
         for (unsigned i = 0; i < 2; ++i) w.write<std::uint16_t>(i, registers::station_address, static_cast<std::uint16_t>(0x1001 + i));
         w.send(Command::bwr, at_station(0, registers::dc_receive_time), {0});
-        const auto t0 = w.read<std::uint64_t>(0, registers::dc_receive_time_unit), t1 = w.read<std::uint64_t>(1, registers::dc_receive_time_unit);
+        const auto t0 = w.read<std::uint64_t>(0, registers::dc_receive_time_unit),
+                   t1 = w.read<std::uint64_t>(1, registers::dc_receive_time_unit);
         constexpr std::int64_t epoch = 700'000'000'000'000'000;
         w.write<std::int64_t>(0, registers::dc_system_time_offset, epoch - static_cast<std::int64_t>(t0));
         w.write<std::int64_t>(1, registers::dc_system_time_offset, epoch + 690 - static_cast<std::int64_t>(t1));
@@ -37,9 +40,12 @@ struct Clocks : testing::Test {
     }
     void cycle(int times, std::int64_t ns = 1'000'000) {
         w.gap_ns = ns;
-        for (int i = 0; i < times; ++i) EXPECT_EQ(w.send(Command::frmw, at_station(0x1001, registers::dc_system_time), std::vector<std::uint8_t>(8)), 2);
+        for (int i = 0; i < times; ++i)
+            EXPECT_EQ(w.send(Command::frmw, at_station(0x1001, registers::dc_system_time), std::vector<std::uint8_t>(8)), 2);
     }
-    std::int64_t difference() { return w.line.controller(1).clock().system_time(w.now_ns) - w.line.controller(0).clock().system_time(w.now_ns); }
+    std::int64_t difference() {
+        return w.line.controller(1).clock().system_time(w.now_ns) - w.line.controller(0).clock().system_time(w.now_ns);
+    }
 };
 
 TEST_F(Clocks, Drifting_clock_is_held_by_frmw) {
@@ -138,8 +144,10 @@ TEST(LineOnSegments, Answers_on_a_segment_in_memory_and_across_a_ring) {
     World w;
     for (int i = 0; i < 3; ++i) w.line.add({.sii = image()});
     w.line.power_on(0);
-    auto master = eth::open("sim:esc-line-a", {.types = {ethertype}, .promiscuous = true}), device = eth::open("sim:esc-line-a", {.promiscuous = true});
-    auto second = eth::open("sim:esc-line-b", {.types = {ethertype}, .promiscuous = true}), device2 = eth::open("sim:esc-line-b", {.promiscuous = true});
+    auto master = eth::open("sim:esc-line-a", {.types = {ethertype}, .promiscuous = true}),
+         device = eth::open("sim:esc-line-a", {.promiscuous = true});
+    auto second = eth::open("sim:esc-line-b", {.types = {ethertype}, .promiscuous = true}),
+         device2 = eth::open("sim:esc-line-b", {.promiscuous = true});
     ASSERT_TRUE(master && device && second && device2);
     esc::LineOnSegments served(w.line, *device.port, device2.port.get());
     ASSERT_TRUE(served.connected());

@@ -9,7 +9,8 @@ struct Controller : testing::Test {
     World w;
     std::array<Firmware, 3> firmware;
     void SetUp() override {
-        for (std::size_t i = 0; i < firmware.size(); ++i) ASSERT_EQ(w.line.add({.sii = image(static_cast<std::uint16_t>(10 + i)), .application = &firmware[i]}), static_cast<int>(i));
+        for (std::size_t i = 0; i < firmware.size(); ++i)
+            ASSERT_EQ(w.line.add({.sii = image(static_cast<std::uint16_t>(10 + i)), .application = &firmware[i]}), static_cast<int>(i));
         w.line.power_on(0);
     }
 };

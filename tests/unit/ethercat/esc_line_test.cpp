@@ -51,16 +51,20 @@ TEST_F(Line, Tree_is_walked_in_the_order_of_ports_0_3_1_2) {
 
 TEST_F(Line, Receive_times_give_the_cable_delays) {
     const std::array all{esc::PortKind::mii, esc::PortKind::mii, esc::PortKind::mii, esc::PortKind::none};
-    const auto       slave = [&](int parent, unsigned port, std::int64_t cable_ns) {
+    const auto slave = [&](int parent, unsigned port, std::int64_t cable_ns) {
         return esc::SlaveOnLine{.controller = {.port_kinds = all, .processing_ns = 600, .clock_start_ns = 1000 * (parent + 2)},
-                                .sii = image(), .parent = parent, .parent_port = port, .cable_ns = cable_ns};
+                                .sii = image(),
+                                .parent = parent,
+                                .parent_port = port,
+                                .cable_ns = cable_ns};
     };
     w.line.add(slave(-1, 0, 0)), w.line.add(slave(0, 1, 500)), w.line.add(slave(0, 2, 900)), w.line.add(slave(1, 1, 200));
     w.line.power_on(0);
     EXPECT_EQ(w.send(Command::bwr, at_station(0, registers::dc_receive_time), {0, 0, 0, 0}), 4);
     const auto times = [&](unsigned position) {
         std::array<std::uint32_t, 4> t{};
-        for (unsigned p = 0; p < 4; ++p) t[p] = w.read<std::uint32_t>(position, static_cast<std::uint16_t>(registers::dc_receive_time + 4 * p));
+        for (unsigned p = 0; p < 4; ++p)
+            t[p] = w.read<std::uint32_t>(position, static_cast<std::uint16_t>(registers::dc_receive_time + 4 * p));
         return t;
     };
     // In order of the frame: 0, 1, 3, 2.
@@ -168,7 +172,7 @@ TEST_F(Line, Disturbances_hit_every_nth_frame) {
     row(1);
     w.line.power_on(0);
     const int loss = w.line.disturb({.fault = esc::LineFault::loss, .every = 3});
-    int       lost = 0;
+    int lost = 0;
     for (int i = 0; i < 9; ++i) lost += count() < 0 ? 1 : 0;
     EXPECT_EQ(lost, 3);
     EXPECT_EQ(w.line.hits(loss), 3U);

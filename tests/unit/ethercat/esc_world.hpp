@@ -56,12 +56,18 @@ struct World {
     std::vector<std::uint8_t> data;   ///< of the answer
     std::uint16_t event = 0;
 
-    struct Item { Command command; std::uint32_t address; std::vector<std::uint8_t> data; std::uint16_t wkc = 0; };
+    struct Item {
+        Command command;
+        std::uint32_t address;
+        std::vector<std::uint8_t> data;
+        std::uint16_t wkc = 0;
+    };
     /// Sends datagrams in one frame; returns false if it is lost.
     bool send(std::vector<Item>& items) {
         FrameWriter writer(frame, {0x10, 0, 0, 0, 0, 1});
         for (std::size_t i = 0; i < items.size(); ++i) {
-            std::uint8_t* to = writer.add(items[i].command, static_cast<std::uint8_t>(i), items[i].address, static_cast<std::uint16_t>(items[i].data.size()));
+            std::uint8_t* to = writer.add(items[i].command, static_cast<std::uint8_t>(i), items[i].address,
+                                          static_cast<std::uint16_t>(items[i].data.size()));
             std::copy(items[i].data.begin(), items[i].data.end(), to);
         }
         const std::size_t length = writer.finish().size();
@@ -96,17 +102,27 @@ struct World {
         return get<T>(data.data());
     }
     template <class T>
-    void write(unsigned slave, std::uint16_t reg, T value) { EXPECT_EQ(send(Command::apwr, at_position(slave, reg), bytes(value)), 1) << std::hex << reg; }
+    void write(unsigned slave, std::uint16_t reg, T value) {
+        EXPECT_EQ(send(Command::apwr, at_position(slave, reg), bytes(value)), 1) << std::hex << reg;
+    }
     void sync_manager(unsigned slave, unsigned n, std::uint16_t start, std::uint16_t length, std::uint8_t control) {
         std::vector<std::uint8_t> b(8);
         put(&b[0], start), put(&b[2], length), b[4] = control, b[6] = 1;
         EXPECT_EQ(send(Command::apwr, at_position(slave, registers::sync_manager_at(n)), b), 1);
     }
-    struct Map { std::uint32_t logical; std::uint16_t length; unsigned start = 0, stop = 7; std::uint16_t physical; unsigned bit = 0; std::uint8_t type; };
+    struct Map {
+        std::uint32_t logical;
+        std::uint16_t length;
+        unsigned start = 0, stop = 7;
+        std::uint16_t physical;
+        unsigned bit = 0;
+        std::uint8_t type;
+    };
     void fmmu(unsigned slave, unsigned n, const Map& m) {
         std::vector<std::uint8_t> b(16);
         put(&b[0], m.logical), put(&b[4], m.length), put(&b[8], m.physical);
-        b[6] = static_cast<std::uint8_t>(m.start), b[7] = static_cast<std::uint8_t>(m.stop), b[10] = static_cast<std::uint8_t>(m.bit), b[11] = m.type, b[12] = 1;
+        b[6] = static_cast<std::uint8_t>(m.start), b[7] = static_cast<std::uint8_t>(m.stop), b[10] = static_cast<std::uint8_t>(m.bit),
+        b[11] = m.type, b[12] = 1;
         EXPECT_EQ(send(Command::apwr, at_position(slave, registers::fmmu_at(n)), b), 1);
     }
 };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-#include "ethercat/config/event_filter.hpp"
 #include "ethercat/config/event_words.hpp"
+#include "ethercat/config/event_filter.hpp"
 
 #include <gtest/gtest.h>
 
@@ -22,17 +22,19 @@ std::string words(Event event, std::uint32_t slave, std::int64_t first = 0, std:
 }
 
 TEST(EthercatEventWords, Refused_state_names_slave_state_code_cause_and_remedy) {
-    EXPECT_EQ(words(Event::state_refused, 1, 4, 0x001e),
-              "slave 4 (x-axis) rejects SAFE-OP with AL status code 0x001E (invalid input configuration): the length of the inputs differs from "
-              "the PDO mapping; compare its PDOs with the configuration, which has no process data");
+    EXPECT_EQ(
+        words(Event::state_refused, 1, 4, 0x001e),
+        "slave 4 (x-axis) rejects SAFE-OP with AL status code 0x001E (invalid input configuration): the length of the inputs differs from "
+        "the PDO mapping; compare its PDOs with the configuration, which has no process data");
     EXPECT_EQ(words(Event::state_refused, 1, 8, 0x8123),
               "slave 4 (x-axis) rejects OP with AL status code 0x8123; see the manual of the drive");
 }
 
 TEST(EthercatEventWords, Wrong_device_names_what_was_found_and_expected) {
-    EXPECT_EQ(words(Event::wrong_product, 0, 0x402, 0x403),
-              "slave 0 has the product code 0x00000402, the configuration expects 0x00000403; it stays in INIT: connect the right device, or "
-              "write `product = 0x00000402` or the `esi` of this device");
+    EXPECT_EQ(
+        words(Event::wrong_product, 0, 0x402, 0x403),
+        "slave 0 has the product code 0x00000402, the configuration expects 0x00000403; it stays in INIT: connect the right device, or "
+        "write `product = 0x00000402` or the `esi` of this device");
     EXPECT_EQ(words(Event::unknown_slave, Events::of_position + 7, 0x2, 0x7d83052),
               "slave at position 7 is not in the configuration (vendor 0x00000002, product 0x07D83052); add [slave 7 NAME], or "
               "write `other-slaves = accept` in [bus]");
@@ -43,17 +45,22 @@ TEST(EthercatEventWords, Objects_and_aborts_are_written_as_in_the_standard) {
               "slave 4 (x-axis) rejects the start-up write of 0x6060:0: SDO abort 0x06020000 (object ");
     EXPECT_EQ(words(Event::mapping_failed, 1, 0x60400010LL << 24 | 0x160001, 0),
               "slave 4 (x-axis) rejects object 0x6040:0 with 16 bits at 0x1600:1: no answer from its mailbox; power-cycle it");
-    EXPECT_EQ(words(Event::mapping_failed, 1, 0x1600LL << 24 | 0x1c1201, 0x06090030),
-              "slave 4 (x-axis) rejects PDO 0x1600 at 0x1C12:1: SDO abort 0x06090030 (value out of range); correct `outputs` or `inputs` or "
-              "their `sync-manager` in its section");
+    EXPECT_EQ(
+        words(Event::mapping_failed, 1, 0x1600LL << 24 | 0x1c1201, 0x06090030),
+        "slave 4 (x-axis) rejects PDO 0x1600 at 0x1C12:1: SDO abort 0x06090030 (value out of range); correct `outputs` or `inputs` or "
+        "their `sync-manager` in its section");
     EXPECT_EQ(words(Event::mapping_failed, 1, 12LL << 24 | 0x1a0000, 0x06040042),
-              "slave 4 (x-axis) rejects 12 entries at 0x1A00:0: SDO abort 0x06040042 (mapped objects exceed the PDO length); correct `inputs` in its section, or, if the "
+              "slave 4 (x-axis) rejects 12 entries at 0x1A00:0: SDO abort 0x06040042 (mapped objects exceed the PDO length); correct "
+              "`inputs` in its section, or, if the "
               "PDO is full, write `entries-per-pdo = 11`");
     EXPECT_EQ(words(Event::mapping_differs, 1, 0x60640020LL << 24 | 0x1a0002, 0x60410010),
-              "slave 4 (x-axis) did not keep the PDO mapping: 0x1A00:2 is 0x60410010 instead of 0x60640020; this PDO is fixed: list its own entries");
-    EXPECT_EQ(words(Event::dc_lost, 1, 123'000, 10'000), "slave 4 (x-axis) is operational, but its clock deviates by 123 us from the reference clock, "
+              "slave 4 (x-axis) did not keep the PDO mapping: 0x1A00:2 is 0x60410010 instead of 0x60640020; this PDO is fixed: list its "
+              "own entries");
+    EXPECT_EQ(words(Event::dc_lost, 1, 123'000, 10'000),
+              "slave 4 (x-axis) is operational, but its clock deviates by 123 us from the reference clock, "
               "more than 10 us; check that the thread misses no cycles, and its manual for what it does without synchronisation");
-    EXPECT_EQ(words(Event::dc_not_set, 1, 5000), "slave 4 (x-axis) has a clock that could not be set within 5000 ms: its receive times were not "
+    EXPECT_EQ(words(Event::dc_not_set, 1, 5000),
+              "slave 4 (x-axis) has a clock that could not be set within 5000 ms: its receive times were not "
               "readable, or the ring is broken; it is not started: check its cables, or remove `dc`");
 }
 
@@ -82,16 +89,21 @@ TEST(EthercatEventWords, Start_up_writes_name_value_and_line) {
     const auto of = [&](std::int64_t object, std::int64_t code) {
         return config::event_words({Event::startup_write_failed, 0, object, code}, setup, "eth:enp3s0");
     };
-    EXPECT_EQ(of(0x606000, 0x06090031), "slave 0 rejects 0x08 for 0x6060:0: SDO abort 0x06090031 (value too high); correct or delete line 12 of the "
+    EXPECT_EQ(of(0x606000, 0x06090031),
+              "slave 0 rejects 0x08 for 0x6060:0: SDO abort 0x06090031 (value too high); correct or delete line 12 of the "
               "configuration");
-    EXPECT_EQ(of(0x809601, 0x7004), "slave 0 rejects 0x0007 for IDN P-0-150 of drive 1: SoE error 0x7004 (value is read-only); its description asks "
+    EXPECT_EQ(of(0x809601, 0x7004),
+              "slave 0 rejects 0x0007 for IDN P-0-150 of drive 1: SoE error 0x7004 (value is read-only); its description asks "
               "for it: check its `esi`");
-    EXPECT_EQ(of(0x42000, 0), "slave 0 rejects 0x0007 for register 0x0420: it does not answer; correct or delete line 14 of the configuration");
+    EXPECT_EQ(of(0x42000, 0),
+              "slave 0 rejects 0x0007 for register 0x0420: it does not answer; correct or delete line 14 of the configuration");
 }
 
 TEST(EthercatEventWords, One_cause_is_news_once_until_the_slave_is_operational) {
     config::EventFilter filter(2);
-    const auto is_new = [&](Event event, std::int64_t first = 0, std::int64_t second = 0) { return filter.is_new(event, 1, first, second); };
+    const auto is_new = [&](Event event, std::int64_t first = 0, std::int64_t second = 0) {
+        return filter.is_new(event, 1, first, second);
+    };
     EXPECT_TRUE(is_new(Event::state_refused, 4, 0x1d));
     EXPECT_FALSE(is_new(Event::start_up_failed, 2, 1)) << "the cause is known";
     EXPECT_FALSE(is_new(Event::state_refused, 4, 0x1d));

@@ -10,9 +10,11 @@ namespace {
 constexpr const char* description = "servo\nservo axes=2\nservo\ndigital_out bits=8\ndigital_in bits=8\n";
 constexpr const char* configuration =
     "[bus]\ncycle = 1ms\n"
-    "[type drive]\ndevice = cia402\nvendor = 0x00ffffff\noutputs = 6040 6060 607A 60FF\ninputs = 6041 6061 6064\ndc = sync0 250us\nsdo 60C2:1 = 1\n"
+    "[type drive]\ndevice = cia402\nvendor = 0x00ffffff\noutputs = 6040 6060 607A 60FF\ninputs = 6041 6061 6064\ndc = sync0 250us\nsdo "
+    "60C2:1 = 1\n"
     "[slave 0 x]\ntype = drive\n[slave 1 y]\ntype = drive\n[slave 2 z]\ntype = drive\n"
-    "[slave 3 out]\nvendor = 0x00ffffff\noutputs = 7000:1 bit 7000:2 bit 7000:3 bit 7000:4 bit 7000:5 bit 7000:6 bit 7000:7 bit 7000:8 bit\n"
+    "[slave 3 out]\nvendor = 0x00ffffff\noutputs = 7000:1 bit 7000:2 bit 7000:3 bit 7000:4 bit 7000:5 bit 7000:6 bit 7000:7 bit 7000:8 "
+    "bit\n"
     "inputs = none\noutputs.sync-manager = 0\n"
     "[slave 4 in]\nvendor = 0x00ffffff\ninputs = 6000:1 bit 6000:2 bit 6000:3 bit 6000:4 bit 6000:5 bit 6000:6 bit 6000:7 bit 6000:8 bit\n"
     "outputs = none\ninputs.sync-manager = 0\n";
@@ -26,7 +28,8 @@ std::string LastEvents::text(const master::Setup& setup) const {
     std::string s;
     for (std::uint64_t n = count_ > events_.size() ? count_ - events_.size() : 0; n < count_; ++n) {
         const Record& r = events_[n % events_.size()];
-        s += "\n  " + std::to_string(static_cast<int>(r.event)) + " " + config::event_words({r.event, r.slave, r.first, r.second}, setup, "sim:line");
+        s += "\n  " + std::to_string(static_cast<int>(r.event)) + " " +
+             config::event_words({r.event, r.slave, r.first, r.second}, setup, "sim:line");
     }
     return s;
 }
@@ -35,8 +38,10 @@ Machine::Machine() {
     devices = devices::make_line(devices::read_line(description));
     const double drifts[] = {40, -60, 90, 0, 0};
     for (std::size_t n = 0; n < devices.size(); ++n)
-        line.add({.controller = {.dc = devices[n].dc, .drift_ppm = drifts[n], .clock_start_ns = 1'000'000'007LL * static_cast<std::int64_t>(n)},
-                  .sii = devices[n].sii, .application = devices[n].firmware.get()});
+        line.add(
+            {.controller = {.dc = devices[n].dc, .drift_ppm = drifts[n], .clock_start_ns = 1'000'000'007LL * static_cast<std::int64_t>(n)},
+             .sii = devices[n].sii,
+             .application = devices[n].firmware.get()});
     const config::Reading read = config::read(configuration, "line.ethercat");
     EXPECT_EQ(config::to_string(read, "line.ethercat"), "");
     setup = read.buses.at(0).setup;

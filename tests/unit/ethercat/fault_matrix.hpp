@@ -22,14 +22,13 @@ namespace fault_matrix {
 using namespace hal::ethercat;
 
 enum class Kind : std::uint8_t { any, process_data, mailbox, state, clock, last = clock };
-inline const char* name(Kind k) {
-    return std::array{"any", "process data", "mailbox", "state", "clock"}[static_cast<std::size_t>(k)];
-}
+inline const char* name(Kind k) { return std::array{"any", "process data", "mailbox", "state", "clock"}[static_cast<std::size_t>(k)]; }
 
 /// `lost_back`: the slaves have executed the frame. `damaged`: a wrong check sequence from a slave on. `foreign`: a header that nobody sent.
 enum class Fault : std::uint8_t { none, lost, lost_back, doubled, executed_twice, late, cut, damaged, foreign, last = foreign };
 inline const char* name(Fault f) {
-    return std::array{"none", "lost", "lost back", "doubled", "executed twice", "late", "cut", "damaged", "foreign"}[static_cast<std::size_t>(f)];
+    return std::array{
+        "none", "lost", "lost back", "doubled", "executed twice", "late", "cut", "damaged", "foreign"}[static_cast<std::size_t>(f)];
 }
 
 /// Returns whether a frame has a datagram of a kind.
@@ -41,10 +40,18 @@ inline bool has(std::span<std::uint8_t> frame, Kind kind) {
         const bool cyclic_clock = d->command == Command::frmw || d->command == Command::armw;
         switch (kind) {
         case Kind::any: return true;
-        case Kind::process_data: if (logical) return true; break;
-        case Kind::mailbox: if (!logical && at >= 0x1000) return true; break;
-        case Kind::state: if (!logical && at >= registers::al_control && at < 0x0140) return true; break;
-        case Kind::clock: if (!logical && (cyclic_clock || (at >= registers::dc_receive_time && at < 0x0a00))) return true; break;
+        case Kind::process_data:
+            if (logical) return true;
+            break;
+        case Kind::mailbox:
+            if (!logical && at >= 0x1000) return true;
+            break;
+        case Kind::state:
+            if (!logical && at >= registers::al_control && at < 0x0140) return true;
+            break;
+        case Kind::clock:
+            if (!logical && (cyclic_clock || (at >= registers::dc_receive_time && at < 0x0a00))) return true;
+            break;
         }
     }
     return false;
@@ -59,7 +66,7 @@ public:
     }
     Fault fault = Fault::none;
     Kind kind = Kind::any;
-    unsigned every = 2;       ///< each n-th frame of `kind`
+    unsigned every = 2;  ///< each n-th frame of `kind`
     unsigned late_cycles = 2;
     std::uint64_t hits = 0;
 
@@ -74,7 +81,8 @@ public:
             spare_ = copy_;
             pass(spare_, now_ns, now, now_ns);
         }
-        if (now == Fault::damaged) line_.disturb({.fault = esc::LineFault::corruption, .slave = static_cast<int>(hits % line_.size()), .count = 1});
+        if (now == Fault::damaged)
+            line_.disturb({.fault = esc::LineFault::corruption, .slave = static_cast<int>(hits % line_.size()), .count = 1});
         pass(copy_, now_ns, now, now == Fault::late ? now_ns + late_cycles * 1'000'000LL : now_ns);
         if (now == Fault::damaged) line_.calm();
         return hal::ethernet::Sent::queued;

@@ -31,8 +31,9 @@ struct Summary {
         if (cycles > longest) longest = cycles, at = what;
     }
     ~Summary() {
-        std::printf("%llu faults, %llu frames hit, %.0f s of virtual time; longest way back to OP %u ms (%s)\n", static_cast<unsigned long long>(faults),
-                    static_cast<unsigned long long>(hits), static_cast<double>(virtual_ns) * 1e-9, longest, at.c_str());
+        std::printf("%llu faults, %llu frames hit, %.0f s of virtual time; longest way back to OP %u ms (%s)\n",
+                    static_cast<unsigned long long>(faults), static_cast<unsigned long long>(hits), static_cast<double>(virtual_ns) * 1e-9,
+                    longest, at.c_str());
     }
 };
 
@@ -93,7 +94,10 @@ TEST(EthercatFaultMatrix, Frames_cables_and_power_fail_at_random) {
                 case 0: m.line.set_power(slave, false, m.now_ns); break;
                 case 1: m.line.set_power(slave, true, m.now_ns); break;
                 case 2: m.line.set_cable(slave, 0, random(2) == 0); break;
-                case 3: m.jumped_ns = m.now_ns, m.line.controller(slave).jump_clock(static_cast<std::int64_t>(random(2'000'000)) - 1'000'000, m.now_ns); break;
+                case 3:
+                    m.jumped_ns = m.now_ns,
+                    m.line.controller(slave).jump_clock(static_cast<std::int64_t>(random(2'000'000)) - 1'000'000, m.now_ns);
+                    break;
                 default:
                     m.port.fault = static_cast<Fault>(random(static_cast<unsigned>(Fault::last) + 1));
                     m.port.kind = static_cast<Kind>(random(static_cast<unsigned>(Kind::last) + 1));

@@ -3,9 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include "ethercat/esc/pdi.hpp"
 #include "ethercat/master/channel.hpp"
 #include "ethercat/master/setup.hpp"
-#include "ethercat/esc/pdi.hpp"
 #include "ethercat/wire/registers.hpp"
 
 namespace {

@@ -49,7 +49,8 @@ struct CoeSlave : MailboxSlave {
         Bytes p(10);
         if (coe::service_of(m.payload.data()) == coe::Service::sdo_information) return information(m);
         switch (command >> 5) {
-        case 1: case 2: {
+        case 1:
+        case 2: {
             const auto request = *coe::read_sdo(m.payload);
             index = request.index, sub = request.sub;
             const auto found = objects.find(index << 8U | sub);
@@ -60,8 +61,8 @@ struct CoeSlave : MailboxSlave {
                 if (size <= 4 && size != 0) {
                     std::uint32_t value = 0;
                     std::memcpy(&value, target->data(), size);
-                    coe::write_sdo(p.data(), coe::Service::sdo_response, {static_cast<std::uint8_t>(0x43 | (4 - size) << 2), index, sub,
-                        value});
+                    coe::write_sdo(p.data(), coe::Service::sdo_response,
+                                   {static_cast<std::uint8_t>(0x43 | (4 - size) << 2), index, sub, value});
                     return answer(p);
                 }
                 at = std::min(size, room - 10);
@@ -107,11 +108,12 @@ struct CoeSlave : MailboxSlave {
         Bytes data;
         if (m.payload[2] == 1) {
             data = {m.payload[6], m.payload[7]};
-            for (const auto& [key, value] : objects) data.push_back(static_cast<std::uint8_t>(key >> 8)),
-                data.push_back(static_cast<std::uint8_t>(key >> 16));
+            for (const auto& [key, value] : objects)
+                data.push_back(static_cast<std::uint8_t>(key >> 8)), data.push_back(static_cast<std::uint8_t>(key >> 16));
         } else if (m.payload[2] == 3) {
             data = {m.payload[6], m.payload[7], 7, 0, 3, 9};
-            for (const char c : std::string("A name longer than one mailbox of 64 bytes can hold in one go")) data.push_back(static_cast<std::uint8_t>(c));
+            for (const char c : std::string("A name longer than one mailbox of 64 bytes can hold in one go"))
+                data.push_back(static_cast<std::uint8_t>(c));
         } else {
             data = {m.payload[6], m.payload[7], m.payload[8], 0, 5, 0, 8, 0, 0x3f, 0, 'V'};
         }
@@ -119,9 +121,9 @@ struct CoeSlave : MailboxSlave {
         for (std::size_t i = 0; i < fragments; ++i) {
             Bytes p(6);
             coe::write_information(p.data(), {static_cast<coe::Information>(m.payload[2] + 1), i + 1 < fragments,
-                static_cast<std::uint16_t>(fragments - 1 - i)});
-            p.insert(p.end(), data.begin() + static_cast<long>(i * chunk), data.begin() + static_cast<long>(std::min(data.size(),
-                (i + 1) * chunk)));
+                                              static_cast<std::uint16_t>(fragments - 1 - i)});
+            p.insert(p.end(), data.begin() + static_cast<long>(i * chunk),
+                     data.begin() + static_cast<long>(std::min(data.size(), (i + 1) * chunk)));
             answer(p);
         }
     }

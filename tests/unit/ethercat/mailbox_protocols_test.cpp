@@ -150,9 +150,9 @@ TEST(EthercatSoe, Reads_and_writes_in_fragments) {
                 const std::size_t left = (value.size() - at - 1) / chunk;
                 Bytes p(4);
                 soe::write(p.data(), {soe::Opcode::read_response, left != 0, false, h.drive, h.elements,
-                    left != 0 ? static_cast<std::uint16_t>(left) : h.idn});
-                p.insert(p.end(), value.begin() + static_cast<long>(at), value.begin() + static_cast<long>(std::min(value.size(),
-                    at + chunk)));
+                                      left != 0 ? static_cast<std::uint16_t>(left) : h.idn});
+                p.insert(p.end(), value.begin() + static_cast<long>(at),
+                         value.begin() + static_cast<long>(std::min(value.size(), at + chunk)));
                 f.slave.reply(MailboxType::soe, p);
             }
         };
@@ -177,8 +177,9 @@ TEST(EthercatAoe, Reads_and_writes_an_object) {
         Bytes answer(4);
         if (get<std::uint32_t>(data + 4) != aoe::sdo_offset(0x2000, 1)) put<std::uint32_t>(answer.data(), 0x06020000);
         else if (h.command == aoe::Command::write) value.assign(data + 12, data + 12 + get<std::uint32_t>(data + 8));
-        else answer.push_back(static_cast<std::uint8_t>(value.size())), answer.resize(8), answer.insert(answer.end(), value.begin(),
-            value.end());
+        else
+            answer.push_back(static_cast<std::uint8_t>(value.size())), answer.resize(8),
+                answer.insert(answer.end(), value.begin(), value.end());
         Bytes p(aoe::header_bytes);
         aoe::write(p.data(), aoe::response_to(h, static_cast<std::uint32_t>(answer.size())));
         p.insert(p.end(), answer.begin(), answer.end());
@@ -186,7 +187,7 @@ TEST(EthercatAoe, Reads_and_writes_an_object) {
     };
     Bytes content{9, 8, 7};
     f.request.kind = Kind::aoe_write, f.request.group = aoe::group_sdo, f.request.offset = aoe::sdo_offset(0x2000, 1),
-        f.request.data = content;
+    f.request.data = content;
     ASSERT_TRUE(f.run());
     f.request.kind = Kind::aoe_read, f.request.data = f.buffer;
     ASSERT_TRUE(f.run());

@@ -99,7 +99,12 @@ private:
         }
         for (unsigned i = 0; i < on.length(); ++i) {
             const unsigned r = at + i;
-            if (reading) data[i] = r == 0x805 ? (out_full_ ? 8 : 0) : r == 0x80d ? (full_ ? 8 : 0) : r == 0x80e ? activate_ : r == 0x80f ? repeat_ : 0;
+            if (reading)
+                data[i] = r == 0x805   ? (out_full_ ? 8 : 0)
+                          : r == 0x80d ? (full_ ? 8 : 0)
+                          : r == 0x80e ? activate_
+                          : r == 0x80f ? repeat_
+                                       : 0;
             else if (r == 0x80e) activate_ = data[i];
         }
         return 1;

@@ -15,7 +15,8 @@ master::Setup with_clocks(unsigned count) {
 TEST(EthercatClocks, Come_into_the_window_and_generate_sync0_on_one_grid) {
     World w;
     const double drifts[] = {100, -50, 30, -100};
-    for (unsigned n = 0; n < 4; ++n) w.add(0x100 + n, 0, false, {.dc_64_bit = n != 2, .drift_ppm = drifts[n], .clock_start_ns = 1'000'000'000LL * (n + 1)});
+    for (unsigned n = 0; n < 4; ++n)
+        w.add(0x100 + n, 0, false, {.dc_64_bit = n != 2, .drift_ppm = drifts[n], .clock_start_ns = 1'000'000'000LL * (n + 1)});
     w.begin(with_clocks(4));
     ASSERT_TRUE(w.operational(8000)) << w.log.text();
     EXPECT_LT(w.cycles, 2000U);

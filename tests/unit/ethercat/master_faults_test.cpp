@@ -145,7 +145,9 @@ TEST(EthercatSoak, Always_in_op_again_after_power_cables_and_frames_failed_at_ra
                 if (!w.line.controller(n).powered()) w.line.set_power(n, true, w.now_ns);
             }
             w.run(300);  // a change of the last step is noticed
-            ASSERT_TRUE(w.operational(30000)) << "seed " << seed << (ring ? " ring " : " line ") << w.log.text().substr(w.log.text().size() - std::min<std::size_t>(2000, w.log.text().size()));
+            ASSERT_TRUE(w.operational(30000)) << "seed " << seed << (ring ? " ring " : " line ")
+                                              << w.log.text().substr(w.log.text().size() -
+                                                                     std::min<std::size_t>(2000, w.log.text().size()));
             for (std::size_t n = 0; n < 6; ++n) w.master->data(n, 0)[0] = static_cast<std::uint8_t>(n + 50);
             w.run(4);
             for (std::size_t n = 0; n < 6; ++n) EXPECT_EQ(w.master->data(n, 1)[0], n + 51) << n;

@@ -29,14 +29,10 @@ struct Firmware : esc::Application {
     void run(esc::Pdi& pdi, std::int64_t) noexcept override {
         if (const auto control = pdi.take_al_control()) {
             const auto state = static_cast<std::uint16_t>(*control & 0x0f);
-            if ((*control & al_identify) != 0)
-                pdi.set_al_status(static_cast<std::uint16_t>(state | al_identify), device_id);
-            else if (state == ignore)
-                return;
-            else if (state == refuse)
-                pdi.set_al_status(static_cast<std::uint16_t>((pdi.al_status() & 0x0f) | 0x10), code);
-            else
-                pdi.set_al_status(state, 0);
+            if ((*control & al_identify) != 0) pdi.set_al_status(static_cast<std::uint16_t>(state | al_identify), device_id);
+            else if (state == ignore) return;
+            else if (state == refuse) pdi.set_al_status(static_cast<std::uint16_t>((pdi.al_status() & 0x0f) | 0x10), code);
+            else pdi.set_al_status(state, 0);
         }
         if ((pdi.al_status() & 0x0f) < 4 || !echo) return;
         std::array<std::uint8_t, 64> out{};
@@ -54,8 +50,10 @@ inline std::vector<std::uint8_t> image(std::uint32_t product, std::uint16_t alia
     if (mailbox) c.mailboxes = {{0x1000, 128}, {0x1080, 128}}, c.protocols = sii::coe;
     c.has_general = true;
     c.general.coe_details = 0x0f;
-    c.sync_managers = {{0x1000, 128, 0x26, 0, 1, sii::SmType::mailbox_out}, {0x1080, 128, 0x22, 0, 1, sii::SmType::mailbox_in},
-                       {0x1100, 2, 0x64, 0, 1, sii::SmType::outputs}, {0x1400, 2, 0x20, 0, 1, sii::SmType::inputs}};
+    c.sync_managers = {{0x1000, 128, 0x26, 0, 1, sii::SmType::mailbox_out},
+                       {0x1080, 128, 0x22, 0, 1, sii::SmType::mailbox_in},
+                       {0x1100, 2, 0x64, 0, 1, sii::SmType::outputs},
+                       {0x1400, 2, 0x20, 0, 1, sii::SmType::inputs}};
     return sii::build(c);
 }
 
@@ -126,14 +124,16 @@ struct Objects final : CoeAccess {
     std::map<std::uint32_t, std::vector<std::uint8_t>> values;
     std::vector<std::uint32_t> written;
     std::uint32_t refuse = 0;
-    Task<SdoResult> upload(Channel& c, BusSlave&, std::uint16_t index, std::uint8_t sub, bool, std::span<std::uint8_t> to) noexcept override {
+    Task<SdoResult> upload(Channel& c, BusSlave&, std::uint16_t index, std::uint8_t sub, bool,
+                           std::span<std::uint8_t> to) noexcept override {
         co_await c.sleep(0);
         const auto found = values.find(static_cast<std::uint32_t>(index << 8 | sub));
         if (found == values.end()) co_return SdoResult{SdoResult::Outcome::aborted, 0x06020000};
         std::copy(found->second.begin(), found->second.end(), to.begin());
         co_return SdoResult{SdoResult::Outcome::done, 0, found->second.size()};
     }
-    Task<SdoResult> download(Channel& c, BusSlave&, std::uint16_t index, std::uint8_t sub, bool, std::span<const std::uint8_t> from) noexcept override {
+    Task<SdoResult> download(Channel& c, BusSlave&, std::uint16_t index, std::uint8_t sub, bool,
+                             std::span<const std::uint8_t> from) noexcept override {
         co_await c.sleep(0);
         const auto object = static_cast<std::uint32_t>(index << 8 | sub);
         if (object == refuse) co_return SdoResult{SdoResult::Outcome::aborted, 0x06090030};
@@ -150,7 +150,9 @@ struct Log final : Events {
         std::int64_t first, second;
     };
     std::vector<Record> all;
-    void report(Event event, std::uint32_t slave, std::int64_t first, std::int64_t second) noexcept override { all.push_back({event, slave, first, second}); }
+    void report(Event event, std::uint32_t slave, std::int64_t first, std::int64_t second) noexcept override {
+        all.push_back({event, slave, first, second});
+    }
     std::size_t count(Event event) const {
         return static_cast<std::size_t>(std::count_if(all.begin(), all.end(), [&](const Record& r) { return r.event == event; }));
     }
@@ -162,7 +164,8 @@ struct Log final : Events {
     std::string text() const {
         std::string s;
         for (const Record& r : all)
-            s += std::to_string(static_cast<int>(r.event)) + "(" + std::to_string(static_cast<int>(r.slave)) + ": " + std::to_string(r.first) + ", " + std::to_string(r.second) + ") ";
+            s += std::to_string(static_cast<int>(r.event)) + "(" + std::to_string(static_cast<int>(r.slave)) + ": " +
+                 std::to_string(r.first) + ", " + std::to_string(r.second) + ") ";
         return s;
     }
 };

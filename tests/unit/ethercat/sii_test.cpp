@@ -86,8 +86,8 @@ TEST(Sii, Checksum_is_the_CRC_of_the_first_seven_words) {
 TEST(Sii, Names_are_dropped_from_the_last_entry_on_when_the_image_is_too_long) {
     Contents c = drive();
     c.rx[0].entries.clear();
-    for (int i = 0; i < 20; ++i) c.rx[0].entries.push_back({0x7000, static_cast<std::uint8_t>(i), "A name of some length " +
-        std::to_string(i), 1, 1, 0});
+    for (int i = 0; i < 20; ++i)
+        c.rx[0].entries.push_back({0x7000, static_cast<std::uint8_t>(i), "A name of some length " + std::to_string(i), 1, 1, 0});
     c.eeprom_bytes = 768;
     const auto image = build(c);
     EXPECT_EQ(image.size(), 768U);

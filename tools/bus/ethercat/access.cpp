@@ -55,7 +55,9 @@ bool EthercatAccess::open(const EthercatOptions& options, bool alone) {
         arguments_.erase(arguments_.begin());
         if (ethernet::describe(address_).in_memory)
             return fail(options, fmt::format("'{}' is a segment in memory, which belongs to another process; type eth:INTERFACE, or "
-                                             "--emulate \"coupler, servo\" for an emulated line", address_)), false;
+                                             "--emulate \"coupler, servo\" for an emulated line",
+                                             address_)),
+                   false;
     }
     ethernet::Options how;
     how.types = {ethercat::ethertype};
@@ -67,8 +69,9 @@ bool EthercatAccess::open(const EthercatOptions& options, bool alone) {
     if (!port_->statistics().up)
         return fail(options, fmt::format("{} has no link; check the cable and the supply of the first slave", address_)), false;
     if (alone && receive(now_ns_ + listening_ns))
-        return fail(options, fmt::format("another EtherCAT master is active on {}, and this command changes states; stop it first",
-            address_)), false;
+        return fail(options,
+                    fmt::format("another EtherCAT master is active on {}, and this command changes states; stop it first", address_)),
+               false;
     return true;
 }
 

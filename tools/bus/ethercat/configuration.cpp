@@ -65,17 +65,15 @@ int run_ethercat_pdos(const EthercatOptions& options) {
                 const std::string place = pdo.sync_manager == 0xff ? "not assigned" : fmt::format("sync manager {}", pdo.sync_manager);
                 text += fmt::format("  {:04X} {}, {}  {}\n", pdo.index, outputs ? "outputs" : "inputs", place, pdo.name);
                 json += fmt::format(R"({}{{"position":{},"index":{},"direction":"{}","sync_manager":{},"name":{},"entries":[)",
-                    json.empty() ? "[" : ",\n ", n,
-                                    pdo.index, outputs ? "outputs" : "inputs", pdo.sync_manager == 0xff ? "null"
-                                        : std::to_string(pdo.sync_manager),
-                                    json_string(pdo.name));
+                                    json.empty() ? "[" : ",\n ", n, pdo.index, outputs ? "outputs" : "inputs",
+                                    pdo.sync_manager == 0xff ? "null" : std::to_string(pdo.sync_manager), json_string(pdo.name));
                 for (std::size_t i = 0; i < pdo.entries.size(); ++i) {
                     const auto& e = pdo.entries[i];
                     text += e.index == 0 ? fmt::format("    gap, {} bit\n", e.bits)
-                                         : fmt::format("    {:04X}:{:X} {}, {} bit  {}\n", e.index, e.sub,
-                                             ethercat::sii::type_name(e.type), e.bits, e.name);
+                                         : fmt::format("    {:04X}:{:X} {}, {} bit  {}\n", e.index, e.sub, ethercat::sii::type_name(e.type),
+                                                       e.bits, e.name);
                     json += fmt::format(R"({}{{"index":{},"sub":{},"bits":{},"name":{}}})", i == 0 ? "" : ",", e.index, e.sub, e.bits,
-                        json_string(e.name));
+                                        json_string(e.name));
                 }
                 json += "]}";
             }
@@ -112,9 +110,13 @@ int run_ethercat_config(const EthercatOptions& options) {
         if (const std::string problem = write_file(*path, *contents); !problem.empty()) return fail(options, problem);
     if (options.json)
         return print(fmt::format("{{\"configuration\":{},\"netlist\":{},\"slaves\":{}}}\n", json_string(file), json_string(netlist),
-            wire.size())) ? 0 : 1;
+                                 wire.size()))
+                   ? 0
+                   : 1;
     return print(fmt::format("{} and {} written, {} slave{}; next: hal run {}\n", file, netlist, wire.size(), wire.size() == 1 ? "" : "s",
-        netlist)) ? 0 : 1;
+                             netlist))
+               ? 0
+               : 1;
 }
 
 int run_ethercat_dc(const EthercatOptions& options) {
@@ -135,8 +137,7 @@ int run_ethercat_dc(const EthercatOptions& options) {
         const auto magnitude = static_cast<std::int64_t>(raw & 0x7fffffff), deviation = raw >> 31 != 0 ? -magnitude : magnitude;
         const bool sync = activation && ((*activation)[0] & 0x01) != 0;
         text += fmt::format("{}  deviation {} ns  delay {} ns  SYNC {}  {}\n", n, deviation, ethercat::get<std::uint32_t>(delay->data()),
-            sync ? "on" : "off",
-                            wire.name(n));
+                            sync ? "on" : "off", wire.name(n));
         json += fmt::format(R"({}{{"position":{},"deviation_ns":{},"delay_ns":{},"sync":{}}})", json.empty() ? "[" : ",\n ", n, deviation,
                             ethercat::get<std::uint32_t>(delay->data()), sync);
     }
@@ -156,19 +157,19 @@ int run_ethercat_check(const EthercatCheckOptions& options) {
             const std::size_t slaves = bus.setup.slaves.size();
             if (options.json)
                 json += fmt::format(R"({}{{"file":{},"link":{},"cycle_ns":{},"slaves":{}}})", json.empty() ? "[" : ",\n ",
-                    json_string(file),
-                                    json_string(bus.link), bus.setup.cycle_ns, slaves);
+                                    json_string(file), json_string(bus.link), bus.setup.cycle_ns, slaves);
             else if (!print(fmt::format("{}: {}, cycle {} us, {} slave{}\n{}", file, bus.link,
-                static_cast<double>(bus.setup.cycle_ns) / 1000, slaves,
-                                        slaves == 1 ? "" : "s", pin_lines(bus, "  ")))) return 1;
+                                        static_cast<double>(bus.setup.cycle_ns) / 1000, slaves, slaves == 1 ? "" : "s",
+                                        pin_lines(bus, "  "))))
+                return 1;
         }
     }
     return !options.json || print((json.empty() ? "[" : json) + "]\n") ? status : 1;
 }
 
 int run_ethercat_plan(const EthercatPlanOptions& options) {
-    if (options.words.size() != 1) return fail(options, fmt::format("nothing is expected at '{}'; see: hal help ethercat plan",
-        options.words[1]));
+    if (options.words.size() != 1)
+        return fail(options, fmt::format("nothing is expected at '{}'; see: hal help ethercat plan", options.words[1]));
     config::Reading reading;
     if (!read_bus_file(options, options.words[0], reading)) return 1;
     std::string text, json;
@@ -177,9 +178,9 @@ int run_ethercat_plan(const EthercatPlanOptions& options) {
         const config::Plan p = config::plan(bus);
         fits = fits && p.fits;
         text += p.text;
-        json += fmt::format(R"({}{{"frames":{},"frame_bytes":{},"wire_ns":{},"propagation_ns":{},"cycle_ns":{},"shortest_cycle_ns":{},)",
-                            json.empty() ? "[" : ",\n ", p.frames, p.frame_bytes, p.wire_ns, p.propagation_ns, p.cycle_ns,
-                                p.shortest_cycle_ns);
+        json +=
+            fmt::format(R"({}{{"frames":{},"frame_bytes":{},"wire_ns":{},"propagation_ns":{},"cycle_ns":{},"shortest_cycle_ns":{},)",
+                        json.empty() ? "[" : ",\n ", p.frames, p.frame_bytes, p.wire_ns, p.propagation_ns, p.cycle_ns, p.shortest_cycle_ns);
         json += fmt::format(R"("input_to_output_ns":{},"load":{:.4f},"fits":{}}})", p.input_to_output_ns, p.load, p.fits);
     }
     if (!print(options.json ? (json.empty() ? "[" : json) + "]\n" : text)) return 1;

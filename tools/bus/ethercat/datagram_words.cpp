@@ -24,17 +24,36 @@ struct RegisterName {
     std::uint16_t first, last;
     const char* name;
 };
-constexpr RegisterName names[] = {
-    {0x0000, 0x000f, "ESC information"}, {0x0010, 0x0011, "station address"}, {0x0012, 0x0013, "station alias"}, {0x0100, 0x0103, "DL control"},
-    {0x0110, 0x0111, "DL status"}, {0x0120, 0x0121, "AL control"}, {0x0130, 0x0133, "AL status"}, {0x0134, 0x0135, "AL status code"},
-    {0x0140, 0x0151, "PDI"}, {0x0200, 0x0201, "ECAT event mask"}, {0x0204, 0x0207, "AL event mask"}, {0x0210, 0x0211, "ECAT event"},
-    {0x0220, 0x0223, "AL event"}, {0x0300, 0x0313, "error counters"}, {0x0400, 0x0443, "watchdog"}, {0x0500, 0x050f, "EEPROM"},
-    {0x0600, 0x06ff, "FMMU"}, {0x0800, 0x087f, "sync manager"}, {0x0900, 0x090f, "DC receive times"}, {0x0910, 0x0917, "DC system time"},
-    {0x0918, 0x091f, "DC receive time"}, {0x0920, 0x0927, "DC system time offset"}, {0x0928, 0x092b, "DC transmission delay"},
-    {0x092c, 0x092f, "DC system time difference"}, {0x0930, 0x0935, "DC control loop"}, {0x0980, 0x09af, "DC SYNC"}};
+constexpr RegisterName names[] = {{0x0000, 0x000f, "ESC information"},
+                                  {0x0010, 0x0011, "station address"},
+                                  {0x0012, 0x0013, "station alias"},
+                                  {0x0100, 0x0103, "DL control"},
+                                  {0x0110, 0x0111, "DL status"},
+                                  {0x0120, 0x0121, "AL control"},
+                                  {0x0130, 0x0133, "AL status"},
+                                  {0x0134, 0x0135, "AL status code"},
+                                  {0x0140, 0x0151, "PDI"},
+                                  {0x0200, 0x0201, "ECAT event mask"},
+                                  {0x0204, 0x0207, "AL event mask"},
+                                  {0x0210, 0x0211, "ECAT event"},
+                                  {0x0220, 0x0223, "AL event"},
+                                  {0x0300, 0x0313, "error counters"},
+                                  {0x0400, 0x0443, "watchdog"},
+                                  {0x0500, 0x050f, "EEPROM"},
+                                  {0x0600, 0x06ff, "FMMU"},
+                                  {0x0800, 0x087f, "sync manager"},
+                                  {0x0900, 0x090f, "DC receive times"},
+                                  {0x0910, 0x0917, "DC system time"},
+                                  {0x0918, 0x091f, "DC receive time"},
+                                  {0x0920, 0x0927, "DC system time offset"},
+                                  {0x0928, 0x092b, "DC transmission delay"},
+                                  {0x092c, 0x092f, "DC system time difference"},
+                                  {0x0930, 0x0935, "DC control loop"},
+                                  {0x0980, 0x09af, "DC SYNC"}};
 
 const char* register_name(std::uint16_t address) {
-    const auto found = std::find_if(std::begin(names), std::end(names), [&](const RegisterName& r) { return address >= r.first && address <= r.last; });
+    const auto found =
+        std::find_if(std::begin(names), std::end(names), [&](const RegisterName& r) { return address >= r.first && address <= r.last; });
     return found == std::end(names) ? "" : found->name;
 }
 
@@ -51,7 +70,8 @@ std::string sdo_words(Bytes payload, bool request) {
     if (!sdo) return "SDO";
     namespace command = coe::command;
     const std::string name = object(sdo->index, sdo->sub) + (sdo->complete() ? ", complete access" : "");
-    if (sdo->is(command::abort)) return fmt::format("SDO abort {}: 0x{:08X}, {}", object(sdo->index, sdo->sub), sdo->value, coe::abort_text(sdo->value));
+    if (sdo->is(command::abort))
+        return fmt::format("SDO abort {}: 0x{:08X}, {}", object(sdo->index, sdo->sub), sdo->value, coe::abort_text(sdo->value));
     if (request) {
         if (sdo->is(command::download)) return "SDO download " + name;
         if (sdo->is(command::upload)) return "SDO upload " + name;
@@ -113,12 +133,22 @@ std::string mailbox_words(Bytes bytes) {
 std::string datagram_address(const DatagramView& d, bool passed) {
     switch (d.command) {
     case Command::nop: return "";
-    case Command::aprd: case Command::apwr: case Command::aprw: case Command::armw:
+    case Command::aprd:
+    case Command::apwr:
+    case Command::aprw:
+    case Command::armw:
         if (passed) return fmt::format("position of 0x{:04X}", d.position());
         return fmt::format("slave {}", static_cast<std::uint16_t>(-static_cast<int>(d.position())));
-    case Command::fprd: case Command::fpwr: case Command::fprw: case Command::frmw: return fmt::format("station 0x{:04X}", d.position());
-    case Command::brd: case Command::bwr: case Command::brw: return "all slaves";
-    case Command::lrd: case Command::lwr: case Command::lrw: return fmt::format("logical 0x{:08X}", d.address);
+    case Command::fprd:
+    case Command::fpwr:
+    case Command::fprw:
+    case Command::frmw: return fmt::format("station 0x{:04X}", d.position());
+    case Command::brd:
+    case Command::bwr:
+    case Command::brw: return "all slaves";
+    case Command::lrd:
+    case Command::lwr:
+    case Command::lrw: return fmt::format("logical 0x{:08X}", d.address);
     }
     return "";
 }
@@ -128,7 +158,8 @@ std::string datagram_words(const DatagramView& d) {
     const std::uint16_t address = d.register_address();
     if (address >= registers::process_data_memory) return mailbox_words({d.data, d.length});
     std::string text = register_name(address);
-    if (address == registers::al_control && d.length >= 1) text += ": " + state_name(d.data[0] & 0x0fU) + ((d.data[0] & 0x10) != 0 ? ", acknowledge" : "");
+    if (address == registers::al_control && d.length >= 1)
+        text += ": " + state_name(d.data[0] & 0x0fU) + ((d.data[0] & 0x10) != 0 ? ", acknowledge" : "");
     if (address == registers::al_status && d.length >= 1) {
         text += ": " + state_name(d.data[0]);
         const std::uint16_t code = d.length >= 6 ? get<std::uint16_t>(d.data + 4) : 0;
@@ -137,8 +168,10 @@ std::string datagram_words(const DatagramView& d) {
             text += fmt::format(" 0x{:04X}{}{}", code, row == nullptr ? "" : ", ", row == nullptr ? "" : row->text);
         }
     }
-    if (address >= registers::sync_manager && address < 0x0880 && d.length < 8 * 9) text += fmt::format(" {}", (address - registers::sync_manager) / 8);
-    if (address >= registers::sync_manager && address < 0x0880 && address % 8 == 5 && d.length == 1) text += (d.data[0] & 0x08) != 0 ? ", full" : ", empty";
+    if (address >= registers::sync_manager && address < 0x0880 && d.length < 8 * 9)
+        text += fmt::format(" {}", (address - registers::sync_manager) / 8);
+    if (address >= registers::sync_manager && address < 0x0880 && address % 8 == 5 && d.length == 1)
+        text += (d.data[0] & 0x08) != 0 ? ", full" : ", empty";
     if (address >= registers::fmmu && address < 0x0700) text += fmt::format(" {}", (address - registers::fmmu) / 16);
     if (address == registers::dc_system_time && d.length == 8) text += fmt::format(": {} ns", get<std::uint64_t>(d.data));
     return text;

@@ -51,8 +51,8 @@ private:
     bool wanted(const DatagramView& d, const std::string& words, const std::string& address) const {
         const auto contains = [&](const std::string& text) {
             return std::search(text.begin(), text.end(), options_.filter.begin(), options_.filter.end(), [](char a, char b) {
-                       return std::tolower(static_cast<unsigned char>(a)) == std::tolower(static_cast<unsigned char>(b));
-                   }) != text.end();
+                return std::tolower(static_cast<unsigned char>(a)) == std::tolower(static_cast<unsigned char>(b));
+            }) != text.end();
         };
         return options_.filter.empty() || contains(to_string(d.command)) || contains(words) || contains(address);
     }
@@ -61,16 +61,18 @@ private:
         std::string bytes;
         for (std::size_t i = 0; i < std::min<std::size_t>(d.length, most_bytes); ++i) bytes += fmt::format(" {:02X}", d.data[i]);
         if (d.length > most_bytes) bytes += " …";
-        std::string text = fmt::format("{:12.6f}  {}  {:4} {}{}  [{}]{}  WKC {}", seconds(time_ns), passed ? "<-" : "->", to_string(d.command), address, place,
-                                       d.length, bytes, d.wkc());
+        std::string text = fmt::format("{:12.6f}  {}  {:4} {}{}  [{}]{}  WKC {}", seconds(time_ns), passed ? "<-" : "->",
+                                       to_string(d.command), address, place, d.length, bytes, d.wkc());
         if (!words.empty()) text += "  " + words;
         return text + "\n";
     }
     std::string json(std::int64_t time_ns, bool passed, const DatagramView& d, const std::string& words) const {
-        return fmt::format(R"({{"time_s":{:.6f},"returned":{},"command":"{}","address":{},"register":{},"length":{},"wkc":{},"data":"{}","meaning":{}}})"
-                           "\n", seconds(time_ns), passed, to_string(d.command), is_logical(d.command) ? d.address : d.position(),
-                           is_logical(d.command) ? "null" : std::to_string(d.register_address()), d.length, d.wkc(),
-                           hex_words({d.data, d.length}), words.empty() ? "null" : json_string(words));
+        return fmt::format(
+            R"({{"time_s":{:.6f},"returned":{},"command":"{}","address":{},"register":{},"length":{},"wkc":{},"data":"{}","meaning":{}}})"
+            "\n",
+            seconds(time_ns), passed, to_string(d.command), is_logical(d.command) ? d.address : d.position(),
+            is_logical(d.command) ? "null" : std::to_string(d.register_address()), d.length, d.wkc(), hex_words({d.data, d.length}),
+            words.empty() ? "null" : json_string(words));
     }
 
     const EthercatDumpOptions& options_;
@@ -85,7 +87,8 @@ int dump_file(const EthercatDumpOptions& options, const std::string& file) {
     for (ethernet::Captured frame : capture.frames)
         if (!dump.frame(frame.time_ns, frame.bytes)) break;
     if (!capture.problem.empty()) return fail(options, fmt::format("{}: {}", file, capture.problem));
-    if (dump.frames() == 0) return fail(options, fmt::format("{}: none of its {} frames is an EtherCAT frame", file, capture.frames.size()));
+    if (dump.frames() == 0)
+        return fail(options, fmt::format("{}: none of its {} frames is an EtherCAT frame", file, capture.frames.size()));
     return 0;
 }
 
@@ -96,7 +99,10 @@ int run_ethercat_dump(const EthercatDumpOptions& options) {
     const std::string& what = options.words.front();
     if (std::filesystem::is_regular_file(what) || what.ends_with(".pcapng") || what.ends_with(".pcap")) return dump_file(options, what);
     if (ethernet::describe(what).in_memory)
-        return fail(options, fmt::format("'{}' is a segment in memory, which belongs to another process; record it with the component segment_record", what));
+        return fail(
+            options,
+            fmt::format("'{}' is a segment in memory, which belongs to another process; record it with the component segment_record",
+                        what));
     ethernet::Options how;
     how.types = {ethertype};
     how.promiscuous = true;
@@ -119,7 +125,9 @@ int run_ethercat_dump(const EthercatDumpOptions& options) {
     }
     const std::uint64_t lost = opened.port->statistics().lost;
     if (lost != 0) write_all(2, fmt::format("{} frames were lost here: the output could not keep up; use --filter\n", lost));
-    if (dump.frames() == 0) return fail(options, fmt::format("no EtherCAT frame arrived on {} within {:.1f} s", what, static_cast<double>(monotonic_ns() - began) / 1e9));
+    if (dump.frames() == 0)
+        return fail(options, fmt::format("no EtherCAT frame arrived on {} within {:.1f} s", what,
+                                         static_cast<double>(monotonic_ns() - began) / 1e9));
     return 0;
 }
 

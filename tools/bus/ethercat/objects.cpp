@@ -48,9 +48,7 @@ bool transfer_file(const EthercatPositionOptions& options, EthercatSession& sess
     if (finished && request.result.outcome == Outcome::aborted)
         why = fmt::format("the slave ends the transfer with FoE error 0x{:04X} ({}){}{}", request.result.abort,
                           ethercat::foe::to_string(static_cast<ethercat::foe::Error>(request.result.abort)),
-                          progress.text[0] != '\0' ? ": "
-            : "",
-                          progress.text.data());
+                          progress.text[0] != '\0' ? ": " : "", progress.text.data());
     else if (finished && request.result.outcome == Outcome::timed_out) why = "no answer from its mailbox; see: hal ethercat states";
     else if (finished && request.result.outcome == Outcome::lost) why = "it no longer responds; check its supply and cable";
     else if (finished) why = s.mailbox.usable() ? "rejected by the mailbox" : "the slave has no mailbox";
@@ -106,8 +104,7 @@ int run_ethercat_foe_read(const EthercatPositionOptions& options) {
     if (s == nullptr) return 1;
     std::vector<std::uint8_t> bytes(std::size_t{16} << 20);
     if (!transfer_file(options, session, *s, false, session.arguments()[0], bytes)) return 1;
-    if (options.json)
-        return print(fmt::format("{{\"position\":{},\"bytes\":{}}}\n", s->position, json_string(hex_words(bytes)))) ? 0 : 1;
+    if (options.json) return print(fmt::format("{{\"position\":{},\"bytes\":{}}}\n", s->position, json_string(hex_words(bytes)))) ? 0 : 1;
     if (::isatty(STDOUT_FILENO) != 0) return fail(options, "the file may be binary; redirect it: > FILE");
     return print(std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size())) ? 0 : 1;
 }

@@ -32,9 +32,7 @@ struct EthercatPositionOptions : EthercatOptions {
     int position = -1;  ///< -1: not given
 
     void declare(OptionSet& set) override {
-        set.words("ADDRESS ARG",
-                  "eth:enp3s0, not with --emulate; then the arguments of the command: numbers in decimal, 0x… or 0…",
-                  false);
+        set.words("ADDRESS ARG", "eth:enp3s0, not with --emulate; then the arguments of the command: numbers in decimal, 0x… or 0…", false);
         declare_bus(set);
         set.value("-p,--position", position, "N", "position of the slave, counted from 0; not needed for a single slave").in(0, 65535);
     }
@@ -46,8 +44,7 @@ struct EthercatValueOptions : EthercatPositionOptions {
 
     void declare(OptionSet& set) override {
         EthercatPositionOptions::declare(set);
-        set.value("-t,--type", type, "TYPE",
-                  "type of the value: bool, int8 … int64, uint8 … uint64, float, double, string, octet_string");
+        set.value("-t,--type", type, "TYPE", "type of the value: bool, int8 … int64, uint8 … uint64, float, double, string, octet_string");
     }
 };
 

@@ -32,8 +32,7 @@ std::string pdo_xml(const ethercat::sii::Pdo& pdo, const char* element) {
         text += fmt::format("          <Entry><Index>#x{:04X}</Index>", e.index);
         if (e.index != 0) text += fmt::format("<SubIndex>{}</SubIndex>", e.sub);
         text += fmt::format("<BitLen>{}</BitLen>", e.bits);
-        if (e.index != 0)
-            text += fmt::format("<Name>{}</Name><DataType>{}</DataType>", escaped(e.name), ethercat::sii::type_name(e.type));
+        if (e.index != 0) text += fmt::format("<Name>{}</Name><DataType>{}</DataType>", escaped(e.name), ethercat::sii::type_name(e.type));
         text += "</Entry>\n";
     }
     return text + fmt::format("        </{}>\n", element);
@@ -41,8 +40,10 @@ std::string pdo_xml(const ethercat::sii::Pdo& pdo, const char* element) {
 
 std::string device_xml(const ethercat::sii::Contents& c) {
     constexpr const char* sm_words[] = {"", "MBoxOut", "MBoxIn", "Outputs", "Inputs"};
-    std::string text = fmt::format("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<EtherCATInfo>\n  <Vendor><Id>#x{:X}</Id></Vendor>\n"
-                                   "  <Descriptions>\n    <Devices>\n      <Device>\n", c.vendor);
+    std::string text = fmt::format(
+        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<EtherCATInfo>\n  <Vendor><Id>#x{:X}</Id></Vendor>\n"
+        "  <Descriptions>\n    <Devices>\n      <Device>\n",
+        c.vendor);
     text += fmt::format("        <Type ProductCode=\"#x{:08X}\" RevisionNo=\"#x{:08X}\">{}</Type>\n        <Name>{}</Name>\n", c.product,
                         c.revision, escaped(c.general.order.empty() ? c.general.name : c.general.order), escaped(c.general.name));
     for (const auto& sm : c.sync_managers) {
@@ -59,8 +60,8 @@ std::string device_xml(const ethercat::sii::Contents& c) {
         if ((c.protocols & ethercat::sii::coe) != 0) {
             const auto flag = [&](std::uint8_t bit) { return (c.general.coe_details & bit) != 0 ? 1 : 0; };
             text += fmt::format("          <CoE SdoInfo=\"{}\" PdoAssign=\"{}\" PdoConfig=\"{}\" CompleteAccess=\"{}\"/>\n",
-                                flag(ethercat::sii::coe_sdo_info), flag(ethercat::sii::coe_pdo_assign),
-                                flag(ethercat::sii::coe_pdo_config), flag(ethercat::sii::coe_complete_access));
+                                flag(ethercat::sii::coe_sdo_info), flag(ethercat::sii::coe_pdo_assign), flag(ethercat::sii::coe_pdo_config),
+                                flag(ethercat::sii::coe_complete_access));
         }
         if ((c.protocols & ethercat::sii::foe) != 0) text += "          <FoE/>\n";
         if ((c.protocols & ethercat::sii::soe) != 0) text += "          <SoE/>\n";
@@ -98,10 +99,11 @@ std::string topology_svg(EthercatWire& wire) {
         text += fmt::format("<text x=\"{}\" y=\"{}\">{}{}{}</text>\n", x + 8, y + 33, ethercat::to_string(s.state),
                             s.al_failed ? " + error" : "", s.has_dc() ? fmt::format(", delay {} ns", s.delay_ns) : "");
     }
-    return fmt::format("<svg xmlns=\"http://www.w3.org/2000/svg\" "
-                       "width=\"{}\" height=\"{}\" font-family=\"sans-serif\" font-size=\"12\">\n",
-                       2 * margin + deepest * step + box_width, margin + wire.size() * row) +
-        text + "</svg>\n";
+    return fmt::format(
+               "<svg xmlns=\"http://www.w3.org/2000/svg\" "
+               "width=\"{}\" height=\"{}\" font-family=\"sans-serif\" font-size=\"12\">\n",
+               2 * margin + deepest * step + box_width, margin + wire.size() * row) +
+           text + "</svg>\n";
 }
 
 }  // namespace

@@ -23,13 +23,14 @@ std::optional<std::size_t> write_image(const EthercatPositionOptions& options, E
         if (image[n] == (*before)[n] && image[n + 1] == (*before)[n + 1]) continue;
         if (!wire.write_sii(position, static_cast<std::uint32_t>(n / 2), static_cast<std::uint16_t>(image[n] | image[n + 1] << 8)))
             return fail(options, fmt::format("slave {}: word 0x{:X} of its EEPROM is not writable after {} words; is it write-protected?",
-                position, n / 2,
-                                             count)), std::nullopt;
+                                             position, n / 2, count)),
+                   std::nullopt;
         ++count;
     }
     if (wire.sii(position, image.size()) != image)
         return fail(options, fmt::format("slave {}: the EEPROM does not contain what was written; write it again before switching it off",
-            position)), std::nullopt;
+                                         position)),
+               std::nullopt;
     return count;
 }
 
@@ -42,16 +43,18 @@ int run_ethercat_reg_read(const EthercatPositionOptions& options) {
     const auto address = ethercat_number(words.empty() ? "" : words[0], 0xffff);
     const auto length = words.size() == 2 ? ethercat_number(words[1], ethercat::largest_datagram_data) : std::optional<std::uint64_t>(2);
     if (words.size() > 2 || !address || !length || *length == 0)
-        return fail(options, "type: hal ethercat reg-read ADDRESS -p N REGISTER [BYTES]; "
-                             "registers are 0..0xffff, at most 1486 bytes (default 2)");
+        return fail(options,
+                    "type: hal ethercat reg-read ADDRESS -p N REGISTER [BYTES]; "
+                    "registers are 0..0xffff, at most 1486 bytes (default 2)");
     const auto* s = wire.chosen(options);
     if (s == nullptr) return 1;
     const auto bytes = wire.read(s->position, static_cast<std::uint16_t>(*address), static_cast<std::uint16_t>(*length));
     if (!bytes)
         return fail(options, fmt::format("slave {}: no answer to a read of register 0x{:04X}, {} bytes; does the device have it?",
-            s->position, *address, *length));
-    if (options.json) return print(fmt::format("{{\"position\":{},\"register\":{},\"bytes\":\"{}\"}}\n", s->position, *address,
-        hex_words(*bytes))) ? 0 : 1;
+                                         s->position, *address, *length));
+    if (options.json)
+        return print(fmt::format("{{\"position\":{},\"register\":{},\"bytes\":\"{}\"}}\n", s->position, *address, hex_words(*bytes))) ? 0
+                                                                                                                                      : 1;
     return print(hex_words(*bytes) + "\n") ? 0 : 1;
 }
 
@@ -68,14 +71,16 @@ int run_ethercat_reg_write(const EthercatPositionOptions& options) {
         if (good) bytes.push_back(static_cast<std::uint8_t>(*byte));
     }
     if (!good)
-        return fail(options, "type: hal ethercat reg-write ADDRESS -p N REGISTER BYTE…; "
-                             "registers are 0..0xffff, bytes 0..255, the lowest first");
+        return fail(options,
+                    "type: hal ethercat reg-write ADDRESS -p N REGISTER BYTE…; "
+                    "registers are 0..0xffff, bytes 0..255, the lowest first");
     const auto* s = wire.chosen(options);
     if (s == nullptr) return 1;
     if (!wire.write(s->position, static_cast<std::uint16_t>(*address), bytes))
         return fail(options, fmt::format("slave {}: register 0x{:04X}, {} bytes, is not writable", s->position, *address, bytes.size()));
     return !options.json || print(fmt::format("{{\"position\":{},\"register\":{},\"written\":{}}}\n", s->position, *address, bytes.size()))
-        ? 0 : 1;
+               ? 0
+               : 1;
 }
 
 int run_ethercat_sii_read(const EthercatPositionOptions& options) {
@@ -98,8 +103,8 @@ int run_ethercat_sii_write(const EthercatPositionOptions& options) {
     const std::vector<std::uint8_t> image((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
     constexpr std::size_t least = 128, most = 128 * 1024;
     if (image.size() < least || image.size() > most || image.size() % 2 != 0)
-        return fail(options, fmt::format("'{}' has {} bytes; an SII image has an even number of 128 to 131072", options.words.back(),
-            image.size()));
+        return fail(options,
+                    fmt::format("'{}' has {} bytes; an SII image has an even number of 128 to 131072", options.words.back(), image.size()));
     const auto contents = ethercat::sii::parse(image);
     if (!contents.checksum_valid)
         return fail(options, fmt::format("'{}' is not an SII image: its checksum is wrong; nothing was written", options.words.back()));
@@ -110,8 +115,7 @@ int run_ethercat_sii_write(const EthercatPositionOptions& options) {
     const std::size_t space = wire.contents(s->position).eeprom_bytes;
     if (space != 0 && image.size() > space)
         return fail(options, fmt::format("'{}' has {} bytes, the EEPROM of slave {} only {}; nothing was written", options.words.back(),
-            image.size(),
-                                         s->position, space));
+                                         image.size(), s->position, space));
     const auto count = write_image(options, wire, s->position, image);
     if (!count) return 1;
     if (options.json) return print(fmt::format("{{\"position\":{},\"words\":{}}}\n", s->position, *count)) ? 0 : 1;
@@ -136,7 +140,8 @@ int run_ethercat_alias(const EthercatPositionOptions& options) {
     if (!write_image(options, wire, s->position, *image)) return 1;
     if (options.json) return print(fmt::format("{{\"position\":{},\"alias\":{},\"before\":{}}}\n", s->position, *alias, before)) ? 0 : 1;
     return print(fmt::format("slave {}: alias {}, before {}; it has it after it was switched off and on\n", s->position, *alias, before))
-        ? 0 : 1;
+               ? 0
+               : 1;
 }
 
 }  // namespace hal::tools

@@ -42,10 +42,12 @@ bool EthercatSession::open(const EthercatOptions& options) {
     if (!until([&] { return master_->status().scanned; }, 2 * second)) {
         const auto& status = master_->status();
         if (status.responding == 0)
-            return fail(options, fmt::format("no slave responds on {}; check cable and supply, and that it is the right interface",
-                address)), false;
+            return fail(options,
+                        fmt::format("no slave responds on {}; check cable and supply, and that it is the right interface", address)),
+                   false;
         return fail(options, fmt::format("{} slaves respond on {}, but they could not be identified within 2 s; check the cables",
-            status.responding, address)), false;
+                                         status.responding, address)),
+               false;
     }
     until([&] {
         for (std::size_t n = 0; n < size(); ++n)
@@ -75,8 +77,9 @@ BusSlave* EthercatSession::chosen(const EthercatPositionOptions& options) {
         return fail(options, fmt::format("{} slaves on the bus; choose one with -p 0 … -p {}", size(), size() - 1)), nullptr;
     const auto position = static_cast<std::size_t>(options.position < 0 ? 0 : options.position);
     if (position >= size())
-        return fail(options, fmt::format("no slave at position {}; the bus has {}, the last one at position {}", position, size(),
-            size() - 1)), nullptr;
+        return fail(options,
+                    fmt::format("no slave at position {}; the bus has {}, the last one at position {}", position, size(), size() - 1)),
+               nullptr;
     return &slave(position);
 }
 

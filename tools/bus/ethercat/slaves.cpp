@@ -33,33 +33,38 @@ int list(const EthercatOptions& options, EthercatWire& wire, Line line, Member m
         const BusSlave& s = wire.slave(n);
         if (options.json)
             text += fmt::format("{}{{\"position\":{},\"state\":{},\"error\":{}{}}}", n == 0 ? "[" : ",\n ", n,
-                json_string(ethercat::to_string(s.state)),
-                                s.al_failed ? json_string(error_of(s)) : "null", member(s));
+                                json_string(ethercat::to_string(s.state)), s.al_failed ? json_string(error_of(s)) : "null", member(s));
         else text += line(s) + "\n";
     }
     return print(text + (options.json ? "]\n" : "")) ? 0 : 1;
 }
 
-std::string state_column(const BusSlave& s) { return fmt::format("{:<4} {}{}{}", s.position, ethercat::to_string(s.state), s.al_failed
-    ? "  " : "", error_of(s)); }
+std::string state_column(const BusSlave& s) {
+    return fmt::format("{:<4} {}{}{}", s.position, ethercat::to_string(s.state), s.al_failed ? "  " : "", error_of(s));
+}
 
 std::optional<State> state_named(const std::string& text) {
     std::string plain;
     for (const char c : text)
         if (c != '-') plain += static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
-    constexpr std::pair<const char*, State> names[] = {{"INIT", State::init}, {"PREOP", State::preop}, {"BOOT", State::boot},
-                                                       {"SAFEOP", State::safeop}, {"OP", State::op}};
+    constexpr std::pair<const char*, State> names[] = {
+        {"INIT", State::init}, {"PREOP", State::preop}, {"BOOT", State::boot}, {"SAFEOP", State::safeop}, {"OP", State::op}};
     for (const auto& [name, state] : names)
         if (plain == name) return state;
     return std::nullopt;
 }
 
 bool set_sync_manager(EthercatWire& wire, const BusSlave& s, unsigned number, std::uint16_t start, std::size_t length,
-    std::uint8_t control) {
+                      std::uint8_t control) {
     const auto bytes = static_cast<std::uint16_t>(length);
-    const std::uint8_t values[8] = {static_cast<std::uint8_t>(start), static_cast<std::uint8_t>(start >> 8),
-        static_cast<std::uint8_t>(bytes),
-                                    static_cast<std::uint8_t>(bytes >> 8), control, 0, static_cast<std::uint8_t>(bytes != 0 ? 1 : 0), 0};
+    const std::uint8_t values[8] = {static_cast<std::uint8_t>(start),
+                                    static_cast<std::uint8_t>(start >> 8),
+                                    static_cast<std::uint8_t>(bytes),
+                                    static_cast<std::uint8_t>(bytes >> 8),
+                                    control,
+                                    0,
+                                    static_cast<std::uint8_t>(bytes != 0 ? 1 : 0),
+                                    0};
     return wire.write(s.position, reg::sync_manager_at(number), values);
 }
 
@@ -133,8 +138,8 @@ int run_ethercat_scan(const EthercatOptions& options) {
         if (s.parent >= 0) text += fmt::format("  at port {} of slave {}", s.parent_port, s.parent);
         return text + (s.has_dc() ? fmt::format("  delay {} ns", s.delay_ns) : "  no clock");
     }, [&](const BusSlave& s) {
-        const std::string parent = s.parent >= 0 ? fmt::format("{},\"parent_port\":{}", s.parent, s.parent_port)
-            : "null,\"parent_port\":null";
+        const std::string parent =
+            s.parent >= 0 ? fmt::format("{},\"parent_port\":{}", s.parent, s.parent_port) : "null,\"parent_port\":null";
         return fmt::format(R"(,"name":{},"parent":{},"delay_ns":{})", json_string(wire.name(s.position)), parent,
                            s.has_dc() ? fmt::format("{}", s.delay_ns) : "null");
     });
@@ -147,20 +152,18 @@ int run_ethercat_slaves(const EthercatOptions& options) {
     return list(options, wire, [&](const BusSlave& s) {
         if (s.alias != 0) alias = s.alias, behind = 0;
         else if (s.position != 0) ++behind;
-        return fmt::format("{:<4} {:>5}:{:<3} {:<8} {} {}", s.position, alias, behind, ethercat::to_string(s.state), s.al_failed ? "E"
-            : "+",
-                           wire.name(s.position));
+        return fmt::format("{:<4} {:>5}:{:<3} {:<8} {} {}", s.position, alias, behind, ethercat::to_string(s.state),
+                           s.al_failed ? "E" : "+", wire.name(s.position));
     }, [&](const BusSlave& s) {
         return fmt::format(R"(,"alias":{},"vendor":{},"product":{},"revision":{},"serial":{},"name":{})", s.alias, s.vendor, s.product,
-            s.revision,
-                           s.serial, json_string(wire.name(s.position)));
+                           s.revision, s.serial, json_string(wire.name(s.position)));
     });
 }
 
 int run_ethercat_states(const EthercatPositionOptions& options) {
     const std::size_t address_words = options.emulate.empty() ? 1 : 0;
-    if (options.words.size() > address_words + 1) return fail(options,
-        fmt::format("unexpected argument '{}'", options.words[address_words + 1]));
+    if (options.words.size() > address_words + 1)
+        return fail(options, fmt::format("unexpected argument '{}'", options.words[address_words + 1]));
     std::optional<State> target;
     if (options.words.size() == address_words + 1) {
         target = state_named(options.words.back());
@@ -174,9 +177,9 @@ int run_ethercat_states(const EthercatPositionOptions& options) {
         if (options.position >= 0 && n != static_cast<std::size_t>(options.position)) continue;
         BusSlave& s = wire.slave(n);
         if (const auto missed = bring(wire, s, *target))
-            code = fail(options, fmt::format("slave {}: {} not reached, it is in {}: {}", n, ethercat::to_string(*missed),
-                ethercat::to_string(s.state),
-                                             s.al_failed ? error_of(s) : "no answer to the request within 10 s"));
+            code = fail(options,
+                        fmt::format("slave {}: {} not reached, it is in {}: {}", n, ethercat::to_string(*missed),
+                                    ethercat::to_string(s.state), s.al_failed ? error_of(s) : "no answer to the request within 10 s"));
     }
     const int printed = list(options, wire, state_column, [](const BusSlave&) { return std::string(); });
     return code != 0 ? code : printed;
@@ -195,12 +198,11 @@ int run_ethercat_crc(const EthercatOptions& options) {
         for (unsigned port = 0; port < 4; ++port) {
             const bool used = port == s.entry_port || s.neighbour[port] >= 0;
             const unsigned invalid = (*all)[2 * port], receive = (*all)[2 * port + 1], forwarded = (*all)[8 + port],
-                lost = (*all)[16 + port];
+                           lost = (*all)[16 + port];
             if (!used && invalid + receive + forwarded + lost == 0) continue;
             text += fmt::format("{:>5} {:>4} {:>8} {:>8} {:>10} {:>12}\n", n, port, invalid, receive, forwarded, lost);
             rows += fmt::format("{}{{\"position\":{},\"port\":{},\"invalid\":{},\"receive\":{},\"forwarded\":{},\"link_losses\":{}}}",
-                rows.empty() ? "" : ",\n ", n,
-                                port, invalid, receive, forwarded, lost);
+                                rows.empty() ? "" : ",\n ", n, port, invalid, receive, forwarded, lost);
             if (invalid + receive + lost == 0) continue;  // forwarded ones happened before
             const int other = s.neighbour[port];
             std::string place = n == 0 && port == s.entry_port ? "the master" : "nothing (open now)";

@@ -31,13 +31,19 @@ struct ValueType {
     std::uint16_t coe_type;  ///< as SDO information reports it
 };
 namespace code = ethercat::coe::type;
-constexpr ValueType value_types[] = {
-    {"bool", Form::logic, 1, code::boolean}, {"int8", Form::sign, 1, code::s8}, {"int16", Form::sign, 2, code::s16},
-        {"int32", Form::sign, 4, code::s32},
-    {"int64", Form::sign, 8, code::s64}, {"uint8", Form::number, 1, code::u8}, {"uint16", Form::number, 2, code::u16},
-    {"uint32", Form::number, 4, code::u32}, {"uint64", Form::number, 8, code::u64}, {"float", Form::real, 4, code::real32},
-    {"double", Form::real, 8, code::real64}, {"string", Form::text, 0, code::visible_string},
-        {"octet_string", Form::octets, 0, code::octet_string}};
+constexpr ValueType value_types[] = {{"bool", Form::logic, 1, code::boolean},
+                                     {"int8", Form::sign, 1, code::s8},
+                                     {"int16", Form::sign, 2, code::s16},
+                                     {"int32", Form::sign, 4, code::s32},
+                                     {"int64", Form::sign, 8, code::s64},
+                                     {"uint8", Form::number, 1, code::u8},
+                                     {"uint16", Form::number, 2, code::u16},
+                                     {"uint32", Form::number, 4, code::u32},
+                                     {"uint64", Form::number, 8, code::u64},
+                                     {"float", Form::real, 4, code::real32},
+                                     {"double", Form::real, 8, code::real64},
+                                     {"string", Form::text, 0, code::visible_string},
+                                     {"octet_string", Form::octets, 0, code::octet_string}};
 
 std::uint64_t little_endian(const Bytes& bytes) {
     std::uint64_t value = 0;
@@ -59,8 +65,8 @@ std::string value_words(const Bytes& bytes, const ValueType& type, std::string& 
     }
     const std::uint64_t raw = little_endian(bytes);
     if (type.form == Form::real) {
-        const double value = type.bytes == 4 ? static_cast<double>(std::bit_cast<float>(static_cast<std::uint32_t>(raw)))
-            : std::bit_cast<double>(raw);
+        const double value =
+            type.bytes == 4 ? static_cast<double>(std::bit_cast<float>(static_cast<std::uint32_t>(raw))) : std::bit_cast<double>(raw);
         const std::string text = fmt::format("{}", value);
         if (std::isfinite(value)) plain += text;
         else json_quote(plain, text);
@@ -112,7 +118,7 @@ int fail_mailbox(const Options& options, const BusSlave& s, const std::string& w
     switch (result.outcome) {
     case Outcome::aborted:
         return fail(options, fmt::format("{}SDO transfer aborted with code 0x{:08X}: {}", who, result.abort,
-            ethercat::coe::abort_text(result.abort)));
+                                         ethercat::coe::abort_text(result.abort)));
     case Outcome::timed_out: return fail(options, who + "no answer from its mailbox; see: hal ethercat states");
     case Outcome::lost: return fail(options, who + "it no longer responds; check its supply and cable");
     default: return fail(options, who + (s.mailbox.usable() ? "rejected by the mailbox" : "the slave has no mailbox"));
@@ -121,7 +127,7 @@ int fail_mailbox(const Options& options, const BusSlave& s, const std::string& w
 
 /// Returns the type that --type names, or that the slave reports; nullptr after printing the reason.
 const ValueType* type_of(const EthercatValueOptions& options, EthercatSession& session, const BusSlave& s, std::uint16_t index,
-    std::uint8_t sub) {
+                         std::uint8_t sub) {
     if (!options.type.empty()) {
         for (const ValueType& t : value_types)
             if (options.type == t.name) return &t;
@@ -155,13 +161,13 @@ int transfer(const EthercatValueOptions& options, bool download) {
     Bytes bytes(65536);
     if (download) {
         if (const auto value = value_bytes(words[2], *type)) bytes = *value;
-        else return fail(options, fmt::format("invalid value '{}' for {}, type {}; --type selects another one", words[2], what,
-            type->name));
+        else
+            return fail(options, fmt::format("invalid value '{}' for {}, type {}; --type selects another one", words[2], what, type->name));
     }
     MailboxRequest request;
     request.kind = download ? MailboxRequest::Kind::sdo_download : MailboxRequest::Kind::sdo_upload;
     request.slave = s->number, request.index = static_cast<std::uint16_t>(*index), request.sub = static_cast<std::uint8_t>(*sub),
-        request.data = bytes;
+    request.data = bytes;
     if (!session.run(request)) return fail(options, fmt::format("slave {}: {}: not finished within 60 s", s->position, what));
     if (!request.result) return fail_mailbox(options, *s, what, request.result);
     if (!download) bytes.resize(request.result.length);
@@ -169,7 +175,9 @@ int transfer(const EthercatValueOptions& options, bool download) {
     const std::string text = value_words(bytes, *type, plain);
     if (options.json)
         return print(fmt::format("{{\"position\":{},\"index\":{},\"sub\":{},\"type\":\"{}\",\"value\":{}}}\n", s->position, *index, *sub,
-            type->name, plain)) ? 0 : 1;
+                                 type->name, plain))
+                   ? 0
+                   : 1;
     return download || print(text + "\n") ? 0 : 1;
 }
 

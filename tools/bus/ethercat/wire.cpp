@@ -37,7 +37,7 @@ std::optional<std::uint16_t> EthercatWire::exchange(Command command, std::uint32
             ethercat::FrameReader reader(*bytes);
             const auto d = reader.next();
             const bool own = d && !d->more && d->command == command && d->index == index_ && d->length == data.size() &&
-                d->register_address() == address >> 16;
+                             d->register_address() == address >> 16;
             if (!own) continue;  // of another master
             std::copy_n(d->data, d->length, data.begin());
             return d->wkc();
@@ -110,7 +110,7 @@ bool EthercatWire::write_sii(std::size_t position, std::uint32_t word, std::uint
     const std::uint8_t to_master[] = {0};
     std::vector<std::uint8_t> answer;
     return write(position, reg::eeprom_configuration, to_master) && write(position, reg::eeprom_data, value) &&
-        eeprom(position, eeprom_writes, word, answer);
+           eeprom(position, eeprom_writes, word, answer);
 }
 
 const ethercat::sii::Contents& EthercatWire::contents(std::size_t position) {
@@ -131,7 +131,7 @@ bool EthercatWire::identify(std::size_t position) {
     auto& s = slaves_[position];
     s.number = s.position = static_cast<std::uint16_t>(position);
     const auto type = read(position, reg::type, 10), station = read(position, reg::station_address, 4),
-        link = read(position, reg::dl_status, 2);
+               link = read(position, reg::dl_status, 2);
     if (!type || !station || !link) return false;
     s.present = true;
     s.fmmus = (*type)[4], s.sync_managers = (*type)[5], s.port_descriptor = (*type)[7], s.features = get<std::uint16_t>(type->data() + 8);
@@ -151,16 +151,17 @@ bool EthercatWire::open(const EthercatOptions& options, bool alone) {
     std::vector<std::uint8_t> byte(1), latch(4);
     const auto count = exchange(Command::brd, ethercat::at_position(0, reg::type), byte);
     if (!count || *count == 0)
-        return fail(options, fmt::format("no slave responds on {}; check cable and supply, and that it is the right interface",
-            address())), false;
+        return fail(options, fmt::format("no slave responds on {}; check cable and supply, and that it is the right interface", address())),
+               false;
     exchange(Command::bwr, ethercat::at_position(0, reg::dc_receive_time), latch);  // the receive times of this frame, for the delays
     slaves_.assign(*count, {});
     contents_.assign(*count, std::nullopt);
     std::vector<ethercat::master::BusSlave*> line;
     for (std::size_t n = 0; n < size(); ++n) {
         if (!identify(n))
-            return fail(options, fmt::format("{} slaves respond on {}, but slave {} stopped doing so; check its cable and supply",
-                                             size(), address(), n)), false;
+            return fail(options, fmt::format("{} slaves respond on {}, but slave {} stopped doing so; check its cable and supply", size(),
+                                             address(), n)),
+                   false;
         line.push_back(&slaves_[n]);
     }
     ethercat::master::find_tree(line);
@@ -175,7 +176,7 @@ ethercat::master::BusSlave* EthercatWire::chosen(const EthercatPositionOptions& 
     const auto position = static_cast<std::size_t>(options.position < 0 ? 0 : options.position);
     if (position >= size())
         return fail(options, fmt::format("no slave at position {}; the last one of {} is at position {}", position, size(), size() - 1)),
-            nullptr;
+               nullptr;
     return &slaves_[position];
 }
 
