@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """hal node ethercat: a line of emulated slaves on a veth pair, with our master at the other end; each is killed in turn."""
+import json
 import os
 import re
 import signal
@@ -79,6 +80,20 @@ class Line(Case):
         self.expect(dump, r"  <-  BWR  all slaves 0120  \[2\] 11 00  WKC 2  AL control: INIT, acknowledge\n")
         self.expect(dump, r"  <-  FPWR station 0x1002 0120  \[2\] 02 00  WKC 1  AL control: PRE-OP\n")
         self.assertEqual(0, self.end(dump))
+
+    def test_firmware_is_written_in_BOOT(self):
+        self.write("servo.line", "servo\nmailbox_device\n")
+        self.node()
+        (self.folder / "new").write_bytes(bytes(range(256)) * 20)
+        write = ["ethercat", "foe-write", "eth:m0", "-p", "1", "new", "firmware"]
+        self.assertIn("slave 1: file 'firmware': the slave ends the transfer with FoE error 0x8008 (allowed in BOOT only)", self.bad(*write, "--password", "0x1234"))
+        self.assertIn("slave 1: file 'firmware': the slave ends the transfer with FoE error 0x800A (no rights (wrong password))", self.bad(*write, "--boot"))
+        self.assertEqual("slave 1: 'firmware' written, 5120 bytes\n", self.good(*write, "--boot", "--password", "0x1234"))
+        self.assertRegex(self.good("ethercat", "states", "eth:m0"), r"(?m)^1 +PRE-OP$")
+        read = json.loads(self.good("ethercat", "foe-read", "eth:m0", "-p", "1", "firmware", "--boot", "--password", "0x1234", "--json"))
+        self.assertEqual(bytes(range(256)) * 20, bytes(int(b, 16) for b in read["bytes"].split()))
+        self.assertEqual("hal ethercat foe-write: slave 0: its EEPROM has no mailbox for BOOT; it takes its firmware in PRE-OP (without --boot), or by a tool of its "
+                         "maker\n", self.bad("ethercat", "foe-write", "eth:m0", "-p", "0", "new", "firmware", "--boot"))
 
     def test_watchdogs_turn_outputs_off_when_the_master_is_killed_and_a_new_one_reaches_OP(self):
         node = self.node()

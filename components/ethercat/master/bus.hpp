@@ -34,6 +34,7 @@ struct Device {
     bool         clock_set = false;  ///< offset and delay are written
     bool         synchronised = false;  ///< its clock was within the window
     bool         drifted = false;  ///< its clock is far beyond the window, while it is operational
+    bool         to_boot = false;  ///< it is to be in BOOT, for its firmware; only a slave that the setup does not name
     bool         helping = false;  ///< the task on its channel works for that of the bus
     std::int64_t began_ns = 0;  ///< of the newest start-up
     std::int64_t sync_begins_ns = 0;  ///< when its SYNC signals begin, on the clock of the cycle; 0: it has none

@@ -80,6 +80,11 @@ void Master::set_target(State target) noexcept {
         bus_->run(*d, [&] { return boot(d->channel, *bus_, *d); });
     }
 }
+void Master::set_boot(const BusSlave& slave, bool to_boot) noexcept {
+    Device& d = *bus_->devices[slave.number];
+    d.to_boot = to_boot && d.slave.configured < 0;
+    bus_->run(d, [&] { return boot(d.channel, *bus_, d); });
+}
 void Master::set_outputs_valid(bool valid) noexcept { bus_->outputs_valid = valid; }
 
 const Setup&        Master::setup() const noexcept { return bus_->setup; }

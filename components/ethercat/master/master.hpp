@@ -53,6 +53,9 @@ public:
     void set_target(State target) noexcept;
     /// Keeps slaves in SAFE-OP while false: their outputs are not valid yet. True at start. [realtime]
     void set_outputs_valid(bool valid) noexcept;
+    /// Takes a slave that the setup does not name to BOOT, where it takes its firmware by FoE, or back to PRE-OP. The slave must be idle().
+    /// [realtime]
+    void set_boot(const BusSlave& slave, bool boot) noexcept;
     /// Forgets all slaves and scans again. [realtime]
     void rescan() noexcept;
 

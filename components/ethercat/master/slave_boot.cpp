@@ -29,9 +29,13 @@ Task<bool> bring_up(Channel& c, Bus& bus, Device& d) noexcept {
     if (!ok) co_return false;
     if (done(State::init)) co_return true;
 
-    d.slave.boot_mailbox = false;
+    d.slave.boot_mailbox = d.to_boot;
     ok = co_await set_mailbox(c, bus, d);
     if (!ok) co_return false;
+    if (d.to_boot) {
+        ok = co_await request_state(c, bus, d, State::boot, t.to_preop);
+        co_return ok;
+    }
     ok = co_await request_state(c, bus, d, State::preop, t.to_preop);
     if (!ok) co_return false;
     if (config == nullptr) co_return true;  // not in the setup: stays here for tools

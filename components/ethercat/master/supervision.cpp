@@ -152,7 +152,7 @@ Task<void> check(Channel& c, Bus& bus, Device& d) noexcept {
         co_return;
     }
     const Slave* config = bus.config(d);
-    const State  last = std::min(config != nullptr ? config->target : State::preop, bus.target);
+    const State  last = d.to_boot ? State::boot : std::min(config != nullptr ? config->target : State::preop, bus.target);
     if (d.slave.state == last && !d.slave.al_failed) co_return;
     if (d.status.operational) {
         const auto status = static_cast<std::uint16_t>(static_cast<unsigned>(d.slave.state) | (d.slave.al_failed ? al_error : 0U));

@@ -107,7 +107,7 @@ TEST(EthercatMaster, Reports_a_refused_state_with_its_code_and_tries_again) {
 }
 
 TEST(EthercatMaster, Waits_for_no_state_without_a_timeout) {
-    for (const std::uint16_t state : {2, 4, 8}) {
+    for (const std::uint16_t state : std::initializer_list<std::uint16_t>{2, 4, 8}) {
         World w;
         Firmware& f = w.add(0x100);
         f.ignore = state;
@@ -267,7 +267,7 @@ TEST(EthercatMaster, Exchanges_a_slow_domain_in_every_nth_cycle_once_operational
 }
 
 TEST(EthercatStart, A_slave_without_mailbox_keeps_its_process_data_whatever_the_setup_would_map) {
-    for (const std::uint16_t bytes : {2, 3}) {
+    for (const std::uint16_t bytes : std::initializer_list<std::uint16_t>{2, 3}) {
         World w;
         w.add(0x100);
         auto setup = drives(1, bytes);

@@ -33,18 +33,19 @@ std::string access_word(std::uint16_t access) {
 }
 
 /// Transfers a file; `bytes` is read or written. Returns false after printing the reason.
-bool transfer_file(const EthercatPositionOptions& options, EthercatSession& session, const BusSlave& s, bool write, const std::string& name,
+bool transfer_file(const EthercatFileOptions& options, EthercatSession& session, BusSlave& s, bool write, const std::string& name,
                    std::vector<std::uint8_t>& bytes) {
+    if (options.boot && !session.set_boot(options, s, true)) return false;
     ethercat::master::FoeProgress progress;
     MailboxRequest request;
     request.kind = write ? MailboxRequest::Kind::foe_write : MailboxRequest::Kind::foe_read;
-    request.slave = s.number, request.name = name, request.data = bytes, request.progress = &progress;
+    request.slave = s.number, request.name = name, request.data = bytes, request.progress = &progress, request.foe.password = options.password;
     const bool finished = session.run(request);
     if (finished && request.result) {
         if (!write) bytes.resize(request.result.length);
-        return true;
+        return !options.boot || session.set_boot(options, s, false);
     }
-    std::string why = "not finished within 60 s";
+    std::string why = "no progress within 60 s";
     if (finished && request.result.outcome == Outcome::aborted)
         why = fmt::format("the slave ends the transfer with FoE error 0x{:04X} ({}){}{}", request.result.abort,
                           ethercat::foe::to_string(static_cast<ethercat::foe::Error>(request.result.abort)),
@@ -52,7 +53,9 @@ bool transfer_file(const EthercatPositionOptions& options, EthercatSession& sess
     else if (finished && request.result.outcome == Outcome::timed_out) why = "no answer from its mailbox; see: hal ethercat states";
     else if (finished && request.result.outcome == Outcome::lost) why = "it no longer responds; check its supply and cable";
     else if (finished) why = s.mailbox.usable() ? "rejected by the mailbox" : "the slave has no mailbox";
-    return fail(options, fmt::format("slave {}: file '{}': {}", s.position, name, why)), false;
+    fail(options, fmt::format("slave {}: file '{}': {}", s.position, name, why));
+    if (options.boot && finished) session.set_boot(options, s, false);
+    return false;
 }
 
 }  // namespace
@@ -96,11 +99,11 @@ int run_ethercat_sdos(const EthercatPositionOptions& options) {
     return print(options.json ? (json.empty() ? "[" : json) + "]\n" : text) ? 0 : 1;
 }
 
-int run_ethercat_foe_read(const EthercatPositionOptions& options) {
+int run_ethercat_foe_read(const EthercatFileOptions& options) {
     EthercatSession session;
     if (!session.open(options)) return 1;
     if (session.arguments().size() != 1) return fail(options, "type: hal ethercat foe-read ADDRESS -p N NAME > FILE");
-    const BusSlave* s = session.chosen(options);
+    BusSlave* s = session.chosen(options);
     if (s == nullptr) return 1;
     std::vector<std::uint8_t> bytes(std::size_t{16} << 20);
     if (!transfer_file(options, session, *s, false, session.arguments()[0], bytes)) return 1;
@@ -109,7 +112,7 @@ int run_ethercat_foe_read(const EthercatPositionOptions& options) {
     return print(std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size())) ? 0 : 1;
 }
 
-int run_ethercat_foe_write(const EthercatPositionOptions& options) {
+int run_ethercat_foe_write(const EthercatFileOptions& options) {
     const std::size_t first = options.emulate.empty() ? 1 : 0, count = options.words.size();
     if (count != first + 1 && count != first + 2) return fail(options, "type: hal ethercat foe-write ADDRESS -p N FILE [NAME]");
     std::ifstream file(options.words[first], std::ios::binary);
@@ -118,7 +121,7 @@ int run_ethercat_foe_write(const EthercatPositionOptions& options) {
     const std::string path = options.words[first], name = count == first + 2 ? options.words.back() : path.substr(path.rfind('/') + 1);
     EthercatSession session;
     if (!session.open(options)) return 1;
-    const BusSlave* s = session.chosen(options);
+    BusSlave* s = session.chosen(options);
     if (s == nullptr || !transfer_file(options, session, *s, true, name, bytes)) return 1;
     if (options.json)
         return print(fmt::format("{{\"position\":{},\"name\":{},\"bytes\":{}}}\n", s->position, json_string(name), bytes.size())) ? 0 : 1;

@@ -38,6 +38,18 @@ struct EthercatPositionOptions : EthercatOptions {
     }
 };
 
+/// Options of the commands for files.
+struct EthercatFileOptions : EthercatPositionOptions {
+    bool          boot = false;
+    std::uint32_t password = 0;
+
+    void declare(OptionSet& set) override {
+        EthercatPositionOptions::declare(set);
+        set.flag("--boot", boot, "in BOOT instead of PRE-OP: firmware");
+        set.value("--password", password, "N", "password of the file (default 0)");
+    }
+};
+
 /// Options of the commands for values.
 struct EthercatValueOptions : EthercatPositionOptions {
     std::string type;
@@ -95,8 +107,8 @@ int run_ethercat_sii_write(const EthercatPositionOptions&);
 int run_ethercat_alias(const EthercatPositionOptions&);
 int run_ethercat_pdos(const EthercatOptions&);
 int run_ethercat_sdos(const EthercatPositionOptions&);
-int run_ethercat_foe_read(const EthercatPositionOptions&);
-int run_ethercat_foe_write(const EthercatPositionOptions&);
+int run_ethercat_foe_read(const EthercatFileOptions&);
+int run_ethercat_foe_write(const EthercatFileOptions&);
 int run_ethercat_config(const EthercatOptions&);
 int run_ethercat_xml(const EthercatPositionOptions&);
 int run_ethercat_graph(const EthercatOptions&);

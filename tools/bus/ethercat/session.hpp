@@ -34,7 +34,9 @@ public:
     /// Returns the slave that --position names, or the only one; nullptr after printing the reason.
     ethercat::master::BusSlave* chosen(const EthercatPositionOptions&);
 
-    /// Serves a mailbox request; false: no time left. Its result is in the request.
+    /// Takes a slave to BOOT, or back to PRE-OP. Returns false after printing the reason.
+    bool set_boot(const EthercatOptions&, ethercat::master::BusSlave&, bool boot);
+    /// Serves a mailbox request; false: not finished within 60 s, for a file 60 s without progress. Its result is in the request.
     bool run(ethercat::master::MailboxRequest&);
 
 private:
