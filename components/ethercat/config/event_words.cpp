@@ -67,6 +67,10 @@ std::string write_words(std::int64_t object, std::int64_t code, const master::Sl
         what = std::string("IDN ") + (soe::is_product(at->index) ? "P-" : "S-") + std::to_string(soe::set_of(at->index)) + "-" +
                std::to_string(soe::number_of(at->index)) + " of drive " + std::to_string(at->sub);
         if (code != 0) why = "SoE error " + hex(code, 4) + " (" + soe::error_text(static_cast<std::uint16_t>(code)) + ")";
+    } else if (at->protocol == Protocol::aoe) {
+        what += " by AoE" + (at->port != 0 ? ", port " + std::to_string(at->port) : std::string());
+        if (code != 0 && std::string_view(coe::abort_text(static_cast<std::uint32_t>(code))).starts_with("unknown"))
+            why = "ADS error " + hex(code, 4);
     } else if (at->protocol == Protocol::reg) {
         what = "register " + hex(at->index, 4), why = "it does not answer";
     }

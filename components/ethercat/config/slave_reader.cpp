@@ -270,12 +270,11 @@ private:
 
     void writes(const SlavePdos& pdos) {
         for (Line* line : keys_.all()) {
-            const auto words = words_of({line->key.text, line->key.at});
-            if (line->used || words.size() < 2 || (words[0].text != "sdo" && words[0].text != "register" && words[0].text != "idn"))
-                continue;
-            line->used = true;
-            if (words[0].text == "idn") idn(*line, words);
-            else sdo(*line, words, pdos);
+            const auto        words = words_of({line->key.text, line->key.at});
+            const std::string what = line->used || words.size() < 2 ? "" : words[0].text;
+            if (what == "idn") line->used = true, idn(*line, words);
+            else if (what == "aoe") line->used = true, aoe(*line, words);
+            else if (what == "sdo" || what == "register") line->used = true, sdo(*line, words, pdos);
         }
     }
 
@@ -318,7 +317,16 @@ private:
         slave_.startup.push_back(std::move(w));
     }
 
-    /// `idn S-0-15 = 07 00`, `idn P-0-150 1 = 01 00`: hexadecimal bytes; the number after it is the drive's.
+    /// Adds a write of hexadecimal bytes.
+    void bytes_write(const Line& line, StartupWrite::Protocol protocol, unsigned index, unsigned sub, std::uint16_t port = 0) {
+        const auto data = esi::hex_bytes(line.value.text);
+        if (!data || data->empty()) return keys_.reject(line, "hexadecimal bytes in the order of the wire, as in 07 00");
+        StartupWrite w = write(static_cast<std::uint16_t>(index), static_cast<std::uint8_t>(sub), *data, State::safeop);
+        w.protocol = protocol, w.port = port, w.line = line.key.at.line;
+        slave_.startup.push_back(std::move(w));
+    }
+
+    /// `idn S-0-15 = 07 00`, `idn P-0-150 1 = 01 00`: the number after it is the drive's.
     void idn(const Line& line, const std::vector<Word>& words) {
         const std::string& text = words[1].text;  // lower case
         const auto         parts = list_of({text, line.key.at}, '-');
@@ -329,45 +337,29 @@ private:
             words.size() > 3)
             return report_.error(Topic::value, line.key.at, "invalid IDN '" + text + "'",
                                  "write idn S-0-15 = 07 00, or idn P-0-150 1 = 07 00 for drive 1");
-        const auto data = esi::hex_bytes(line.value.text);
-        if (!data || data->empty()) return keys_.reject(line, "hexadecimal bytes in the order of the wire, as in 07 00");
-        StartupWrite w = write(static_cast<std::uint16_t>((parts[0].text == "p" ? 0x8000U : 0U) | *set << 12 | *number),
-                               static_cast<std::uint8_t>(*drive), *data, State::safeop);
-        w.protocol = StartupWrite::Protocol::soe, w.line = line.key.at.line;
-        slave_.startup.push_back(std::move(w));
+        const unsigned product = parts[0].text == "p" ? 0x8000U : 0U;
+        bytes_write(line, StartupWrite::Protocol::soe, product | static_cast<unsigned>(*set << 12 | *number),
+                    static_cast<unsigned>(*drive));
+    }
+
+    /// `aoe 2001 = 05 00`, `aoe 8000:1 1001 = 01 00`: the number after the object is the port.
+    void aoe(const Line& line, const std::vector<Word>& words) {
+        const auto at = address(words[1].text);
+        const auto port = words.size() == 3 ? parse_natural(words[2].text) : std::optional<std::uint64_t>(0);
+        if (!at || !port || *port > 0xffff || words.size() > 3)
+            return report_.error(Topic::value, line.key.at, "invalid aoe '" + line.key.text.substr(4) + "'",
+                                 "write aoe 8000:1 1001 = 01 00");
+        bytes_write(line, StartupWrite::Protocol::aoe, at->index, at->sub, static_cast<std::uint16_t>(*port));
     }
 
     void leftover() {
-        const std::vector<std::string> all{"type",
-                                           "esi",
-                                           "device",
-                                           "axes",
-                                           "modules",
-                                           "vendor",
-                                           "product",
-                                           "revision",
-                                           "serial",
-                                           "optional",
-                                           "lrw",
-                                           "complete-access",
-                                           "entries-per-pdo",
-                                           "preop-timeout",
-                                           "op-timeout",
-                                           "mailbox-timeout",
-                                           "watchdog",
-                                           "state",
-                                           "domain",
-                                           "dc",
-                                           "sync0-cycle",
-                                           "sync1-cycle",
-                                           "sync1-shift",
-                                           "assign-activate",
-                                           "outputs",
-                                           "inputs",
-                                           "pdo-order",
-                                           "sdo",
-                                           "idn",
-                                           "register"};
+        constexpr const char* keys =
+            "type esi device axes modules vendor product revision serial optional lrw complete-access entries-per-pdo preop-timeout "
+            "op-timeout "
+            "mailbox-timeout watchdog state domain dc sync0-cycle sync1-cycle sync1-shift assign-activate outputs inputs pdo-order sdo idn "
+            "aoe register";
+        std::vector<std::string> all;
+        for (const Word& word : words_of({keys, {}})) all.push_back(word.text);
         for (const Line* line : keys_.all())
             if (!line->used)
                 report_.error(Topic::line, line->key.at, "unknown key '" + line->key.text + "' of a slave",

@@ -34,6 +34,13 @@ bool is_sdo_abort(std::span<const std::uint8_t> payload, std::uint32_t index, st
 }
 
 Task<SdoResult> CoeClient::write_other(Channel& channel, BusSlave& slave, const StartupWrite& write) noexcept {
+    if (write.protocol == StartupWrite::Protocol::aoe) {
+        AoeAddress address;
+        address.target_port = write.port;
+        const SdoResult result = co_await aoe_.write(channel, slave, address, aoe::group_sdo,
+                                                     aoe::sdo_offset(write.index, write.sub, write.complete), write.data);
+        co_return result;
+    }
     const SdoResult result = co_await soe_.write(channel, slave, write.sub, write.index, soe::element::value, write.data);
     co_return result;
 }

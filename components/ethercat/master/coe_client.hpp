@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <span>
 
+#include "ethercat/master/aoe_client.hpp"
 #include "ethercat/master/mailbox.hpp"
 #include "ethercat/master/soe_client.hpp"
 #include "ethercat/wire/coe.hpp"
@@ -60,7 +61,7 @@ public:
                            std::span<std::uint8_t> to) noexcept override;
     Task<SdoResult> download(Channel&, BusSlave&, std::uint16_t index, std::uint8_t sub, bool complete,
                              std::span<const std::uint8_t> from) noexcept override;
-    Task<SdoResult> write_other(Channel&, BusSlave&, const StartupWrite&) noexcept override;  ///< An IDN: by SoE.
+    Task<SdoResult> write_other(Channel&, BusSlave&, const StartupWrite&) noexcept override;  ///< An IDN by SoE, an object by AoE.
 
     /// Reads a list of indexes; `length` of the result counts bytes, two for each index.
     Task<MailboxResult> list(Channel&, BusSlave&, coe::List which, std::span<std::uint8_t> to) noexcept;
@@ -81,6 +82,7 @@ private:
 
     Mailboxes& mailboxes_;
     SoeClient  soe_{mailboxes_};
+    AoeClient  aoe_{mailboxes_};
 };
 
 }  // namespace hal::ethercat::master

@@ -59,9 +59,9 @@ public:
     /// Forgets all slaves and scans again. [realtime]
     void rescan() noexcept;
 
-    const Setup&        setup() const noexcept;                              ///< [any]
-    const BusStatus&    status() const noexcept;                         ///< [realtime]
-    const DomainStatus& domain(std::size_t n) const noexcept;         ///< [realtime]
+    const Setup&        setup() const noexcept;  ///< [any]
+    const BusStatus&    status() const noexcept;  ///< [realtime]
+    const DomainStatus& domain(std::size_t n) const noexcept;  ///< [realtime]
     std::uint64_t       cycles_incomplete() const noexcept;  ///< Returns DomainStatus::incomplete of all domains. [realtime]
     void                reset_domain(std::size_t n) noexcept;  ///< Resets least counter and changes. [realtime]
     const SlaveStatus&  slave_status(std::size_t slave) const noexcept;  ///< Returns the status of `Setup::slaves[slave]`. [realtime]

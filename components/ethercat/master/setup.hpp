@@ -66,12 +66,13 @@ struct SyncManager {
 
 /// A value written at a state transition.
 struct StartupWrite {
-    enum class Protocol : std::uint8_t { coe, soe, reg, aoe } protocol = Protocol::coe;
+    enum class Protocol : std::uint8_t { coe, soe, reg, aoe } protocol = Protocol::coe;  ///< aoe: an object by AoE
     State                     before = State::safeop;  ///< written before this state is requested
     std::uint16_t             index = 0;  ///< object, IDN or register
     std::uint8_t              sub = 0;  ///< sub-index, or the drive number of SoE
     bool                      complete = false;  ///< complete access
     std::vector<std::uint8_t> data;
+    std::uint16_t             port = 0;  ///< AoE: of the target
     std::uint32_t             line = 0;  ///< of the configuration, for messages
 };
 

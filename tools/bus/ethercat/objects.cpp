@@ -39,7 +39,8 @@ bool transfer_file(const EthercatFileOptions& options, EthercatSession& session,
     ethercat::master::FoeProgress progress;
     MailboxRequest request;
     request.kind = write ? MailboxRequest::Kind::foe_write : MailboxRequest::Kind::foe_read;
-    request.slave = s.number, request.name = name, request.data = bytes, request.progress = &progress, request.foe.password = options.password;
+    request.slave = s.number, request.name = name, request.data = bytes, request.progress = &progress,
+    request.foe.password = options.password;
     const bool finished = session.run(request);
     if (finished && request.result) {
         if (!write) bytes.resize(request.result.length);

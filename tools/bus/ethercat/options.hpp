@@ -40,7 +40,7 @@ struct EthercatPositionOptions : EthercatOptions {
 
 /// Options of the commands for files.
 struct EthercatFileOptions : EthercatPositionOptions {
-    bool          boot = false;
+    bool boot = false;
     std::uint32_t password = 0;
 
     void declare(OptionSet& set) override {

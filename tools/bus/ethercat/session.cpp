@@ -85,7 +85,8 @@ BusSlave* EthercatSession::chosen(const EthercatPositionOptions& options) {
 
 bool EthercatSession::set_boot(const EthercatOptions& options, BusSlave& s, bool boot) {
     if (boot && !s.bootstrap.usable())
-        return fail(options, fmt::format("slave {}: its EEPROM has no mailbox for BOOT; it takes its firmware in PRE-OP (without --boot), or by a tool of its maker",
+        return fail(options, fmt::format("slave {}: its EEPROM has no mailbox for BOOT; it takes its firmware in PRE-OP (without --boot), "
+                                         "or by a tool of its maker",
                                          s.position)),
                false;
     const State target = boot ? State::boot : State::preop;
@@ -94,14 +95,16 @@ bool EthercatSession::set_boot(const EthercatOptions& options, BusSlave& s, bool
     const auto reached = [&] { return s.state == target && !s.al_failed; };
     // a slave that was just flashed may start anew
     if (until([&] { return reached() || (boot && s.al_failed); }, (boot ? 10 : 60) * second) && reached()) return true;
-    return fail(options, fmt::format("slave {}: {} not reached, it is in {}{}; see: hal ethercat states", s.position, to_string(target), to_string(s.state),
-                                     s.al_failed ? fmt::format(", AL status code 0x{:04X}", s.al_code) : "")),
+    return fail(options, fmt::format("slave {}: {} not reached, it is in {}{}; see: hal ethercat states", s.position, to_string(target),
+                                     to_string(s.state), s.al_failed ? fmt::format(", AL status code 0x{:04X}", s.al_code) : "")),
            false;
 }
 
 bool EthercatSession::run(master::MailboxRequest& request) {
     if (!requests_.submit(request)) return false;
-    const auto moved = [&] { return request.progress == nullptr ? 0U : request.progress->bytes + (std::uint32_t{request.progress->done} << 16); };
+    const auto moved = [&] {
+        return request.progress == nullptr ? 0U : request.progress->bytes + (std::uint32_t{request.progress->done} << 16);
+    };
     std::uint32_t before = 0;
     do {  // a file may take minutes, as long as it goes on
         before = moved();
