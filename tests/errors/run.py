@@ -20,8 +20,9 @@ HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))
 from program import environment, program  # noqa: E402
 
-# No command line provokes these alike on every machine; tests/unit/session_memory.cpp and tests/cli/cell_test.py do.
-ELSEWHERE = {"out-of-memory", "thread-refused", "no-dds"}
+# No command line provokes these alike on every machine; tests/unit/session_memory.cpp, tests/cli/cell_test.py and
+# tests/cli/program_life_test.py do.
+ELSEWHERE = {"out-of-memory", "thread-refused", "no-dds", "not-permitted"}
 TIMEOUT = float(os.environ.get("HALCYON_TEST_TIMEOUT", "10"))
 
 

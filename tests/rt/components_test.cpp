@@ -19,7 +19,7 @@ const std::map<std::string, std::string> arguments{
     {"dds_publish", "topic=rt/pins fields=f:float,b:bit,i:s32,u:u32,l:s64,k:u64 rate=0 domain=230"},
     {"dds_subscribe", "topic=rt/pins fields=f:float,b:bit,i:s32,u:u32,l:s64,k:u64 domain=230"},
     {"ethercat", "config=tests/rt/drive.ethercat"},
-    {"lcec", "config=tests/netlists/ethercat_lcec/ethercat-conf.xml link=sim:lcec"},
+    {"lcec", "config=tests/rt/ethercat-conf.xml link=sim:rt/lcec"},
     {"segment_record", "link=sim:rt/recorder file=/dev/null"},
     {"tdma", "link=sim:rt/master station=master schedule=\"master:; cycle 2000; slot 0 100\""},
 };
