@@ -41,6 +41,21 @@ class Slaves(Ethercat):
         (self.folder / "line.txt").write_text("coupler\ndigital_out bits=4\n")
         self.assertEqual(2, len(self.on("slaves", line="line.txt").splitlines()))
 
+    def test_a_missing_comma_is_named(self):
+        self.assertEqual("hal ethercat slaves: --emulate: 'digital_in' is a device of its own; write it on the next line, or after a comma; options of servo: "
+                         "axes dc modes alias serial\n", self.refused("slaves", line="servo digital_in"))
+
+    def test_start_up_writes_by_AoE_and_a_missing_link_are_reported_with_their_place(self):
+        (self.folder / "aoe.ethercat").write_text("[bus]\n[slave 0 x]\nvendor = 1\noutputs = none\ninputs = none\naoe 2001 port = 05\naoe 2001 = x\n")
+        said = self.bad("ethercat", "check", "aoe.ethercat")
+        self.assertIn("aoe.ethercat:6:1: error: invalid aoe '2001 port'; write aoe 8000:1 1001 = 01 00\n", said)
+        self.assertIn("aoe.ethercat:7:", said)
+        (self.folder / "ethercat-conf.xml").write_text('<masters><master idx="0"/></masters>')
+        (self.folder / "no-link.hal").write_text("loadrt lcec\n")
+        said = self.bad("check", "no-link.hal")
+        self.assertIn("no-link.hal:1:8: error: component 'lcec' cannot make 'lcec.0': link= is missing: this format has no interface [construct-failed]\n", said)
+        self.assertIn("help: write link=eth:enp3s0, or link=sim:NAME for an emulated line\n", said)
+
     def test_states_requests_one_and_says_why_it_is_refused(self):
         self.assertEqual("0    INIT\n1    INIT\n2    INIT\n3    INIT\n", self.on("states"))
         self.assertEqual("0    SAFE-OP\n1    SAFE-OP\n2    SAFE-OP\n3    SAFE-OP\n", self.on("states", "safe-op"))

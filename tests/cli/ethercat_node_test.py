@@ -73,13 +73,13 @@ class Line(Case):
     def test_dump_shows_what_a_command_does(self):
         self.node()
         dump = self.start("ethercat", "dump", "eth:m0")
-        self.start("ethercat", "dump", "eth:m0", "--filter", "nothing has this", "--for", "1s")
+        filtered = self.start("ethercat", "dump", "eth:m0", "--filter", "nothing has this")
         wait_until(lambda: self.good("ethercat", "upload", "eth:m0", "-p", "1", "0x1018", "1") and " CoE SDO uploaded 0x1018:1" in self.said(dump), "dump shows it")
         self.bad("ethercat", "upload", "eth:m0", "-p", "1", "0x2fff", "0")
         self.expect(dump, r"  <-  FPRD station 0x1002 1100  \[256\] 0A 00 .* WKC 1  CoE SDO abort 0x2FFF:0: 0x06020000, object does not exist\n")
         self.expect(dump, r"  <-  BWR  all slaves 0120  \[2\] 11 00  WKC 2  AL control: INIT, acknowledge\n")
         self.expect(dump, r"  <-  FPWR station 0x1002 0120  \[2\] 02 00  WKC 1  AL control: PRE-OP\n")
-        self.assertEqual(0, self.end(dump))
+        self.assertEqual((0, 0, ""), (self.end(dump), self.end(filtered), self.said(filtered)))
 
     def test_firmware_is_written_in_BOOT(self):
         self.write("servo.line", "servo\nmailbox_device\n")

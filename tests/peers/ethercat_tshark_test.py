@@ -122,7 +122,7 @@ def main():
         same(f"{station:#x}: states requested until OP", [2, 4, 8], list(dict.fromkeys(states))[:3])
         downloads = [row[1:] for fields in writes for row in numbers(fields, "ecat_mailbox.coe.sdoreq", "ecat_mailbox.coe.sdoidx",
                                                                      "ecat_mailbox.coe.sdosub", "ecat_mailbox.coe.sdodata") if row[0] == 1]
-        downloads = [row for at, row in enumerate(downloads) if at == 0 or row != downloads[at - 1]]  # a repeated request is none of the order
+        downloads = [row for at, row in enumerate(downloads) if at == 0 or row != downloads[at - 1]]  # without requests that were repeated
         for at, wanted in enumerate(OUTPUTS + INPUTS):
             same(f"{station:#x}: download {at}", tuple(map(hex, wanted)), tuple(map(hex, downloads[at])) if at < len(downloads) else None)
         registers = {}

@@ -12,6 +12,7 @@
 #include "ethercat/wire/mailbox.hpp"
 #include "ethercat/wire/registers.hpp"
 #include "ethercat/wire/states.hpp"
+#include "text/glyphs.hpp"
 
 namespace hal::tools {
 
@@ -100,8 +101,8 @@ std::string foe_words(Bytes payload) {
     if (!m) return "";
     const std::string text(m->text());
     switch (m->opcode) {
-    case foe::Opcode::read: return "read '" + text + "'";
-    case foe::Opcode::write: return "write '" + text + "'";
+    case foe::Opcode::read: return "read '" + printable(text) + "'";
+    case foe::Opcode::write: return "write '" + printable(text) + "'";
     case foe::Opcode::data: return fmt::format("data packet {}, {} bytes", m->value, text.size());
     case foe::Opcode::ack: return fmt::format("acknowledge packet {}", m->value);
     case foe::Opcode::error: return fmt::format("error 0x{:X}, {}", m->value, foe::to_string(static_cast<foe::Error>(m->value)));

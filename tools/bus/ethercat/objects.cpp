@@ -44,7 +44,10 @@ bool transfer_file(const EthercatFileOptions& options, EthercatSession& session,
     const bool finished = session.run(request);
     if (finished && request.result) {
         if (!write) bytes.resize(request.result.length);
-        return !options.boot || session.set_boot(options, s, false);
+        if (!options.boot || session.set_boot(options, s, false)) return true;
+        return fail(options, fmt::format("slave {}: file '{}' was {}, but the slave did not return to PRE-OP", s.position, name,
+                                         write ? "written" : "read")),
+               false;
     }
     std::string why = "no progress within 60 s";
     if (finished && request.result.outcome == Outcome::aborted)

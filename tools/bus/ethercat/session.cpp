@@ -90,7 +90,8 @@ bool EthercatSession::set_boot(const EthercatOptions& options, BusSlave& s, bool
                                          s.position)),
                false;
     const State target = boot ? State::boot : State::preop;
-    until([&] { return master_->idle(s); }, second);
+    if (!until([&] { return master_->idle(s); }, 10 * second))
+        return fail(options, fmt::format("slave {}: its start-up does not end; see: hal ethercat states", s.position)), false;
     master_->set_boot(s, boot);
     const auto reached = [&] { return s.state == target && !s.al_failed; };
     // a slave that was just flashed may start anew
