@@ -53,6 +53,8 @@ struct SlaveInfo {
 struct Bus {
     std::string            name;  ///< of its pins in LinuxCNC's format; empty in a `.ethercat` file
     std::string            link = "sim:ethercat", backup;  ///< link addresses; a backup closes a ring
+    std::string            gateway;  ///< IPv4 address on which the mailbox gateway listens; empty: no gateway
+    std::uint16_t          gateway_port = 34980;
     bool                   cycle_given = false;  ///< setup.cycle_ns is from the file; else it is that of the thread
     master::Setup          setup;
     std::vector<SlaveInfo> slaves;  ///< as many as in setup.slaves
@@ -73,6 +75,9 @@ bool read_from_disk(const std::string& path, std::string& bytes);
 /// Reads a configuration of either format: XML if its first character is `<`. Relative paths in it start at the folder of `path`.
 Reading read(std::string_view text, const std::string& path, const ReadFile& = read_from_disk);
 
+/// Sets the mailbox gateway of a bus: "none", ADDRESS or ADDRESS:PORT. Returns false for anything else.
+bool read_gateway(std::string_view text, Bus&);
+
 /// Formats each error as "file:12:7: error: sentence; help", for hosts without a renderer.
 std::string to_string(const Reading&, const std::string& path);
 
@@ -81,6 +86,7 @@ struct Found {
     std::string                   name;  ///< of its section; empty: slave-POSITION
     std::string                   device;  ///< name or order code, for a comment
     std::string                   esi;  ///< path of its description; empty: none
+    std::string                   order;  ///< its order code there
     std::uint32_t                 vendor = 0, product = 0, revision = 0;
     std::uint16_t                 alias = 0;
     std::vector<sii::Pdo>         rx, tx;  ///< of the SII; those with a sync manager are assigned

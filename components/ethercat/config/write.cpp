@@ -148,7 +148,8 @@ std::string write(const std::string& link, std::int64_t cycle_ns, const std::vec
         if (name.empty()) name = "slave-" + std::to_string(i);
         if (const unsigned n = names[name]++; n != 0) name += "-" + std::to_string(i);
         out += "\n[slave " + std::to_string(i) + " " + name + "]" + (s.device.empty() ? "" : "  # " + one_line(s.device)) + "\n";
-        if (!s.esi.empty()) out += "esi = " + s.esi + "\n";
+        if (!s.esi.empty()) out += "esi      = " + s.esi + "\n";
+        if (!s.order.empty()) out += "device   = " + s.order + "\n";
         if (s.vendor != 0) out += "vendor   = " + hex(s.vendor) + "\n";
         if (s.product != 0) out += "product  = " + hex(s.product) + "\n";
         if (s.revision != 0) out += "revision = " + hex(s.revision) + "+  # or a higher one\n";

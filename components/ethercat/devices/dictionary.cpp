@@ -82,6 +82,17 @@ void Dictionary::sub(std::uint8_t sub, std::string name, std::uint16_t type, std
     if (objects_.back().type == 0) objects_.back().type = type;
 }
 
+void Dictionary::object(std::uint16_t index, std::string name, coe::ObjectCode code, std::uint16_t type) {
+    DictionaryObject& o = objects_.emplace_back();
+    o.index = index, o.type = type, o.code = code, o.name = std::move(name);
+}
+
+void Dictionary::entry(std::uint8_t sub, std::string name, std::uint16_t type, std::uint16_t bits, std::uint16_t access,
+                       std::span<const std::uint8_t> initial) {
+    const auto& e = add(objects_.back(), sub, std::move(name), type, bits, access);
+    std::copy_n(initial.begin(), std::min(initial.size(), e.bytes()), memory_.begin() + e.offset);
+}
+
 void Dictionary::limit(std::int64_t low, std::int64_t high) {
     auto& e = objects_.back().entries.back();
     e.limited = true, e.low = low, e.high = high;

@@ -59,6 +59,11 @@ public:
                 std::uint16_t sub0_access = coe::access::read, std::uint16_t type = 0);
     /// Adds an entry to the newest record.
     void sub(std::uint8_t sub, std::string name, std::uint16_t type, std::uint16_t access, std::uint64_t initial = 0);
+    /// Adds an object without entries; entry() adds them.
+    void object(std::uint16_t index, std::string name, coe::ObjectCode code, std::uint16_t type);
+    /// Adds an entry of any type and length to the newest object; `initial` may be shorter.
+    void entry(std::uint8_t sub, std::string name, std::uint16_t type, std::uint16_t bits, std::uint16_t access,
+               std::span<const std::uint8_t> initial = {});
     /// Limits the newest entry.
     void limit(std::int64_t low, std::int64_t high);
     /// Sorts the objects. Nothing may be added after it.

@@ -8,6 +8,9 @@
 
 #include "ethercat/devices/builder.hpp"
 
+namespace hal::ethercat::esi {
+struct File;
+}
 namespace hal::ethercat::devices {
 
 inline constexpr unsigned most_channels = 64;
@@ -41,11 +44,13 @@ public:
 
 /// Options of a device in a line description.
 struct DeviceOptions {
-    unsigned      bits = 8, channels = 4, axes = 1;
-    std::uint16_t alias = 0;
-    std::uint32_t serial = 0;
-    bool          dc_required = false;
-    std::uint32_t modes = 0x3a5;  ///< of a servo (6502h)
+    unsigned                         bits = 8, channels = 4, axes = 1;
+    std::uint16_t                    alias = 0;
+    std::uint32_t                    serial = 0;
+    bool                             dc_required = false;
+    std::uint32_t                    modes = 0x3a5;  ///< of a servo (6502h)
+    std::string                      file{}, device{};   ///< description of an esi device, and its name there; empty: the only one
+    std::shared_ptr<const esi::File> description{};  ///< the contents of `file`
 };
 
 /// A device: its description and its behaviour.

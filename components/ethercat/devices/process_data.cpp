@@ -38,10 +38,10 @@ void ProcessData::build() noexcept {
         if (pdo == nullptr) continue;
         for (const auto& e : pdo->entries) {
             if (e.sub == 0 || e.sub > dictionary_->count(*pdo)) continue;
-            const auto mapping = coe::Mapping::of(get<std::uint32_t>(dictionary_->data(e)));
-            if (mapping.index != 0 && used_ < copies_.size())
-                if (auto* data = dictionary_->at(mapping.index, mapping.sub))
-                    copies_[used_++] = {data, static_cast<std::uint32_t>(bits_), mapping.bits};
+            const auto  mapping = coe::Mapping::of(get<std::uint32_t>(dictionary_->data(e)));
+            const auto* entry = mapping.index != 0 ? dictionary_->find(mapping.index, mapping.sub) : nullptr;
+            if (entry != nullptr && mapping.bits <= entry->bits && used_ < copies_.size())
+                copies_[used_++] = {dictionary_->data(*entry), static_cast<std::uint32_t>(bits_), mapping.bits};
             bits_ += mapping.bits;
         }
     }

@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <optional>
 
+#include "ethercat/devices/esi_device.hpp"
 #include "ethercat/devices/mailbox_device.hpp"
 #include "ethercat/devices/servo.hpp"
+#include "hal/read_file.hpp"
 #include "text/numbers.hpp"
 
 namespace hal::ethercat::devices {
@@ -23,6 +25,7 @@ constexpr DeviceRow device_rows[] = {
     {"analog_out", "channels", [](const DeviceOptions& o) { return make_analog(o, true); }},
     {"servo", "axes dc modes", make_servo},
     {"mailbox_device", "", make_mailbox_device},
+    {"esi", "file device", make_esi_device},
 };
 
 const DeviceRow* device_row(std::string_view name) {
@@ -49,6 +52,12 @@ std::string set_option(DeviceOptions& o, std::string_view key, std::string_view 
         o.dc_required = value == "required";
         return {};
     }
+    if (key == "file" || key == "device") {
+        if (value.empty())
+            return "option '" + std::string(key) + "' has no value; write " + std::string(key) + (key == "file" ? "=FILE.xml" : "=NAME");
+        (key == "file" ? o.file : o.device) = value;
+        return {};
+    }
     const std::uint64_t most = key == "bits"       ? 64
                                : key == "channels" ? 16
                                : key == "axes"     ? 8
@@ -69,6 +78,36 @@ std::string set_option(DeviceOptions& o, std::string_view key, std::string_view 
     return {};
 }
 
+/// Reads the description of an esi device. Returns what is wrong, or an empty text; `help` has what to write.
+std::string read_description(DeviceOptions& o, const FindFile& find, std::string& help) {
+    help = "write esi file=FILE.xml device=NAME, with the order code or product code of the device";
+    if (o.file.empty()) return "an esi device needs the description of its maker";
+    const std::string path = find ? find(o.file) : o.file;
+    std::string       bytes;
+    if (!read_regular_file(path, 64'000'000, bytes)) return "cannot read '" + path + "': " + bytes;
+    esi::File file = esi::read(bytes);
+    for (const esi::Message& m : file.messages)
+        if (m.severity == Severity::error) {
+            help = m.help;
+            return "'" + path + "', line " + std::to_string(m.at.line) + ": " + m.sentence;
+        }
+    std::string        problem;
+    const esi::Device* device = find_device(file, o.device, problem);
+    if (device == nullptr) {
+        std::string list;
+        for (const esi::Device& d : file.devices)
+            if (list.find(d.order) == std::string::npos) list += (list.empty() ? "" : ", ") + d.order;
+        help = "write device=NAME with one of: " + list;
+        return "'" + path + "': " + problem;
+    }
+    if (std::string why = why_not_emulated(*device); !why.empty()) {
+        help = "choose another device";
+        return "'" + path + "', device '" + device->order + "': " + why;
+    }
+    o.description = std::make_shared<const esi::File>(std::move(file));
+    return {};
+}
+
 }  // namespace
 
 std::vector<std::string_view> names() {
@@ -79,7 +118,7 @@ std::vector<std::string_view> names() {
 
 std::optional<Device> make(std::string_view name, const DeviceOptions& options) {
     const auto* row = device_row(name);
-    if (row == nullptr) return std::nullopt;
+    if (row == nullptr || (row->make == make_esi_device && !options.description)) return std::nullopt;
     Parts  parts = row->make(options);
     Device device;
     device.name = std::string(name);
@@ -89,7 +128,12 @@ std::optional<Device> make(std::string_view name, const DeviceOptions& options) 
     return device;
 }
 
-LineDescription read_line(std::string_view text) {
+FindFile beside(const std::string& path) {
+    const std::string folder = path.find('/') == std::string::npos ? "" : path.substr(0, path.rfind('/') + 1);
+    return [folder](const std::string& name) { return name.starts_with('/') ? name : folder + name; };
+}
+
+LineDescription read_line(std::string_view text, const FindFile& find) {
     LineDescription           out;
     text::Messages<LineTopic> messages;
     for (text::Lines lines(text); auto line = lines.next();) {
@@ -116,6 +160,10 @@ LineDescription read_line(std::string_view text) {
                 LineTopic::option, words[n].at, problem,
                 "options of " + words[0].text + ": " + std::string(row->options) + (row->options.empty() ? "" : " ") + "alias serial");
         }
+        std::string help;
+        if (good && row->make == make_esi_device)
+            if (const std::string problem = read_description(slave.options, find, help); !problem.empty())
+                good = false, messages.error(LineTopic::option, words[0].at, problem, help);
         if (good) out.slaves.push_back(std::move(slave));
     }
     if (out.slaves.empty() && !messages.failed())

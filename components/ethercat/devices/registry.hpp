@@ -5,10 +5,12 @@
 //     coupler
 //     servo axes=2 alias=5 serial=1
 //     digital_in bits=16
+//     esi file=drive.xml device=SERVO-1     # as the description of its maker has it
 //
 // Everything here is [setup].
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -45,8 +47,12 @@ struct LineDescription {
     std::vector<Slave>                    slaves;
     std::vector<text::Message<LineTopic>> messages;
 };
-/// Reads the description of a line; invalid lines are reported in `messages` and left out.
-LineDescription read_line(std::string_view text);
+/// Returns the path of a file that a description names.
+using FindFile = std::function<std::string(const std::string& name)>;
+/// Reads the description of a line; invalid lines are reported in `messages` and left out. Without `find`, paths start at the working folder.
+LineDescription read_line(std::string_view text, const FindFile& find = {});
+/// Returns a FindFile for names relative to the folder of a file.
+FindFile beside(const std::string& path);
 /// Makes the devices of a line.
 std::vector<Device> make_line(const LineDescription&);
 

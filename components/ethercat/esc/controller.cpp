@@ -93,7 +93,7 @@ void Controller::work_until(std::int64_t now_ns) noexcept {
 
 void Controller::run_application(std::int64_t now_ns) noexcept {
     last_run_ns_ = now_ns;
-    if (application_ != nullptr) application_->run(*this, now_ns);
+    if (application_ != nullptr && eeprom_.loaded()) application_->run(*this, now_ns);  // else the interface to it is not configured
 }
 
 void Controller::find_due() noexcept {

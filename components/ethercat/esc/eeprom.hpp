@@ -26,6 +26,11 @@ public:
     void fail(unsigned count) noexcept { failures_ = count; }
     /// Damages the checksum, or repairs it; takes effect at power-on or reload. [realtime]
     void damage(bool damaged) noexcept { damaged_ = damaged; }
+    /// Inverts the highest bit of the product code, or restores it. [realtime]
+    void falsify(bool wrong) noexcept {
+        constexpr std::size_t product_high = 0x17;  // byte 3 of word 0Ah
+        if (content_.size() > product_high && wrong != falsified_) content_[product_high] ^= 0x80, falsified_ = wrong;
+    }
 
 private:
     void         execute(bool write_enabled, std::int64_t now_ns) noexcept;
@@ -36,7 +41,7 @@ private:
     std::vector<std::uint8_t> content_;
     std::int64_t              read_ns_ = 0, write_ns_ = 0, busy_until_ns_ = INT64_MIN, chip_busy_until_ns_ = INT64_MIN;
     unsigned                  failures_ = 0;
-    bool                      loaded_ = false, damaged_ = false, reads_8_ = true;
+    bool                      loaded_ = false, damaged_ = false, falsified_ = false, reads_8_ = true;
 };
 
 }  // namespace hal::ethercat::esc

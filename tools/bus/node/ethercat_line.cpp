@@ -135,7 +135,7 @@ bool read_devices(const Options& options, std::vector<devices::Device>& to) {
     const std::string& path = options.words.front();
     std::string text;
     if (!read_file(path, text)) return fail(options, fmt::format("cannot read '{}': {}", path, text)), false;
-    const devices::LineDescription description = devices::read_line(text);
+    const devices::LineDescription description = devices::read_line(text, ethercat::devices::beside(path));
     bool good = true;
     for (const auto& message : description.messages) {
         const std::string place = message.at.line == 0 ? path : fmt::format("{}:{}:{}", path, message.at.line, message.at.column);
