@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Reads a `.ethercat` file: its sections, and which of them make up a slave.
+#include <arpa/inet.h>
+
 #include <algorithm>
 #include <cstdio>
 #include <set>
@@ -92,6 +94,13 @@ private:
         reference_ = keys.find("reference");
         keys.take_time("frame-timeout", bus.setup.frame_timeout_ns, 10'000, 1'000'000'000);
         keys.take_time("sync-window", bus.setup.sync_window_ns, 10, 1'000'000'000);
+        if (Line* line = keys.find("gateway")) {
+            if (!read_gateway(line->value.text, bus)) keys.reject(*line, "none, or an IPv4 address and perhaps a port: 127.0.0.1:34980");
+            else if (!bus.gateway.empty() && !bus.gateway.starts_with("127."))
+                report_.warning(Topic::value, line->value.at,
+                                "programs on other computers can read and write the objects of the slaves through the gateway",
+                                "its protocol has no password; write 127.0.0.1 to allow only programs on this computer");
+        }
         if (Line* line = keys.find("other-slaves")) {
             if (same_word(line->value.text, "accept")) bus.setup.accept_other_slaves = true;
             else if (!same_word(line->value.text, "fault")) keys.reject(*line, "fault or accept");
@@ -99,7 +108,8 @@ private:
         if (!bus.backup.empty() && bus.backup == bus.link)
             report_.error(Topic::value, keys.find("backup")->value.at, "the backup is the link itself: '" + bus.link + "'",
                           "write the address of the second port, which closes the ring");
-        unknown_keys(keys, "[bus]", {"link", "backup", "cycle", "clock", "reference", "frame-timeout", "sync-window", "other-slaves"});
+        unknown_keys(keys, "[bus]",
+                     {"link", "backup", "cycle", "clock", "reference", "frame-timeout", "sync-window", "other-slaves", "gateway"});
     }
 
     void domain(Section& s) {
@@ -265,6 +275,22 @@ void check_bus(const Bus& bus, Report& report) {
                 report.error(Topic::slave, bus.slaves[i].at, "duplicate device ID " + std::to_string(*a.identity.device_id), first,
                              "duplicate");
         }
+}
+
+bool read_gateway(std::string_view text, Bus& bus) {
+    bus.gateway.clear();
+    if (same_word(text, "none")) return true;
+    const std::size_t colon = text.find(':');
+    const std::string address(text.substr(0, colon));
+    in_addr           parsed{};
+    if (inet_pton(AF_INET, address.c_str(), &parsed) != 1) return false;
+    if (colon != std::string_view::npos) {
+        const auto port = parse_natural(text.substr(colon + 1));
+        if (!port || *port == 0 || *port > 65535) return false;
+        bus.gateway_port = static_cast<std::uint16_t>(*port);
+    }
+    bus.gateway = address;
+    return true;
 }
 
 bool read_from_disk(const std::string& path, std::string& bytes) { return read_regular_file(path, 64'000'000, bytes); }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "cia402/error_words.hpp"
 #include "ethercat/wire/al_status_codes.hpp"
 #include "ethercat/wire/coe.hpp"
 #include "ethercat/wire/soe.hpp"
@@ -127,8 +128,26 @@ std::string identity_words(const char* what, std::int64_t found, std::int64_t ex
            "; it stays in INIT: connect the right device, or write `" + key + " = " + hex(found, 8) + "` or the `esi` of this device";
 }
 
+/// A cable, seen from one of the two slaves that it connects.
+std::string cable_words(std::int64_t port_and_neighbour, const master::Setup& setup, const std::string& link) {
+    const auto        other = static_cast<std::uint32_t>(port_and_neighbour >> 8);
+    const std::string port = "port " + std::to_string(port_and_neighbour & 0xff);
+    if (other == Events::nothing) return port + ", which is open now";
+    return port + ": check the cable between there and " + (other == Events::bus ? link : slave_words(other, setup)) +
+           ", its connectors and its shield";
+}
+
+std::string emergency_words(std::int64_t first, std::int64_t bytes) {
+    std::string data;
+    for (int n = 0; n < 5; ++n) data += " " + hex(bytes >> 8 * n & 0xff, 2).substr(2);
+    const auto code = static_cast<std::uint16_t>(first & 0xffff);
+    if (code == 0) return "reports that its errors are gone";
+    return "reports emergency " + hex(code, 4) + " (" + canopen::cia402::error_word(code) + "), error register " +
+           hex(first >> 16 & 0xff, 2) + ", data" + data + "; see the manual of the device";
+}
+
 /// What happened to one slave; it follows the slave's name.
-std::string of_slave(const Happened& w, const master::Setup& setup) {
+std::string of_slave(const Happened& w, const master::Setup& setup, const std::string& link) {
     static const master::Slave unnamed;
     const master::Slave&       slave = w.slave < setup.slaves.size() ? setup.slaves[w.slave] : unnamed;
     const auto                 first = w.first, second = w.second;
@@ -145,7 +164,11 @@ std::string of_slave(const Happened& w, const master::Setup& setup) {
         return "is not unique: the slave at position " + std::to_string(second) + " has the " +
                (slave.identity.device_id ? "device ID " : "alias ") + std::to_string(first) +
                " too; neither is started: give each its own, power-cycle both and load the master again";
-    case Event::sii_failed: return "has an unreadable EEPROM (status " + hex(first, 4) + " at word " + hex(second, 2) + "); power-cycle it";
+    case Event::sii_failed:
+        if ((first & 0x1800) != 0 && second == 7)
+            return "has an EEPROM with a wrong checksum (status " + hex(first, 4) +
+                   "), so that its application does not run; write the contents anew with a tool of its maker, then power-cycle it";
+        return "has an unreadable EEPROM (status " + hex(first, 4) + " at word " + hex(second, 2) + "); power-cycle it";
     case Event::no_mailbox:
         return "has no mailbox, but the configuration writes " + object_words(first) + " at start; delete its `sdo` and `idn` lines";
     case Event::too_few_fmmus:
@@ -187,6 +210,10 @@ std::string of_slave(const Happened& w, const master::Setup& setup) {
         return "is the last that the primary port reaches: the ring is broken behind it; all slaves still exchange data, repair the cable";
     case Event::start_up_failed:
         return "could not be started; it was in " + state_words(first) + " and is started again in " + std::to_string(second) + " s";
+    case Event::damaged_frames:
+        return "received " + std::to_string(second) + (second == 1 ? " damaged frame" : " damaged frames") + " at " +
+               cable_words(first, setup, link);
+    case Event::emergency: return emergency_words(first, second);
     case Event::reference_clock: return first != 0 ? "has the reference clock" : "has the reference clock (32 bits)";
     default: return {};
     }
@@ -244,7 +271,7 @@ std::string slave_words(std::uint32_t slave, const master::Setup& setup) {
 std::string event_words(const Happened& what, const master::Setup& setup, const std::string& link, const std::string& backup) {
     const std::string bus = of_bus(what, setup, link, backup);
     if (!bus.empty()) return bus;
-    const std::string text = of_slave(what, setup);
+    const std::string text = of_slave(what, setup, link);
     return text.empty() ? text : slave_words(what.slave, setup) + " " + text;
 }
 

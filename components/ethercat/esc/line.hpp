@@ -64,6 +64,7 @@ struct LineCommand {
         jump,       ///< of the local clock: `value`, ns
         eeprom,     ///< fails the next `value` commands
         checksum,   ///< of the EEPROM: good if `on`; takes effect at power-on
+        identity,   ///< in the EEPROM: its own if `on`, else another product code
         watchdog,   ///< expires
         disturb,    ///< adds `disturbance`
         calm,       ///< ends all disturbances

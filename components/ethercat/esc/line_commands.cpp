@@ -40,6 +40,7 @@ void Line::execute(const LineCommand& command, std::int64_t now_ns) noexcept {
     case Kind::jump: return c.jump_clock(static_cast<std::int64_t>(command.value), now_ns);
     case Kind::eeprom: return c.eeprom().fail(command.value > 0 ? static_cast<unsigned>(command.value) : 0U);
     case Kind::checksum: return c.eeprom().damage(!command.on);
+    case Kind::identity: return c.eeprom().falsify(!command.on);
     case Kind::watchdog: return c.expire_watchdog();
     case Kind::end_cable:
     case Kind::calm:

@@ -93,6 +93,7 @@ Task<void> start_clocks(Channel& c, Bus& bus) noexcept {
     for (const std::uint16_t number : bus.by_position) any |= bus.devices[number]->slave.present && bus.devices[number]->slave.has_dc();
     if (bus.reference < 0 && (!any || !wanted)) co_return;
 
+    const int    reference_before = bus.reference;
     const Answer latched = co_await clear_all(c, registers::dc_receive_time, 4);
     if (!latched.arrived || latched.wkc == 0) co_return;
     const std::int64_t latched_ns = c.sent_ns();
@@ -145,6 +146,11 @@ Task<void> start_clocks(Channel& c, Bus& bus) noexcept {
     const BusSlave& leader = bus.devices[static_cast<std::size_t>(bus.reference)]->slave;
     bus.image.set_reference(leader.station, bus.setup.lead == ClockLead::thread);
     bus.status.dc_active = true;
+    // Until now this slave followed other times. What its filter made of them, a reference clock would keep for good.
+    if (bus.reference != reference_before) {
+        co_await c.sleep(2 * bus.setup.cycle_ns);  // frames with the other reference are back
+        co_await write<std::uint16_t>(c, leader, registers::dc_speed_counter_start, 0x1000);
+    }
 }
 
 Task<bool> synchronise(Channel& c, Bus& bus, Device& d) noexcept {

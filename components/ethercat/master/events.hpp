@@ -20,7 +20,7 @@ enum class Event : std::uint8_t {
     wrong_revision,
     wrong_serial,  ///< [found, expected]
     duplicate_alias,               ///< alias or device identification [number, position of the second]
-    sii_failed,                    ///< EEPROM not readable [0502h, word]
+    sii_failed,                    ///< EEPROM not readable, or 7: its checksum is wrong [0502h, word]
     no_mailbox,                    ///< start-up writes for a slave without mailbox [index << 8 | sub, -]
     too_few_fmmus,
     too_few_sync_managers,  ///< [present, needed]
@@ -48,6 +48,8 @@ enum class Event : std::uint8_t {
     ring_closed,      ///< `slave` is the one before the break [position, responding to the primary port]
     topology_changed,              ///< [slaves before, slaves now]
     other_master,                  ///< EtherCAT frames that are not ours [frames in the last second, -]
+    damaged_frames,                ///< received at a port, damaged on the cable there [port | neighbour << 8, frames]
+    emergency,                     ///< of CoE, from the slave itself [code | error register << 16, its 5 bytes, the first lowest]
     start_up_failed,               ///< gives up for now and starts again later [State it was in, seconds to the next try]
 };
 
@@ -56,6 +58,7 @@ class Events {
 public:
     static constexpr std::uint32_t bus = 0xffff'ffff;          ///< `slave` of an event of the whole bus
     static constexpr std::uint32_t of_position = 0x1'0000;     ///< see Event
+    static constexpr std::uint32_t nothing = 0xffff'fffe;      ///< neighbour of Event::damaged_frames: the port is open
     virtual ~Events() = default;
     virtual void report(Event event, std::uint32_t slave, std::int64_t first, std::int64_t second) noexcept = 0;
 };

@@ -57,6 +57,17 @@ struct Gateway::Pending {
     std::array<std::uint8_t, largest_mailbox> bytes{};
 };
 
+std::vector<GatewaySlave> GatewaySlaves::all() const {
+    std::vector<GatewaySlave> slaves;
+    const std::size_t         count = count_;
+    for (std::size_t n = 0; n < count; ++n) {
+        const Row&         row = rows_[n];
+        const GatewaySlave s{row.station, row.number, row.vendor, row.product, row.revision, row.serial};
+        if (s.station != 0 && row.station == s.station) slaves.push_back(s);
+    }
+    return slaves;
+}
+
 Gateway::Gateway(RequestPort& port, GatewaySetup setup, std::string& problem) : requests_(port), setup_(std::move(setup)) {
     problem.clear();
     udp_ = open_socket(SOCK_DGRAM, setup_.address, setup_.port, problem);
@@ -142,20 +153,20 @@ void Gateway::take(std::span<const std::uint8_t> bytes, const Sender& sender) {
     }
     auto pending = std::make_unique<Pending>();
     std::copy_n(bytes.data() + ecat_header_bytes, length, pending->bytes.data());
+    const std::vector<GatewaySlave> slaves = setup_.slaves();
     if (message->station == 0) {
-        const std::size_t reply = answer_for_master(setup_.slaves, pending->bytes, length);
+        const std::size_t reply = answer_for_master(slaves, pending->bytes, length);
         if (reply != 0) answer(sender, std::span(pending->bytes).first(reply));
         else ++dropped_;
         return;
     }
-    const auto slave =
-        std::find_if(setup_.slaves.begin(), setup_.slaves.end(), [&](const auto& s) { return s.station == message->station; });
+    const auto slave = std::find_if(slaves.begin(), slaves.end(), [&](const auto& s) { return s.station == message->station; });
     pending->sender = sender;
     MailboxRequest& request = pending->request;
     request.kind = MailboxRequest::Kind::message;
     request.data = pending->bytes, request.length = length;
-    if (slave != setup_.slaves.end()) request.slave = slave->number;
-    if (slave == setup_.slaves.end() || !requests_.submit(request)) ++dropped_;
+    if (slave != slaves.end()) request.slave = slave->number;
+    if (slave == slaves.end() || !requests_.submit(request)) ++dropped_;
     else pending_.push_back(std::move(pending));
 }
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-// The mailbox gateway (ETG.8200): programs of vendors reach the mailboxes of slaves by UDP or TCP while the machine runs. There is no
-// access
-// control in the protocol, so it listens on the loopback interface by default.
+// The mailbox gateway (ETG.8200): programs of vendors reach the mailboxes of slaves by UDP or TCP while the machine runs. The protocol has no
+// access control.
 #pragma once
 
 #include <array>
 #include <atomic>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
@@ -23,12 +23,40 @@ struct GatewaySlave {
     std::uint32_t vendor = 0, product = 0, revision = 0, serial = 0;
 };
 
+/// The slaves as the cycle knows them, for the thread of the gateway.
+class GatewaySlaves {
+public:
+    explicit GatewaySlaves(std::size_t most) : rows_(most) {}  ///< [setup]
+    /// Sets the slaves in the order of their positions: `slave(n)` returns the BusSlave at position n. [realtime] one thread
+    template <class Slave>
+    void set(std::size_t count, Slave slave) noexcept {
+        count = count < rows_.size() ? count : rows_.size();
+        for (std::size_t n = 0; n < count; ++n) {
+            const BusSlave& s = slave(n);
+            Row&            row = rows_[n];
+            row.station = 0;  // not valid until all of it is written
+            row.number = s.number, row.vendor = s.vendor, row.product = s.product, row.revision = s.revision, row.serial = s.serial;
+            row.station = s.station;
+        }
+        count_ = count;
+    }
+    std::vector<GatewaySlave> all() const;  ///< Returns the slaves; one that changes at this moment is left out. [setup]
+
+private:
+    struct Row {
+        std::atomic<std::uint16_t> station{0}, number{0};
+        std::atomic<std::uint32_t> vendor{0}, product{0}, revision{0}, serial{0};
+    };
+    std::vector<Row>         rows_;
+    std::atomic<std::size_t> count_{0};
+};
+
 struct GatewaySetup {
-    std::string               address = "127.0.0.1";  ///< of the interface to listen on; "0.0.0.0": all
-    std::uint16_t             port = 34980;         ///< 0: any free one
-    bool                      tcp = true;
-    std::size_t               most_clients = 16;      ///< of TCP
-    std::vector<GatewaySlave> slaves;
+    std::string                                address = "127.0.0.1";  ///< of the interface to listen on; "0.0.0.0": all
+    std::uint16_t                              port = 34980;  ///< 0: any free one
+    bool                                       tcp = true;
+    std::size_t                                most_clients = 16;  ///< of TCP
+    std::function<std::vector<GatewaySlave>()> slaves;  ///< Returns the slaves; called in the gateway's thread.
 };
 
 /// Answers an SDO upload from the dictionary of the master (ETG.1510): names, 8000h + n configuration of slave n, F000h, F020h addresses.

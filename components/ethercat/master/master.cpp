@@ -115,6 +115,9 @@ Master::Phase Master::dc_phase() const noexcept {
 
 std::size_t Master::found() const noexcept { return bus_->by_position.size(); }
 BusSlave&   Master::found(std::size_t position) noexcept { return bus_->devices[bus_->by_position[position]]->slave; }
+BusSlave*   Master::numbered(std::uint16_t number) noexcept {
+    return number < bus_->devices.size() && bus_->devices[number]->slave.present ? &bus_->devices[number]->slave : nullptr;
+}
 BusSlave*   Master::slave(std::size_t slave) noexcept {
     const int device = bus_->device_of[slave];
     return device < 0 ? nullptr : &bus_->devices[static_cast<std::size_t>(device)]->slave;

@@ -78,6 +78,8 @@ public:
     /// Returns the number of slaves on the bus after the scan. [realtime]
     std::size_t found() const noexcept;
     BusSlave&   found(std::size_t position) noexcept;  ///< Returns the slave at a position below found(). [realtime]
+    /// Returns the slave with this BusSlave::number; nullptr: not on the bus. [realtime]
+    BusSlave* numbered(std::uint16_t number) noexcept;
     /// Returns the slave that is Setup::slaves[slave]; nullptr: missing. [realtime]
     BusSlave* slave(std::size_t slave) noexcept;
     /// Returns the channel of a slave. It belongs to the start-up while idle() is false. [realtime]

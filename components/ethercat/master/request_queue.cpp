@@ -82,22 +82,26 @@ void RequestServer::collect() noexcept {
             Slot& slot = slots_[request->slave];
             (slot.last != nullptr ? slot.last->next : slot.first) = request;
             slot.last = request;
+            ++waiting_;
         }
     }
 }
 
 void RequestServer::step(std::int64_t now_ns) noexcept {
     collect();
-    std::size_t at = 0;
+    constexpr std::size_t looked_at = 16;  // slots in a cycle while nothing is requested
+    const std::size_t     most = waiting_ != 0 ? slots_.size() : std::min(slots_.size(), looked_at);
+    std::size_t           at = 0;
     for (const auto& worker : workers_) {
         if (worker->channel.busy()) continue;
-        for (; at < slots_.size(); ++at) {
+        for (; at < most; ++at) {
             const std::size_t n = (next_slot_ + at) % slots_.size();
             Slot&             slot = slots_[n];
             if (slot.busy) continue;
             BusSlave* slave = find_(static_cast<std::uint16_t>(n));
             if (slave == nullptr || mailboxes_.find(*slave) == nullptr) {
-                for (; slot.first != nullptr;) finish(*std::exchange(slot.first, slot.first->next), slave == nullptr ? nobody : refused());
+                for (; slot.first != nullptr; --waiting_)
+                    finish(*std::exchange(slot.first, slot.first->next), slave == nullptr ? nobody : refused());
                 slot.last = nullptr;
                 continue;
             }
@@ -112,6 +116,7 @@ void RequestServer::step(std::int64_t now_ns) noexcept {
             worker->channel.set_now(now_ns);
             if (slot.first != nullptr) {
                 worker->request = std::exchange(slot.first, slot.first->next);
+                --waiting_;
                 if (slot.first == nullptr) slot.last = nullptr;
                 worker->request->stage = Stage::running;
                 worker->channel.start([&] { return serve(worker->channel, *worker, *slave); });
@@ -137,6 +142,7 @@ void RequestServer::stop() noexcept {
         while (slot.first != nullptr) finish(*std::exchange(slot.first, slot.first->next), nobody);
         slot.last = nullptr;
     }
+    waiting_ = 0;
 }
 
 Task<> RequestServer::serve(Channel& channel, Worker& worker, BusSlave& slave) noexcept {

@@ -150,7 +150,7 @@ private:
     std::vector<std::unique_ptr<RequestPort>> ports_;
     std::vector<std::unique_ptr<Worker>>      workers_;
     std::vector<Slot>                         slots_;
-    std::size_t                               next_slot_ = 0;
+    std::size_t                               next_slot_ = 0, waiting_ = 0;  // waiting_: requests in slots
 };
 
 }  // namespace hal::ethercat::master

@@ -32,6 +32,8 @@ Task<void> read_device_id(Channel& c, BusSlave& s) noexcept {
 
 }  // namespace
 
+constexpr std::uint16_t eeprom_not_loaded = 0x1800;  ///< 0502h: wrong checksum, or not loaded; its application does not run
+
 Task<bool> identify(Channel& c, Bus& bus, BusSlave& s) noexcept {
     Answer a = co_await read(c, s, registers::type, 10);
     if (a.wkc != 1) co_return false;
@@ -50,9 +52,10 @@ Task<bool> identify(Channel& c, Bus& bus, BusSlave& s) noexcept {
         if (!sii.ok) break;
         std::memcpy(words + (word - 8), sii.words.data(), 8);
     }
-    if (!sii.ok) {
+    const bool unloaded = sii.ok && (sii.control & eeprom_not_loaded) != 0;
+    if (!sii.ok || unloaded) {
         if (s.position < bus.unreadable.size() && !bus.unreadable.test(s.position))
-            bus.events.report(Event::sii_failed, Events::of_position + s.position, sii.control, 8);
+            bus.events.report(Event::sii_failed, Events::of_position + s.position, sii.control, unloaded ? 7 : 8);
         if (s.position < bus.unreadable.size()) bus.unreadable.set(s.position);
         co_return false;
     }

@@ -237,6 +237,15 @@ static void judge_clock(Bus& bus, Device& d) noexcept {
     }
 }
 
+/// Returns what is at the other end of the cable at a port, as events name slaves.
+std::uint32_t neighbour(const Bus& bus, const Device& d, unsigned port) noexcept {
+    if (d.slave.position == 0 && port == d.slave.entry_port) return Events::bus;
+    const int other = d.slave.neighbour[port];
+    if (other < 0) return Events::nothing;
+    const BusSlave& s = bus.devices[static_cast<std::size_t>(other)]->slave;
+    return s.configured >= 0 ? static_cast<std::uint32_t>(s.configured) : Events::of_position + s.position;
+}
+
 Task<void> watch(Channel& c, Bus& bus) noexcept {
     std::uint64_t foreign = bus.status.foreign;
     bool          other = false;
@@ -257,7 +266,7 @@ Task<void> watch(Channel& c, Bus& bus) noexcept {
                 std::array<std::uint8_t, 20> now{};
                 std::memcpy(now.data(), c.data(), now.size());
                 bool high = false;
-                for (std::size_t p = 0; p < 4; ++p) {
+                for (unsigned p = 0; p < 4; ++p) {
                     PortErrors&                       e = d.status.ports[p];
                     std::array<std::uint8_t, 4>&      last = d.last_errors[p];
                     const std::array<std::uint8_t, 4> values{now[2 * p], now[2 * p + 1], now[8 + p], now[16 + p]};
@@ -265,8 +274,13 @@ Task<void> watch(Channel& c, Bus& bus) noexcept {
                         sum += values[n] >= last[n] ? values[n] - last[n] : values[n];
                         high |= values[n] > counter_high;
                     };
+                    const PortErrors before = e;
                     add(e.invalid_frames, 0), add(e.rx_errors, 1), add(e.forwarded, 2), add(e.lost_links, 3);
                     last = values;
+                    const std::uint64_t damaged = e.invalid_frames + e.rx_errors - before.invalid_frames - before.rx_errors;
+                    if (damaged > e.forwarded - before.forwarded)  // forwarded ones were damaged on an earlier cable
+                        bus.report(Event::damaged_frames, d, p | std::int64_t{neighbour(bus, d, p)} << 8,
+                                   static_cast<std::int64_t>(damaged));
                 }
                 if (high) {  // they stop at FFh
                     std::memset(c.data(), 0, 20);

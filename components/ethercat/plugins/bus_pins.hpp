@@ -2,10 +2,12 @@
 // The state of the bus and of its slaves as pins.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 
 #include "ethercat/master/status.hpp"
+#include "ethercat/plugins/emergencies.hpp"
 #include "hal/component.hpp"
 
 namespace hal::ethercat {
@@ -64,21 +66,34 @@ struct SlavePins {
           dc_deviation(c, f, (name + ".dc-sync-diff").c_str(), "deviation of its clock; 4294967295: no data", {.unit = "ns"}),
           losses(c, f, (name + ".losses").c_str(), "how often the slave was lost"),
           crc_errors(c, f, (name + ".crc-errors").c_str(), "damaged frames that it received, all ports"),
-          lost_links(c, f, (name + ".lost-links").c_str(), "lost links, all ports") {}
+          crc_errors_at{{{c, f, (name + ".crc-errors.0").c_str(), "at port 0, from the master's side"},
+                         {c, f, (name + ".crc-errors.1").c_str(), "at port 1"},
+                         {c, f, (name + ".crc-errors.2").c_str(), "at port 2"},
+                         {c, f, (name + ".crc-errors.3").c_str(), "at port 3"}}},
+          lost_links(c, f, (name + ".lost-links").c_str(), "lost links, all ports"),
+          emcy(c, f, (name + ".emcy").c_str(), "code of its newest emergency; 0: none, or the error is gone"),
+          emcy_count(c, f, (name + ".emcy-count").c_str(), "emergencies received") {}
 
     /// [realtime]
-    void show(const master::SlaveStatus& s) noexcept {
+    void show(const master::SlaveStatus& s, const Emergencies::Heard& heard) noexcept {
+        emcy = heard.code, emcy_count = heard.count;
         online = s.online, operational = s.operational;
         state = static_cast<std::uint32_t>(s.state), al_code = s.al_code;
         dc_deviation = s.dc_deviation_ns, losses = s.losses;
         std::uint64_t errors = 0, links = 0;
-        for (const master::PortErrors& p : s.ports) errors += p.invalid_frames + p.rx_errors, links += p.lost_links;
+        for (std::size_t n = 0; n < s.ports.size(); ++n) {
+            const std::uint64_t damaged = s.ports[n].invalid_frames + s.ports[n].rx_errors;
+            crc_errors_at[n] = damaged, errors += damaged, links += s.ports[n].lost_links;
+        }
         crc_errors = errors, lost_links = links;
     }
 
-    Out<bool>          online, operational;
-    Out<std::uint32_t> state, al_code, dc_deviation, losses;
-    Out<std::uint64_t> crc_errors, lost_links;
+    Out<bool>                         online, operational;
+    Out<std::uint32_t>                state, al_code, dc_deviation, losses;
+    Out<std::uint64_t>                crc_errors;
+    std::array<Out<std::uint64_t>, 4> crc_errors_at;
+    Out<std::uint64_t>                lost_links;
+    Out<std::uint32_t>                emcy, emcy_count;
 };
 
 }  // namespace hal::ethercat

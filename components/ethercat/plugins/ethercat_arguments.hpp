@@ -26,6 +26,11 @@ struct EthercatArguments {
         component_, "link", "", "link address, overrides the configuration: eth:enp3s0, sim:NAME, …", {.per_instance = true}};
     hal::TextArgument backup{
         component_, "backup", "", "link address of the port that closes a ring, overrides the configuration", {.per_instance = true}};
+    hal::TextArgument gateway{component_,
+                              "gateway",
+                              "",
+                              "address of the mailbox gateway, overrides the configuration: 127.0.0.1, 127.0.0.1:34980, none",
+                              {.per_instance = true}};
     hal::Argument number{
         component_, "master", 0, "of a configuration with several masters: which one, from 0", {.per_instance = true, .min = 0, .max = 63}};
 
@@ -63,6 +68,9 @@ struct EthercatArguments {
             throw hal::ArgumentError("link", "link= is missing: this format has no interface",
                                      "write link=eth:enp3s0, or link=sim:NAME for an emulated line");
         if (!backup.get().empty()) bus.backup = backup.get();
+        if (!gateway.get().empty() && !config::read_gateway(gateway.get(), bus))
+            throw hal::ArgumentError("gateway", "gateway=" + gateway.get() + ": expected none, or an IPv4 address and perhaps a port",
+                                     "write gateway=127.0.0.1:34980");
         return bus;
     }
 

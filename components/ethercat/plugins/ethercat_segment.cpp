@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
-#include <cmath>
 #include <deque>
 #include <memory>
 #include <optional>
@@ -11,62 +10,13 @@
 #include "ethercat/devices/servo.hpp"
 #include "ethercat/esc/line.hpp"
 #include "ethercat/esc/responder.hpp"
+#include "ethercat/plugins/segment_pins.hpp"
 #include "hal/component.hpp"
+#include "hal/texts.hpp"
 
 namespace {
 
 using namespace hal::ethercat;
-
-/// Pins of one emulated slave.
-struct SlavePins {
-    SlavePins(hal::Component& c, const hal::Function& f, const std::string& name)
-        : power(c, f, (name + ".power").c_str(), "FALSE: the slave has no power; its settings and volatile objects are lost",
-                {.initial = true}),
-          cable(c, f, (name + ".cable").c_str(), "FALSE: the cable to the slave before it is broken", {.initial = true}),
-          drift(c, f, (name + ".drift").c_str(), "error of its oscillator, at most 100000", {.unit = "ppm"}),
-          reject_state(c, f, (name + ".reject-state").c_str(), "state that the slave rejects: 2 PRE-OP, 4 SAFE-OP, 8 OP; 0 none"),
-          reject_code(c, f, (name + ".reject-code").c_str(), "AL status code of that rejection, 1..65535", {.initial = 0x0012}),
-          fail_code(c, f, (name + ".leave-op").c_str(),
-                    "a change to another number than 0 drops from OP to SAFE-OP with this AL status code"),
-          mailbox_delay(c, f, (name + ".mailbox-delay").c_str(), "minimum time to a mailbox answer, at most 60", {.unit = "s"}),
-          state(c, f, (name + ".state").c_str(), "1 INIT, 2 PRE-OP, 3 BOOT, 4 SAFE-OP, 8 OP, 0 no power") {}
-
-    hal::In<bool>           power, cable;
-    hal::In<double>         drift;
-    hal::In<std::uint32_t>  reject_state, reject_code, fail_code;
-    hal::In<double>         mailbox_delay;
-    hal::Out<std::uint32_t> state;
-    bool                    was_power = true, was_cable = true;
-    double                  was_drift = 0;
-    std::uint32_t           was_fail = 0;
-};
-
-/// Pins of one axis of a servo drive.
-struct AxisPins {
-    AxisPins(hal::Component& c, const hal::Function& f, const std::string& name, devices::ServoAxis& its_axis)
-        : axis(its_axis),
-          position(c, f, (name + "position").c_str(), "position of the motor", {.unit = "counts"}),
-          velocity(c, f, (name + "velocity").c_str(), "velocity of the motor", {.unit = "counts/s"}),
-          statusword(c, f, (name + "statusword").c_str(), "6041h"),
-          inputs(c, f, (name + "inputs").c_str(), "digital inputs of the drive (60FDh)"),
-          error_code(c, f, (name + "fail").c_str(), "a change to another number than 0 raises a fault with this error code (603Fh)") {}
-
-    devices::ServoAxis&     axis;
-    hal::Out<double>        position, velocity;
-    hal::Out<std::uint32_t> statusword;
-    hal::In<std::uint32_t>  inputs, error_code;
-    std::uint32_t           was_error = 0;
-};
-
-/// Pin of one channel of an I/O device.
-template <class Pin>
-struct Channel {
-    devices::IoBehaviour& io;
-    unsigned              number;
-    Pin                   pin;
-    Channel(hal::Component& c, const hal::Function& f, const std::string& name, const char* about, devices::IoBehaviour& its_io, unsigned n)
-        : io(its_io), number(n), pin(c, f, name.c_str(), about) {}
-};
 
 class EthercatSegment : public hal::Component {
 public:
@@ -74,7 +24,8 @@ public:
         std::string text = devices_.get();
         for (char& c : text)
             if (c == ',') c = '\n';
-        const devices::LineDescription description = devices::read_line(text);
+        const devices::LineDescription description = 
+            devices::read_line(text, [texts = hal::Texts(*this)](const std::string& name) { return texts.find(name); });
         for (const auto& m : description.messages)
             if (m.severity == hal::Severity::error)  // duplicate aliases may be wanted
                 throw hal::ArgumentError("devices", "devices=\"" + devices_.get() + "\": " + m.sentence + "; " + m.help);
@@ -98,7 +49,8 @@ public:
         line_->power_on(now == hal::ethernet::unclocked ? 0 : now);
         connection_ = std::make_unique<esc::LineOnSegments>(*line_, *primary_, secondary_.get());
         if (!connection_->connected()) throw std::runtime_error(link_.get() + " already has emulated slaves; choose another name");
-        for (SlavePins& pins : slaves_) pins.was_power = pins.was_cable = true, pins.was_drift = 0;
+        for (EmulatedSlavePins& pins : slaves_) pins.forget();
+        unposted_ = true;
     }
 
     void stop() noexcept {
@@ -113,19 +65,16 @@ public:
         silent_ = line_->frames() == frames_ ? silent_ + 1 : 0, frames_ = line_->frames();
         if (silent_ >= silent_cycles)
             line_->advance(cycle.start_ns());  // frames move its time; without them its watchdogs run all the same
+        bool disturbed = unposted_;
         for (unsigned n = 0; n < slaves_.size(); ++n) {
-            using Kind = esc::LineCommand::Kind;
-            SlavePins& pins = slaves_[n];
-            if (pins.power != pins.was_power && line_->post({.kind = Kind::power, .slave = n, .on = pins.power}))
-                pins.was_power = pins.power;
-            if (pins.cable != pins.was_cable && line_->post({.kind = Kind::cable, .slave = n, .port = 0, .on = pins.cable}))
-                pins.was_cable = pins.cable;
-            const double drift = std::isfinite(pins.drift.get()) ? std::clamp(pins.drift.get(), -most_drift, most_drift) : 0.0;
-            if (drift != pins.was_drift && line_->post({.kind = Kind::drift, .slave = n, .value = drift})) pins.was_drift = drift;
+            EmulatedSlavePins& pins = slaves_[n];
+            pins.post_changes(*line_, n);
+            disturbed |= pins.frames_changed();
             set_faults(pins, *line_devices_[n].firmware);
             pins.state = pins.power ? static_cast<std::uint32_t>(line_devices_[n].firmware->state()) : 0U;
         }
-        for (AxisPins& pins : axes_) {
+        if (disturbed) unposted_ = !post_disturbances();
+        for (EmulatedAxisPins& pins : axes_) {
             pins.position = pins.axis.position(), pins.velocity = pins.axis.velocity(), pins.statusword = pins.axis.statusword();
             pins.axis.set_inputs(pins.inputs);
             if (pins.error_code != pins.was_error && pins.error_code != 0) pins.axis.fail(static_cast<std::uint16_t>(pins.error_code));
@@ -139,11 +88,16 @@ public:
 
 private:
     static constexpr unsigned silent_cycles = 10;
-    static constexpr double   most_drift = 100'000;  ///< ppm
-    static constexpr double   most_delay = 60;       ///< s
+
+    /// Replaces the disturbances of frames by those that the pins ask for. Returns whether the line took them all. [realtime]
+    bool post_disturbances() noexcept {
+        bool posted = line_->post({.kind = esc::LineCommand::Kind::calm});
+        for (unsigned n = 0; n < slaves_.size(); ++n) posted = posted && slaves_[n].post_disturbances(*line_, n);
+        return posted;
+    }
 
     /// Copies the pins of firmware faults. [realtime]
-    static void set_faults(SlavePins& pins, devices::Firmware& firmware) noexcept {
+    static void set_faults(EmulatedSlavePins& pins, devices::Firmware& firmware) noexcept {
         devices::FirmwareFaults& faults = firmware.faults();
         for (const State state : {State::preop, State::safeop, State::op}) {
             const bool          rejected = pins.reject_state == static_cast<std::uint32_t>(state);
@@ -153,8 +107,7 @@ private:
         if (pins.fail_code != pins.was_fail && pins.fail_code != 0 && firmware.state() == State::op)
             faults.fail.store(static_cast<std::uint16_t>(std::min<std::uint32_t>(pins.fail_code, 0xffff)), std::memory_order_relaxed);
         pins.was_fail = pins.fail_code;
-        const double delay = std::isfinite(pins.mailbox_delay.get()) ? std::clamp(pins.mailbox_delay.get(), 0.0, most_delay) : 0.0;
-        faults.mailbox_delay_ns.store(static_cast<std::int64_t>(delay * 1e9), std::memory_order_relaxed);
+        faults.mailbox_delay_ns.store(nanoseconds(pins.mailbox_delay), std::memory_order_relaxed);
     }
 
     static std::unique_ptr<hal::ethernet::Port> open(const std::string& address, const hal::ethernet::Options& options) {
@@ -191,24 +144,25 @@ private:
     hal::TextArgument devices_{
         *this, "devices", "coupler",
         "devices along the line, separated by commas: coupler, digital_in bits=16, digital_out bits=8, analog_in channels=4, "
-        "analog_out channels=2, servo axes=1, mailbox_device; all take alias= and serial=, a servo dc=required and modes= (6502h)"};
+        "analog_out channels=2, servo axes=1, mailbox_device, esi file=drive.xml device=NAME; all take alias= and serial=, a servo dc=required and modes= (6502h)"};
     hal::TextArgument link_{*this, "link", "sim:ethercat", "segment in memory where the master is"};
     hal::TextArgument backup_{*this, "backup", "", "segment in memory of the master's second port, which closes a ring"};
     hal::Function update_{*this, "update", &EthercatSegment::update, "copies values between pins and devices; in the thread of the master"};
 
     std::vector<devices::Device> line_devices_;
     // Deques: a pin may not move once it is declared.
-    std::deque<SlavePins>                       slaves_;
-    std::deque<AxisPins>                        axes_;
-    std::deque<Channel<hal::In<bool>>>          digital_in_;
-    std::deque<Channel<hal::Out<bool>>>         digital_out_;
-    std::deque<Channel<hal::In<std::int32_t>>>  analog_in_;
-    std::deque<Channel<hal::Out<std::int32_t>>> analog_out_;
-    std::unique_ptr<hal::ethernet::Port>        primary_, secondary_;
-    std::optional<esc::Line>                    line_;
-    std::uint64_t                               frames_ = 0;
-    unsigned                                    silent_ = 0;
-    std::unique_ptr<esc::LineOnSegments>        connection_;
+    std::deque<EmulatedSlavePins>                  slaves_;
+    std::deque<EmulatedAxisPins>                   axes_;
+    std::deque<ChannelPin<hal::In<bool>>>          digital_in_;
+    std::deque<ChannelPin<hal::Out<bool>>>         digital_out_;
+    std::deque<ChannelPin<hal::In<std::int32_t>>>  analog_in_;
+    std::deque<ChannelPin<hal::Out<std::int32_t>>> analog_out_;
+    std::unique_ptr<hal::ethernet::Port>           primary_, secondary_;
+    std::optional<esc::Line>                       line_;
+    std::uint64_t                                  frames_ = 0;
+    unsigned                                       silent_ = 0;
+    bool                                           unposted_ = false;  ///< disturbances that the line did not take yet
+    std::unique_ptr<esc::LineOnSegments>           connection_;
 };
 
 }  // namespace
@@ -225,6 +179,8 @@ cables and devices, at the same times in every run of `hal sim`.
 A master on the same segment is `loadrt ethercat config=machine.ethercat link=sim:line`.
 
 Slaves are counted from 0 along the line. `slave-N.power` and `slave-N.cable` switch a slave off and break its cable. `slave-N.reject-state` with
-`slave-N.reject-code` makes a slave reject a state, `slave-N.leave-op` makes it leave OP, and `slave-N.mailbox-delay` makes its mailbox slow. With `backup` the line is a ring
-with both ports of the master.
+`slave-N.reject-code` makes a slave reject a state, `slave-N.leave-op` makes it leave OP, and `slave-N.mailbox-delay` makes its mailbox slow. Frames on the
+cable before a slave are disturbed by `lose-every`, `corrupt-every`, `double-every` and `delay-every` with `delay`, its clock by `drift` and `clock-jump`, its
+EEPROM by `eeprom-fail`, `eeprom-damaged` and `wrong-identity`, and `expire-watchdog` stops its outputs. With `backup` the line is a ring with both ports of the
+master.
 )");

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "ethercat/master/status.hpp"
+#include "ethercat/plugins/emergencies.hpp"
 #include "hal/component.hpp"
 
 namespace hal::ethercat {
@@ -55,7 +56,7 @@ struct LcecSlavePins {
           op(c, f, (name + ".slave-state-op").c_str(), "the slave is in OP") {}
 
     /// [realtime]
-    void show(const master::SlaveStatus& s) noexcept {
+    void show(const master::SlaveStatus& s, const Emergencies::Heard&) noexcept {
         online = s.online, operational = s.operational;
         init = s.state == State::init, preop = s.state == State::preop, safeop = s.state == State::safeop, op = s.state == State::op;
     }

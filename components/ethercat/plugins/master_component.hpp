@@ -16,9 +16,10 @@
 
 #include "ethercat/config/event_filter.hpp"
 #include "ethercat/config/event_words.hpp"
-#include "ethercat/master/coe_client.hpp"
-#include "ethercat/master/mailbox.hpp"
+#include "ethercat/master/gateway.hpp"
 #include "ethercat/master/master.hpp"
+#include "ethercat/master/request_queue.hpp"
+#include "ethercat/plugins/emergencies.hpp"
 #include "ethercat/plugins/entry_pins.hpp"
 #include "ethercat/plugins/ethercat_arguments.hpp"
 #include "ethercat/wire/registers.hpp"
@@ -87,8 +88,13 @@ public:
         primary_ = std::move(primary.port), backup_ = std::move(backup.port);
         simulated_ = primary_->description().simulated;
         mailboxes_ = std::make_unique<master::Mailboxes>(bus_.setup.slaves.size() + spare_slaves);
-        client_ = std::make_unique<master::CoeClient>(*mailboxes_);
-        master_ = std::make_unique<Master>(bus_.setup, primary_->address(), static_cast<master::Events&>(*this), *client_);
+        emergencies_ = std::make_unique<Emergencies>(bus_.setup.slaves.size(), static_cast<master::Events&>(*this));
+        for (std::size_t n = 0; n < mailboxes_->size(); ++n) mailboxes_->at(n).set_sink(MailboxType::coe, emergencies_.get());
+        server_ = std::make_unique<master::RequestServer>(
+            *mailboxes_, [this](std::uint16_t n) { return master_->status().scanned ? master_->numbered(n) : nullptr; }, 2);
+        server_->set_poll_interval(emergencies_every_ns);
+        master_ = std::make_unique<Master>(bus_.setup, primary_->address(), static_cast<master::Events&>(*this), server_->coe());
+        for (std::size_t n = 0; n < server_->workers(); ++n) master_->add(server_->channel(n));
         for (std::size_t n = 0; n < places_.size(); ++n) areas_[n] = master_->data(places_[n].slave, places_[n].sync_manager);
         if (!simulated_) master_->set_epoch(since_2000_ns() - hal::monotonic_ns());
         period_reported_ = was_fresh_ = unknown_raised_ = false;
@@ -97,14 +103,18 @@ public:
         filter_ = config::EventFilter(bus_.setup.slaves.size());
         discipline_.lose();
         reporter_.start();
+        if (!bus_.gateway.empty()) open_gateway();
         master_->attach(*primary_, backup_.get());
     }
 
     void stop() noexcept {
         if (primary_ && master_) release_slaves();
+        if (server_) server_->stop();
+        gateway_.reset();
         master_.reset();
-        client_.reset();
+        server_.reset();
         mailboxes_.reset();
+        emergencies_.reset();
         clock_.reset();
         reporter_.stop();
         primary_.reset(), backup_.reset();
@@ -118,7 +128,9 @@ public:
         master_->receive(cycle.start_ns());
         follow(cycle);
         bus_pins_.show(master_->status(), master_->cycles_incomplete());
-        for (std::size_t n = 0; n < slaves_.size(); ++n) slaves_[n].show(master_->slave_status(n));
+        for (std::size_t n = 0; n < slaves_.size(); ++n) slaves_[n].show(master_->slave_status(n), emergencies_->of(n));
+        if (gateway_ && std::exchange(slaves_changed_, false))
+            gateway_slaves_->set(master_->found(), [this](std::size_t n) -> const master::BusSlave& { return master_->found(n); });
         entries_.show(areas_);
     }
 
@@ -130,6 +142,7 @@ public:
         if (apart_ == tolerated_cycles) raise(apart_words_);
         if (unreceived_ > 2 || apart_ > 2) return;  // outputs must not move without their inputs
         entries_.take(areas_);
+        server_->step(cycle.start_ns());
         master_->transmit(cycle.start_ns());
     }
 
@@ -138,11 +151,28 @@ public:
     }
 
 private:
-    static constexpr unsigned tolerated_cycles = 100;  ///< without the other function, while the netlist is loaded
-    static constexpr double   not_a_number = std::numeric_limits<double>::quiet_NaN();
+    static constexpr unsigned     tolerated_cycles = 100;  ///< without the other function, while the netlist is loaded
+    static constexpr std::int64_t emergencies_every_ns = 100'000'000;  ///< a mailbox whose state is not in the process data is looked at
+    static constexpr double       not_a_number = std::numeric_limits<double>::quiet_NaN();
     struct Place {
         std::size_t slave = 0, sync_manager = 0;
     };
+
+    /// Lets other programs reach the mailboxes of the slaves. [setup]
+    void open_gateway() {
+        gateway_slaves_ = std::make_unique<master::GatewaySlaves>(bus_.setup.slaves.size() + spare_slaves);
+        master::GatewaySetup setup;
+        setup.address = bus_.gateway, setup.port = bus_.gateway_port;
+        setup.slaves = [this] { return gateway_slaves_->all(); };
+        std::string problem;
+        gateway_ = std::make_unique<master::Gateway>(server_->open(), std::move(setup), problem);
+        if (!problem.empty()) {
+            server_->stop();
+            gateway_.reset();
+            throw std::runtime_error(problem);
+        }
+        slaves_changed_ = true;
+    }
 
     bool has_clocks() const {
         for (const master::Slave& s : bus_.setup.slaves)
@@ -208,6 +238,8 @@ private:
     void report(Event event, std::uint32_t slave, std::int64_t first, std::int64_t second) noexcept override {
         if (filter_.is_new(event, slave, first, second)) reporter_.tell({event, slave, first, second});
         const bool named = slave < slaves_.size();
+        if (event == Event::scanned || event == Event::topology_changed || event == Event::slave_returned || event == Event::slave_lost)
+            slaves_changed_ = true;
         if (event == Event::slave_lost && named) raise(lost_words_[slave]);
         if (event == Event::fell_back && named) raise(left_words_[slave], static_cast<double>(second));
         if (event == Event::dc_lost && named) raise(clock_words_[slave], static_cast<double>(first) * 1e-3);
@@ -250,17 +282,21 @@ private:
     unsigned               unsent_ = 0, unreceived_ = 0, apart_ = 0;
     std::atomic<pthread_t> receiver_{};
 
-    std::unique_ptr<hal::ethernet::Port> primary_, backup_;
-    std::unique_ptr<master::Mailboxes>   mailboxes_;
-    std::unique_ptr<master::CoeClient>   client_;
-    std::unique_ptr<Master>              master_;
-    std::optional<hal::DisciplinedClock> clock_;
-    hal::Discipline                      discipline_;
-    hal::Reporter<config::Happened>      reporter_{name_, [this](const config::Happened& h) {
+    std::unique_ptr<hal::ethernet::Port>   primary_, backup_;
+    std::unique_ptr<master::Mailboxes>     mailboxes_;
+    std::unique_ptr<Emergencies>           emergencies_;
+    std::unique_ptr<master::RequestServer> server_;
+    std::unique_ptr<Master>                master_;
+    std::unique_ptr<master::GatewaySlaves> gateway_slaves_;
+    std::unique_ptr<master::Gateway>       gateway_;
+    bool                                   slaves_changed_ = false;
+    std::optional<hal::DisciplinedClock>   clock_;
+    hal::Discipline                        discipline_;
+    hal::Reporter<config::Happened>        reporter_{name_, [this](const config::Happened& h) {
         return config::event_words(h, bus_.setup, bus_.link, bus_.backup);
     }, 256, [](const config::Happened& h) { return std::to_string(static_cast<int>(h.event)) + " " + std::to_string(h.slave); }};
-    const hal_faults*                    faults_ = nullptr;
-    bool                                 unknown_raised_ = false, was_fresh_ = false, simulated_ = false, period_reported_ = false;
+    const hal_faults*                      faults_ = nullptr;
+    bool                                   unknown_raised_ = false, was_fresh_ = false, simulated_ = false, period_reported_ = false;
 };
 
 }  // namespace hal::ethercat

@@ -30,7 +30,7 @@ struct GatewayLine {
     explicit GatewayLine(int type) {
         GatewaySetup setup;
         setup.port = 0;
-        setup.slaves = {{0x1001, 0, 2, 0x1234, 0x10000, 7}};
+        setup.slaves = [] { return std::vector<GatewaySlave>{{0x1001, 0, 2, 0x1234, 0x10000, 7}}; };
         gateway = std::make_unique<Gateway>(port, setup, problem);
         EXPECT_EQ(problem, "");
         slave.on_request = [this](const MailboxMessage& m) {
