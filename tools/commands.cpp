@@ -144,7 +144,7 @@ constexpr Subcommand table[] = {
     command<EthercatPositionOptions, ON_BUS(run_ethercat_sdos)>("ethercat sdos", "ADDRESS|--emulate LINE [-p N] [--json]", "list the object dictionary of a slave"),
     command<EthercatFileOptions, ON_BUS(run_ethercat_foe_read)>("ethercat foe-read", "ADDRESS|--emulate LINE [-p N] NAME [--boot] [--password N] [--json] > FILE", "read a file of a slave in PRE-OP or BOOT"),
     command<EthercatFileOptions, ON_BUS(run_ethercat_foe_write)>("ethercat foe-write", "ADDRESS|--emulate LINE [-p N] FILE [NAME] [--boot] [--password N] [--json]", "write a file to a slave in PRE-OP, or its firmware in BOOT"),
-    command<EthercatOptions, ON_BUS(run_ethercat_config)>("ethercat config", "ADDRESS|--emulate LINE NAME [--json]", "write NAME.ethercat and a netlist to start from for the slaves of a bus"),
+    command<EthercatConfigOptions, ON_BUS(run_ethercat_config)>("ethercat config", "ADDRESS|--emulate LINE|--esi LIST NAME [--json]", "write NAME.ethercat and a netlist to start from for the slaves of a bus, or for descriptions"),
     command<EthercatPositionOptions, ON_BUS(run_ethercat_xml)>("ethercat xml", "ADDRESS|--emulate LINE [-p N] [--json] > FILE", "print a device description (ESI) of a slave from its EEPROM"),
     command<EthercatOptions, ON_BUS(run_ethercat_graph)>("ethercat graph", "ADDRESS|--emulate LINE [--json] > FILE", "draw the topology of a bus as SVG"),
     command<EthercatOptions, ON_BUS(run_ethercat_dc)>("ethercat dc", "ADDRESS|--emulate LINE [--json]", "print the deviations of the clocks of the slaves"),

@@ -19,16 +19,19 @@ constexpr const char* emulated_segment = "sim:hal-ethercat";
 
 bool EthercatAccess::emulate(const EthercatOptions& options) {
     std::string text = options.emulate;
-    if (std::filesystem::is_regular_file(text)) {
+    const bool in_file = std::filesystem::is_regular_file(text);
+    if (in_file) {
         if (!read_file(options.emulate, text)) return fail(options, text), false;
     } else {
         for (char& c : text)
             if (c == ',') c = '\n';
     }
-    const auto description = ethercat::devices::read_line(text);
-    if (!description.messages.empty()) {
-        const auto& message = description.messages.front();
-        return fail(options, fmt::format("--emulate: {}; {}", message.sentence, message.help)), false;
+    const auto description = ethercat::devices::read_line(text, in_file ? ethercat::devices::beside(options.emulate) : ethercat::devices::FindFile());
+    for (const auto& m : description.messages) {
+        const bool is_error = m.severity == Severity::error;
+        fail(options, fmt::format("{}: {}{}; {}", in_file ? fmt::format("{}:{}:{}", options.emulate, m.at.line, m.at.column) : "--emulate",
+                                  is_error ? "" : "warning: ", m.sentence, m.help));
+        if (is_error) return false;
     }
     devices_ = ethercat::devices::make_line(description);
     ethernet::Options how;
@@ -53,6 +56,8 @@ bool EthercatAccess::open(const EthercatOptions& options, bool alone) {
             return fail(options, "missing address: type eth:INTERFACE, or --emulate \"coupler, servo\" to try it without hardware"), false;
         address_ = arguments_.front();
         arguments_.erase(arguments_.begin());
+        if (address_.starts_with("gateway:"))
+            return fail(options, "this command needs the bus itself; through a gateway there are upload, download and sdos"), false;
         if (ethernet::describe(address_).in_memory)
             return fail(options, fmt::format("'{}' is a segment in memory, which belongs to another process; type eth:INTERFACE, or "
                                              "--emulate \"coupler, servo\" for an emulated line",
@@ -70,7 +75,9 @@ bool EthercatAccess::open(const EthercatOptions& options, bool alone) {
         return fail(options, fmt::format("{} has no link; check the cable and the supply of the first slave", address_)), false;
     if (alone && receive(now_ns_ + listening_ns))
         return fail(options,
-                    fmt::format("another EtherCAT master is active on {}, and this command changes states; stop it first", address_)),
+                    fmt::format("another EtherCAT master is active on {}, and this command changes states; stop it, or, for objects, use "
+                                "its mailbox gateway: gateway:127.0.0.1 instead of {}",
+                                address_, address_)),
                false;
     return true;
 }

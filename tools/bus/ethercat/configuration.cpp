@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "bus/ethercat/plan_picture.hpp"
 #include "bus/ethercat/wire.hpp"
 #include "bus/ethercat/words.hpp"
 #include "cli/output.hpp"
@@ -33,22 +34,10 @@ bool read_bus_file(const Options& options, const std::string& path, config::Read
     reading = config::read(text, path);
     if (const std::string messages = config::to_string(reading, path); !messages.empty())
         write_all(2, messages.back() == '\n' ? messages : messages + "\n");
+    for (const config::Message& m : reading.messages)
+        if (m.severity == Severity::warning)
+            write_all(2, fmt::format("{}:{}:{}: warning: {}{}{}\n", path, m.at.line, m.at.column, m.sentence, m.help.empty() ? "" : "; ", m.help));
     return reading.good();
-}
-
-std::string devices_of(const std::string& emulate) {
-    std::string text = emulate;
-    if (std::filesystem::is_regular_file(emulate) && read_file(emulate, text)) {
-        std::string devices;
-        for (std::size_t at = 0; at < text.size();) {
-            const std::size_t end = std::min(text.find('\n', at), text.size());
-            const std::string line = text.substr(at, std::min(text.find('#', at), end) - at);
-            if (line.find_first_not_of(" \t\r") != std::string::npos) devices += (devices.empty() ? "" : ", ") + line;
-            at = end + 1;
-        }
-        return devices;
-    }
-    return text;
 }
 
 }  // namespace
@@ -79,44 +68,6 @@ int run_ethercat_pdos(const EthercatOptions& options) {
             }
     }
     return print(options.json ? (json.empty() ? "[" : json) + "]\n" : text) ? 0 : 1;
-}
-
-int run_ethercat_config(const EthercatOptions& options) {
-    EthercatWire wire;
-    if (!wire.open(options)) return 1;
-    if (wire.arguments().size() != 1) return fail(options, "type: hal ethercat config ADDRESS NAME; it writes NAME.ethercat and NAME.hal");
-    const std::filesystem::path stem = wire.arguments()[0];
-    const std::string file = stem.string() + ".ethercat", netlist = stem.string() + ".hal", name = stem.filename().string();
-    for (const std::string& path : {file, netlist})
-        if (std::filesystem::exists(path)) return fail(options, fmt::format("'{}' exists already; choose another name", path));
-    std::vector<config::Found> found(wire.size());
-    for (std::size_t n = 0; n < wire.size(); ++n) {
-        const auto& c = wire.contents(n);
-        found[n].name = c.general.order.empty() ? c.general.name : c.general.order;
-        found[n].device = c.general.name;
-        found[n].vendor = c.vendor, found[n].product = c.product, found[n].revision = c.revision, found[n].alias = c.alias();
-        found[n].rx = c.rx, found[n].tx = c.tx, found[n].sync_managers = c.sync_managers;
-        if (!c.dc.empty()) found[n].assign_activate = c.dc.front().assign_activate;
-    }
-    constexpr std::int64_t millisecond = 1'000'000;
-    const bool emulated = !options.emulate.empty();
-    const std::string text = config::write(emulated ? "sim:" + name : wire.address(), millisecond, found);
-    const config::Reading reading = config::read(text, file);
-    if (!reading.good() || reading.buses.empty())
-        return fail(options, "the slaves describe their process data in a way that no configuration can be made of: " +
-                                 config::to_string(reading, file));
-    const std::string lines = config::netlist(reading.buses.front(), name + ".ethercat", emulated ? devices_of(options.emulate) : "");
-    for (const auto& [path, contents] : {std::pair(&file, &text), std::pair(&netlist, &lines)})
-        if (const std::string problem = write_file(*path, *contents); !problem.empty()) return fail(options, problem);
-    if (options.json)
-        return print(fmt::format("{{\"configuration\":{},\"netlist\":{},\"slaves\":{}}}\n", json_string(file), json_string(netlist),
-                                 wire.size()))
-                   ? 0
-                   : 1;
-    return print(fmt::format("{} and {} written, {} slave{}; next: hal run {}\n", file, netlist, wire.size(), wire.size() == 1 ? "" : "s",
-                             netlist))
-               ? 0
-               : 1;
 }
 
 int run_ethercat_dc(const EthercatOptions& options) {
@@ -172,6 +123,17 @@ int run_ethercat_plan(const EthercatPlanOptions& options) {
         return fail(options, fmt::format("nothing is expected at '{}'; see: hal help ethercat plan", options.words[1]));
     config::Reading reading;
     if (!read_bus_file(options, options.words[0], reading)) return 1;
+    if (!options.svg.empty()) {
+        if (options.json) return fail(options, "--json and --svg exclude each other");
+        if (reading.buses.size() != 1)
+            return fail(options, fmt::format("{} has {} masters; a picture shows one", options.words[0], reading.buses.size()));
+        const config::PlanOptions assumed;
+        const config::Plan p = config::plan(reading.buses[0], assumed);
+        const std::string picture = ethercat_plan_picture(reading.buses[0], p, assumed);
+        if (options.svg == "-") return print(picture) ? 0 : 1;
+        const std::string why = write_file(options.svg, picture);
+        return why.empty() ? 0 : fail(options, why);
+    }
     std::string text, json;
     bool fits = true;
     for (const config::Bus& bus : reading.buses) {

@@ -66,7 +66,7 @@ bool transfer_file(const EthercatFileOptions& options, EthercatSession& session,
 
 int run_ethercat_sdos(const EthercatPositionOptions& options) {
     EthercatSession session;
-    if (!session.open(options)) return 1;
+    if (!session.open(options, true)) return 1;
     if (!session.arguments().empty()) return fail(options, fmt::format("unexpected argument '{}'", session.arguments().front()));
     const BusSlave* s = session.chosen(options);
     if (s == nullptr) return 1;

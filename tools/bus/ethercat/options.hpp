@@ -27,6 +27,18 @@ protected:
     }
 };
 
+/// Options of `config`, which writes files for a bus or for descriptions.
+struct EthercatConfigOptions : EthercatOptions {
+    std::string esi;
+
+    void declare(OptionSet& set) override {
+        set.words("ADDRESS NAME", "eth:enp3s0, not with --emulate; then the name of the files: NAME.ethercat and NAME.hal", false);
+        declare_bus(set);
+        set.value("--esi", esi, "LIST",
+                  "write the files for these descriptions instead of the slaves on a bus: FILE.xml, or FILE.xml:DEVICE, separated by commas");
+    }
+};
+
 /// Options of the commands that concern one slave.
 struct EthercatPositionOptions : EthercatOptions {
     int position = -1;  ///< -1: not given
@@ -70,10 +82,12 @@ struct EthercatCheckOptions : Options {
     }
 };
 struct EthercatPlanOptions : Options {
+    std::string svg;
     bool json = false;
 
     void declare(OptionSet& set) override {
         set.words("FILE", "configuration of the bus, NAME.ethercat or LinuxCNC's ethercat-conf.xml");
+        set.value("--svg", svg, "FILE", "draw the timing of a cycle instead; - prints it");
         set.flag("--json", json, "print JSON");
     }
 };
@@ -109,7 +123,7 @@ int run_ethercat_pdos(const EthercatOptions&);
 int run_ethercat_sdos(const EthercatPositionOptions&);
 int run_ethercat_foe_read(const EthercatFileOptions&);
 int run_ethercat_foe_write(const EthercatFileOptions&);
-int run_ethercat_config(const EthercatOptions&);
+int run_ethercat_config(const EthercatConfigOptions&);
 int run_ethercat_xml(const EthercatPositionOptions&);
 int run_ethercat_graph(const EthercatOptions&);
 int run_ethercat_dc(const EthercatOptions&);

@@ -4,6 +4,7 @@
 #include <fmt/core.h>
 
 #include "cli/output.hpp"
+#include "hal/clock.hpp"
 
 namespace hal::tools {
 
@@ -19,7 +20,7 @@ constexpr std::uint16_t most_slaves = 1024;
 
 EthercatSession::EthercatSession()
     : mailboxes_(most_slaves),
-      server_(mailboxes_, [this](std::uint16_t n) { return master_ && n < master_->found() ? &master_->found(n) : nullptr; }),
+      server_(mailboxes_, [this](std::uint16_t n) { return find(n); }),
       requests_(server_.open()) {}
 
 EthercatSession::~EthercatSession() {
@@ -28,7 +29,18 @@ EthercatSession::~EthercatSession() {
     master_.reset();
 }
 
-bool EthercatSession::open(const EthercatOptions& options) {
+BusSlave* EthercatSession::find(std::uint16_t number) {
+    return (gateway_.is_open() || master_) && number < size() ? &slave(number) : nullptr;
+}
+
+bool EthercatSession::open(const EthercatOptions& options, bool objects) {
+    if (options.emulate.empty() && !options.words.empty() && GatewayLine::is_gateway(options.words.front())) {
+        if (!objects)
+            return fail(options, "this command needs the bus itself; through a gateway there are upload, download and sdos"), false;
+        arguments_.assign(options.words.begin() + 1, options.words.end());
+        const std::string problem = gateway_.open(options.words.front());
+        return problem.empty() || (fail(options, problem), false);
+    }
     if (!access_.open(options, true)) return false;
     const std::string& address = access_.address();
     ethernet::Port* port = &access_.port();
@@ -58,6 +70,12 @@ bool EthercatSession::open(const EthercatOptions& options) {
 }
 
 void EthercatSession::cycle() {
+    if (gateway_.is_open()) {
+        gateway_.receive();
+        server_.step(monotonic_ns());
+        for (std::size_t n = 0; n < server_.workers(); ++n) gateway_.serve(server_.channel(n), monotonic_ns());
+        return;
+    }
     access_.pass(cycle_ns);
     const std::int64_t now_ns = access_.now_ns();
     master_->receive(now_ns);
@@ -67,8 +85,9 @@ void EthercatSession::cycle() {
 }
 
 bool EthercatSession::until(const std::function<bool()>& done, std::int64_t timeout_ns) {
-    for (const std::int64_t end = access_.now_ns() + timeout_ns; !done(); cycle())
-        if (access_.now_ns() >= end) return false;
+    const auto now_ns = [this] { return gateway_.is_open() ? monotonic_ns() : access_.now_ns(); };
+    for (const std::int64_t end = now_ns() + timeout_ns; !done(); cycle())
+        if (now_ns() >= end) return false;
     return true;
 }
 

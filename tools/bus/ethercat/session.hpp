@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "bus/ethercat/access.hpp"
+#include "bus/ethercat/gateway_line.hpp"
 #include "ethercat/master/master.hpp"
 #include "ethercat/master/request_queue.hpp"
 
@@ -25,12 +26,15 @@ public:
     EthercatSession();
     ~EthercatSession() override;
 
-    /// Opens the bus that the options name and brings its slaves to PRE-OP. Returns false after printing the reason.
-    bool open(const EthercatOptions&);
+    /// Opens the bus that the options name and brings its slaves to PRE-OP. With `objects`, the address may be that of the mailbox gateway of a
+    /// running master, whose slaves stay as they are. Returns false after printing the reason.
+    bool open(const EthercatOptions&, bool objects = false);
     /// Returns the positional arguments behind the address.
-    const std::vector<std::string>& arguments() const { return access_.arguments(); }
-    std::size_t size() const { return master_->found(); }
-    ethercat::master::BusSlave& slave(std::size_t position) { return master_->found(position); }
+    const std::vector<std::string>& arguments() const { return gateway_.is_open() ? arguments_ : access_.arguments(); }
+    std::size_t size() const { return gateway_.is_open() ? gateway_.size() : master_->found(); }
+    ethercat::master::BusSlave& slave(std::size_t position) { return gateway_.is_open() ? gateway_.slave(position) : master_->found(position); }
+    /// Returns whether the gateway ended the connection.
+    bool gateway_lost() const { return gateway_.is_closed(); }
     /// Returns the slave that --position names, or the only one; nullptr after printing the reason.
     ethercat::master::BusSlave* chosen(const EthercatPositionOptions&);
 
@@ -44,6 +48,10 @@ private:
     void cycle();
     bool until(const std::function<bool()>& done, std::int64_t timeout_ns);
 
+    ethercat::master::BusSlave* find(std::uint16_t number);
+
+    GatewayLine gateway_;
+    std::vector<std::string> arguments_;
     EthercatAccess access_;
     ethercat::master::Mailboxes mailboxes_;
     ethercat::master::RequestServer server_;

@@ -146,7 +146,7 @@ const ValueType* type_of(const EthercatValueOptions& options, EthercatSession& s
 /// One SDO transfer as the arguments describe it.
 int transfer(const EthercatValueOptions& options, bool download) {
     EthercatSession session;
-    if (!session.open(options)) return 1;
+    if (!session.open(options, true)) return 1;
     const auto& words = session.arguments();
     if (words.size() != (download ? 3U : 2U))
         return fail(options, fmt::format("type: {} ADDRESS -p N INDEX SUB{}", options.program, download ? " VALUE" : ""));
@@ -169,6 +169,7 @@ int transfer(const EthercatValueOptions& options, bool download) {
     request.slave = s->number, request.index = static_cast<std::uint16_t>(*index), request.sub = static_cast<std::uint8_t>(*sub),
     request.data = bytes;
     if (!session.run(request)) return fail(options, fmt::format("slave {}: {}: not finished within 60 s", s->position, what));
+    if (session.gateway_lost()) return fail(options, fmt::format("{} closed the connection; does the machine still run?", options.words.front()));
     if (!request.result) return fail_mailbox(options, *s, what, request.result);
     if (!download) bytes.resize(request.result.length);
     std::string plain;
