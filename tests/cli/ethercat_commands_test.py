@@ -7,7 +7,7 @@ import sys
 import unittest
 from xml.etree import ElementTree
 
-from harness import HAL, Case
+from harness import HAL, ROOT, Case
 from own_network import VARIABLE, own_network
 
 LINE = "coupler, servo axes=2, digital_in bits=8 alias=7, mailbox_device"
@@ -140,6 +140,48 @@ class Configuration(Ethercat):
                       self.good("ethercat", "check", "machine.ethercat"))
         self.assertEqual(7, json.loads(self.good("ethercat", "check", "machine.ethercat", "--json"))[0]["slaves"])
 
+    def test_config_from_descriptions_runs_on_emulated_devices(self):
+        (self.folder / "drive.xml").write_text((ROOT / "tests/unit/ethercat/data/servo.xml").read_text())
+        said = self.good("ethercat", "config", "--esi", "drive.xml:SERVO-1, drive.xml:SERVO-1", "two")
+        self.assertEqual("two.ethercat and two.hal written, 2 slaves; next: hal run two.hal\n", said)
+        text = (self.folder / "two.ethercat").read_text()
+        self.assertIn("[slave 1 servo-1-1]  # Servo drive\nesi      = drive.xml\ndevice   = SERVO-1\nvendor   = 0xCAFE\n", text)
+        run = self.run_program("sim", "two.hal", "--for", "3s")
+        self.assertIn("slave 1 (servo-1-1) is operational", run.stdout + run.stderr)
+        self.assertIn("no faults", run.stdout + run.stderr)
+        (self.folder / "machine").mkdir()
+        self.good("ethercat", "config", "--esi", "drive.xml:SERVO-1", "machine/one")
+        self.assertIn("esi      = ../drive.xml\n", (self.folder / "machine/one.ethercat").read_text())
+        run = self.run_program("sim", "machine/one.hal", "--for", "3s")
+        self.assertIn("slave 0 (servo-1) is operational", run.stdout + run.stderr)
+        self.good("ethercat", "config", "--esi", "drive.xml:0x402", "eth:enp3s0", "real")
+        self.assertIn("link  = eth:enp3s0\n", (self.folder / "real.ethercat").read_text())
+        self.assertNotIn("loadrt ethercat_segment", (self.folder / "real.hal").read_text())
+        bad = lambda *words: self.bad("ethercat", "config", *words)
+        self.assertEqual("hal ethercat config: 'drive.xml': the description has several devices; write drive.xml:NAME with one of: SERVO-1, DIO-8\n",
+                         bad("--esi", "drive.xml", "x"))
+        self.assertEqual("hal ethercat config: cannot read 'none.xml': No such file or directory\n", bad("--esi", "none.xml", "x"))
+        self.assertEqual("hal ethercat config: --esi and --emulate exclude each other\n", bad("--esi", "drive.xml", "--emulate", "servo", "x"))
+        self.assertEqual("hal ethercat config: type: hal ethercat config --esi FILE.xml:DEVICE NAME, or eth:INTERFACE before NAME\n", bad("--esi", "drive.xml"))
+
+    def test_a_described_device_does_what_its_description_says(self):
+        (self.folder / "drive.xml").write_text((ROOT / "tests/unit/ethercat/data/servo.xml").read_text())
+        line = "coupler, esi file=drive.xml device=SERVO-1 alias=9, esi file=drive.xml device=DIO-8"
+        self.assertEqual([(0xffffff, 0), (0xcafe, 9), (0xcafe, 0)],
+                         [(row["vendor"], row["alias"]) for row in json.loads(self.on("slaves", "--json", line=line))])
+        self.assertEqual("0x01 1\n", self.on("upload", "-p", 1, "0x60c2", 1, line=line))
+        self.on("download", "-p", 1, "0x60c2", 1, 2, line=line)
+        self.assertIn("code 0x06010002: object is read-only", self.refused("download", "-p", 1, "0x6041", 0, 2, line=line))
+        self.assertIn("607A:0 DINT, 32 bit  Target position\n", self.on("pdos", line=line))
+        (self.folder / "line.txt").write_text("coupler\nesi file=drive.xml device=none\n")
+        self.assertEqual("hal ethercat slaves: line.txt:2:1: 'drive.xml': the description has no device 'none'; write device=NAME with one of: SERVO-1, DIO-8\n",
+                         self.refused("slaves", line="line.txt"))
+        for wrong, printed in (("esi", "an esi device needs the description of its maker; write esi file=FILE.xml device=NAME, with the order code or product code "
+                             "of the device"),
+                            ("esi file=none.xml", "cannot read 'none.xml': No such file or directory; write esi file=FILE.xml device=NAME, with the order code "
+                             "or product code of the device")):
+            self.assertEqual(f"hal ethercat slaves: --emulate: {printed}\n", self.refused("slaves", line=wrong))
+
     def test_config_links_an_axis_to_each_drive(self):
         self.on("config", "drives", line="servo axes=2, servo, digital_out bits=16")
         text = (self.folder / "drives.ethercat").read_text()
@@ -160,6 +202,19 @@ class Configuration(Ethercat):
         text = (self.folder / "small.ethercat").read_text().replace("cycle = 1ms", "cycle = 50us")
         (self.folder / "fast.ethercat").write_text(text)
         self.assertIn("fast.ethercat: the cycle is too short; raise `cycle`", self.bad("ethercat", "plan", "fast.ethercat"))
+
+    def test_plan_draws_the_timing(self):
+        """The drawings beside the machines are what comes of their configurations."""
+        for machine in ("ethercat-cnc/cnc", "ethercat-servo/servo"):
+            file = ROOT / "halfiles" / f"{machine}.ethercat"
+            self.assertEqual((file.parent / "timing.svg").read_text(), self.good("ethercat", "plan", file, "--svg", "-"),
+                             f"make it anew: hal ethercat plan halfiles/{machine}.ethercat --svg halfiles/{machine.split('/')[0]}/timing.svg")
+        self.assertEqual("", self.good("ethercat", "plan", ROOT / "halfiles/ethercat-cnc/cnc.ethercat", "--svg", "cnc.svg"))
+        texts = [t.text for t in ElementTree.parse(self.folder / "cnc.svg").iter("{http://www.w3.org/2000/svg}text")]
+        self.assertIn("SYNC0", texts)
+        self.assertIn("Wire load 1.6 %; shortest cycle 123.48 us; worst case from an input to the output that answers it 2123.48 us.", texts)
+        self.assertEqual("hal ethercat plan: --json and --svg exclude each other\n",
+                         self.bad("ethercat", "plan", ROOT / "halfiles/ethercat-cnc/cnc.ethercat", "--svg", "x.svg", "--json"))
 
     def test_check_reports_the_place(self):
         (self.folder / "wrong.ethercat").write_text("[bus]\nspeed = 3\n")
