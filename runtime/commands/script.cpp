@@ -150,6 +150,8 @@ void Script::run_line(const Command& command) {
                        argument ? "write spaces around the = of an assignment: NAME = VALUE" : "`help` lists all commands");
         return;
     }
+    if (session_.journal().wanted() && !only_looks(*row, command))
+        session_.journal().add(row->edits() ? "edit" : "command", std::string(session_.sources.text(command.span)));
     if (!row->edits() && !check_arity(row->usage(), command.name, command.args, pending_)) return lines_.push_back(command.span);
     if (row->flags & command_transaction) return group(command);
     if ((state_.collecting || checked_begin_) && collect(command, *row)) return;

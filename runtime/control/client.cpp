@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "control/client.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <chrono>
@@ -32,8 +33,14 @@ struct Client::State {
     std::string in;
     std::size_t taken = 0;
     std::map<std::uint64_t, Json> replies;  ///< received before a caller waits for them
-    std::deque<Json> events;
+    struct Event {
+        Json message;
+        std::string payload = {};
+    };
+    std::deque<Event> events;
+    std::size_t payload_left = 0;  ///< bytes still to come of the newest event
     std::function<void(std::string_view)> notice;
+    static constexpr std::size_t most_payload = std::size_t{256} << 20;
     std::string reason;       ///< that the other side gave for closing the connection
 
     ~State() { lose(); }
@@ -50,7 +57,11 @@ struct Client::State {
         if (!message.is_object()) return lose();
         if (const auto event = message.find("event"); event != message.end()) {
             if (*event == "closed") reason = message.value("reason", "");
-            if (*event != "notice") return events.push_back(std::move(message));
+            if (*event != "notice") {
+                if (const auto bytes = message.find("bytes"); bytes != message.end() && bytes->is_number_unsigned()) payload_left = bytes->get<std::size_t>();
+                if (payload_left > most_payload) return lose();
+                return events.push_back({std::move(message)});
+            }
             if (notice) notice(message.value("text", ""));
             return;
         }
@@ -61,6 +72,16 @@ struct Client::State {
         }
     }
 
+    /// Moves raw bytes that have come to the newest event.
+    bool take_payload() {
+        if (payload_left == 0) return false;
+        const std::size_t part = std::min(payload_left, in.size() - taken);
+        events.back().payload.append(in, taken, part);
+        taken += part;
+        payload_left -= part;
+        return true;
+    }
+
     /// Reads what has come and takes the complete lines.
     void read_lines() {
         std::array<char, 65536> part;
@@ -69,12 +90,13 @@ struct Client::State {
         if (got < 0) return;
         const std::size_t searched = in.size();
         in.append(part.data(), static_cast<std::size_t>(got));
-        std::size_t from = searched;
-        for (std::size_t end; (end = in.find('\n', from)) != std::string::npos; from = taken) {
+        std::size_t from = take_payload() ? taken : searched;
+        for (std::size_t end; payload_left == 0 && (end = in.find('\n', from)) != std::string::npos; from = taken) {
             const std::size_t begin = taken;
             taken = end + 1;
             take(std::string_view(in).substr(begin, end - begin));
             if (fd < 0) return;
+            take_payload();
         }
         in.erase(0, taken);
         taken = 0;
@@ -206,15 +228,21 @@ Json Client::request(Json body) {
 }
 
 bool Client::next_event(Json& event, int timeout_ms) {
+    std::string payload;
+    return next_event(event, payload, timeout_ms);
+}
+
+bool Client::next_event(Json& event, std::string& payload, int timeout_ms) {
     State& s = *state_;
     const auto end = std::chrono::steady_clock::now() + std::chrono::milliseconds(timeout_ms);
-    while (s.events.empty()) {
+    while (s.events.empty() || (s.events.size() == 1 && s.payload_left > 0)) {
         if (s.fd < 0) return false;
         const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(end - std::chrono::steady_clock::now()).count();
         if (timeout_ms >= 0 && left < 0) return false;
         s.wait_for(POLLIN, timeout_ms < 0 ? -1 : static_cast<int>(left));
     }
-    event = std::move(s.events.front());
+    event = std::move(s.events.front().message);
+    payload = std::move(s.events.front().payload);
     s.events.pop_front();
     return true;
 }

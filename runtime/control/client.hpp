@@ -72,6 +72,8 @@ public:
     nlohmann::json wait(std::uint64_t id);
     /// The next event (values of a subscription …): true and `event`, or false after `timeout_ms` (-1: waits for ever).
     bool next_event(nlohmann::json& event, int timeout_ms);
+    /// The same; `payload` is the raw bytes that follow an event with the member "bytes".
+    bool next_event(nlohmann::json& event, std::string& payload, int timeout_ms);
 
 private:
     Client();

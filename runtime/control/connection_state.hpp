@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "commands/shell.hpp"
+#include "control/probe_feeds.hpp"
 #include "control/program_requests.hpp"
 #include "control/connection.hpp"
 #include "control/request.hpp"
@@ -30,6 +31,7 @@ struct Connection::State {
     pid_t peer;
     const std::uint64_t owner = session.programs().new_owner();  ///< of the components that this client answers for
     Subscriptions subscriptions;
+    ProbeFeeds probes{session};
     std::atomic<std::uint64_t> requests{0}, rubbish{0};
     std::atomic<bool> engaged{false};  ///< a request is being executed, or `begin` is open since the last one
     // What follows, and the shell's members beside cancel(), belong to the thread in handle().
@@ -45,6 +47,9 @@ struct Connection::State {
     void set(const Json& body, std::string& reply);
     void subscribe(const Json& body, std::string& reply);
     void unsubscribe(const Json& body, std::string& reply);
+    void probe(const Json& body, std::string& reply);
+    void unprobe(const Json& body, std::string& reply);
+    void journal(const Json& body, std::string& reply);
     void list(const Json& body, std::string& reply);
     void describe_kind(const Json& body, std::string& reply);
     void complete(const Json& body, std::string& reply);

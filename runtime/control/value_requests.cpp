@@ -46,6 +46,7 @@ void Connection::State::set(const Json& body, std::string& reply) {
         resolve_set(session.model(), command);
         const CommandRow& row = *find_command(command.name.text);
         if (!check_lock(row, command, session.locked, session.model(), diagnostics)) break;
+        session.journal().add("edit", command.name.text + " " + command.args[0].text + " " + command.args[1].text);
         transaction.apply(row.form(), command, diagnostics);
     }
     if (!transaction.commit(diagnostics)) throw RequestError{render(diagnostics, session.sources) + "nothing was changed"};

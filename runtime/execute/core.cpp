@@ -58,6 +58,7 @@ void Core::cycle(std::int64_t grid_ns, std::int64_t due_ns, std::int64_t woke_ns
         end_ns = account(woke_ns);
         limiter_.flush(measure_ ? woke_ns : due_ns, [this](const FaultEvent& e) noexcept { faults_.push(e); });
         output();
+        if (probes_) sample_probes();
         answer();
     }
     ++info_.number;
@@ -119,6 +120,15 @@ void Core::take_over() noexcept {
     plan::Plan* const offered = inbox_.exchange(nullptr, std::memory_order_acq_rel);
     drain_writes();
     if (offered) take(offered);
+    if (!probe_inbox_.load(std::memory_order_relaxed)) return;
+    if (plan::ProbeSet* const probes = probe_inbox_.exchange(nullptr, std::memory_order_acq_rel)) {
+        probes_ = probes->probes.empty() ? nullptr : probes;
+        probes_taken_.store(probes->epoch, std::memory_order_release);
+    }
+}
+
+void Core::sample_probes() noexcept {
+    for (const plan::Probe& probe : probes_->probes) probe.ring->sample(info_.number, info_.start_ns, probe.from.data());
 }
 
 void Core::take(plan::Plan* plan) noexcept {
@@ -132,6 +142,7 @@ void Core::take(plan::Plan* plan) noexcept {
     for (const plan::Pointer& pointer : plan->pointers) *pointer.to = pointer.slot;
     for (std::size_t i = 0; i < plan->carries.size(); ++i) plan->carries[i].to->raw = plan->scratch[i];
     plan_ = plan;
+    probes_ = plan->probes.get();
     shown_.store(plan, std::memory_order_release);
     sampled_ = 0;
     taken_.store(plan->epoch, std::memory_order_release);

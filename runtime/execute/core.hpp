@@ -92,6 +92,10 @@ public:
     /// Withdraws an unanswered plan. Returns false if the thread has taken it already.
     bool withdraw(plan::Plan* plan) { return inbox_.compare_exchange_strong(plan, nullptr, std::memory_order_acq_rel); }
     std::uint64_t taken() const { return taken_.load(std::memory_order_acquire); }
+    /// The same for probes, which change while the plan stays. A later plan brings its own.
+    void offer(plan::ProbeSet* probes) { probe_inbox_.store(probes, std::memory_order_release); }
+    bool withdraw(plan::ProbeSet* probes) { return probe_inbox_.compare_exchange_strong(probes, nullptr, std::memory_order_acq_rel); }
+    std::uint64_t probes_taken() const { return probes_taken_.load(std::memory_order_acquire); }
     /// Queues a batch of writes, all of which take effect in the same cycle. Returns false and queues none if the queue is full.
     bool write(const Write* row, std::size_t count) {
         if (!writes_.push(row, count)) return false;
@@ -143,6 +147,7 @@ private:
     static void publish(plan::Plan& plan) noexcept;
     void output() noexcept;
     void answer() noexcept;
+    void sample_probes() noexcept;
     bool live() const noexcept { return running_.load(std::memory_order_acquire) && !stopped_.load(std::memory_order_relaxed); }
     const plan::Step* where() const noexcept;
     std::uint32_t slow_function(std::int64_t woke_ns) const noexcept;
@@ -161,6 +166,8 @@ private:
     const bool measure_;                  // false under the virtual clock: times are 0, so runs are identical
     std::atomic<plan::Plan*> inbox_{nullptr};         // written by the session, emptied by the thread
     std::atomic<std::uint64_t> taken_{0};             // written by the thread
+    std::atomic<plan::ProbeSet*> probe_inbox_{nullptr};  // written by the session, emptied by the thread
+    std::atomic<std::uint64_t> probes_taken_{0};      // written by the thread
     std::atomic<Observation*> observation_{nullptr};  // written by the session, emptied by the thread
     std::atomic<bool> stopped_{false};                // set by the thread and the supervisor, cleared by the session
     std::atomic<bool> passed_{false};                 // set by the thread
@@ -184,6 +191,7 @@ private:
     Queue<FaultEvent> faults_{256};                   // thread to session
     FaultLimiter limiter_;                            // the thread's own
     plan::Plan* plan_ = nullptr;          // the rest is the thread's own
+    plan::ProbeSet* probes_ = nullptr;
     hal_cycle info_{};
     std::int64_t grid_ns_ = 0;            // position of the cycle that runs
     const plan::Step* volatile current_ = nullptr;

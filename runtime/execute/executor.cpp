@@ -153,6 +153,20 @@ std::vector<Core*> Executor::swap(const std::vector<std::pair<Core*, plan::Plan*
     return silent;
 }
 
+std::vector<Core*> Executor::swap(const std::vector<std::pair<Core*, plan::ProbeSet*>>& probes, std::int64_t timeout_ns) {
+    std::vector<Core*> silent;
+    for (const auto& [core, set] : probes) core->offer(set);
+    for (const auto& [core, set] : probes) call(runner(*core));
+    for (const auto& [core, set] : probes) {
+        const auto taken = [core = core, set = set] { return core->probes_taken() == set->epoch; };
+        wait_for([&, core = core] { return taken() || hangs(*core, timeout_ns); }, timeout_ns + 2 * core->period_ns());
+        if (taken()) continue;
+        if (core->withdraw(set)) silent.push_back(core);
+        else wait_for(taken, for_ever);  // it is just taking it
+    }
+    return silent;
+}
+
 bool Executor::observe(const std::vector<std::pair<Core*, Observation*>>& wishes, std::int64_t timeout_ns) {
     for (const auto& [core, wish] : wishes) core->observe(wish);
     for (const auto& [core, wish] : wishes) call(runner(*core));

@@ -42,6 +42,8 @@ public:
     /// Offers plans and waits until each thread has taken its own. Returns the cores that did not within the timeout;
     /// their plans are withdrawn.
     std::vector<Core*> swap(const std::vector<std::pair<Core*, plan::Plan*>>& plans, std::int64_t timeout_ns);
+    /// The same for probes, while the plans stay.
+    std::vector<Core*> swap(const std::vector<std::pair<Core*, plan::ProbeSet*>>& probes, std::int64_t timeout_ns);
     /// Waits for all observations. Returns false when a thread did not answer; its observation is withdrawn.
     bool observe(const std::vector<std::pair<Core*, Observation*>>& wishes, std::int64_t timeout_ns);
     /// Queues a batch of at most Core::most_writes writes per thread; each batch takes effect in one cycle. Waits while a queue is

@@ -28,6 +28,7 @@ public:
     /// Returns the records with ages relative to `now_ns`, the oldest first.
     std::vector<FaultRecord> records(std::int64_t now_ns) const;
     bool empty() const { return rows_.empty(); }
+    std::uint64_t newest_number() const { return number_; }  ///< 0: there was no fault yet
     const FaultRecord& newest() const { return rows_.back().record; }
     void clear() { rows_.clear(); }
 

@@ -60,6 +60,8 @@ Session::~Session() {
 
 const SessionOptions& Session::options() const { return state_->options; }
 const Model& Session::model() const { return state_->model; }
+Probes& Session::probes() { return state_->probes; }
+Journal& Session::journal() { return state_->journal; }
 Absences& Session::absences() { return state_->absences; }
 
 Transaction Session::begin() {

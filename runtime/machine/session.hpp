@@ -21,8 +21,10 @@
 #include "model/absence.hpp"
 #include "model/model.hpp"
 #include "netlist/netlist.hpp"
+#include "machine/journal.hpp"
 #include "machine/live_values.hpp"
 #include "machine/plugin_host.hpp"
+#include "machine/probes.hpp"
 #include "machine/reports.hpp"
 #include "machine/thread_control.hpp"
 #include "machine/transaction.hpp"
@@ -73,6 +75,8 @@ public:
     ThreadControl& threads() { return threads_; }
     const ThreadControl& threads() const { return threads_; }
     LiveValues& values() { return values_; }
+    Probes& probes();
+    Journal& journal();
     Reports& reports() { return reports_; }
     const Reports& reports() const { return reports_; }
     const PluginHost& host() const { return host_; }

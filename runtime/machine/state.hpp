@@ -15,7 +15,9 @@
 #include "model/compile.hpp"
 #include "machine/elaborate.hpp"
 #include "machine/fault_log.hpp"
+#include "machine/journal.hpp"
 #include "machine/plugins.hpp"
+#include "machine/probes.hpp"
 #include "machine/session.hpp"
 
 namespace hal {
@@ -51,7 +53,9 @@ struct SessionState {
     bool touched = false;                    ///< threads may have been made, ended or given a plan for the open transaction
     std::unique_ptr<char[]> reserve;         ///< given back when memory has run out, so that undoing has some
 
+    Probes probes{*this};
     FaultLog faults{*this};
+    Journal journal{*this};
     hal_status status{sizeof status, nullptr, nullptr};  ///< for plugins
     std::vector<std::string> refused;        ///< by the system: "memory locking"
     bool shut = false;

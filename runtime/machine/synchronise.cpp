@@ -146,6 +146,7 @@ bool SessionState::swap(const std::unordered_set<const LoadedFunction*>& without
     input.core_of = [this](const Thread& thread) -> void* { return core(&thread); };
     input.check_finite = check_finite;
     Compiled compiled = compile(model, input);
+    probes.enter(compiled);
     observe_unknowns(compiled);
     keep_values();
 

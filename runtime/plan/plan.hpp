@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "hal/abi.h"
+#include "plan/probe.hpp"
 
 namespace hal::plan {
 
@@ -132,6 +133,7 @@ struct Plan {
     std::size_t image_size = 0;
     std::vector<Memory> working_set;         ///< steps, image, code, instances in the order of their steps: see Core::warm
     std::vector<std::shared_ptr<void>> keep; ///< what must outlive the plan: cells shared between threads
+    std::unique_ptr<ProbeSet> probes;        ///< nullptr: nothing is probed. The session replaces it when a newer one has been taken
     std::vector<std::uint64_t> scratch;      ///< buffer for the values carried over, so that taking the plan allocates nothing
 };
 
