@@ -230,7 +230,7 @@ TEST(LiveProbes, Attached_and_detached_under_load_they_lose_nothing_and_disturb_
         for (const auto& [group, seen] : rows.of)
             for (std::size_t k = 0; k < seen.size(); ++k) {
                 ASSERT_EQ(seen[k].values[0], seen[k].values[1]) << "of one cycle";
-                if (k > 0) ASSERT_EQ(seen[k].values[0], seen[k - 1].values[0] + 1) << "no row lost or doubled";
+                if (k > 0) { ASSERT_EQ(seen[k].values[0], seen[k - 1].values[0] + 1) << "no row lost or doubled"; }
             }
         EXPECT_EQ(rows.lost, 0u);
         const auto lock = machine.session.lock();

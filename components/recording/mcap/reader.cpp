@@ -1,0 +1,269 @@
+// SPDX-License-Identifier: MIT
+#include "recording/mcap/reader.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "recording/mcap/bytes.hpp"
+#include "recording/mcap/compression.hpp"
+#include "recording/mcap/crc.hpp"
+
+namespace hal::mcap {
+namespace {
+
+constexpr std::size_t record_head = 9, footer_bytes = record_head + 20;
+
+class FileSource final : public Source {
+public:
+    explicit FileSource(int file, std::uint64_t size) : file_(file), size_(size) {}
+    ~FileSource() override { ::close(file_); }
+    std::uint64_t size() const override { return size_; }
+    bool          read(std::uint64_t offset, std::size_t count, std::string& to) override {
+        if (offset > size_ || count > size_ - offset) return false;
+        to.resize(count);
+        for (std::size_t done = 0; done < count;) {
+            const ssize_t n = ::pread(file_, to.data() + done, count - done, static_cast<off_t>(offset + done));
+            if (n < 0 && errno == EINTR) continue;
+            if (n <= 0) return false;
+            done += static_cast<std::size_t>(n);
+        }
+        return true;
+    }
+
+private:
+    int           file_;
+    std::uint64_t size_;
+};
+
+class BytesSource final : public Source {
+public:
+    explicit BytesSource(std::string_view bytes) : bytes_(bytes) {}
+    std::uint64_t size() const override { return bytes_.size(); }
+    bool          read(std::uint64_t offset, std::size_t count, std::string& to) override {
+        if (offset > bytes_.size() || count > bytes_.size() - offset) return false;
+        to = bytes_.substr(offset, count);
+        return true;
+    }
+
+private:
+    std::string_view bytes_;
+};
+
+std::map<std::string, std::string> read_pairs(std::string_view text) {
+    std::map<std::string, std::string> entries;
+    for (Fields fields(text); fields.more();) {
+        const std::string_view key = fields.text(), value = fields.text();
+        if (fields.good()) entries.emplace(key, value);
+    }
+    return entries;
+}
+
+Message read_message(std::string_view content) {
+    Fields  fields(content);
+    Message message;
+    message.channel = fields.get<std::uint16_t>();
+    message.sequence = fields.get<std::uint32_t>();
+    message.log_time = fields.get<std::uint64_t>();
+    message.publish_time = fields.get<std::uint64_t>();
+    message.payload = fields.rest();
+    return message;
+}
+
+}  // namespace
+
+std::unique_ptr<Source> open_file(const std::string& path, std::string& problem) {
+    const int   file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+    struct stat about{};
+    if (file >= 0 && ::fstat(file, &about) == 0 && S_ISREG(about.st_mode))
+        return std::make_unique<FileSource>(file, static_cast<std::uint64_t>(about.st_size));
+    problem = "cannot read '" + path + "': " + (file < 0 ? std::strerror(errno) : "it is not a regular file");
+    if (file >= 0) ::close(file);
+    return nullptr;
+}
+
+std::unique_ptr<Source> open_bytes(std::string_view bytes) { return std::make_unique<BytesSource>(bytes); }
+
+bool Reader::open(std::unique_ptr<Source> source) {
+    source_ = std::move(source);
+    std::string begin;
+    if (!source_->read(0, magic.size(), begin) || begin != magic)
+        return fail("not an MCAP file: it does not begin with the bytes that such a file has");
+    if (read_summary()) return true;
+    schemas_.clear();
+    channels_.clear();
+    chunks_.clear();
+    metadata_.clear();
+    unfinished_ = true;
+    return scan();
+}
+
+// A schema, a channel or an index: from the summary, or found by a scan.
+bool Reader::take(std::uint8_t opcode, std::string_view content) {
+    if (schemas_.size() + channels_.size() + chunks_.size() + metadata_.size() > most_entries) return fail("the file has too many parts");
+    Fields fields(content);
+    if (opcode == op_schema) {
+        const auto id = fields.get<std::uint16_t>();
+        Schema     schema{id, std::string(fields.text()), std::string(fields.text()), std::string(fields.text())};
+        if (fields.good() && id != 0) schemas_.try_emplace(id, std::move(schema));
+    } else if (opcode == op_channel) {
+        const auto id = fields.get<std::uint16_t>(), schema = fields.get<std::uint16_t>();
+        Channel    channel{id, schema, std::string(fields.text()), std::string(fields.text()), read_pairs(fields.text())};
+        if (fields.good()) channels_.try_emplace(id, std::move(channel));
+    } else if (opcode == op_chunk_index) {
+        ChunkIndex index;
+        index.begin_time = fields.get<std::uint64_t>();
+        index.end_time = fields.get<std::uint64_t>();
+        index.offset = fields.get<std::uint64_t>();
+        index.length = fields.get<std::uint64_t>();
+        for (Fields entries(fields.text()); entries.more();) {
+            const auto channel = entries.get<std::uint16_t>();
+            index.message_indexes[channel] = entries.get<std::uint64_t>();
+        }
+        index.message_index_length = fields.get<std::uint64_t>();
+        index.compression = fields.text();
+        index.compressed_size = fields.get<std::uint64_t>();
+        index.size = fields.get<std::uint64_t>();
+        if (!fields.good()) return fail("a chunk index is incomplete");
+        chunks_.push_back(std::move(index));
+    } else if (opcode == op_metadata_index) {
+        const auto offset = fields.get<std::uint64_t>(), length = fields.get<std::uint64_t>();
+        metadata_.push_back({offset, length, std::string(fields.text())});
+    }
+    return true;
+}
+
+bool Reader::read_summary() {
+    const std::uint64_t size = source_->size();
+    std::string         end;
+    if (size < 2 * magic.size() + footer_bytes || !source_->read(size - magic.size() - footer_bytes, magic.size() + footer_bytes, end))
+        return false;
+    Fields fields(end);
+    if (fields.get<std::uint8_t>() != op_footer || fields.get<std::uint64_t>() != 20) return false;
+    const auto begin = fields.get<std::uint64_t>();
+    fields.get<std::uint64_t>();
+    const auto          crc = fields.get<std::uint32_t>();
+    const std::uint64_t footer = size - magic.size() - footer_bytes;
+    if (fields.rest() != magic || begin == 0 || begin > footer || footer - begin > most_chunk) return false;
+    std::string summary;
+    if (!source_->read(begin, static_cast<std::size_t>(footer - begin), summary)) return false;
+    if (crc != 0 && crc32(std::string_view(end).substr(0, footer_bytes - 4), crc32(summary)) != crc) return false;
+    for (Fields records(summary); records.more();) {
+        const auto             opcode = records.get<std::uint8_t>();
+        const std::string_view content = records.blob();
+        if (!records.good() || !take(opcode, content)) return false;
+    }
+    return true;
+}
+
+// What is there up to the first part that is incomplete.
+bool Reader::scan() {
+    const std::uint64_t size = source_->size();
+    std::string         head, content;
+    for (std::uint64_t at = magic.size(); at + record_head <= size && source_->read(at, record_head, head);) {
+        Fields     fields(head);
+        const auto opcode = fields.get<std::uint8_t>();
+        const auto length = fields.get<std::uint64_t>();
+        if (length > size - at - record_head || opcode == op_data_end) break;
+        if (opcode == op_chunk) {
+            constexpr std::size_t fixed = 8 + 8 + 8 + 4 + 4;
+            if (length < fixed || !source_->read(at + record_head, static_cast<std::size_t>(std::min<std::uint64_t>(length, 256)), content))
+                break;
+            Fields     chunk(content);
+            ChunkIndex index;
+            index.begin_time = chunk.get<std::uint64_t>();
+            index.end_time = chunk.get<std::uint64_t>();
+            index.size = chunk.get<std::uint64_t>();
+            chunk.get<std::uint32_t>();
+            index.compression = chunk.text();
+            index.compressed_size = chunk.get<std::uint64_t>();
+            index.offset = at;
+            index.length = record_head + length;
+            if (!chunk.good() || chunks_.size() >= most_entries) break;
+            std::string records;
+            if (!load_chunk(index, records)) break;  // torn: the end of what can be read
+            for (Fields inner(records); inner.more();) {
+                const auto             kind = inner.get<std::uint8_t>();
+                const std::string_view what = inner.blob();
+                if (inner.good() && (kind == op_schema || kind == op_channel) && !take(kind, what)) return false;
+            }
+            chunks_.push_back(std::move(index));
+        } else if ((opcode == op_schema || opcode == op_channel) && length <= most_chunk) {
+            if (!source_->read(at + record_head, static_cast<std::size_t>(length), content) || !take(opcode, content)) break;
+        } else if (opcode == op_metadata && metadata_.size() < 1000 && length <= (1 << 20) &&
+                   source_->read(at + record_head, static_cast<std::size_t>(length), content)) {
+            metadata_.push_back({at, record_head + length, std::string(Fields(content).text())});
+        }
+        at += record_head + length;
+    }
+    problem_.clear();
+    return true;
+}
+
+bool Reader::load_chunk(const ChunkIndex& chunk, std::string& records) {
+    std::string bytes;
+    if (chunk.length < record_head || chunk.length > most_chunk || chunk.size > most_chunk) return fail("a chunk is larger than 256 MiB");
+    if (!source_->read(chunk.offset, static_cast<std::size_t>(chunk.length), bytes))
+        return fail("a chunk is not where the index says, or the file is cut off");
+    Fields fields(bytes);
+    if (fields.get<std::uint8_t>() != op_chunk) return fail("a chunk is not where the index says");
+    Fields content(fields.blob());
+    content.get<std::uint64_t>();
+    content.get<std::uint64_t>();
+    const auto             size = content.get<std::uint64_t>();
+    const auto             crc = content.get<std::uint32_t>();
+    const std::string_view compression = content.text(), compressed = content.blob();
+    if (!fields.good() || !content.good() || size > most_chunk) return fail("a chunk is incomplete");
+    std::string problem;
+    if (!expand(compression, compressed, size, records, problem)) return fail(problem);
+    ++chunks_read_;
+    return crc == 0 || crc32(records) == crc || fail("a chunk is damaged: its CRC is wrong");
+}
+
+std::uint64_t Reader::begin_time() const {
+    std::uint64_t time = chunks_.empty() ? 0 : std::numeric_limits<std::uint64_t>::max();
+    for (const ChunkIndex& chunk : chunks_) time = std::min(time, chunk.begin_time);
+    return time;
+}
+
+std::uint64_t Reader::end_time() const {
+    std::uint64_t time = 0;
+    for (const ChunkIndex& chunk : chunks_) time = std::max(time, chunk.end_time);
+    return time;
+}
+
+std::map<std::string, std::string> Reader::metadata(std::string_view name) {
+    std::map<std::string, std::string> all;
+    for (const Metadata& one : metadata_) {
+        std::string bytes;
+        if (one.name != name || one.length > (1 << 20) || !source_->read(one.offset, static_cast<std::size_t>(one.length), bytes)) continue;
+        Fields fields(bytes);
+        if (fields.get<std::uint8_t>() != op_metadata) continue;
+        Fields content(fields.blob());
+        content.text();
+        all.merge(read_pairs(content.text()));
+    }
+    return all;
+}
+
+bool Reader::each(const Visit& visit, std::uint64_t begin, std::uint64_t end) {
+    std::string records;
+    for (const ChunkIndex& chunk : chunks_) {
+        if (chunk.end_time < begin || chunk.begin_time >= end) continue;
+        if (!load_chunk(chunk, records)) return false;
+        for (Fields fields(records); fields.more();) {
+            const auto             opcode = fields.get<std::uint8_t>();
+            const std::string_view content = fields.blob();
+            if (!fields.good() || opcode != op_message || content.size() < 22) continue;
+            const Message message = read_message(content);
+            if (message.log_time >= begin && message.log_time < end && !visit(message)) return true;
+        }
+    }
+    return true;
+}
+
+}  // namespace hal::mcap

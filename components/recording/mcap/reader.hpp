@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: MIT
+// Reads MCAP files of any writer. Nothing in the file is trusted: sizes are bounded, CRCs are checked. One thread at a time.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <map>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "recording/mcap/records.hpp"
+
+namespace hal::mcap {
+
+/// Where the bytes of a file come from.
+class Source {
+public:
+    virtual ~Source() = default;
+    virtual std::uint64_t size() const = 0;
+    /// Replaces `to` by `count` bytes from `offset`. Returns false when they cannot be read.
+    virtual bool read(std::uint64_t offset, std::size_t count, std::string& to) = 0;
+};
+
+/// A file, or nullptr with `problem`.
+std::unique_ptr<Source> open_file(const std::string& path, std::string& problem);
+/// Bytes that outlive it.
+std::unique_ptr<Source> open_bytes(std::string_view bytes);
+
+class Reader {
+public:
+    static constexpr std::uint64_t most_chunk = std::uint64_t{256} << 20;   ///< bytes of a chunk, expanded
+    static constexpr std::size_t   most_entries = 1'000'000;                   ///< chunks, or other records of the summary
+
+    /// Reads what the file contains. Without a summary it scans the file. Returns false and sets problem() when it is not an MCAP file.
+    bool               open(std::unique_ptr<Source> source);
+    const std::string& problem() const { return problem_; }
+    /// True: the file has no summary, as after a power failure; it was read up to its last complete chunk.
+    bool unfinished() const { return unfinished_; }
+
+    const std::map<std::uint16_t, Schema>&  schemas() const { return schemas_; }
+    const std::map<std::uint16_t, Channel>& channels() const { return channels_; }
+    const std::vector<ChunkIndex>&          chunks() const { return chunks_; }
+    std::uint64_t                           begin_time() const;
+    std::uint64_t                           end_time() const;  ///< of the last message
+    /// Returns the named entries of all metadata records of that name that the summary lists.
+    std::map<std::string, std::string> metadata(std::string_view name);
+
+    using Visit = std::function<bool(const Message&)>;
+    /// Calls `visit` for the messages with begin <= log time < end, in the order of the file, until it returns false. Only chunks that may have
+    /// some are read. Returns false and sets problem() when one is damaged.
+    bool          each(const Visit& visit, std::uint64_t begin = 0, std::uint64_t end = std::numeric_limits<std::uint64_t>::max());
+    std::uint64_t chunks_read() const { return chunks_read_; }
+
+private:
+    bool fail(std::string sentence) {
+        problem_ = std::move(sentence);
+        return false;
+    }
+    bool read_summary();
+    bool scan();
+    bool take(std::uint8_t opcode, std::string_view content);
+    bool load_chunk(const ChunkIndex& chunk, std::string& records);
+
+    std::unique_ptr<Source>          source_;
+    std::string                      problem_;
+    bool                             unfinished_ = false;
+    std::map<std::uint16_t, Schema>  schemas_;
+    std::map<std::uint16_t, Channel> channels_;
+    std::vector<ChunkIndex>          chunks_;
+    struct Metadata {
+        std::uint64_t offset, length;
+        std::string   name;
+    };
+    std::vector<Metadata> metadata_;
+    std::uint64_t         chunks_read_ = 0;
+};
+
+}  // namespace hal::mcap

@@ -1,0 +1,188 @@
+// SPDX-License-Identifier: MIT
+#include "recording/mcap/recording.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <charconv>
+#include <fstream>
+#include <map>
+#include <numeric>
+#include <sstream>
+#include <utility>
+
+#include "recording/mcap/reader.hpp"
+
+namespace hal::mcap {
+namespace {
+
+/// The value of a text member of a flat JSON object, as our events have them.
+std::string json_text(std::string_view object, std::string_view key) {
+    std::string quoted = "\"";
+    quoted += key;
+    quoted += "\":\"";
+    std::size_t at = object.find(quoted);
+    std::string text;
+    if (at == object.npos) return text;
+    for (at += quoted.size(); at < object.size() && object[at] != '"'; ++at) {
+        if (object[at] != '\\' || at + 1 >= object.size()) {
+            text += object[at];
+            continue;
+        }
+        const char c = object[++at];
+        text += c == 'n' ? '\n' : c == 't' ? '\t' : c;
+    }
+    return text;
+}
+
+// Rows of several threads may come in batches: a channel's own are in order but for those of a thread that hung.
+void sort(Table& table) {
+    if (std::is_sorted(table.times_ns.begin(), table.times_ns.end())) return;
+    std::vector<std::size_t> order(table.rows());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return table.times_ns[a] < table.times_ns[b]; });
+    Table sorted{table.topic, table.columns, {}, {}};
+    for (const std::size_t row : order) {
+        sorted.times_ns.push_back(table.times_ns[row]);
+        for (std::size_t c = 0; c < table.columns.size(); ++c) sorted.words.push_back(table.word(row, c));
+    }
+    table = std::move(sorted);
+}
+
+bool load_mcap(const std::string& path, Recording& to, std::string& problem, const LoadOptions& options) {
+    Reader reader;
+    auto   source = open_file(path, problem);
+    if (!source) return false;
+    if (!reader.open(std::move(source))) {
+        problem = "'" + path + "': " + reader.problem();
+        return false;
+    }
+    if (reader.unfinished()) to.note = "'" + path + "' ends without a summary: it was read up to its last complete chunk";
+    std::map<std::uint16_t, std::pair<RowReader, std::size_t>> rows;
+    std::map<std::uint16_t, bool>                              events;
+    for (const auto& [id, channel] : reader.channels()) {
+        const auto schema = reader.schemas().find(channel.schema);
+        RowReader  row;
+        if (schema != reader.schemas().end() && row.open(schema->second, channel)) {
+            to.tables.push_back({channel.topic, row.columns(), {}, {}});
+            rows.emplace(id, std::pair{std::move(row), to.tables.size() - 1});
+        }
+        events[id] = channel.topic == "/hal/events" && channel.encoding == "json";
+    }
+    std::vector<std::uint64_t> values;
+    std::size_t                bytes = 0;
+    const auto                 visit = [&](const Message& message) {
+        const auto time_ns = static_cast<std::int64_t>(message.log_time);
+        bytes += 8;
+        if (const auto at = rows.find(message.channel); at != rows.end()) {
+            if (!at->second.first.read(message.payload, values)) return true;
+            Table& table = to.tables[at->second.second];
+            table.times_ns.push_back(time_ns);
+            table.words.insert(table.words.end(), values.begin(), values.end());
+            bytes += values.size() * 8;
+        } else if (events[message.channel]) {
+            to.events.push_back({time_ns, json_text(message.payload, "kind"), json_text(message.payload, "text")});
+            bytes += message.payload.size();
+        }
+        return bytes <= options.most_bytes;
+    };
+    const auto end = options.end_ns == INT64_MAX ? UINT64_MAX : static_cast<std::uint64_t>(options.end_ns);
+    if (!reader.each(visit, static_cast<std::uint64_t>(std::max<std::int64_t>(options.begin_ns, 0)), end))
+        to.note = "'" + path + "': " + reader.problem() + "; it was read up to there";
+    if (bytes > options.most_bytes) {
+        problem = "'" + path + "' has more than " + std::to_string(options.most_bytes >> 20) + " MiB of values; choose a part of it";
+        return false;
+    }
+    return true;
+}
+
+std::vector<std::string> csv_words(const std::string& line) {
+    std::vector<std::string> words(1);
+    bool                     quoted = false;
+    for (std::size_t i = 0; i < line.size(); ++i) {
+        if (line[i] == '"') {
+            if (quoted && i + 1 < line.size() && line[i + 1] == '"') words.back() += line[i++];
+            else quoted = !quoted;
+        } else if (line[i] == ',' && !quoted) {
+            words.emplace_back();
+        } else if (line[i] != '\r') {
+            words.back() += line[i];
+        }
+    }
+    return words;
+}
+
+bool load_csv(const std::string& path, Recording& to, std::string& problem, const LoadOptions& options) {
+    std::ifstream file(path);
+    std::string   line;
+    if (!file || !std::getline(file, line)) {
+        problem = "cannot read '" + path + "'";
+        return false;
+    }
+    const std::vector<std::string> names = csv_words(line);
+    if (names.size() < 2 || names[0] != "time_s") {
+        problem = "'" + path + "' is not a recording: its first column must be time_s";
+        return false;
+    }
+    Table table{"", {}, {}, {}};
+    for (std::size_t i = 1; i < names.size(); ++i) table.columns.push_back({names[i], HAL_TYPE_FLOAT, ""});
+    std::vector<double> held(table.columns.size());
+    for (std::size_t number = 2; std::getline(file, line); ++number) {
+        const std::vector<std::string> words = csv_words(line);
+        double                         time_s = 0;
+        const auto                     number_of = [](const std::string& word, double& value) {
+            const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+            return error == std::errc() && end == word.data() + word.size();
+        };
+        bool good = words.size() == names.size() && number_of(words[0], time_s) && time_s >= 0 && time_s < 9e9;
+        for (std::size_t i = 1; good && i < words.size(); ++i)
+            good = words[i].empty() || number_of(words[i], held[i - 1]);  // empty: as before
+        if (!good) {
+            problem = "'" + path + "', line " + std::to_string(number) + ": not a row of " + std::to_string(names.size()) + " numbers";
+            return false;
+        }
+        const auto time_ns = static_cast<std::int64_t>(time_s * 1e9 + 0.5);
+        if (time_ns < options.begin_ns || time_ns >= options.end_ns) continue;
+        table.times_ns.push_back(time_ns);
+        for (const double value : held) table.words.push_back(std::bit_cast<std::uint64_t>(value));
+        if (table.words.size() * 8 <= options.most_bytes) continue;
+        problem = "'" + path + "' has more than " + std::to_string(options.most_bytes >> 20) + " MiB of values; choose a part of it";
+        return false;
+    }
+    to.tables.push_back(std::move(table));
+    return true;
+}
+
+}  // namespace
+
+double Table::real(std::size_t row, std::size_t column) const {
+    const std::uint64_t value = word(row, column);
+    switch (columns[column].type) {
+    case HAL_TYPE_FLOAT: return std::bit_cast<double>(value);
+    case HAL_TYPE_S32:
+    case HAL_TYPE_S64: return static_cast<double>(static_cast<std::int64_t>(value));
+    default: return static_cast<double>(value);
+    }
+}
+
+std::int64_t Recording::begin_ns() const {
+    std::int64_t time = INT64_MAX;
+    for (const Table& table : tables)
+        if (table.rows() != 0) time = std::min(time, table.times_ns.front());
+    return time == INT64_MAX ? 0 : time;
+}
+
+std::int64_t Recording::end_ns() const {
+    std::int64_t time = 0;
+    for (const Table& table : tables)
+        if (table.rows() != 0) time = std::max(time, table.times_ns.back());
+    return time;
+}
+
+bool load(const std::string& path, Recording& to, std::string& problem, const LoadOptions& options) {
+    if (!(path.ends_with(".csv") ? load_csv : load_mcap)(path, to, problem, options)) return false;
+    for (Table& table : to.tables) sort(table);
+    std::erase_if(to.tables, [](const Table& table) { return table.rows() == 0; });
+    return true;
+}
+
+}  // namespace hal::mcap
