@@ -98,7 +98,7 @@ constexpr Subcommand table[] = {
     command<NewOptions, run_new>("new", "component NAME [--folder DIR]", "create a component to start from: source, CMakeLists.txt, test"),
     command<CompileOptions, run_compile>("compile", "FILE… [--output DIR] [--check-rt [-- ARGUMENT=VALUE…]]", "build a plugin from one source file and install it"),
     command<ExplainOptions, run_explain>("explain", "[CODE]", "explain a diagnostic code and what to do about it"),
-    command<RecordOptions, run_record>("record", "[CHANNEL] [FILE]", "record the samples of a sampler"),
+    command<RecordOptions, run_record>("record", "FILE NAME… [--last TIME] | [CHANNEL] [FILE]", "record any values of a running instance to MCAP or CSV, or the samples of a sampler"),
     command<PlayOptions, run_play>("play", "[CHANNEL] [FILE]", "feed a streamer"),
     command<DumpOptions, ON_BUS(run_can_dump)>("can dump", "ADDRESS… [--filter ID[/MASK]] [--time relative|delta|absolute] [--for TIME] [--count N] [--json]", "print and decode the frames of a CAN bus"),
     command<SendOptions, ON_BUS(run_can_send)>("can send", "ADDRESS FRAME… [--every TIME [--for TIME]]", "send frames: 123#1122AABB"),

@@ -23,7 +23,8 @@ ROWS = {
     "tools": ["tools/inspect", "tools/comp", "tools/bus"],  # the table of subcommands
     "tools/cli": ["runtime/control"],
     "tools/run": ["tools/cli", "runtime/cells"],
-    "tools/inspect": ["tools/run", "drivers/link"],  # record: its files
+    "tools/record": ["tools/run", "drivers/link", "components/recording/mcap"],
+    "tools/inspect": ["tools/record"],
     "tools/doc": ["tools/cli"],
     "tools/comp": ["tools/doc"],
     "tools/bus": ["tools/cli", "components/canopen/master", "components/canopen/device",
@@ -44,6 +45,8 @@ ROWS = {
     "components/safety": ["components"],
     "components/sim": ["components"],
     "components/estimation": ["components"],
+    "components/recording": ["components", "components/recording/mcap"],
+    "components/recording/mcap": ["runtime/abi"],
     "components/vision": ["components"],
     "components/dds": ["components", "components/dds/links"],
     "components/dds/links": [],  # what cells gives the components, as data

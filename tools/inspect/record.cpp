@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `hal record` and halsampler: the samples of a sampler as text.
+// `hal record` and halsampler: the samples of a sampler as text. Values without a sampler: record/recorder.hpp.
 #include "inspect/record.hpp"
 
 #include <algorithm>
@@ -124,6 +124,17 @@ int follow(Stream& stream, const RecordOptions& options, RecordFile& file) {
 }  // namespace
 
 int run_record(const RecordOptions& options) {
+    const std::vector<std::string>& words = options.words;
+    const bool named = !words.empty() && (words[0].ends_with(".mcap") || (words.size() > 1 && words[0].ends_with(".csv")));
+    if (!options.classic && (named || options.values.asked())) {
+        if (words.empty()) return fail(options, "missing file: hal record FILE.mcap NAMES");
+        if (options.csv || options.tag || options.count != 0 || !options.channel.empty())
+            return fail(options, "--csv, --tag, --count and --channel are for a sampler; the ending of the file chooses the format, --for the end");
+        Recording what = options.values;
+        what.file = words[0];
+        what.names.assign(words.begin() + 1, words.end());
+        return record_values(options, instance_wanted(options.name), std::move(what));
+    }
     Stream stream;
     if (!stream.open(options, "sampler")) return 1;
     if (stream.file.empty()) {

@@ -77,7 +77,7 @@ Message read_message(std::string_view content) {
 }  // namespace
 
 std::unique_ptr<Source> open_file(const std::string& path, std::string& problem) {
-    const int   file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+    const int   file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOCTTY | O_NONBLOCK);
     struct stat about{};
     if (file >= 0 && ::fstat(file, &about) == 0 && S_ISREG(about.st_mode))
         return std::make_unique<FileSource>(file, static_cast<std::uint64_t>(about.st_size));

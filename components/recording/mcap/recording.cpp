@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <bit>
 #include <charconv>
-#include <fstream>
 #include <map>
 #include <numeric>
 #include <sstream>
@@ -112,12 +111,15 @@ std::vector<std::string> csv_words(const std::string& line) {
 }
 
 bool load_csv(const std::string& path, Recording& to, std::string& problem, const LoadOptions& options) {
-    std::ifstream file(path);
-    std::string   line;
-    if (!file || !std::getline(file, line)) {
-        problem = "cannot read '" + path + "'";
+    const auto  source = open_file(path, problem);
+    std::string text, line;
+    if (!source) return false;
+    if (source->size() > 4 * options.most_bytes || !source->read(0, static_cast<std::size_t>(source->size()), text)) {
+        problem = "'" + path + "' is too large, or cannot be read";
         return false;
     }
+    std::istringstream file(text);
+    std::getline(file, line);
     const std::vector<std::string> names = csv_words(line);
     if (names.size() < 2 || names[0] != "time_s") {
         problem = "'" + path + "' is not a recording: its first column must be time_s";

@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <bit>
+#include <deque>
+#include <map>
+#include <memory>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include <fnmatch.h>
+
+#include "hal/component.hpp"
+#include "hal/texts.hpp"
+#include "recording/mcap/recording.hpp"
+
+namespace {
+
+using AnyOut = std::variant<std::monostate, hal::Out<bool>, hal::Out<double>, hal::Out<std::int32_t>, hal::Out<std::uint32_t>,
+                            hal::Out<std::int64_t>, hal::Out<std::uint64_t>>;
+
+struct Playback : hal::Component {
+    explicit Playback(const hal_host* host)
+        : Component(host),
+          file(*this, "file", "", "recording to play: .mcap or .csv, beside the netlist"),
+          names(*this, "names", "*", "values to play, as patterns separated by commas") {
+        read();
+        for (Track& track : tracks_) declare(track);
+    }
+
+    hal::TextArgument file, names;
+    hal::In<bool>     enable{*this, "enable", "FALSE holds the time and the values", {.initial = true}};
+    hal::In<bool>     restart{*this, "restart", "a rising edge starts again at the beginning"};
+    hal::Param<bool>  loop{*this, "loop", "TRUE starts again after the end"};
+    hal::Out<double>  time{*this, "time", "time since the beginning of the recording", {.unit = "s"}};
+    hal::Out<bool>    done{*this, "done", "TRUE: the last row has been played"};
+    hal::Function     run{*this, "update", &Playback::update, "sets the outputs to the values recorded at this time"};
+
+    void update(hal::Cycle cycle) noexcept {
+        const bool again = restart && !was_restart_;
+        was_restart_ = restart;
+        if (again || (loop && done)) rewind();
+        if (!enable) return;
+        if (begun_) elapsed_ns_ += cycle.period_ns();
+        begun_ = true;
+        bool more = false;
+        for (Track& track : tracks_) {
+            const std::vector<std::int64_t>& times = track.table.times_ns;
+            const std::size_t                before = track.next;
+            while (track.next < times.size() && times[track.next] - begin_ns_ <= elapsed_ns_) ++track.next;
+            if (track.next != before) show(track, track.next - 1);
+            more = more || track.next < times.size();
+        }
+        time = static_cast<double>(elapsed_ns_) * 1e-9;
+        done = !more;
+    }
+
+private:
+    struct Track {
+        hal::mcap::Table                             table;
+        std::size_t                                  next = 0;
+        std::vector<std::pair<std::size_t, AnyOut*>> pins = {};  // column and pin
+    };
+
+    bool wanted(const std::string& name) const {
+        const std::string& all = names.get();
+        for (std::size_t at = 0; at <= all.size();) {
+            const std::size_t end = std::min(all.find(',', at), all.size());
+            if (::fnmatch(all.substr(at, end - at).c_str(), name.c_str(), 0) == 0) return true;
+            at = end + 1;
+        }
+        return false;
+    }
+
+    void read() {
+        if (file.get().empty()) return;
+        const hal::Texts texts(*this);
+        if (!texts.offered()) return;
+        hal::mcap::Recording recording;
+        std::string          problem;
+        if (!hal::mcap::load(texts.find(file.get()), recording, problem))
+            throw hal::ArgumentError("file", "file=" + file.get() + ": " + problem);
+        if (recording.tables.empty()) throw hal::ArgumentError("file", "file=" + file.get() + ": the recording has no rows");
+        begin_ns_ = recording.begin_ns();
+        for (hal::mcap::Table& table : recording.tables) tracks_.push_back({std::move(table)});
+    }
+
+    // A value that several tables have, because an edit moved it to another thread, is one pin.
+    void declare(Track& track) {
+        for (std::size_t c = 0; c < track.table.columns.size(); ++c) {
+            const hal::mcap::Column& column = track.table.columns[c];
+            if (!wanted(column.name)) continue;
+            const bool own = column.name == "enable" || column.name == "restart" || column.name == "loop" || column.name == "time" ||
+                             column.name == "done";
+            const std::string name = own ? "value-" + column.name : column.name;
+            const auto [at, made] = by_name_.try_emplace(name, nullptr);
+            if (made) {
+                AnyOut& pin = pins_.emplace_back();
+                at->second = &pin;
+                emplace(pin, column.type, units_.emplace_back(name).c_str(), units_.emplace_back(column.unit).c_str());
+            }
+            track.pins.emplace_back(c, at->second);
+        }
+    }
+
+    void emplace(AnyOut& pin, hal_type type, const char* name, const char* unit) {
+        const char* const doc = "value of the recording";
+        switch (type) {
+        case HAL_TYPE_BIT: pin.emplace<1>(*this, name, doc); break;
+        case HAL_TYPE_FLOAT: pin.emplace<2>(*this, name, doc, {.unit = unit}); break;
+        case HAL_TYPE_S32: pin.emplace<3>(*this, name, doc); break;
+        case HAL_TYPE_U32: pin.emplace<4>(*this, name, doc); break;
+        case HAL_TYPE_S64: pin.emplace<5>(*this, name, doc); break;
+        default: pin.emplace<6>(*this, name, doc); break;
+        }
+    }
+
+    static void show(Track& track, std::size_t row) noexcept {
+        for (const auto& [column, pin] : track.pins) {
+            const std::uint64_t word = track.table.word(row, column);
+            std::visit([word](auto& out) {
+                if constexpr (requires { out.get(); }) {
+                    using T = std::remove_cvref_t<decltype(out.get())>;
+                    if constexpr (std::is_same_v<T, double>) out = std::bit_cast<double>(word);
+                    else if constexpr (std::is_same_v<T, bool>) out = word != 0;
+                    else out = static_cast<T>(word);
+                }
+            }, *pin);
+        }
+    }
+
+    void rewind() noexcept {
+        for (Track& track : tracks_) track.next = 0;
+        elapsed_ns_ = 0;
+        begun_ = false;
+    }
+
+    std::vector<Track>             tracks_;
+    std::deque<AnyOut>             pins_;
+    std::deque<std::string>        units_;
+    std::map<std::string, AnyOut*> by_name_;
+    std::int64_t                   begin_ns_ = 0, elapsed_ns_ = 0;
+    bool                           begun_ = false, was_restart_ = false;
+};
+
+}  // namespace
+
+HAL_COMPONENT(Playback, "playback", "Plays a recording into pins", R"(
+The file is one that `hal record` wrote, or another MCAP file with flat ROS 2 messages. Each recorded value becomes an output of its own name and
+type: `x-pid.error` is `playback.0.x-pid.error`. In each cycle the outputs have the values that were recorded at that time after the first row; a
+recording of a thread of the same period is played row by row. The whole file is read when the component is loaded, at most 1 GiB of values.
+
+    loadrt playback file=run.mcap names=x-*
+    addf playback.0.update servo-thread
+    net x-fb playback.0.x-fb => x-pid.feedback
+
+`hal replay` does this for a netlist by itself, and compares what it computes with what was recorded.
+)")

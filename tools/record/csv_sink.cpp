@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <bit>
+#include <cerrno>
+#include <fmt/core.h>
+
+#include "link/record_file.hpp"
+#include "record/sink.hpp"
+
+namespace hal::tools {
+namespace {
+
+std::string field(const std::string& text) {
+    if (text.find_first_of(",\"\n") == std::string::npos) return text;
+    std::string quoted = "\"";
+    for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+    return quoted + '"';
+}
+
+/// A line per row: the time, then all values; those of other threads are empty. Events have no place in it.
+class CsvSink final : public Sink {
+public:
+    CsvSink(const std::string& path, const std::vector<ProbeColumn>& columns) : columns_(columns), file_(path) {
+        std::string line = "time_s";
+        for (const ProbeColumn& column : columns_) line += "," + field(column.name);
+        put(line + "\n");
+    }
+
+    bool layout(const std::vector<ProbeGroup>& groups) override {
+        groups_ = groups;
+        return file_.error() == 0;
+    }
+
+    bool row(std::size_t group, std::uint64_t, std::int64_t time_ns, const std::uint64_t* words) override {
+        cells_.assign(columns_.size(), "");
+        for (const std::size_t i : groups_[group].columns) cells_[i] = text(columns_[i].type, *words++);
+        std::string line = fmt::format("{}.{:09}", time_ns / 1'000'000'000, time_ns % 1'000'000'000);
+        for (const std::string& cell : cells_) (line += ',') += cell;
+        return put(line + "\n");
+    }
+
+    bool event(const ProbeClient::Entry&) override { return true; }
+    bool flush() override { return file_.flush(); }
+    bool close() override { return file_.close(); }
+    std::uint64_t bytes() const override { return bytes_; }
+    int error() const override { return file_.error(); }
+
+private:
+    static std::string text(hal_type type, std::uint64_t word) {
+        if (type == HAL_TYPE_FLOAT) return fmt::format("{}", std::bit_cast<double>(word));  // reads as the same value
+        if (type == HAL_TYPE_S32 || type == HAL_TYPE_S64) return std::to_string(static_cast<std::int64_t>(word));
+        return std::to_string(word);
+    }
+    bool put(const std::string& line) {
+        bytes_ += line.size();
+        return file_.put(line);
+    }
+
+    const std::vector<ProbeColumn> columns_;
+    std::vector<ProbeGroup> groups_;
+    std::vector<std::string> cells_;
+    std::uint64_t bytes_ = 0;
+    RecordFile file_;
+};
+
+}  // namespace
+
+std::unique_ptr<Sink> make_csv_sink(const std::string& path, const std::vector<ProbeColumn>& columns) { return std::make_unique<CsvSink>(path, columns); }
+
+std::unique_ptr<Sink> make_sink(const std::string& path, const std::vector<ProbeColumn>& columns, const Origin& origin) {
+    return path.ends_with(".csv") ? make_csv_sink(path, columns) : make_mcap_sink(path, columns, origin);
+}
+
+bool add_batch(Sink& sink, const ProbeBatch& batch, std::int64_t begin_ns, std::int64_t end_ns, std::uint64_t& rows) {
+    bool good = true;
+    std::vector<std::uint64_t> words;
+    batch.in_time_order([&](const ProbeBatch::Part& part, std::size_t row) {
+        const std::int64_t time_ns = batch.time_ns(part, row);
+        if (!good || time_ns < begin_ns || time_ns >= end_ns) return;
+        words.clear();
+        for (std::size_t c = 0; c < part.columns; ++c) words.push_back(batch.raw(part, row, c));
+        good = sink.row(part.group, batch.cycle(part, row), time_ns, words.data());
+        rows += good ? 1 : 0;
+    });
+    return good;
+}
+
+}  // namespace hal::tools

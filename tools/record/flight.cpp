@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: MIT
+#include "record/flight.hpp"
+
+#include <algorithm>
+#include <ctime>
+#include <fmt/core.h>
+
+namespace hal::tools {
+
+void FlightMemory::layout(std::vector<ProbeGroup> groups) { layouts_.push_back(std::move(groups)); }
+
+void FlightMemory::add(ProbeBatch&& batch) {
+    bytes_ += batch.bytes.size();
+    // rows of the layout before may still come after the next one was announced; their number tells
+    const std::size_t number = static_cast<std::size_t>(batch.layout);
+    batches_.push_back({number >= 1 && number <= layouts_.size() ? number - 1 : layouts_.size() - 1, std::move(batch)});
+}
+
+void FlightMemory::note_last(const Held& held) {
+    for (const ProbeBatch::Part& part : held.batch.parts) {
+        if (part.rows == 0 || part.group >= layouts_[held.layout].size() || layouts_[held.layout][part.group].period_ns != 0) continue;
+        auto at = std::find_if(last_.begin(), last_.end(), [&](const Last& one) { return one.layout == held.layout && one.group == part.group; });
+        if (at == last_.end()) at = last_.insert(at, {held.layout, part.group, {}});
+        at->words.clear();
+        for (std::size_t c = 0; c < part.columns; ++c) at->words.push_back(held.batch.raw(part, part.rows - 1, c));
+    }
+}
+
+void FlightMemory::prune(std::int64_t now_ns, std::int64_t but_from_ns) {
+    const std::int64_t from = std::min(now_ns - last_ns_, but_from_ns);
+    while (!batches_.empty() && (batches_.front().batch.until_ns < from || bytes_ > most_bytes)) {
+        note_last(batches_.front());
+        bytes_ -= batches_.front().batch.bytes.size();
+        batches_.pop_front();
+    }
+    while (!entries_.empty() && entries_.front().time_ns < from) entries_.pop_front();
+}
+
+bool FlightMemory::write(Sink& sink, std::int64_t begin_ns, std::int64_t end_ns, std::uint64_t& rows) const {
+    for (const auto& entry : entries_)
+        if (entry.time_ns >= begin_ns && entry.time_ns < end_ns && !sink.event(entry)) return false;
+    std::optional<std::size_t> layout;
+    for (const Held& held : batches_) {
+        if (held.batch.until_ns < begin_ns) continue;
+        if (layout != held.layout) {
+            layout = held.layout;
+            if (!sink.layout(layouts_[*layout])) return false;
+            for (const Last& last : last_)
+                if (last.layout == *layout && !sink.row(last.group, 0, begin_ns, last.words.data())) return false;
+        }
+        if (!add_batch(sink, held.batch, begin_ns, end_ns, rows)) return false;
+    }
+    return true;
+}
+
+void FlightTrigger::event(std::int64_t time_ns, const std::string& cause) {
+    if (!since_) {
+        since_ = time_ns;
+        end_ = time_ns + after_ns_;
+        cause_ = cause;
+    } else {
+        end_ = std::max(end_, std::min(time_ns + after_ns_, *since_ + 3 * after_ns_));
+    }
+}
+
+std::string flight_name(const std::string& file, std::int64_t unix_ns, const std::string& cause, unsigned number) {
+    const std::time_t seconds = static_cast<std::time_t>(unix_ns / 1'000'000'000);
+    std::tm utc{};
+    gmtime_r(&seconds, &utc);
+    char time[32];
+    std::strftime(time, sizeof time, "%Y%m%dT%H%M%SZ", &utc);
+    std::string word;
+    for (const char c : cause) word += (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ? c : '-';
+    const std::size_t dot = file.rfind('.');
+    return fmt::format("{}-{}-{}-{:03}{}", file.substr(0, dot), time, word, number, file.substr(dot));
+}
+
+}  // namespace hal::tools

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: MIT
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "record/sink.hpp"
+#include "recording/mcap/rows.hpp"
+#include "recording/mcap/writer.hpp"
+
+namespace hal::tools {
+namespace {
+
+constexpr const char* event_schema =
+    R"({"type":"object","properties":{"kind":{"type":"string"},"text":{"type":"string"}},"required":["kind","text"]})";
+
+/// servo-thread: ServoThread, as ROS names messages.
+std::string message_name(const std::string& thread) {
+    std::string name;
+    bool begins = true;
+    for (const char c : thread) {
+        const bool letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'), digit = c >= '0' && c <= '9';
+        if (letter || (digit && !name.empty())) name += begins && c >= 'a' ? static_cast<char>(c - 'a' + 'A') : c;
+        begins = !letter;
+    }
+    return name.empty() ? "Values" : name;
+}
+
+class McapSink final : public Sink {
+public:
+    McapSink(const std::string& path, const std::vector<ProbeColumn>& columns, const Origin& origin)
+        : columns_(columns), offset_ns_(origin.unix_offset_ns), writer_(path) {
+        std::map<std::string, std::string> about{{"instance", origin.instance},
+                                                 {"version", origin.version},
+                                                 {"unix_offset_ns", std::to_string(origin.unix_offset_ns)}};
+        if (!origin.cause.empty()) about["cause"] = origin.cause;
+        writer_.metadata("halcyon", about);
+        if (!origin.netlist.empty()) writer_.attachment("netlist.hal", "text/plain", origin.netlist, 0);
+        const std::uint16_t schema = writer_.add_schema("halcyon.Event", "jsonschema", event_schema);
+        events_ = writer_.add_channel(schema, "/hal/events", "json", {});
+    }
+
+    bool layout(const std::vector<ProbeGroup>& groups) override {
+        groups_.clear();
+        for (const ProbeGroup& group : groups) {
+            std::vector<mcap::Column> columns;
+            for (const std::size_t i : group.columns) columns.push_back({columns_[i].name, columns_[i].type, columns_[i].unit});
+            mcap::RowWriter rows(columns);
+            const std::string thread = group.thread.empty() ? "no-thread" : group.thread;
+            const int number = ++layouts_[thread];  // a schema never changes: after an edit a thread's rows have another topic
+            const std::string suffix = number == 1 ? "" : "_" + std::to_string(number);
+            auto metadata = rows.metadata();
+            metadata["thread"] = group.thread;
+            metadata["period_ns"] = std::to_string(group.period_ns);
+            const auto schema = writer_.add_schema("halcyon_msgs/msg/" + message_name(thread) + (number == 1 ? "" : "V" + std::to_string(number)), "ros2msg", rows.schema());
+            groups_.push_back({writer_.add_channel(schema, "/hal/" + thread + suffix, "cdr", std::move(metadata)), std::move(rows)});
+        }
+        return writer_.error() == 0;
+    }
+
+    bool row(std::size_t group, std::uint64_t cycle, std::int64_t time_ns, const std::uint64_t* words) override {
+        groups_[group].rows.write(words, payload_);
+        return writer_.message(groups_[group].channel, static_cast<std::uint32_t>(cycle), static_cast<std::uint64_t>(time_ns + offset_ns_), payload_);
+    }
+
+    bool event(const ProbeClient::Entry& entry) override {
+        const std::string text = nlohmann::json{{"kind", entry.kind}, {"text", entry.text}}.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+        return writer_.message(events_, number_++, static_cast<std::uint64_t>(entry.time_ns + offset_ns_), text);
+    }
+
+    bool flush() override { return writer_.flush(); }
+    bool close() override { return writer_.close(); }
+    std::uint64_t bytes() const override { return writer_.bytes(); }
+    int error() const override { return writer_.error(); }
+
+private:
+    struct Group {
+        std::uint16_t channel;
+        mcap::RowWriter rows;
+    };
+    const std::vector<ProbeColumn> columns_;
+    const std::int64_t offset_ns_;
+    mcap::Writer writer_;
+    std::vector<Group> groups_;
+    std::map<std::string, int> layouts_;
+    std::uint16_t events_ = 0;
+    std::uint32_t number_ = 0;
+    std::string payload_;
+};
+
+}  // namespace
+
+std::unique_ptr<Sink> make_mcap_sink(const std::string& path, const std::vector<ProbeColumn>& columns, const Origin& origin) {
+    return std::make_unique<McapSink>(path, columns, origin);
+}
+
+}  // namespace hal::tools

@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: MIT
+#include "record/recorder.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <cstring>
+#include <deque>
+#include <fmt/core.h>
+
+#include "cli/output.hpp"
+#include "cli/signals.hpp"
+#include "record/flight.hpp"
+#include "record/names.hpp"
+#include "record/sink.hpp"
+#include "text/quoting.hpp"
+
+namespace hal::tools {
+namespace {
+
+class Recorder {
+public:
+    Recorder(const Options& options, const Recording& what, Client& client, ProbeClient& probe)
+        : options_(options), what_(what), client_(client), probe_(probe), origin_{client.instance(), client.version(), client.run("save").out, "", probe.unix_ns(0)} {
+        stop_.listen();
+        client.cancel_on(-1);
+    }
+
+    int to_files() {
+        if (!open(file_name())) return 1;
+        while (!stop_.requested() && !ended_) {
+            const auto got = next();
+            if (got == ProbeClient::Got::disconnected) return lost_machine();
+            if (got == ProbeClient::Got::layout && !sink_->layout(probe_.groups())) return cannot_write();
+            if (got == ProbeClient::Got::journal && !sink_->event(probe_.entry())) return cannot_write();
+            if (got == ProbeClient::Got::batch && !add()) return cannot_write();
+        }
+        return finish();
+    }
+
+    int flight() {
+        FlightMemory memory(probe_.groups(), what_.last_ns);
+        FlightTrigger trigger(what_.last_ns, what_.after_ns);
+        const bool forever = what_.for_ns < 0;
+        for (bool over = false; !over;) {
+            const auto got = next();
+            over = stop_.requested() || got == ProbeClient::Got::disconnected || (!forever && now_ns_ - first_ns_ >= what_.for_ns);
+            if (got == ProbeClient::Got::layout) memory.layout(probe_.groups());
+            if (got == ProbeClient::Got::journal) {
+                memory.add(probe_.entry());
+                if (probe_.entry().kind == "fault") trigger.event(probe_.entry().time_ns, "fault");
+            }
+            if (got == ProbeClient::Got::batch) {
+                now_ns_ = batch_.until_ns;
+                if (first_ns_ == 0) first_ns_ = now_ns_;
+                if (const auto time_ns = triggered()) trigger.event(*time_ns, what_.trigger);
+                memory.add(std::move(batch_));
+                memory.prune(now_ns_, trigger.pending() ? trigger.begin_ns() : INT64_MAX);
+            }
+            if (got == ProbeClient::Got::disconnected && client_.closed_because().empty()) trigger.event(now_ns_, "end-of-machine");
+            if (trigger.pending() && (over || now_ns_ >= trigger.end_ns())) {
+                if (!write(memory, trigger)) return cannot_write();
+                trigger.done();
+            }
+        }
+        return 0;
+    }
+
+private:
+    ProbeClient::Got next() {
+        constexpr int look_ms = 100;  // for Ctrl-C
+        return probe_.next(batch_, look_ms);
+    }
+
+    std::string file_name() const {
+        if (what_.rotate_ns < 0) return what_.file;
+        const std::size_t dot = what_.file.rfind('.');
+        return fmt::format("{}-{:03}{}", what_.file.substr(0, dot), files_ + 1, what_.file.substr(dot));
+    }
+
+    bool open(const std::string& path) {
+        path_ = path;
+        rows_ = 0;
+        ++files_;
+        sink_ = make_sink(path, probe_.columns(), origin_);
+        if (sink_->error() == 0 && sink_->layout(probe_.groups())) return true;
+        fail(options_, fmt::format("cannot write '{}': {}", path, std::strerror(sink_->error())));
+        return false;
+    }
+
+    bool add() {
+        if (begin_ns_ < 0) begin_ns_ = first_time();
+        const std::int64_t end_ns = what_.for_ns < 0 || begin_ns_ < 0 ? INT64_MAX : begin_ns_ + what_.for_ns;
+        if (!add_batch(*sink_, batch_, 0, end_ns, rows_)) return false;
+        ended_ = begin_ns_ >= 0 && batch_.until_ns >= end_ns;
+        if (what_.most_mb > 0 && static_cast<double>(sink_->bytes()) >= what_.most_mb * 1e6) ended_ = true;
+        if (what_.rotate_ns < 0 || begin_ns_ < 0 || ended_ || batch_.until_ns - begin_ns_ < what_.rotate_ns * files_) return true;
+        if (!complete()) return false;
+        return open(file_name());
+    }
+
+    std::int64_t first_time() const {
+        std::int64_t first = -1;
+        for (const auto& part : batch_.parts)
+            if (part.rows != 0 && (first < 0 || batch_.time_ns(part, 0) < first)) first = batch_.time_ns(part, 0);
+        return first;
+    }
+
+    bool complete() {
+        if (!sink_->close()) return false;
+        written_.push_back(path_);
+        print(fmt::format("{}: {} of {}, {:.1f} MB{}\n", path_, counted(rows_, "row"), counted(probe_.columns().size(), "value"),
+                          static_cast<double>(sink_->bytes()) * 1e-6, probe_.lost() == 0 ? "" : ", " + counted(probe_.lost(), "row") + " lost"));
+        // files of this run only; of a flight recorder the first is kept, because it is often the cause of those after it
+        const std::size_t first = what_.last_ns >= 0 ? 1 : 0;
+        while (what_.keep != 0 && written_.size() > std::max<std::size_t>(what_.keep, 1 + first)) {
+            std::remove(written_[first].c_str());
+            written_.erase(written_.begin() + static_cast<std::ptrdiff_t>(first));
+        }
+        return true;
+    }
+
+    int finish() { return complete() ? 0 : cannot_write(); }
+
+    int lost_machine() {
+        const int status = finish();
+        if (status != 0) return status;
+        return what_.for_ns < 0 ? 0 : fail(options_, fmt::format("instance '{}' has ended before the time was over", client_.instance()));
+    }
+
+    int cannot_write() {
+        const int error = sink_->error();
+        sink_->close();
+        return fail(options_, fmt::format("cannot write '{}': {}; the file is complete up to there", path_, std::strerror(error)));
+    }
+
+    /// The time of the first row in which the trigger has become non-zero.
+    std::optional<std::int64_t> triggered() {
+        if (what_.trigger.empty()) return std::nullopt;
+        std::optional<std::int64_t> at;
+        batch_.in_time_order([&](const ProbeBatch::Part& part, std::size_t row) {
+            if (part.group >= probe_.groups().size()) return;
+            const auto& columns = probe_.groups()[part.group].columns;
+            for (std::size_t c = 0; c < columns.size() && c < part.columns; ++c) {
+                const ProbeColumn& column = probe_.columns()[columns[c]];
+                if (column.name != what_.trigger) continue;
+                const bool on = batch_.real(part, row, c, column.type) != 0;
+                if (on && !was_on_ && !at) at = batch_.time_ns(part, row);
+                was_on_ = on;
+            }
+        });
+        return at;
+    }
+
+    bool write(const FlightMemory& memory, const FlightTrigger& trigger) {
+        path_ = flight_name(what_.file, probe_.unix_ns(trigger.begin_ns() + what_.last_ns), trigger.cause(), ++files_);
+        rows_ = 0;
+        Origin origin = origin_;
+        origin.cause = trigger.cause();
+        sink_ = make_sink(path_, probe_.columns(), origin);
+        return sink_->error() == 0 && memory.write(*sink_, trigger.begin_ns(), trigger.end_ns(), rows_) && complete();
+    }
+
+    const Options& options_;
+    const Recording& what_;
+    Client& client_;
+    ProbeClient& probe_;
+    const Origin origin_;
+    StopRequest stop_;
+    ProbeBatch batch_;
+    std::unique_ptr<Sink> sink_;
+    std::string path_;
+    std::vector<std::string> written_;
+    std::uint64_t rows_ = 0;
+    unsigned files_ = 0;
+    std::int64_t begin_ns_ = -1, now_ns_ = 0, first_ns_ = 0;
+    bool ended_ = false, was_on_ = true;
+};
+
+}  // namespace
+
+int record_values(const Options& options, const std::string& instance, Recording what) {
+    if (!what.file.ends_with(".mcap") && !what.file.ends_with(".csv"))
+        return fail(options, fmt::format("unknown format of '{}'; name the file .mcap or .csv", what.file));
+    if (what.names.empty() && !what.all) return fail(options, "missing names of values; or --all");
+    if (what.last_ns >= 0 && what.rotate_ns >= 0) return fail(options, "--last and --rotate exclude each other; leave one out");
+    if (what.last_ns < 0 && !what.trigger.empty()) return fail(options, "--trigger needs --last TIME: what is kept until it comes");
+    std::string problem;
+    const auto client = Client::connect(instance, problem);
+    if (!client) return fail(options, problem);
+    if (!what.trigger.empty()) what.names.push_back(what.trigger);
+    std::vector<std::string> names = probed_names(*client, what.names, problem);
+    if (!problem.empty()) return fail(options, problem);
+    if (what.all)
+        for (std::string& name : all_names(*client))
+            if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(std::move(name));
+    ProbeClient::Options wanted;
+    wanted.every = what.every;
+    wanted.journal = true;
+    const auto probe = ProbeClient::attach(*client, names, wanted, problem);
+    if (!probe) return fail(options, problem);
+    Recorder recorder(options, what, *client, *probe);
+    return what.last_ns >= 0 ? recorder.flight() : recorder.to_files();
+}
+
+}  // namespace hal::tools
