@@ -52,6 +52,8 @@
 #include "inspect/top.hpp"
 #include "machine/source_tree.hpp"
 #include "paths.hpp"
+#include "record/plot.hpp"
+#include "record/replay.hpp"
 #include "run/check.hpp"
 #include "run/fmt.hpp"
 #include "run/run.hpp"
@@ -99,6 +101,8 @@ constexpr Subcommand table[] = {
     command<CompileOptions, run_compile>("compile", "FILE… [--output DIR] [--check-rt [-- ARGUMENT=VALUE…]]", "build a plugin from one source file and install it"),
     command<ExplainOptions, run_explain>("explain", "[CODE]", "explain a diagnostic code and what to do about it"),
     command<RecordOptions, run_record>("record", "FILE NAME… [--last TIME] | [CHANNEL] [FILE]", "record any values of a running instance to MCAP or CSV, or the samples of a sampler"),
+    command<PlotOptions, run_plot>("plot", "FILE [NAME…] [-o OUT.svg]", "draw values of a recording"),
+    command<ReplayOptions, run_replay>("replay", "FILE NETLIST… [--tolerance X]", "drive a netlist with a recording on a virtual clock, and compare"),
     command<PlayOptions, run_play>("play", "[CHANNEL] [FILE]", "feed a streamer"),
     command<DumpOptions, ON_BUS(run_can_dump)>("can dump", "ADDRESS… [--filter ID[/MASK]] [--time relative|delta|absolute] [--for TIME] [--count N] [--json]", "print and decode the frames of a CAN bus"),
     command<SendOptions, ON_BUS(run_can_send)>("can send", "ADDRESS FRAME… [--every TIME [--for TIME]]", "send frames: 123#1122AABB"),

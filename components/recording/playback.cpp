@@ -109,7 +109,7 @@ private:
         const char* const doc = "value of the recording";
         switch (type) {
         case HAL_TYPE_BIT: pin.emplace<1>(*this, name, doc); break;
-        case HAL_TYPE_FLOAT: pin.emplace<2>(*this, name, doc, {.unit = unit}); break;
+        case HAL_TYPE_FLOAT: pin.emplace<2>(*this, name, doc, hal::PinOptions<double>{.unit = unit}); break;
         case HAL_TYPE_S32: pin.emplace<3>(*this, name, doc); break;
         case HAL_TYPE_U32: pin.emplace<4>(*this, name, doc); break;
         case HAL_TYPE_S64: pin.emplace<5>(*this, name, doc); break;

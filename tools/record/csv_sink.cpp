@@ -65,7 +65,9 @@ private:
 
 }  // namespace
 
-std::unique_ptr<Sink> make_csv_sink(const std::string& path, const std::vector<ProbeColumn>& columns) { return std::make_unique<CsvSink>(path, columns); }
+std::unique_ptr<Sink> make_csv_sink(const std::string& path, const std::vector<ProbeColumn>& columns) {
+    return std::make_unique<CsvSink>(path, columns);
+}
 
 std::unique_ptr<Sink> make_sink(const std::string& path, const std::vector<ProbeColumn>& columns, const Origin& origin) {
     return path.ends_with(".csv") ? make_csv_sink(path, columns) : make_mcap_sink(path, columns, origin);

@@ -19,7 +19,8 @@ void FlightMemory::add(ProbeBatch&& batch) {
 void FlightMemory::note_last(const Held& held) {
     for (const ProbeBatch::Part& part : held.batch.parts) {
         if (part.rows == 0 || part.group >= layouts_[held.layout].size() || layouts_[held.layout][part.group].period_ns != 0) continue;
-        auto at = std::find_if(last_.begin(), last_.end(), [&](const Last& one) { return one.layout == held.layout && one.group == part.group; });
+        auto at =
+            std::find_if(last_.begin(), last_.end(), [&](const Last& one) { return one.layout == held.layout && one.group == part.group; });
         if (at == last_.end()) at = last_.insert(at, {held.layout, part.group, {}});
         at->words.clear();
         for (std::size_t c = 0; c < part.columns; ++c) at->words.push_back(held.batch.raw(part, part.rows - 1, c));

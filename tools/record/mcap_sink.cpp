@@ -28,9 +28,8 @@ class McapSink final : public Sink {
 public:
     McapSink(const std::string& path, const std::vector<ProbeColumn>& columns, const Origin& origin)
         : columns_(columns), offset_ns_(origin.unix_offset_ns), writer_(path) {
-        std::map<std::string, std::string> about{{"instance", origin.instance},
-                                                 {"version", origin.version},
-                                                 {"unix_offset_ns", std::to_string(origin.unix_offset_ns)}};
+        std::map<std::string, std::string> about{
+            {"instance", origin.instance}, {"version", origin.version}, {"unix_offset_ns", std::to_string(origin.unix_offset_ns)}};
         if (!origin.cause.empty()) about["cause"] = origin.cause;
         writer_.metadata("halcyon", about);
         if (!origin.netlist.empty()) writer_.attachment("netlist.hal", "text/plain", origin.netlist, 0);
@@ -50,7 +49,8 @@ public:
             auto metadata = rows.metadata();
             metadata["thread"] = group.thread;
             metadata["period_ns"] = std::to_string(group.period_ns);
-            const auto schema = writer_.add_schema("halcyon_msgs/msg/" + message_name(thread) + (number == 1 ? "" : "V" + std::to_string(number)), "ros2msg", rows.schema());
+            const auto schema = writer_.add_schema(
+                "halcyon_msgs/msg/" + message_name(thread) + (number == 1 ? "" : "V" + std::to_string(number)), "ros2msg", rows.schema());
             groups_.push_back({writer_.add_channel(schema, "/hal/" + thread + suffix, "cdr", std::move(metadata)), std::move(rows)});
         }
         return writer_.error() == 0;
@@ -58,11 +58,13 @@ public:
 
     bool row(std::size_t group, std::uint64_t cycle, std::int64_t time_ns, const std::uint64_t* words) override {
         groups_[group].rows.write(words, payload_);
-        return writer_.message(groups_[group].channel, static_cast<std::uint32_t>(cycle), static_cast<std::uint64_t>(time_ns + offset_ns_), payload_);
+        return writer_.message(groups_[group].channel, static_cast<std::uint32_t>(cycle), static_cast<std::uint64_t>(time_ns + offset_ns_),
+                               payload_);
     }
 
     bool event(const ProbeClient::Entry& entry) override {
-        const std::string text = nlohmann::json{{"kind", entry.kind}, {"text", entry.text}}.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+        const std::string text =
+            nlohmann::json{{"kind", entry.kind}, {"text", entry.text}}.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
         return writer_.message(events_, number_++, static_cast<std::uint64_t>(entry.time_ns + offset_ns_), text);
     }
 

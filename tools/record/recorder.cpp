@@ -20,7 +20,11 @@ namespace {
 class Recorder {
 public:
     Recorder(const Options& options, const Recording& what, Client& client, ProbeClient& probe)
-        : options_(options), what_(what), client_(client), probe_(probe), origin_{client.instance(), client.version(), client.run("save").out, "", probe.unix_ns(0)} {
+        : options_(options),
+          what_(what),
+          client_(client),
+          probe_(probe),
+          origin_{client.instance(), client.version(), client.run("save").out, "", probe.unix_ns(0)} {
         stop_.listen();
         client.cancel_on(-1);
     }
@@ -109,7 +113,8 @@ private:
         if (!sink_->close()) return false;
         written_.push_back(path_);
         print(fmt::format("{}: {} of {}, {:.1f} MB{}\n", path_, counted(rows_, "row"), counted(probe_.columns().size(), "value"),
-                          static_cast<double>(sink_->bytes()) * 1e-6, probe_.lost() == 0 ? "" : ", " + counted(probe_.lost(), "row") + " lost"));
+                          static_cast<double>(sink_->bytes()) * 1e-6,
+                          probe_.lost() == 0 ? "" : ", " + counted(probe_.lost(), "row") + " lost"));
         // files of this run only; of a flight recorder the first is kept, because it is often the cause of those after it
         const std::size_t first = what_.last_ns >= 0 ? 1 : 0;
         while (what_.keep != 0 && written_.size() > std::max<std::size_t>(what_.keep, 1 + first)) {

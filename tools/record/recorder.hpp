@@ -28,14 +28,19 @@ struct Recording {
         set.value("--every", every, "N", "record each N-th cycle of each thread (default 1)").in(1, 1'000'000);
         set.duration("--for", for_ns, "end after this time of the machine", 1);
         set.value("--limit", most_mb, "MB", "end when the file has this size").not_negative();
-        set.duration("--rotate", rotate_ns, "start another file, FILE-001, FILE-002 …, after each such time", 1'000'000, "10min, 1h or 30s");
+        set.duration("--rotate", rotate_ns, "start another file, FILE-001, FILE-002 …, after each such time", 1'000'000,
+                     "10min, 1h or 30s");
         set.value("--keep", keep, "N", "keep only the newest N files of --rotate, or the first and the newest of --last").in(0, 1'000'000);
-        set.duration("--last", last_ns, "flight recorder: keep the last TIME in memory, write it on a fault, a trigger, or the end of the machine", 1'000'000, "60s, 10s or 5min");
+        set.duration("--last", last_ns,
+                     "flight recorder: keep the last TIME in memory, write it on a fault, a trigger, or the end of the machine", 1'000'000,
+                     "60s, 10s or 5min");
         set.value("--trigger", trigger, "NAME", "with --last: also write when this pin or signal becomes TRUE or non-zero");
         set.duration("--after", after_ns, "with --last: what to record after the event (default 5s)");
     }
     /// Something of it was given: the words are FILE NAMES.
-    bool asked() const { return all || every != 1 || for_ns >= 0 || most_mb > 0 || rotate_ns >= 0 || last_ns >= 0 || keep != 0 || !trigger.empty(); }
+    bool asked() const {
+        return all || every != 1 || for_ns >= 0 || most_mb > 0 || rotate_ns >= 0 || last_ns >= 0 || keep != 0 || !trigger.empty();
+    }
 };
 
 /// Records until the end that was asked for, Ctrl-C, or the end of the machine. Returns the exit code.

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: MIT
+#include "record/plot.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <fmt/core.h>
+#include <fnmatch.h>
+
+#include "cli/output.hpp"
+#include "text/suggest.hpp"
+
+namespace hal::tools {
+namespace {
+
+constexpr std::size_t most_traces = 24;
+
+/// The columns of a name or a pattern, in the order of the file.
+std::size_t add_traces(const mcap::Recording& recording, const std::string& wanted, std::vector<Trace>& traces) {
+    const std::size_t before = traces.size();
+    for (const mcap::Table& table : recording.tables)
+        for (std::size_t c = 0; c < table.columns.size(); ++c) {
+            const mcap::Column& column = table.columns[c];
+            if (column.name == wanted || ::fnmatch(wanted.c_str(), column.name.c_str(), 0) == 0)
+                traces.push_back({column.name, column.unit, column.type, &table, c});
+        }
+    return traces.size() - before;
+}
+
+}  // namespace
+
+int run_plot(const PlotOptions& options) {
+    const std::string& file = options.words.front();
+    mcap::Recording recording;
+    std::string problem;
+    if (!mcap::load(file, recording, problem)) return fail(options, problem);
+    if (!recording.note.empty()) std::fputs(fmt::format("{}: {}\n", options.program, recording.note).c_str(), stderr);
+    if (recording.tables.empty()) return fail(options, fmt::format("'{}' has no rows", file));
+    std::vector<Trace> traces;
+    for (std::size_t i = 1; i < options.words.size(); ++i) {
+        if (add_traces(recording, options.words[i], traces) != 0) continue;
+        std::vector<std::string> names;
+        for (const mcap::Table& table : recording.tables)
+            for (const mcap::Column& column : table.columns) names.push_back(column.name);
+        const std::string hint = suggestion(options.words[i], names, "it has");
+        return fail(options, fmt::format("'{}' has no value '{}'{}", file, options.words[i], hint.empty() ? "" : "; " + hint));
+    }
+    if (options.words.size() == 1) add_traces(recording, "*", traces);
+    if (traces.size() > most_traces)
+        return fail(options, fmt::format("{} values are too many for one picture; choose at most {}", traces.size(), most_traces));
+    const std::int64_t begin_ns = recording.begin_ns() + options.from_ns, last_ns = recording.end_ns();
+    const std::int64_t end_ns = options.for_ns < 0 ? last_ns : std::min(last_ns, begin_ns + options.for_ns);
+    if (begin_ns >= last_ns && options.from_ns > 0)
+        return fail(options, fmt::format("--from is after the end: '{}' has {:.6g} s", file,
+                                         static_cast<double>(last_ns - recording.begin_ns()) * 1e-9));
+    const std::string svg = plot_svg(traces, recording.events, begin_ns, end_ns, options.width);
+    if (options.output == "-") return print(svg) ? 0 : 1;
+    const std::string output = options.output.empty() ? file.substr(0, file.rfind('.')) + ".svg" : options.output;
+    problem = write_file(output, svg);
+    if (!problem.empty()) return fail(options, problem);
+    return print(fmt::format("{}\n", output)) ? 0 : 1;
+}
+
+}  // namespace hal::tools

@@ -1,0 +1,201 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <cmath>
+#include <fmt/core.h>
+#include <limits>
+
+#include "cli/xml_escape.hpp"
+#include "record/plot.hpp"
+
+namespace hal::tools {
+namespace {
+
+constexpr const char* colours[] = {"#0072b2", "#d55e00", "#009e73", "#cc79a7",
+                                   "#8a6d00", "#56a0c8", "#444444", "#9467bd"};  // distinct for the colour-blind
+constexpr double left = 78, right = 12, top = 14, gap = 12, bit_height = 22, strip_height = 150, legend_line = 17;
+
+/// Traces with one scale.
+struct Strip {
+    std::vector<const Trace*> traces;
+    bool bit = false;
+    double low = 0, high = 1, y = 0, height = 0;
+};
+
+// 1, 2 or 5 times a power of ten, for about `parts` intervals.
+double tick_step(double span, double parts) {
+    const double raw = span / parts, power = std::pow(10, std::floor(std::log10(raw))), digit = raw / power;
+    return power * (digit < 1.5 ? 1 : digit < 3.5 ? 2 : digit < 7.5 ? 5 : 10);
+}
+
+class Picture {
+public:
+    Picture(const std::vector<mcap::Event>& events, std::int64_t begin_ns, std::int64_t end_ns, int width)
+        : events_(events), begin_(begin_ns), end_(std::max(end_ns, begin_ns + 1)), width_(width), plot_(width - left - right) {}
+
+    std::string draw(std::vector<Strip> strips) {
+        double y = top;
+        for (Strip& strip : strips) {
+            y += strip.bit ? 0 : legend_line;
+            strip.y = y;
+            strip.height = strip.bit ? bit_height : strip_height;
+            y += strip.height + gap;
+        }
+        const double bottom = y - gap, height = bottom + 40;
+        svg_ = fmt::format(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0}\" height=\"{1:.0f}\" viewBox=\"0 0 {0} {1:.0f}\" "
+            "font-family=\"sans-serif\" "
+            "font-size=\"12\">\n<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n",
+            width_, height);
+        time_axis(bottom);
+        std::size_t colour = 0;
+        for (Strip& strip : strips) {
+            if (!strip.bit) value_axis(strip);
+            double x = left;
+            for (const Trace* trace : strip.traces) {
+                const char* const stroke = colours[colour++ % std::size(colours)];
+                if (strip.bit) {
+                    svg_ += fmt::format(
+                        "<text x=\"{:.0f}\" y=\"{:.1f}\" text-anchor=\"end\" fill=\"{}\" textLength=\"{:.0f}\" "
+                        "lengthAdjust=\"spacingAndGlyphs\">{}</text>\n",
+                        left - 6, strip.y + 15, stroke, std::min(left - 10, 6.6 * static_cast<double>(trace->name.size())),
+                        xml_escape(trace->name));
+                } else {
+                    const std::string label = trace->name + (trace->unit.empty() ? "" : " [" + trace->unit + "]");
+                    svg_ +=
+                        fmt::format("<text x=\"{:.0f}\" y=\"{:.1f}\" fill=\"{}\">{}</text>\n", x, strip.y - 4, stroke, xml_escape(label));
+                    x += 7.0 * static_cast<double>(label.size()) + 16;
+                }
+                line(strip, *trace, stroke);
+            }
+        }
+        marks(bottom);
+        return svg_ + "</svg>\n";
+    }
+
+private:
+    double x_of(std::int64_t time_ns) const {
+        return left + plot_ * static_cast<double>(time_ns - begin_) / static_cast<double>(end_ - begin_);
+    }
+    static double y_of(const Strip& strip, double value) {
+        return strip.y + strip.height - strip.height * (std::clamp(value, strip.low, strip.high) - strip.low) / (strip.high - strip.low);
+    }
+
+    void time_axis(double bottom) {
+        const double span = static_cast<double>(end_ - begin_) * 1e-9, step = tick_step(span, std::max(2.0, plot_ / 110));
+        for (double t = 0; t <= span * 1.0001; t += step) {
+            const double x = left + plot_ * t / span;
+            svg_ += fmt::format(
+                "<path d=\"M{0:.1f} {1:.0f}V{2:.1f}\" stroke=\"#ddd\"/><text x=\"{0:.1f}\" y=\"{3:.1f}\" "
+                "text-anchor=\"middle\">{4:.6g}</text>\n",
+                x, top, bottom, bottom + 16, std::abs(t) < step / 1000 ? 0.0 : t);
+        }
+        svg_ += fmt::format("<text x=\"{:.0f}\" y=\"{:.1f}\" text-anchor=\"middle\">time in s</text>\n", left + plot_ / 2, bottom + 33);
+    }
+
+    void value_axis(const Strip& strip) {
+        const double step = tick_step(strip.high - strip.low, 4);
+        for (double value = std::ceil(strip.low / step) * step; value <= strip.high + step / 1000; value += step) {
+            const double y = y_of(strip, value);
+            svg_ += fmt::format(
+                "<path d=\"M{0:.0f} {1:.1f}H{2:.0f}\" stroke=\"#ddd\"/><text x=\"{3:.0f}\" y=\"{4:.1f}\" "
+                "text-anchor=\"end\">{5:.6g}</text>\n",
+                left, y, left + plot_, left - 6, y + 4, std::abs(value) < step / 1000 ? 0.0 : value);
+        }
+        svg_ += fmt::format("<rect x=\"{:.0f}\" y=\"{:.1f}\" width=\"{:.0f}\" height=\"{:.1f}\" fill=\"none\" stroke=\"#999\"/>\n", left,
+                            strip.y, plot_, strip.height);
+    }
+
+    // A pixel at a time: the value that enters it, the extremes in it, the value that leaves it.
+    void line(const Strip& strip, const Trace& trace, const char* stroke) {
+        const auto& times = trace.table->times_ns;
+        auto row = static_cast<std::size_t>(std::upper_bound(times.begin(), times.end(), begin_) - times.begin());
+        if (row > 0) --row;
+        std::string path;
+        bool pen = false;
+        for (double last = NAN; row < times.size() && times[row] <= end_;) {
+            const double pixel = std::floor(std::max(x_of(times[row]), left));
+            double low = std::numeric_limits<double>::infinity(), high = -low, first = NAN;
+            const double x = std::max(x_of(times[row]), left);
+            for (; row < times.size() && times[row] <= end_ && std::floor(std::max(x_of(times[row]), left)) == pixel; ++row) {
+                last = trace.table->real(row, trace.column);
+                if (std::isnan(first)) first = last;
+                if (std::isfinite(last)) low = std::min(low, last), high = std::max(high, last);
+            }
+            if (!(low <= high)) {  // NaN: a gap
+                pen = false;
+                continue;
+            }
+            if (pen) path += fmt::format("H{:.1f}V{:.1f}", x, y_of(strip, first));
+            else path += fmt::format("M{:.1f} {:.1f}", x, y_of(strip, first));
+            if (low != first) path += fmt::format("V{:.1f}", y_of(strip, low));
+            if (high != low) path += fmt::format("V{:.1f}", y_of(strip, high));
+            if (std::isfinite(last) && last != high) path += fmt::format("V{:.1f}", y_of(strip, last));
+            pen = std::isfinite(last);
+        }
+        if (pen && row >= times.size()) path += fmt::format("H{:.1f}", std::min(x_of(std::max(times.back(), begin_)), left + plot_));
+        svg_ += fmt::format("<path d=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.4\" stroke-linejoin=\"round\"/>\n", path, stroke);
+    }
+
+    void marks(double bottom) {
+        for (const mcap::Event& event : events_) {
+            if (event.time_ns < begin_ || event.time_ns > end_) continue;
+            const char* const colour = event.kind == "fault" ? "#c00" : "#777";
+            const double x = x_of(event.time_ns);
+            svg_ += fmt::format(
+                "<g><title>{}: {}</title><path d=\"M{:.1f} {:.0f}V{:.1f}\" stroke=\"{}\" stroke-dasharray=\"4 3\"/><text x=\"{:.1f}\" "
+                "y=\"{:.0f}\" fill=\"{}\" "
+                "font-size=\"10\">{}</text></g>\n",
+                xml_escape(event.kind), xml_escape(event.text), x, top - 4, bottom, colour, x + 3, top + 2, colour, xml_escape(event.kind));
+        }
+    }
+
+    const std::vector<mcap::Event>& events_;
+    const std::int64_t begin_, end_;
+    const int width_;
+    const double plot_;
+    std::string svg_;
+};
+
+// The extremes between the times, with a margin.
+void scale(Strip& strip, std::int64_t begin_ns, std::int64_t end_ns) {
+    double low = std::numeric_limits<double>::infinity(), high = -low;
+    for (const Trace* trace : strip.traces) {
+        const auto& times = trace->table->times_ns;
+        auto row = static_cast<std::size_t>(std::upper_bound(times.begin(), times.end(), begin_ns) - times.begin());
+        for (row -= row > 0 ? 1 : 0; row < times.size() && times[row] <= end_ns; ++row) {
+            const double value = trace->table->real(row, trace->column);
+            if (std::isfinite(value)) low = std::min(low, value), high = std::max(high, value);
+        }
+    }
+    if (!(low <= high)) low = 0, high = 1;
+    if (low == high) low -= std::max(std::abs(low) * 0.1, 0.5), high += std::max(std::abs(high) * 0.1, 0.5);
+    const double margin = (high - low) * 0.05;
+    strip.low = low - margin;
+    strip.high = high + margin;
+}
+
+}  // namespace
+
+std::string plot_svg(const std::vector<Trace>& traces, const std::vector<mcap::Event>& events, std::int64_t begin_ns, std::int64_t end_ns,
+                     int width) {
+    std::vector<Strip> strips;
+    for (const Trace& trace : traces) {
+        const bool bit = trace.type == HAL_TYPE_BIT, integer = trace.type != HAL_TYPE_FLOAT;
+        const auto fits = [&](const Strip& strip) {
+            const Trace& other = *strip.traces[0];
+            return !bit && !strip.bit && other.unit == trace.unit && (other.type != HAL_TYPE_FLOAT) == integer;
+        };
+        const auto at = std::find_if(strips.begin(), strips.end(), fits);
+        Strip& strip = at == strips.end() ? strips.emplace_back() : *at;
+        strip.traces.push_back(&trace);
+        strip.bit = bit;
+    }
+    std::stable_partition(strips.begin(), strips.end(), [](const Strip& strip) { return !strip.bit; });
+    for (Strip& strip : strips) {
+        if (strip.bit) strip.low = -0.15, strip.high = 1.15;
+        else scale(strip, begin_ns, end_ns);
+    }
+    return Picture(events, begin_ns, end_ns, width).draw(std::move(strips));
+}
+
+}  // namespace hal::tools

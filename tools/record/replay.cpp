@@ -1,0 +1,224 @@
+// SPDX-License-Identifier: MIT
+#include "record/replay.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fmt/core.h>
+#include <fnmatch.h>
+#include <map>
+#include <set>
+#include <unistd.h>
+
+#include "cli/output.hpp"
+#include "recording/mcap/recording.hpp"
+#include "run/hosted_machine.hpp"
+#include "text/quoting.hpp"
+
+namespace hal::tools {
+namespace {
+
+constexpr const char* player = "replay";  // the instance of playback
+
+bool matches(const std::string& list, const std::string& name) {
+    for (std::size_t at = 0; at <= list.size();) {
+        const std::size_t end = std::min(list.find(',', at), list.size());
+        if (::fnmatch(list.substr(at, end - at).c_str(), name.c_str(), 0) == 0) return true;
+        at = end + 1;
+    }
+    return false;
+}
+
+double real_of(hal_type type, std::uint64_t word) {
+    if (type == HAL_TYPE_FLOAT) return std::bit_cast<double>(word);
+    return type == HAL_TYPE_S32 || type == HAL_TYPE_S64 ? static_cast<double>(static_cast<std::int64_t>(word)) : static_cast<double>(word);
+}
+
+/// A recorded value that the netlist computes itself.
+struct Compared {
+    std::string name;
+    const mcap::Table* table;
+    std::size_t column;
+    std::size_t row = 0, rows = 0;     // the next recorded row; compared so far
+    double worst = 0, recorded = 0, replayed = 0;
+    std::int64_t at_ns = 0;
+};
+
+class Replay {
+public:
+    Replay(const ReplayOptions& options, const mcap::Recording& recording, HostedMachine& machine)
+        : options_(options), recording_(recording), machine_(machine) {}
+
+    /// Connects the player to what has no writer. Returns the exit status.
+    int connect(const std::string& file) {
+        std::vector<std::vector<std::string>> commands{{"loadrt", "playback", "names=" + std::string(player), "file=" + file}};
+        {
+            const auto lock = machine_.session.lock();
+            const Model& model = machine_.session.model();
+            if (model.threads.empty()) return fail(options_, "the netlist has no thread");
+            const std::string thread = thread_name(model);
+            if (thread.empty()) return fail(options_, fmt::format("unknown thread '{}'", options_.thread));
+            commands.push_back({"addf", std::string(player) + ".update", thread, "1"});
+            for (const mcap::Table& table : recording_.tables)
+                for (std::size_t c = 0; c < table.columns.size(); ++c) use(model, table, c, commands);
+        }
+        if (driven_.empty())
+            return fail(options_,
+                        "nothing of the recording is an input of the netlist: no value in it is a signal without a writer, or an input pin "
+                        "without a signal");
+        ProcessOutput output;
+        return machine_.shell.execute(commands, output, "<replay>");
+    }
+
+    /// Runs the netlist over the recording and compares.
+    int run() {
+        std::vector<std::string> names;
+        for (const Compared& one : compared_) names.push_back(one.name);
+        std::shared_ptr<LiveProbe> probe;
+        if (!names.empty()) {
+            const auto lock = machine_.session.lock();
+            std::string problem;
+            probe = machine_.session.probes().attach({names}, problem);
+            if (!probe) return fail(options_, problem);
+            layout_ = Probes::layout(*probe);
+        }
+        machine_.start_threads();
+        const std::int64_t all_ns = recording_.end_ns() - recording_.begin_ns();
+        const std::int64_t wanted_ns = options_.for_ns < 0 ? all_ns : std::min(options_.for_ns, all_ns);
+        constexpr std::int64_t step_ns = 200'000'000;
+        for (std::int64_t left_ns = wanted_ns + period_ns_; left_ns > 0 && !machine_.stop.requested(); left_ns -= step_ns) {
+            machine_.advance(std::min(step_ns, left_ns), 0);
+            if (!probe) continue;
+            const auto lock = machine_.session.lock();
+            for (const ProbeRows& rows : machine_.session.probes().take(*probe, std::size_t{1} << 28)) compare(rows, wanted_ns);
+        }
+        return machine_.faulted() || machine_.stop.requested() ? 1 : 0;
+    }
+
+    /// Prints the result. Returns the exit status.
+    int report(int status) {
+        std::size_t width = 0;
+        for (const Compared& one : compared_) width = std::max(width, one.name.size());
+        std::string text;
+        std::size_t different = 0;
+        for (const Compared& one : compared_) {
+            const bool differs = options_.tolerance >= 0 && !(one.worst <= options_.tolerance);
+            different += differs;
+            if (options_.quiet && !differs) continue;
+            if (one.rows == 0) text += fmt::format("{:{}}  no row at the same time\n", one.name, width);
+            else if (one.worst == 0) text += fmt::format("{:{}}  equal in {}\n", one.name, width, counted(one.rows, "row"));
+            else
+                text += fmt::format("{:{}}  differs by up to {:.6g}: {:.6g} instead of {:.6g} at {:.6f} s\n", one.name, width, one.worst,
+                                    one.replayed, one.recorded, static_cast<double>(one.at_ns) * 1e-9);
+        }
+        const double seconds = static_cast<double>(recording_.end_ns() - recording_.begin_ns()) * 1e-9;
+        if (!options_.quiet || different != 0)
+            text += fmt::format("{:.6g} s of recording: {} driven, {} compared{}\n",
+                                options_.for_ns < 0 ? seconds : std::min(seconds, static_cast<double>(options_.for_ns) * 1e-9),
+                                counted(driven_.size(), "input"), counted(compared_.size(), "value"),
+                                options_.tolerance < 0 ? ""
+                                : different == 0
+                                    ? ", none differs"
+                                    : fmt::format(", {} by more than {:g}",
+                                                  different == 1 ? "1 differs" : fmt::format("{} differ", different), options_.tolerance));
+        if (!print(text)) return 1;
+        return different != 0 ? 1 : status;
+    }
+
+private:
+    std::string thread_name(const Model& model) {
+        const Thread* thread = nullptr;
+        if (!options_.thread.empty()) {
+            thread = model.find_thread(options_.thread);
+            if (!thread) return "";
+        }
+        for (const mcap::Table& table : recording_.tables) {
+            const Thread* const own = table.topic.starts_with("/hal/") ? model.find_thread(table.topic.substr(5)) : nullptr;
+            if (!thread && own) thread = own;
+        }
+        if (!thread) thread = model.threads.front().get();
+        period_ns_ = thread->options.period_ns;
+        return thread->name;
+    }
+
+    void use(const Model& model, const mcap::Table& table, std::size_t c, std::vector<std::vector<std::string>>& commands) {
+        const mcap::Column& column = table.columns[c];
+        if (!matches(options_.names, column.name)) return;
+        const Pin* const pin = model.find_pin(column.name);
+        const Signal* const signal = pin ? pin->signal : model.find_signal(column.name);
+        if ((!pin && !signal) || (pin && (pin->of_thread || pin->function))) return;  // times are never the same
+        const std::string source = fmt::format("{}.{}", player, column.name);
+        const bool parameter = pin && pin->dir == HAL_DIR_PARAM;
+        if (signal && !signal->writer && signal->ios == 0) {
+            if (driven_.insert(signal->name).second) commands.push_back({"net", signal->name, source});
+        } else if (!signal && pin->dir == HAL_DIR_IN) {
+            if (driven_.insert(pin->name).second) commands.push_back({"net", fmt::format("{}:{}", player, pin->name), source, pin->name});
+        } else if (!parameter && !driven_.contains(signal ? signal->name : pin->name) && seen_.insert(column.name).second) {
+            compared_.push_back({column.name, &table, c});
+        }
+    }
+
+    // Both times count from the first row. A recorded row is compared with the row of the same time.
+    void compare(const ProbeRows& rows, std::int64_t wanted_ns) {
+        if (rows.layout) layout_ = *rows.layout;
+        std::size_t at = 0;
+        for (const auto& part : rows.parts) {
+            const auto& columns = layout_.groups[part.group].columns;
+            const std::size_t words = columns.size() + 2;
+            for (std::size_t i = 0; i < part.rows; ++i, at += words * 8) {
+                std::vector<std::uint64_t> row(words);
+                std::memcpy(row.data(), rows.bytes.data() + at, words * 8);
+                if (begin_ns_ < 0) begin_ns_ = static_cast<std::int64_t>(row[1]);
+                const std::int64_t time_ns = static_cast<std::int64_t>(row[1]) - begin_ns_;
+                if (time_ns > wanted_ns) continue;
+                for (std::size_t k = 0; k < columns.size(); ++k) compare(compared_[columns[k]], time_ns, row[k + 2]);
+            }
+        }
+    }
+
+    void compare(Compared& one, std::int64_t time_ns, std::uint64_t word) const {
+        const auto& times = one.table->times_ns;
+        while (one.row < times.size() && times[one.row] - recording_.begin_ns() < time_ns) ++one.row;
+        if (one.row >= times.size() || times[one.row] - recording_.begin_ns() != time_ns) return;
+        const hal_type type = one.table->columns[one.column].type;
+        const double recorded = one.table->real(one.row, one.column), replayed = real_of(type, word);
+        ++one.rows;
+        const double apart = std::isnan(recorded) && std::isnan(replayed) ? 0 : recorded == replayed ? 0 : std::abs(recorded - replayed);
+        if (apart <= one.worst) return;
+        one.worst = apart;
+        one.recorded = recorded;
+        one.replayed = replayed;
+        one.at_ns = time_ns;
+    }
+
+    const ReplayOptions& options_;
+    const mcap::Recording& recording_;
+    HostedMachine& machine_;
+    std::set<std::string> driven_, seen_;
+    std::vector<Compared> compared_;
+    ProbeLayout layout_;
+    std::int64_t begin_ns_ = -1, period_ns_ = 0;
+};
+
+}  // namespace
+
+int run_replay(const ReplayOptions& options) {
+    if (options.words.size() < 2) return fail(options, "missing netlist: hal replay FILE NETLIST");
+    const std::string file = std::filesystem::absolute(options.words.front()).string();
+    mcap::Recording recording;
+    std::string problem;
+    if (!mcap::load(options.words.front(), recording, problem)) return fail(options, problem);
+    if (recording.tables.empty()) return fail(options, fmt::format("'{}' has no rows", options.words.front()));
+    ReplayOptions netlists = options;
+    netlists.words.erase(netlists.words.begin());
+    HostedMachine machine(netlists, fmt::format("replay-{}", ::getpid()), true);
+    if (!machine.serve(false)) return 1;
+    if (const int status = machine.load(); status != 0) return status;
+    Replay replay(options, recording, machine);
+    if (const int status = replay.connect(file); status != 0) return status;
+    return replay.report(replay.run());
+}
+
+}  // namespace hal::tools
