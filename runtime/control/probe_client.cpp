@@ -66,9 +66,6 @@ bool ProbeClient::read_batch(const Json& event, std::string&& payload, ProbeBatc
     batch.until_ns = event.value("until_ns", std::int64_t{0});
     batch.parts.clear();
     batch.bytes = std::move(payload);
-    const ProbeLayout* layout = batch.layout == layout_.number ? &layout_ : nullptr;
-    for (const ProbeLayout& earlier : earlier_)
-        if (earlier.number == batch.layout) layout = &earlier;
     std::size_t offset = 0;
     for (const Json& part : event.value("parts", Json::array())) {
         ProbeBatch::Part& one = batch.parts.emplace_back();
@@ -76,8 +73,8 @@ bool ProbeClient::read_batch(const Json& event, std::string&& payload, ProbeBatc
         one.rows = part.value("rows", std::size_t{0});
         one.lost = part.value("lost", std::uint64_t{0});
         one.offset = offset;
-        if (!layout || one.group >= layout->groups.size() || one.rows > batch.bytes.size()) return false;
-        one.columns = layout->groups[one.group].columns.size();
+        if (batch.layout != layout_.number || one.group >= layout_.groups.size() || one.rows > batch.bytes.size()) return false;
+        one.columns = layout_.groups[one.group].columns.size();
         offset += one.rows * (one.columns + 2) * 8;
         lost_ += one.lost;
     }
@@ -96,7 +93,6 @@ ProbeClient::Got ProbeClient::next(ProbeBatch& batch, int timeout_ms) {
         if (event.value("probe", std::uint64_t{0}) != number_) continue;
         if (kind == "samples") return read_batch(event, std::move(payload), batch) ? Got::batch : Got::disconnected;
         if (kind != "layout") continue;
-        earlier_.assign(1, layout_);
         layout_.number = event.value("layout", std::uint64_t{0});
         return read_groups(event) ? Got::layout : Got::disconnected;
     }

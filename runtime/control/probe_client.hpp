@@ -104,7 +104,6 @@ private:
     std::uint64_t number_ = 0, lost_ = 0;
     std::vector<ProbeColumn> columns_;
     ProbeLayout layout_;
-    std::vector<ProbeLayout> earlier_;  ///< a batch that was filled before an edit has the layout of then
     std::int64_t unix_offset_ns_ = 0;
     Entry entry_;
 };

@@ -6,7 +6,10 @@
 #include <string_view>
 #include <utility>
 
+#include <pybind11/stl.h>
+
 #include "component.hpp"
+#include "probe.hpp"
 
 using namespace hal::python;
 
@@ -80,6 +83,12 @@ PYBIND11_MODULE(_core, module) {
             return py::make_tuple(item.name, item.full, static_cast<int>(item.type.type), item.dir);
         })
         .def("size", &Component::size);
+    py::class_<Probe>(module, "Probe")
+        .def(py::init<const std::vector<std::string>&, std::uint32_t, int, int>())
+        .def("columns", &Probe::columns)
+        .def("next", &Probe::next)
+        .def("unix_ns", &Probe::unix_ns)
+        .def("lost", &Probe::lost);
     module.def("leave_all", &leave_all);
     module.def("after_fork", &forget_all);
     module.def("flush_all", &flush_all);

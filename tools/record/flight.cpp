@@ -11,9 +11,7 @@ void FlightMemory::layout(std::vector<ProbeGroup> groups) { layouts_.push_back(s
 
 void FlightMemory::add(ProbeBatch&& batch) {
     bytes_ += batch.bytes.size();
-    // rows of the layout before may still come after the next one was announced; their number tells
-    const std::size_t number = static_cast<std::size_t>(batch.layout);
-    batches_.push_back({number >= 1 && number <= layouts_.size() ? number - 1 : layouts_.size() - 1, std::move(batch)});
+    batches_.push_back({layouts_.size() - 1, std::move(batch)});
 }
 
 void FlightMemory::note_last(const Held& held) {

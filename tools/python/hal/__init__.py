@@ -18,6 +18,7 @@ from hal import _core
 from hal._base import *  # noqa: F403
 from hal._base import (_BY_DIR, _BY_NAME, _TYPES, _ask, _run, _value, _word, MSG_ERR, InvalidArgument, Type, error)
 from hal._component import Pin, component  # noqa: F401
+from hal._probe import probe  # noqa: F401
 from hal._stream import stream  # noqa: F401
 
 _msg_level = MSG_ERR
