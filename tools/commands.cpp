@@ -53,7 +53,7 @@
 #include "machine/source_tree.hpp"
 #include "paths.hpp"
 #include "record/plot.hpp"
-#include "record/replay.hpp"
+#include "run/replay.hpp"
 #include "run/check.hpp"
 #include "run/fmt.hpp"
 #include "run/run.hpp"

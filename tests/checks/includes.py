@@ -22,9 +22,9 @@ ROWS = {
     "runtime/cells": ["runtime/control", "components/dds/links"],
     "tools": ["tools/inspect", "tools/comp", "tools/bus"],  # the table of subcommands
     "tools/cli": ["runtime/control"],
-    "tools/run": ["tools/cli", "runtime/cells"],
-    "tools/record": ["tools/run", "drivers/link", "components/recording/mcap"],
-    "tools/inspect": ["tools/record"],
+    "tools/run": ["tools/record", "runtime/cells"],
+    "tools/record": ["tools/cli", "drivers/link", "components/recording/mcap"],
+    "tools/inspect": ["tools/run"],
     "tools/doc": ["tools/cli"],
     "tools/comp": ["tools/doc"],
     "tools/bus": ["tools/cli", "components/canopen/master", "components/canopen/device",

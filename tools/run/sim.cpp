@@ -13,23 +13,13 @@
 #include "run/cell_netlists.hpp"
 #include "run/hosted_machine.hpp"
 #include "run/report.hpp"
+#include "run/sim_record.hpp"
 #include "run/sim_summary.hpp"
 #include "text/diagnostic.hpp"
 
 namespace hal::tools {
 
 namespace {
-
-std::vector<std::string> names_in(const std::vector<std::string>& lists) {
-    std::vector<std::string> names;
-    for (const std::string& list : lists)
-        for (std::size_t at = 0; at <= list.size();) {
-            const std::size_t end = std::min(list.find(',', at), list.size());
-            if (end > at) names.push_back(list.substr(at, end - at));
-            at = end + 1;
-        }
-    return names;
-}
 
 struct Shown {
     std::string name, value;
@@ -57,6 +47,17 @@ bool add_named(Session& session, const std::string& name, std::vector<Shown>& al
 }
 
 }  // namespace
+
+std::vector<std::string> names_in(const std::vector<std::string>& lists) {
+    std::vector<std::string> names;
+    for (const std::string& list : lists)
+        for (std::size_t at = 0; at <= list.size();) {
+            const std::size_t end = std::min(list.find(',', at), list.size());
+            if (end > at) names.push_back(list.substr(at, end - at));
+            at = end + 1;
+        }
+    return names;
+}
 
 int show_values(const SimOptions& options, Session& session) {
     const auto lock = session.lock();
@@ -88,9 +89,12 @@ bool summary_wanted(const SimOptions& options, bool printed) { return !options.q
 
 int run_sim(const SimOptions& options) {
     const bool advance = options.for_ns >= 0 || options.cycles != 0;
+    if (!options.record.empty() && !advance) return fail(options, "--record needs --for TIME or --cycles N");
+    if (!options.values.empty() && options.record.empty()) return fail(options, "--values needs --record FILE");
     if (options.for_ns >= 0 && options.cycles != 0) return fail(options, "--for and --cycles exclude each other; leave one out");
     auto nodes = requested_nodes(options);
     if (!nodes) return 1;
+    if (!nodes->empty() && !options.record.empty()) return fail(options, "--record records one machine; add --node NAME");
     if (!nodes->empty()) return sim_cell(options, std::move(*nodes));
     HostedMachine machine(options, options.name.empty() ? fmt::format("sim-{}", ::getpid()) : options.name, true);
     if (!machine.serve(!options.name.empty())) return 1;
@@ -100,7 +104,7 @@ int run_sim(const SimOptions& options) {
     const bool loaded = status == 0;
     if (loaded && advance) {
         machine.start_threads();
-        machine.advance(options.for_ns, options.cycles);
+        status = options.record.empty() ? (machine.advance(options.for_ns, options.cycles), 0) : record_advance(options, machine);
     }
     const auto wall = std::chrono::steady_clock::now() - begun;
     for (const std::string& command : options.execute)

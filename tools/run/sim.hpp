@@ -16,6 +16,8 @@ struct SimOptions : NetlistOptions {
     std::vector<std::string> execute;  ///< commands
     bool report = false;
     bool quiet = false;  ///< no summary
+    std::string record;  ///< file
+    std::vector<std::string> values;   ///< to be recorded: names and patterns, separated by commas
 
     void declare(OptionSet& set) override {
         set.words("FILE", "netlists (.hal), or an INI file with [HAL]HALFILE");
@@ -26,6 +28,8 @@ struct SimOptions : NetlistOptions {
         declare_netlists(set);
         set.flag("--report", report, "print the timing report on stderr at the end");
         set.values("--show", show, "NAMES", "print these pins, parameters and signals at the end; patterns like 'pid.*' too; may be repeated");
+        set.value("--record", record, "FILE", "record the time that --for or --cycles advances to FILE.mcap or FILE.csv");
+        set.values("--values", values, "NAMES", "with --record: only these pins, parameters and signals; patterns too; may be repeated");
         set.flag("-q,--quiet", quiet, "no summary (default: on stderr, when that is a terminal or the netlist printed nothing)");
         set.value("--node", part, "NAME", "simulate only this node of a netlist for several machines (default: all nodes)");
         set.values("-e,--execute", execute, "COMMAND", "execute this command at the end; for several machines: 'NODE: COMMAND'; may be repeated");

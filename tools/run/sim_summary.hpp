@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "commands/shell.hpp"
 #include "machine/session.hpp"
@@ -26,6 +27,9 @@ public:
 private:
     ProcessOutput process_;
 };
+
+/// Returns the names of lists that are separated by commas.
+std::vector<std::string> names_in(const std::vector<std::string>& lists);
 
 /// Prints what --show names. Returns the exit status. Takes the session's lock.
 int show_values(const SimOptions& options, Session& session);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "record/replay.hpp"
+#include "run/replay.hpp"
 
 #include <algorithm>
 #include <bit>
