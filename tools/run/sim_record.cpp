@@ -63,7 +63,7 @@ int record_advance(const SimOptions& options, HostedMachine& machine) {
         layout = Probes::layout(*probe);
         journal = session.journal().begin();
     }
-    const auto sink = make_sink(options.record, Probes::columns(*probe), {session.options().name, paths::version, "", "", 0});
+    const auto sink = make_sink(options.record, Probes::columns(*probe), {session.options().name, std::string(paths::version), "", "", 0});
     bool good = sink->error() == 0 && sink->layout(layout.groups);
     std::uint64_t rows = 0;
     std::int64_t left_ns = options.for_ns;

@@ -41,9 +41,10 @@ bool expand(std::string_view compression, std::string_view bytes, std::uint64_t 
     }
 #ifdef HALCYON_ZSTD
     if (compression == "zstd") {
+        problem = "a chunk does not decompress";
+        if (const auto known = ZSTD_getFrameContentSize(bytes.data(), bytes.size()); known != ZSTD_CONTENTSIZE_UNKNOWN && known != size) return false;
         to.resize(size);
         const std::size_t got = ZSTD_decompress(to.data(), to.size(), bytes.data(), bytes.size());
-        problem = "a chunk does not decompress";
         return !ZSTD_isError(got) && got == size;
     }
     problem = "unsupported compression '" + std::string(compression.substr(0, 20)) + "'; supported: zstd and none";

@@ -42,7 +42,8 @@ std::string identifier(const std::string& name) {
         if (lower != '_' || (!field.empty() && field.back() != '_')) field += lower;
     }
     while (!field.empty() && field.back() == '_') field.pop_back();
-    if (field.empty() || (field.front() >= '0' && field.front() <= '9')) field.insert(0, "v_");
+    if (field.empty()) return "v";
+    if (field.front() >= '0' && field.front() <= '9') field.insert(0, "v_");
     return field;
 }
 

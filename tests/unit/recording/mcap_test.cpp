@@ -1,0 +1,215 @@
+// SPDX-License-Identifier: MIT
+// Files of recordings: what was written is read, also when the file was cut off, damaged, or the disk was full.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <bit>
+#include <cerrno>
+#include <cmath>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include "recording/mcap/bytes.hpp"
+#include "recording/mcap/crc.hpp"
+#include "recording/mcap/reader.hpp"
+#include "recording/mcap/recording.hpp"
+#include "recording/mcap/rows.hpp"
+#include "recording/mcap/writer.hpp"
+
+namespace hal::mcap {
+namespace {
+
+struct Folder {
+    Folder() : path(std::filesystem::temp_directory_path() / ("mcap-" + std::to_string(::getpid()))) {
+        std::filesystem::create_directories(path);
+    }
+    ~Folder() { std::filesystem::remove_all(path); }
+    std::string file(const std::string& name) const { return (path / name).string(); }
+    std::filesystem::path path;
+};
+
+const std::vector<Column> columns{{"x.0.pos-cmd", HAL_TYPE_FLOAT, "mm"},
+                                  {"on", HAL_TYPE_BIT, ""},
+                                  {"count", HAL_TYPE_S32, ""},
+                                  {"X-0.pos_cmd", HAL_TYPE_FLOAT, ""},
+                                  {"big", HAL_TYPE_U64, ""}};
+constexpr std::uint64_t start_ns = 1'700'000'000'000'000'000, period_ns = 1'000'000;
+
+std::vector<std::uint64_t> values(std::uint64_t row) {
+    return {std::bit_cast<std::uint64_t>(std::sin(static_cast<double>(row) * 0.01)), row / 100 % 2,
+            static_cast<std::uint64_t>(-static_cast<std::int64_t>(row)), std::bit_cast<std::uint64_t>(0.5 * static_cast<double>(row)),
+            std::uint64_t{1} << 63 | row};
+}
+
+/// Writes so many rows; a chunk per second. Returns false when something could not be written.
+bool write(const std::string& path, std::uint64_t rows) {
+    Writer writer(path);
+    RowWriter row(columns);
+    const auto schema = writer.add_schema("halcyon_msgs/msg/Servo", "ros2msg", row.schema());
+    const auto channel = writer.add_channel(schema, "/hal/servo", "cdr", row.metadata());
+    const auto events =
+        writer.add_channel(writer.add_schema("halcyon.Event", "jsonschema", "{\"type\":\"object\"}"), "/hal/events", "json", {});
+    writer.metadata("halcyon", {{"instance", "test"}});
+    writer.attachment("netlist.hal", "text/plain", "loadrt and2\n", 1);
+    std::string payload;
+    for (std::uint64_t i = 0; i < rows; ++i) {
+        row.write(values(i).data(), payload);
+        writer.message(channel, static_cast<std::uint32_t>(i), start_ns + i * period_ns, payload);
+    }
+    writer.message(events, 0, start_ns + rows * period_ns, R"({"kind":"fault","text":"it \"stopped\""})");
+    return writer.close();
+}
+
+std::string content(const std::string& path) {
+    std::ifstream file(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
+}
+
+void put_file(const std::string& path, std::string_view bytes) {
+    std::ofstream(path, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+}
+
+TEST(Recording, What_is_written_is_read) {
+    const Folder folder;
+    ASSERT_TRUE(write(folder.file("a.mcap"), 2500));
+    EXPECT_FALSE(std::filesystem::exists(folder.file("a.mcap.part")));
+    Recording recording;
+    std::string problem;
+    ASSERT_TRUE(load(folder.file("a.mcap"), recording, problem)) << problem;
+    EXPECT_EQ(recording.note, "");
+    ASSERT_EQ(recording.tables.size(), 1u);
+    const Table& table = recording.tables[0];
+    ASSERT_EQ(table.rows(), 2500u);
+    ASSERT_EQ(table.columns.size(), columns.size());
+    for (std::size_t c = 0; c < columns.size(); ++c) {
+        const auto original =
+            std::find_if(columns.begin(), columns.end(), [&](const Column& one) { return one.name == table.columns[c].name; });
+        ASSERT_NE(original, columns.end());
+        EXPECT_EQ(table.columns[c].type, original->type);
+        EXPECT_EQ(table.columns[c].unit, original->unit);
+        for (std::uint64_t row = 0; row < 2500; row += 7)
+            EXPECT_EQ(table.word(row, c), values(row)[static_cast<std::size_t>(original - columns.begin())]);
+    }
+    EXPECT_EQ(recording.begin_ns(), static_cast<std::int64_t>(start_ns));
+    EXPECT_EQ(recording.end_ns(), static_cast<std::int64_t>(start_ns + 2499 * period_ns));
+    ASSERT_EQ(recording.events.size(), 1u);
+    EXPECT_EQ(recording.events[0].kind, "fault");
+    EXPECT_EQ(recording.events[0].text, "it \"stopped\"");
+}
+
+TEST(Recording, A_time_window_reads_its_chunks_only) {
+    const Folder folder;
+    ASSERT_TRUE(write(folder.file("a.mcap"), 20'000));
+    Reader reader;
+    std::string problem;
+    ASSERT_TRUE(reader.open(open_file(folder.file("a.mcap"), problem)));
+    ASSERT_GE(reader.chunks().size(), 20u);
+    std::uint64_t rows = 0;
+    ASSERT_TRUE(reader.each([&](const Message&) { return ++rows, true; }, start_ns + 10'500 * period_ns, start_ns + 10'600 * period_ns));
+    EXPECT_EQ(rows, 100u);
+    EXPECT_LE(reader.chunks_read(), 2u);
+    EXPECT_EQ(reader.metadata("halcyon").at("instance"), "test");
+}
+
+TEST(Recording, A_file_without_its_end_is_read_up_to_its_last_chunk) {
+    const Folder folder;
+    ASSERT_TRUE(write(folder.file("a.mcap"), 5000));
+    const std::string whole = content(folder.file("a.mcap"));
+    std::size_t last = 0;
+    for (const double share : {0.3, 0.6, 0.9, 0.999}) {
+        put_file(folder.file("cut.mcap"),
+                 std::string_view(whole).substr(0, static_cast<std::size_t>(static_cast<double>(whole.size()) * share)));
+        Recording recording;
+        std::string problem;
+        ASSERT_TRUE(load(folder.file("cut.mcap"), recording, problem)) << problem;
+        EXPECT_NE(recording.note, "");
+        const std::size_t rows = recording.tables.empty() ? 0 : recording.tables[0].rows();
+        EXPECT_GE(rows, last);
+        last = rows;
+    }
+    EXPECT_GT(last, 3000u);
+}
+
+TEST(Recording, A_damaged_chunk_is_noticed) {
+    const Folder folder;
+    ASSERT_TRUE(write(folder.file("a.mcap"), 5000));
+    std::string bytes = content(folder.file("a.mcap"));
+    Reader reader;
+    std::string problem;
+    ASSERT_TRUE(reader.open(open_file(folder.file("a.mcap"), problem)));
+    bytes[reader.chunks().at(2).offset + reader.chunks().at(2).length / 2] ^= 0x40;
+    put_file(folder.file("b.mcap"), bytes);
+    Recording recording;
+    ASSERT_TRUE(load(folder.file("b.mcap"), recording, problem));
+    EXPECT_NE(recording.note.find("chunk"), std::string::npos) << recording.note;
+}
+
+TEST(Recording, On_a_full_disk_the_file_is_complete_up_to_there) {
+    const Folder folder;
+    ASSERT_TRUE(write(folder.file("whole.mcap"), 20'000));
+    const auto size = std::filesystem::file_size(folder.file("whole.mcap"));
+    rlimit before{};
+    getrlimit(RLIMIT_FSIZE, &before);
+    std::signal(SIGXFSZ, SIG_IGN);
+    rlimit small{size / 2, before.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &small);
+    EXPECT_FALSE(write(folder.file("full.mcap"), 20'000));
+    setrlimit(RLIMIT_FSIZE, &before);
+    Recording recording;
+    std::string problem;
+    ASSERT_TRUE(load(folder.file("full.mcap"), recording, problem)) << problem;
+    EXPECT_EQ(recording.note, "") << "it has a summary";
+    ASSERT_EQ(recording.tables.size(), 1u);
+    EXPECT_GT(recording.tables[0].rows(), 5000u);
+    EXPECT_LT(recording.tables[0].rows(), 20'000u);
+}
+
+TEST(Recording, Names_become_distinct_identifiers) {
+    const RowWriter rows(
+        {{"x.0.pos-cmd", HAL_TYPE_FLOAT, "mm"}, {"X-0.pos_cmd", HAL_TYPE_FLOAT, ""}, {"0", HAL_TYPE_BIT, ""}, {"--", HAL_TYPE_S32, ""}});
+    EXPECT_EQ(rows.schema(), "float64 x_0_pos_cmd\nfloat64 x_0_pos_cmd_2\nint32 v\nbool v_0\n");
+    EXPECT_EQ(rows.metadata().at("pin.x_0_pos_cmd_2"), "X-0.pos_cmd");
+    EXPECT_EQ(rows.metadata().at("unit.x_0_pos_cmd"), "mm");
+}
+
+TEST(Recording, Rows_of_another_writer_are_read_with_their_alignment) {
+    RowReader reader;
+    ASSERT_TRUE(
+        reader.open({1, "a/msg/B", "ros2msg", "bool on # a comment\nint16 n\nuint8 MOST=5\n\nfloat32 v\n"}, {1, 1, "/a", "cdr", {}}));
+    std::vector<std::uint64_t> row;
+    ASSERT_TRUE(reader.read(std::string_view("\0\1\0\0\1\0\xfe\xff\0\0\xc0\x3f", 12), row));
+    EXPECT_EQ(row[0], 1u);
+    EXPECT_EQ(static_cast<std::int64_t>(row[1]), -2);
+    EXPECT_EQ(std::bit_cast<double>(row[2]), 1.5);
+    EXPECT_FALSE(reader.read(std::string_view("\0\1\0\0\1", 5), row));
+    EXPECT_FALSE(reader.open({1, "a/msg/B", "ros2msg", "float64[] v\n"}, {1, 1, "/a", "cdr", {}}));
+    EXPECT_FALSE(reader.open({1, "a/msg/B", "ros2msg", "string v\n"}, {1, 1, "/a", "cdr", {}}));
+}
+
+TEST(Recording, What_is_not_a_recording_is_rejected) {
+    const Folder folder;
+    Recording recording;
+    std::string problem;
+    EXPECT_FALSE(load(folder.file("nowhere.mcap"), recording, problem));
+    EXPECT_NE(problem.find("No such file"), std::string::npos);
+    put_file(folder.file("a.mcap"), "hello");
+    EXPECT_FALSE(load(folder.file("a.mcap"), recording, problem));
+    EXPECT_NE(problem.find("not an MCAP file"), std::string::npos);
+    put_file(folder.file("a.csv"), "time_s,a\n0.1,1\n0.2,x\n");
+    EXPECT_FALSE(load(folder.file("a.csv"), recording, problem));
+    EXPECT_NE(problem.find("line 3"), std::string::npos) << problem;
+}
+
+TEST(Recording, Crc_is_that_of_zlib) {
+    EXPECT_EQ(crc32("123456789"), 0xCBF43926u);
+    EXPECT_EQ(crc32("6789", crc32("12345")), 0xCBF43926u);
+    EXPECT_EQ(crc32(""), 0u);
+}
+
+}  // namespace
+}  // namespace hal::mcap
