@@ -16,7 +16,6 @@ from mcap_ros2.decoder import DecoderFactory  # noqa: E402
 
 NETLIST = """loadrt threads name1=servo-thread period1=1000000 name2=slow period2=10000000
 loadrt siggen names=wave
-loadrt counter names=c
 loadrt comp names=above
 loadrt sum2 names=late
 setp wave.frequency 2
@@ -24,7 +23,7 @@ setp late.in0 3
 addf wave.update servo-thread
 addf above servo-thread
 addf late slow
-net sine wave.sine => above.in0
+net sine wave.sine => above.in1
 net high above.out
 net slow-sum late.out
 newsig no-thread s32

@@ -5,10 +5,12 @@
 #include <cstdio>
 #include <cstring>
 #include <deque>
+#include <filesystem>
 #include <fmt/core.h>
 
 #include "cli/output.hpp"
 #include "cli/signals.hpp"
+#include "machine/address.hpp"
 #include "record/flight.hpp"
 #include "record/names.hpp"
 #include "record/sink.hpp"
@@ -60,7 +62,8 @@ public:
                 memory.add(std::move(batch_));
                 memory.prune(now_ns_, trigger.pending() ? trigger.begin_ns() : INT64_MAX);
             }
-            if (got == ProbeClient::Got::disconnected && client_.closed_because().empty()) trigger.event(now_ns_, "end-of-machine");
+            // one that ends in order removes its socket
+            if (got == ProbeClient::Got::disconnected && std::filesystem::exists(socket_path(client_.instance()))) trigger.event(now_ns_, "end-of-machine");
             if (trigger.pending() && (over || now_ns_ >= trigger.end_ns())) {
                 if (!write(memory, trigger)) return cannot_write();
                 trigger.done();

@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: MIT
+"""Recordings of values: hal record FILE NAMES, hal sim --record, hal plot, hal replay, and the flight recorder."""
+import csv
+import resource
+import signal
+import subprocess
+import unittest
+
+from harness import Case, HAL, wait_until
+
+NETLIST = """loadrt threads name1=servo period1=1000000
+loadrt siggen names=wave
+loadrt comp names=above
+loadrt sum2 names=offset
+setp wave.frequency 5
+setp offset.in1 10
+addf wave.update servo
+addf above servo
+addf offset servo
+net sine wave.sine => above.in1 offset.in0
+net high above.out
+net shifted offset.out
+"""
+
+# The control of a plant, and the same without the plant: its feedback comes from the recording.
+CONTROL = """loadrt pid names=loop
+setp loop.Pgain $(GAIN)
+setp loop.enable TRUE
+net feedback => loop.feedback
+net effort loop.output
+addf loop.do-pid-calcs servo
+"""
+PLANT = """loadrt integ names=plant
+setp plant.gain 20
+net effort => plant.in
+net feedback plant.out
+addf plant servo
+"""
+
+
+class Simulated(Case):
+    def sim(self, text, *words):
+        return self.good("sim", self.write("a.hal", text), "-q", *words)
+
+    def rows(self, name="run.csv"):
+        with open(self.folder / name, newline="") as file:
+            return list(csv.reader(file))
+
+    def test_every_cycle_is_in_the_table(self):
+        self.sim(NETLIST, "--for", "50ms", "--record", "run.csv", "--values", "sine,high")
+        rows = self.rows()
+        self.assertEqual(["time_s", "high", "sine"], rows[0])
+        self.assertEqual(50, len(rows) - 1)
+        for row in rows[1:]:
+            self.assertEqual(row[1], "1" if float(row[2]) > 0 else "0")
+
+    def test_the_same_netlist_gives_the_same_file(self):
+        self.sim(NETLIST, "--for", "3s", "--record", "b.mcap", "--name", "x")
+        self.sim(NETLIST, "--for", "3s", "--record", "c.mcap", "--name", "x")
+        self.assertEqual((self.folder / "b.mcap").read_bytes(), (self.folder / "c.mcap").read_bytes())
+
+    def test_words(self):
+        self.write("a.hal", NETLIST)
+        self.assertIn("--record needs --for TIME", self.bad("sim", "a.hal", "--record", "x.mcap"))
+        self.assertIn("name the file .mcap or .csv", self.bad("sim", "a.hal", "--for", "1s", "--record", "x.bag"))
+        self.assertIn("No such file", self.bad("sim", "a.hal", "--for", "1s", "--record", "nowhere/x.mcap"))
+        self.assertIn("cannot read 'x.mcap': No such file", self.bad("plot", "x.mcap"))
+        self.assertIn("missing netlist", self.bad("replay", "x.mcap"))
+
+    def test_a_plot_has_the_values_it_was_asked_for(self):
+        self.sim(NETLIST, "--for", "1s", "--record", "run.mcap")
+        self.assertEqual("run.svg\n", self.good("plot", "run.mcap", "sine", "high"))
+        svg = (self.folder / "run.svg").read_text()
+        self.assertIn(">sine</text>", svg)
+        self.assertIn(">high</text>", svg)
+        self.assertNotIn("shifted", svg)
+        self.assertLess(len(svg), 200_000)
+        self.assertIn("did you mean 'sine'?", self.bad("plot", "run.mcap", "sin"))
+        self.assertIn("--from is after the end", self.bad("plot", "run.mcap", "sine", "--from", "5s"))
+        self.assertIn("<svg", self.good("plot", "run.mcap", "sine", "-o", "-", "--from", "200ms", "--for", "100ms"))
+
+    def test_a_replay_of_the_same_control_is_equal(self):
+        whole = "loadrt threads name1=servo period1=1000000\n" + PLANT + CONTROL
+        self.write("whole.hal", whole + "setp loop.command 1\n")
+        self.write("control.hal", "loadrt threads name1=servo period1=1000000\n" + CONTROL + "setp loop.command 1\n")
+        self.good("sim", "whole.hal", "-q", "--for", "500ms", "--record", "run.mcap", "--values", "effort,feedback", "--", "GAIN=1")
+        out = self.good("replay", "run.mcap", "control.hal", "--tolerance", "1e-9", "--", "GAIN=1")
+        self.assertRegex(out, r"effort  equal in 500 rows\n0\.499 s of recording: 1 input driven, 1 value compared, none differs\n")
+        out = self.bad_output("replay", "run.mcap", "control.hal", "--tolerance", "1e-9", "--", "GAIN=2")
+        self.assertRegex(out, r"effort  differs by up to 1: 2 instead of 1 at 0\.\d+ s\n")
+        self.assertIn("1 differs by more than 1e-09", out)
+        self.assertIn("nothing of the recording is an input", self.bad("replay", "run.mcap", "whole.hal", "--", "GAIN=1"))
+
+    def bad_output(self, *words):
+        done = self.run_program(*words)
+        self.assertEqual(1, done.returncode, done.stderr)
+        return done.stdout
+
+
+class Live(Case):
+    def setUp(self):
+        super().setUp()
+        self.machine = self.start("run", self.write("a.hal", NETLIST + "start\n"))
+
+    def recorder(self, *words):
+        process = subprocess.Popen([str(HAL), "record", *words], env=self.environment, cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.addCleanup(self.end, process)
+        return process
+
+    def times(self, name):
+        with open(self.folder / name, newline="") as file:
+            return [float(row[0]) for row in list(csv.reader(file))[1:]]
+
+    def test_a_running_machine_is_recorded_without_a_sampler(self):
+        out = self.good("record", "run.csv", "sine", "wave.*", "--for", "300ms")
+        self.assertRegex(out, r"^run\.csv: 300 rows of \d+ values, 0\.\d MB\n$")
+        times = self.times("run.csv")
+        self.assertEqual(300, len(times))
+        self.assertGreaterEqual(min(b - a for a, b in zip(times, times[1:])), 0.000999)
+
+    def test_a_file_is_complete_after_ctrl_c(self):
+        process = self.recorder("run.mcap", "--all")
+        wait_until((self.folder / "run.mcap.part").exists, "the file is begun")
+        self.shell("setp", "wave.amplitude", "2")
+        wait_until(lambda: (self.folder / "run.mcap.part").stat().st_size > 1000 or process.poll() is not None, "something is written")
+        out, err = self.end(process, signal.SIGINT)
+        self.assertEqual((0, ""), (process.returncode, err))
+        self.assertRegex(out, r"^run\.mcap: ")
+        self.assertIn(b"setp wave.amplitude 2", self.expanded("run.mcap"))
+
+    def expanded(self, name):
+        """What the recording's events are, by the picture: titles of its marks."""
+        self.good("plot", name, "sine")
+        return (self.folder / name.replace(".mcap", ".svg")).read_bytes()
+
+    def test_every_nth_cycle_and_rotation(self):
+        out = self.good("record", "run.csv", "sine", "--every", "10", "--for", "900ms", "--rotate", "300ms", "--keep", "2")
+        self.assertGreaterEqual(len(out.splitlines()), 3)
+        kept = sorted(path.name for path in self.folder.glob("run-*.csv"))
+        self.assertEqual(2, len(kept), kept)
+        times = self.times(kept[-1])
+        self.assertTrue(all(abs(b - a - 0.01) < 0.0011 for a, b in zip(times, times[1:])), times)
+
+    def test_size_limit(self):
+        self.assertRegex(self.good("record", "run.csv", "sine", "--limit", "0.02"), r"^run\.csv: \d+ rows")
+
+    def test_a_flight_recorder_writes_at_a_trigger(self):
+        self.shell("newsig", "crash", "bit")
+        process = self.recorder("box.csv", "sine", "--last", "200ms", "--after", "100ms", "--trigger", "crash")
+        self.good("record", "wait.csv", "sine", "--for", "400ms")
+        self.assertEqual([], list(self.folder.glob("box-*")))
+        self.shell("sets", "crash", "TRUE")
+        name = wait_until(lambda: [path.name for path in self.folder.glob("box-*.csv")], "the trigger has written")[0]
+        self.assertRegex(name, r"^box-\d{8}T\d{6}Z-crash-001\.csv$")
+        self.end(process, signal.SIGINT)
+        times = self.times(name)
+        self.assertAlmostEqual(0.3, times[-1] - times[0], delta=0.06)
+
+    def test_a_flight_recorder_writes_when_the_machine_dies(self):
+        process = self.recorder("box.csv", "sine", "--last", "200ms")
+        self.good("record", "wait.csv", "sine", "--for", "400ms")
+        self.machine.kill()
+        out, _ = process.communicate(timeout=60)
+        self.assertEqual(0, process.returncode)
+        self.assertRegex(out, r"^box-\d{8}T\d{6}Z-end-of-machine-001\.csv: \d+ rows")
+
+    def test_a_full_disk_ends_with_a_readable_file(self):
+        def small():
+            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+            resource.setrlimit(resource.RLIMIT_FSIZE, (40_000, resource.RLIM_INFINITY))
+        done = subprocess.run([str(HAL), "record", "run.mcap", "--all"], env=self.environment, cwd=self.folder, preexec_fn=small, capture_output=True, text=True, timeout=60)
+        self.assertEqual(1, done.returncode)
+        self.assertRegex(done.stderr, r"^hal record: cannot write 'run\.mcap': File too large; the file is complete up to there\n$")
+        self.good("plot", "run.mcap", "sine")
+
+    def test_words(self):
+        self.assertIn("did you mean 'sine'?", self.bad("record", "run.mcap", "sin"))
+        self.assertIn("matches 'zz*'", self.bad("record", "run.mcap", "zz*"))
+        self.assertIn("missing names", self.bad("record", "run.mcap"))
+        self.assertIn("--trigger needs --last", self.bad("record", "run.mcap", "sine", "--trigger", "high"))
+        self.assertIn("for a sampler", self.bad("record", "run.mcap", "sine", "--tag"))
+        self.assertIn("No such file or directory", self.bad("record", "nowhere/run.mcap", "sine"))
+
+
+if __name__ == "__main__":
+    unittest.main()
