@@ -25,12 +25,12 @@ struct Playback : hal::Component {
     explicit Playback(const hal_host* host)
         : Component(host),
           file(*this, "file", "", "recording to play: .mcap or .csv, beside the netlist"),
-          names(*this, "names", "*", "values to play, as patterns separated by commas") {
+          values(*this, "values", "*", "values to play, as patterns separated by commas") {
         read();
         for (Track& track : tracks_) declare(track);
     }
 
-    hal::TextArgument file, names;
+    hal::TextArgument file, values;
     hal::In<bool>     enable{*this, "enable", "FALSE holds the time and the values", {.initial = true}};
     hal::In<bool>     restart{*this, "restart", "a rising edge starts again at the beginning"};
     hal::Param<bool>  loop{*this, "loop", "TRUE starts again after the end"};
@@ -65,7 +65,7 @@ private:
     };
 
     bool wanted(const std::string& name) const {
-        const std::string& all = names.get();
+        const std::string& all = values.get();
         for (std::size_t at = 0; at <= all.size();) {
             const std::size_t end = std::min(all.find(',', at), all.size());
             if (::fnmatch(all.substr(at, end - at).c_str(), name.c_str(), 0) == 0) return true;
@@ -152,9 +152,17 @@ The file is one that `hal record` wrote, or another MCAP file with flat ROS 2 me
 type: `x-pid.error` is `playback.0.x-pid.error`. In each cycle the outputs have the values that were recorded at that time after the first row; a
 recording of a thread of the same period is played row by row. The whole file is read when the component is loaded, at most 1 GiB of values.
 
-    loadrt playback file=run.mcap names=x-*
+    loadrt playback file=run.csv values=x-*
+    loadrt lowpass names=filter
     addf playback.0.update servo-thread
-    net x-fb playback.0.x-fb => x-pid.feedback
+    addf filter servo-thread
+    net x-fb playback.0.x-fb => filter.in
+
+`run.csv`:
+
+    time_s,x-fb,x-cmd
+    5.000,0.0,1.0
+    5.001,0.1,1.0
 
 `hal replay` does this for a netlist by itself, and compares what it computes with what was recorded.
 )")

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What happened to a machine, in order: commands and edits that were executed, and faults. Kept only while somebody listens.
+// What happened to a machine, in order: commands and edits that were executed, and faults. Kept only while a client listens.
 #pragma once
 
 #include <cstdint>

@@ -296,7 +296,7 @@ std::vector<ProbeRows> Probes::take(LiveProbe& probe, std::size_t most) {
             const std::uint64_t lost = group.ring->lost();  // before the rows: a loss is named with or before the row after it
             const std::size_t rows = move_rows(probe, group, until_ns, most, to.bytes);
             if (rows > 0 || lost > group.reported) to.parts.push_back({i, rows, lost - std::exchange(group.reported, lost)});
-            // until_ns must hold for what is left, too
+            // until_ns must hold for the remaining rows, too
             if (group.ring->size() > 0 && static_cast<std::int64_t>(group.ring->row(0)[1]) < until_ns) all = false;
         }
         return all;
@@ -318,10 +318,10 @@ std::vector<ProbeRows> Probes::take(LiveProbe& probe, std::size_t most) {
         rows.layout = probe.layout;
         probe.announced = probe.layout.number;
     }
-    std::int64_t until_ns = now_ns;
+    std::int64_t until_ns = INT64_MAX;
     for (const RingGroup& group : probe.groups)
         if (group.ring) until_ns = std::min(until_ns, std::max(group.ring->reached_ns(), now_ns - patience_ns));
-    until_ns = std::max(until_ns, probe.until_ns);
+    until_ns = std::max(until_ns == INT64_MAX ? now_ns : until_ns, probe.until_ns);
     if (collect(probe.groups, rows, until_ns)) probe.until_ns = until_ns;
     rows.until_ns = probe.until_ns;
     for (std::size_t i = 0; i < probe.groups.size(); ++i) {

@@ -58,6 +58,26 @@ class PythonTest(Case):
     def pid(self, name="echo"):
         return int(next(line for line in self.shell("show", "comp", name).stdout.splitlines() if f" {name} " in line).split()[3])
 
+    def test_a_probe_gives_arrays_of_every_cycle(self):
+        self.machine("loadrt siggen names=wave\n" + SERVO + "addf wave.update servo\nstart\n")
+        out = self.python("""import hal
+with hal.probe(["wave.sine", "adder.out", "wave.frequency", "servo.threadbeat"]) as samples:
+    cycles, counts = [], []
+    for rows in samples:
+        assert rows.thread == "servo" and len(rows) == len(rows["wave.sine"]) == len(rows.time_ns), rows.thread
+        assert set(rows["adder.out"]) == {5.0} and set(rows["wave.frequency"]) == {1.0} and "nothing" not in rows
+        cycles += rows.cycle
+        counts += rows["servo.threadbeat"]
+        if len(cycles) >= 200:
+            break
+print(all(b == a + 1 for a, b in zip(counts, counts[1:])), samples.lost, samples.units["wave.frequency"])
+try:
+    hal.probe("adder.uot")
+except hal.error as problem:
+    print(problem)
+""")
+        self.assertEqual("True 0 Hz\nunknown pin, parameter or signal 'adder.uot'; did you mean 'adder.out'?\n", out)
+
     def test_a_component_from_loadusr_is_linked_like_any_other(self):
         self.write("echo.py", ECHO)
         self.machine(f"loadusr -W {sys.executable} echo.py\n{SERVO}setp echo.gain 2\nnet doubled echo.out => adder.in1\n".replace("setp adder.in1 3\n", "")

@@ -167,8 +167,8 @@ class Live(Case):
     def test_a_full_disk_ends_with_a_readable_file(self):
         def small():
             signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-            resource.setrlimit(resource.RLIMIT_FSIZE, (40_000, resource.RLIM_INFINITY))
-        done = subprocess.run([str(HAL), "record", "run.mcap", "--all"], env=self.environment, cwd=self.folder, preexec_fn=small, capture_output=True, text=True, timeout=60)
+            resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, resource.RLIM_INFINITY))
+        done = subprocess.run([str(HAL), "record", "run.mcap", "sine", "shifted"], env=self.environment, cwd=self.folder, preexec_fn=small, capture_output=True, text=True, timeout=60)
         self.assertEqual(1, done.returncode)
         self.assertRegex(done.stderr, r"^hal record: cannot write 'run\.mcap': File too large; the file is complete up to there\n$")
         self.good("plot", "run.mcap", "sine")

@@ -11,7 +11,7 @@
 
 namespace hal::tools {
 
-/// What a recording says about where it comes from.
+/// Where a recording comes from.
 struct Origin {
     std::string instance, version, netlist, cause;
     std::int64_t unix_offset_ns = 0;  ///< from the machine's clock to Unix time

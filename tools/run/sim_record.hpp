@@ -6,7 +6,7 @@
 
 namespace hal::tools {
 
-/// Advances as --for or --cycles say and records meanwhile: the same file from the same netlist, but for the dates in it. Returns the exit status.
+/// Advances by --for or --cycles and records meanwhile: the same netlist gives the same file. Returns the exit status.
 int record_advance(const SimOptions& options, HostedMachine& machine);
 
 }  // namespace hal::tools

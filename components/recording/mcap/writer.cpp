@@ -279,7 +279,7 @@ bool Writer::close() {
         size_ = back;
         if (::ftruncate(file_, static_cast<off_t>(size_)) == 0 && ::lseek(file_, static_cast<off_t>(size_), SEEK_SET) >= 0) {
             std::string end;
-            put(end, std::uint32_t{0});  // the CRC is not known without reading the file again: 0 means that there is none
+            put(end, std::uint32_t{0});  // 0: no CRC; computing it would mean reading the file again
             if (record(op_data_end, end)) write(summary());
         }
         if (error_ == 0) error_ = ENOSPC;
