@@ -112,7 +112,7 @@ TEST_F(Probed, Values_are_grouped_by_the_thread_that_owns_them) {
     ASSERT_EQ((rows.of[{1, 2}].size()), 1u);
     rows.take(machine.session, *probe, layout);
     ASSERT_EQ((rows.of[{1, 2}].size()), 1u) << "only when it changes";
-    machine.must("setp c.step 7");
+    machine.must("sets knob 7");
     rows.take(machine.session, *probe, layout);
     ASSERT_EQ((rows.of[{1, 2}].size()), 2u);
     EXPECT_EQ(std::bit_cast<double>(rows.of[{1, 2}].back().values[0]), 7.0);
@@ -216,7 +216,7 @@ TEST(LiveProbes, Attached_and_detached_under_load_they_lose_nothing_and_disturb_
             std::this_thread::sleep_for(std::chrono::microseconds(500));  // others want the lock, too
         }
     });
-    const int rounds = 20;
+    const int rounds = 10;
     for (int i = 0; i < rounds; ++i) {
         std::shared_ptr<LiveProbe> probe;
         {
