@@ -116,6 +116,14 @@ enum class Sent : std::uint8_t {
 /// Returns "queued", "full", "bus off", "down" or "rejected". [any]
 const char* to_string(Sent) noexcept;
 
+/// When a frame may start: the transmit-enable window of a time-triggered controller (TTCAN, ISO 11898-4). Times on the clock of `now_ns`.
+struct Window {
+    std::int64_t not_before_ns = 0;
+    std::int64_t last_start_ns = INT64_MAX;  ///< discarded if it has not started by then
+    std::int64_t idle_from_ns = 0, idle_until_ns = 0;  ///< discarded if a frame started in [from, until); equal times: no condition
+    bool single_shot = false;  ///< discarded after an error, instead of being repeated
+};
+
 /// Statistics of a link; counts start at open().
 struct Statistics {
     State state = State::active;
@@ -174,6 +182,7 @@ struct Description {
     bool in_memory = false;       ///< a bus in memory: its first user sets the bit rate
     bool has_bit_rate = true;     ///< frames share the time of one bus; false: carried in Ethernet frames
     bool has_stamps = false;      ///< Options::stamps gives received frames the timestamp of the kernel or of the bus
+    bool has_windows = false;     ///< send() within a Window works
     bool fd_on_request = false;   ///< Options::fd fails on a device without CAN FD: set it only when the user requests it
     std::string interface{};      ///< of the kernel, "can0"; empty: none
     std::string segment{};        ///< address of the Ethernet segment that carries the frames; empty: none
@@ -204,6 +213,9 @@ public:
 
     /// Queues a frame. It leaves at flush(), or earlier if the queue is full. [realtime] sender
     virtual Sent send(const Frame&, std::int64_t now_ns) noexcept = 0;
+    /// Queues a frame that starts in a window, behind those queued before. What became of it is known by its echo (Options::own_frames):
+    /// a discarded frame has none. Only with Description::has_windows. [realtime] sender
+    virtual Sent send_within(const Frame&, const Window&, std::int64_t /*now_ns*/) noexcept { return Sent::rejected; }
     /// Sends queued frames as far as the bus takes them; the rest stays for the next call. Call it once per cycle. [realtime] sender
     virtual void flush(std::int64_t now_ns) noexcept = 0;
     /// Receives the next frames in order of time. Returns how many; 0: none by now. [realtime] receiver

@@ -141,6 +141,7 @@ void Bus::work(std::int64_t now) noexcept {
         if (first == INT64_MAX) break;
         const auto start = std::max(free_at_, first);
         if (start >= now) break;
+        if (discard_expired(start)) continue;
         transmit(start, now);
     }
     worked_until_.store(now, std::memory_order_relaxed);
@@ -170,6 +171,35 @@ void Bus::work_untimed(std::int64_t now) noexcept {
             done(c, time);
         }
     }
+}
+
+/// Discards the frames whose window does not allow a start any more. Returns true when there was one.
+bool Bus::discard_expired(std::int64_t start) noexcept {
+    bool any = false;
+    for (Node* n : nodes) {
+        const Outgoing* f = n->outgoing.front();
+        if (f == nullptr || f->time_ns > start) continue;
+        if (std::max(start, n->hold_until) <= f->last_start && was_idle(f->idle_from, f->idle_until)) continue;
+        discard(*n);
+        any = true;
+    }
+    return any;
+}
+
+/// Returns true when no frame started in [from, until).
+bool Bus::was_idle(std::int64_t from, std::int64_t until) const noexcept {
+    for (std::size_t i = 0; i < std::min(started_, starts_.size()); ++i) {
+        const auto start = starts_[(started_ - 1 - i) % starts_.size()];
+        if (start < from) return true;
+        if (start < until) return false;
+    }
+    return true;
+}
+
+void Bus::discard(Node& n) noexcept {
+    n.delayed = n.doubled = n.counted = false;
+    n.thrown_away.fetch_add(1, std::memory_order_relaxed);
+    n.outgoing.drop();
 }
 
 bool Bus::hears(const Node& n) const noexcept { return !n.off && !n.cut.load(std::memory_order_relaxed); }
@@ -213,6 +243,7 @@ void Bus::transmit(std::int64_t start, std::int64_t now) noexcept {
         if (sender.tec < 128) sender.tec += 8;
         occupy(start, sender.tec < 128 ? idle + bits(error_frame_bits) : std::max(now, idle));
         if (winner.babbling) sender.babble_at = free_at_ + sender.babble_period;
+        else if (sender.outgoing.front()->single_shot) discard(sender);
         sender.errors.fetch_add(1, std::memory_order_relaxed);
         publish(sender);
         return event(sender, error_no_acknowledge, end);
@@ -246,6 +277,7 @@ void Bus::transmit(std::int64_t start, std::int64_t now) noexcept {
             const bool sending = n == &sender || also_sends(*n);
             if (sending) n->tec += 8;
             else if (n->rec < 255) ++n->rec;
+            if (sending && !(n == &sender && winner.babbling) && n->outgoing.front()->single_shot) discard(*n);
             n->errors.fetch_add(1, std::memory_order_relaxed);
             if (sending && n->tec > 255) failed(*n, noticed);
             else if (n->tec >= 128 && sending) n->hold_until = free_at_ + bits(8);  // passive nodes suspend transmission
@@ -262,6 +294,7 @@ void Bus::transmit(std::int64_t start, std::int64_t now) noexcept {
     if (fault != nullptr && fault->what.fault == Fault::duplicate) {
         sender.tec += 8;
         sender.doubled = true;
+        if (!winner.babbling && sender.outgoing.front()->single_shot) discard(sender);
         if (sender.tec > 255) failed(sender, end);
         return publish(sender);
     }
@@ -333,6 +366,7 @@ void Bus::event(Node& n, std::uint32_t error_class, std::int64_t time) noexcept 
 }
 
 void Bus::occupy(std::int64_t start, std::int64_t end) noexcept {
+    starts_[started_++ % starts_.size()] = start;
     free_at_ = end;
     busy_ns_ += end - start;
 }

@@ -10,6 +10,7 @@
 // On a bus without a bit rate (`unlimited`) A checks again after 3, so that B's frame does not wait for a later call.
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <cstdint>
 #include <memory>
@@ -23,11 +24,18 @@
 
 namespace hal::can::simbus {
 
+/// A frame to be sent; `time_ns` is when it was queued or, with a window, when that begins.
+struct Outgoing : Frame {
+    std::int64_t last_start = INT64_MAX;
+    std::int64_t idle_from = 0, idle_until = 0;
+    bool single_shot = false;
+};
+
 /// One end of the bus. Fields without a comment belong to the pump.
 struct Node {
     Node(const Options& options) : outgoing(options.send_capacity), incoming(options.receive_capacity) {}
 
-    hal::Queue<Frame> outgoing;  ///< writer: the sending thread; `time_ns` is when it was queued
+    hal::Queue<Outgoing> outgoing;  ///< writer: the sending thread
     hal::Queue<Frame> incoming;  ///< reader: the receiving thread; `time_ns` is when it is complete
     std::vector<Filter> filters;
     int number = 0;
@@ -114,6 +122,9 @@ private:
     void event(Node&, std::uint32_t error_class, std::int64_t time) noexcept;
     void occupy(std::int64_t start, std::int64_t end) noexcept;
     bool hears(const Node&) const noexcept;
+    bool discard_expired(std::int64_t start) noexcept;
+    bool was_idle(std::int64_t from, std::int64_t until) const noexcept;
+    void discard(Node&) noexcept;
     Active* struck(const Candidate&, std::int64_t start) noexcept;
     std::uint64_t draw() noexcept;
     std::int64_t bits(unsigned count) const noexcept { return duration_ns({count, 0}, bit_rate); }
@@ -126,6 +137,8 @@ private:
     std::atomic<std::int64_t> worked_until_{INT64_MIN};
     std::int64_t window_start_ = INT64_MIN, busy_ns_ = 0;
     std::atomic<double> load_{0.0};
+    std::array<std::int64_t, 512> starts_{};  ///< of the last frames, for windows that require an idle bus
+    std::size_t started_ = 0;
 };
 
 }  // namespace hal::can::simbus

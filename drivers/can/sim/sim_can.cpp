@@ -25,6 +25,7 @@ public:
         node_.restart_ms = options.restart_ms;
         description_ = describe(bus_->name);
         description_.bit_rate = bus_->bit_rate, description_.data_rate = bus_->data_rate, description_.fd = bus_->fd;
+        description_.has_windows = bus_->bit_rate != 0;
         bus_->add(node_);
     }
     ~SimulatedLink() override { bus_->remove(std::move(owned_)); }
@@ -36,12 +37,14 @@ public:
         };
         if (!frame.valid() || node_.listen_only || (frame.fd && !bus_->fd)) return drop(Sent::rejected);
         if (state() == State::bus_off) return drop(Sent::bus_off);
-        Frame queued = frame;
-        queued.time_ns = bus_->time(now_ns);
-        queued.own = false;
-        if (node_.outgoing.push(queued)) return Sent::queued;
-        flush(now_ns);
-        return node_.outgoing.push(queued) ? Sent::queued : drop(Sent::full);
+        return queue({frame}, bus_->time(now_ns), now_ns);
+    }
+    Sent send_within(const Frame& frame, const Window& window, std::int64_t now_ns) noexcept override {
+        if (!frame.valid() || node_.listen_only || (frame.fd && !bus_->fd) || bus_->bit_rate == 0)
+            return node_.dropped.fetch_add(1, std::memory_order_relaxed), Sent::rejected;
+        if (state() == State::bus_off) return node_.dropped.fetch_add(1, std::memory_order_relaxed), Sent::bus_off;
+        const Outgoing outgoing{frame, window.last_start_ns, window.idle_from_ns, window.idle_until_ns, window.single_shot};
+        return queue(outgoing, std::max(window.not_before_ns, bus_->time(now_ns)), now_ns);
     }
     void flush(std::int64_t now_ns) noexcept override {
         bus_->pump(now_ns);
@@ -147,6 +150,16 @@ public:
     std::int64_t time_ns() const noexcept override { return bus_->time(unclocked); }
 
 private:
+    Sent queue(Outgoing frame, std::int64_t time_ns, std::int64_t now_ns) noexcept {
+        frame.time_ns = time_ns;
+        frame.own = false;
+        if (node_.outgoing.push(frame)) return Sent::queued;
+        flush(now_ns);
+        if (node_.outgoing.push(frame)) return Sent::queued;
+        node_.dropped.fetch_add(1, std::memory_order_relaxed);
+        return Sent::full;
+    }
+
     const std::shared_ptr<Bus> bus_;
     std::unique_ptr<Node> owned_;
     Node& node_;

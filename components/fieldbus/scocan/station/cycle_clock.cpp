@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: MIT
+#include "cycle_clock.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace hal::scocan {
+
+namespace {
+constexpr double a = 0.3, b = 0.03;
+constexpr double largest_drift = 1e-3;  // 1000 ppm: no crystal
+constexpr std::uint32_t settling = 8;   // SYNCs until deviations can be judged
+}  // namespace
+
+void CycleClock::clear() noexcept {
+    period_ = nominal_, p_ = error_ = square_ = 0;
+    taken_ = lost_ = rejected_ = 0;
+    seen_ = false;
+}
+
+void CycleClock::lead(Time begin) noexcept {
+    clear();
+    epoch_ = begin, taken_ = 2, seen_ = true;
+    ++cycle_;
+}
+
+void CycleClock::advance(std::uint32_t cycles) noexcept {
+    p_ += period_ * cycles;
+    cycle_ += cycles;
+    seen_ = false;
+}
+
+CycleClock::Taken CycleClock::take(Time stamp) noexcept {
+    const auto begin = [&] {
+        clear();
+        epoch_ = stamp, taken_ = 1, seen_ = true;
+        ++cycle_;
+        return Taken::first;
+    };
+    if (taken_ == 0) return begin();
+    const double d = static_cast<double>(stamp - epoch_) - p_;
+    const double n = std::round(d / period_);
+    if (taken_ == 1) {
+        if (n < 1 || n > 8 || std::abs(d / n / nominal_ - 1) > largest_drift) return begin();
+        period_ = d / n;
+        cycle_ += static_cast<std::uint64_t>(n);
+        p_ += d, taken_ = 2, lost_ = 0, seen_ = true;
+        return Taken::good;
+    }
+    const double e = d - n * period_;
+    if (n == 0 && seen_) return Taken::duplicate;
+    const double limit = taken_ < settling ? nominal_ / 4 : std::max(5 * sigma(), floor_);
+    if (n < 0 || std::abs(e) > limit) {
+        error_ = e;
+        if (++rejected_ < 3) return Taken::rejected;
+        const double kept = period_;
+        begin();
+        period_ = kept, taken_ = 2;
+        return Taken::jumped;
+    }
+    advance(static_cast<std::uint32_t>(n));
+    p_ += a * e;
+    period_ = std::clamp(period_ + b * e / std::max(n, 1.0), nominal_ * (1 - largest_drift), nominal_ * (1 + largest_drift));
+    error_ = e;
+    square_ = taken_ == 2 ? e * e : square_ + (e * e - square_) / 16;
+    ++taken_;
+    rejected_ = lost_ = 0;
+    seen_ = true;
+    return Taken::good;
+}
+
+void CycleClock::own(Time stamp) noexcept {
+    const auto n = std::llround((static_cast<double>(stamp - epoch_) - p_) / period_);
+    if (n > 0) advance(static_cast<std::uint32_t>(n));
+    seen_ = true, lost_ = rejected_ = 0;
+}
+
+std::uint32_t CycleClock::pass(Time now, Time wait) noexcept {
+    if (taken_ < 2) return 0;
+    const double overdue = static_cast<double>(now - epoch_) - p_ - static_cast<double>(wait);
+    if (overdue < period_) return 0;
+    const auto cycles = static_cast<std::uint32_t>(std::min(overdue / period_, 1e6));
+    lost_ += cycles;
+    advance(cycles);
+    return cycles;
+}
+
+Time CycleClock::at(std::uint64_t cycle, Time offset) const noexcept {
+    const auto ahead = static_cast<double>(static_cast<std::int64_t>(cycle - cycle_));
+    return epoch_ + std::llround(p_ + period_ * (ahead + static_cast<double>(offset) / nominal_));
+}
+
+double CycleClock::sigma() const noexcept { return std::sqrt(square_); }
+
+}  // namespace hal::scocan

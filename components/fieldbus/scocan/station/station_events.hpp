@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: MIT
+// What a station reports, and its state.
+#pragma once
+
+#include <cstdint>
+
+#include "fieldbus/scocan/station/crystal.hpp"
+#include "fieldbus/scocan/wire/wire.hpp"
+
+namespace hal::scocan {
+
+enum class State : std::uint8_t {
+    listening,    ///< no SYNC yet
+    running,      ///< sends in its slots
+    silent,       ///< too many SYNCs lost: receives only
+    listen_only,  ///< another table or an unknown mode: receives only
+    silenced,     ///< sent outside of its slots: sends nothing until reset
+    down,         ///< the controller is off the bus, or the interface is down
+};
+const char* to_string(State) noexcept;
+
+/// `who` is a node, or no_node; `id` the identifier it is about.
+enum class Event : std::uint8_t {
+    running,         ///< synchronised: the slots may be used
+    sync_lost,       ///< value: SYNCs lost; the node stops sending
+    sync_late,       ///< value: ns behind (or before) its time; ignored
+    sync_doubled,    ///< a second SYNC in one cycle; ignored
+    sync_jumped,     ///< a new phase: adopted
+    other_sync,      ///< who: a second SYNC node sends; this one is on standby
+    leading,         ///< this node sends the SYNC
+    standby,         ///< this node does not send the SYNC any more
+    other_table,     ///< value: CRC of the SYNC sender; receives only
+    table_agrees,    ///< the CRCs agree again
+    unknown_mode,    ///< value: mode of the SYNC; receives only
+    foreign_frame,   ///< id, who: its owner by the table; value: slot in which it was
+    babbling,        ///< id, who; value: frames outside of their slots in one cycle
+    late_frame,      ///< own frame; value: ns behind the end of its transmit window
+    silenced,        ///< this node
+    bus_off,
+    bus_on,
+    mode_changed,    ///< value: mode
+    mode_refused,    ///< who, value: reason (Answer::Reason); id: mode
+    monitor_lost,    ///< idle slots are not announced any more
+    monitor_found,
+    frame_too_long,  ///< id; value: bytes: does not fit into any slot
+};
+inline constexpr std::uint32_t no_node = UINT32_MAX;
+
+struct Count {
+    std::uint64_t syncs = 0, syncs_lost = 0, syncs_ignored = 0, losses = 0;
+    std::uint64_t sent_private = 0, sent_shared = 0, sent_recycled = 0;
+    std::uint64_t missed = 0;     ///< private slots in which the frame could not be sent
+    std::uint64_t foreign = 0, late = 0, received = 0, dropped = 0;
+    std::uint64_t idle = 0, announced = 0, mode_changes = 0;
+};
+
+/// Receives frames of the application and events. [realtime]
+class Sink {
+public:
+    virtual ~Sink() = default;
+    /// `begin_ns`: start of frame, on the clock of the link.
+    virtual void on_frame(const can::Frame&, Time begin_ns) noexcept = 0;
+    virtual void on_sent(const can::Frame&, Time /*begin_ns*/) noexcept {}
+    virtual void on_event(Event, std::uint32_t who, std::uint32_t id, Time value) noexcept = 0;
+};
+
+struct StationOptions {
+    bool single_shot = true;  ///< false: a controller that repeats disturbed frames in private slots
+    bool windows = true;      ///< use the transmit windows of the controller, where it has them
+    Crystal crystal{};        ///< of a simulated node
+};
+
+}  // namespace hal::scocan

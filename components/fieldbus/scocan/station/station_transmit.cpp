@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+
+#include "link/timing.hpp"
+#include "station.hpp"
+
+namespace hal::scocan {
+
+can::Sent Station::send(const can::Frame& frame, bool state, std::uint32_t slot) noexcept {
+    if (frame.extended || frame.fd || !frame.valid() || frame.id < 0x10 || table_.last_start(frame.length) < 0) return ++count_.dropped, can::Sent::rejected;
+    const Use* owner = table_.owner(mode_, frame.id);
+    bool priv = owner != nullptr;
+    if (owner != nullptr && owner->node != node_) return ++count_.dropped, can::Sent::rejected;
+    if (slot != no_slot) {
+        const Use* use = slot < table_.slots ? table_.use(mode_, slot, counter_) : nullptr;
+        if (use == nullptr || use->node != node_ || !use->carries(frame.id)) return ++count_.dropped, can::Sent::rejected;
+        priv = true;
+    }
+    if (queue_.push(frame, slot, priv, state)) return can::Sent::queued;
+    return ++count_.dropped, can::Sent::full;
+}
+
+void Station::transmit(Time now, Time period) noexcept {
+    if (link_ == nullptr || first_seen_ == INT64_MIN) return;
+    now_ = now;
+    const Time local = crystal_.local(now);
+    if (is_sync_node() && state_ != State::down && state_ != State::silenced) lead(local);
+    if (clock_.known()) {
+        if (windows_) plan_ahead(local, period);
+        else start_now(local);
+    }
+    link_->flush(now);
+}
+
+/// Plans the slots that begin until the next call.
+void Station::plan_ahead(Time now, Time period) noexcept {
+    const Time slack = std::min(period / 4, table_.enabled() / 2);
+    const Time next = begin_of(next_cycle_, next_slot_);
+    if (next < now - slack || next > now + period + 2 * table_.cycle) {  // the first call, a late one, or the clock has jumped
+        const Where w = where(now);
+        next_cycle_ = w.cycle, next_slot_ = w.slot;
+        if (w.offset > slack && ++next_slot_ == table_.slots) next_slot_ = 0, ++next_cycle_;
+    }
+    while (begin_of(next_cycle_, next_slot_) < now + period - slack) {
+        plan(next_cycle_, next_slot_);
+        if (++next_slot_ == table_.slots) next_slot_ = 0, ++next_cycle_;
+    }
+    if (!senses_) recycle_announced(now);
+}
+
+bool Station::may_send(std::uint64_t cycle) const noexcept {
+    if (state_ != State::running) return false;
+    if (!armed_.prepared || armed_.confirmed || cycle < armed_.at) return true;
+    return clock_.cycle() >= armed_.at && clock_.seen();  // whether the mode changes is known from the SYNC of that cycle
+}
+
+std::uint32_t Station::mode_of(std::uint64_t cycle) const noexcept {
+    return armed_.confirmed && cycle >= armed_.at ? armed_.mode : mode_;
+}
+
+SendQueue::Entry* Station::next_private(const Use& use, std::uint32_t slot) noexcept {
+    return queue_.next([&](const SendQueue::Entry& e) { return e.priv && (e.slot == no_slot || e.slot == slot) && use.carries(e.frame.id); });
+}
+
+void Station::plan(std::uint64_t cycle, std::uint32_t slot) noexcept {
+    if (slot == 0) {
+        if (is_sync_node()) plan_sync(cycle);
+        return;
+    }
+    if (!may_send(cycle)) return;
+    const Use* use = table_.use(mode_of(cycle), slot, counter_of(cycle));
+    if (!numbered_ && (use == nullptr || use->every > 1)) return;  // the slot may be somebody's
+    const Time begin = begin_of(cycle, slot);
+    if (use == nullptr || use->kind == Kind::shared) return plan_shared(cycle, slot, {.not_before_ns = begin});
+    if (use->node == node_)
+        if (SendQueue::Entry* e = next_private(*use, slot)) {
+            const Time last = begin + (single_shot_ ? table_.enabled() : table_.last_start(e->frame.length));
+            e->in_flight = emit(e->frame, {.not_before_ns = begin, .last_start_ns = last, .single_shot = single_shot_});
+            e->until = begin + table_.slot() - table_.guard;
+            return;
+        }
+    const Time idle_from = begin - table_.guard / 2, idle_until = begin + table_.idle - table_.bits(1);
+    if (role_ == Role::monitor) {
+        const Time at = begin + table_.idle;
+        emit(announcement(slot), {at, at + table_.guard - table_.bits(1), idle_from, idle_until, true});
+        return;
+    }
+    if (senses_) plan_shared(cycle, slot, {.not_before_ns = begin + table_.idle + table_.guard, .idle_from_ns = idle_from, .idle_until_ns = idle_until});
+}
+
+/// Hands over the shared frames that may fit into a slot, from the begin of the window on. The controller discards those that do not start
+/// in time; they wait for the next slot.
+void Station::plan_shared(std::uint64_t cycle, std::uint32_t slot, const can::Window& window) noexcept {
+    const Time begin = begin_of(cycle, slot);
+    Time from = window.not_before_ns;
+    for (;;) {
+        SendQueue::Entry* e = queue_.next([&](const SendQueue::Entry& entry) {
+            return !entry.priv && from <= begin + table_.last_start(entry.frame.length);
+        });
+        if (e == nullptr) return;
+        can::Window w = window;
+        w.last_start_ns = begin + table_.last_start(e->frame.length);
+        e->in_flight = emit(e->frame, w);
+        if (!e->in_flight) return;
+        e->until = begin + table_.slot() - table_.guard;
+        from += table_.bits(can::frame_bits(e->frame).nominal);
+    }
+}
+
+/// Uses the rest of a slot that the monitor has announced as idle.
+void Station::recycle_announced(Time now) noexcept {
+    if (announced_slot_ == no_slot) return;
+    const Where w = where(now);
+    if (w.cycle == announced_cycle_ && w.slot == announced_slot_ && may_send(w.cycle)) plan_shared(w.cycle, w.slot, {.not_before_ns = now});
+    announced_slot_ = no_slot;
+}
+
+/// Without transmit windows: sends what may start now, one frame at a time.
+void Station::start_now(Time now) noexcept {
+    const Where w = where(now);
+    if (!w.known) return;
+    if (w.slot == 0) {
+        if (is_sync_node()) plan_sync(w.cycle);
+        return;
+    }
+    if (!may_send(w.cycle) || queue_.flying()) return;
+    const Use* use = table_.use(mode_of(w.cycle), w.slot, w.counter);
+    if (!numbered_ && (use == nullptr || use->every > 1)) return;
+    const bool is_shared = use == nullptr || use->kind == Kind::shared;
+    const bool used = used_cycle_ == w.cycle && used_slot_ == w.slot;
+    SendQueue::Entry* e = nullptr;
+    bool in_own_window = false;
+    if (!is_shared && use->node == node_ && !used && w.offset <= table_.enabled()) e = next_private(*use, w.slot), in_own_window = e != nullptr;
+    const bool was_idle = last_begin_ < begin_of(w.cycle, w.slot) - table_.guard;
+    if (!is_shared && role_ == Role::monitor && !used && was_idle && w.offset >= table_.idle) {
+        used_cycle_ = w.cycle, used_slot_ = w.slot;
+        emit(announcement(w.slot), {});
+        return;
+    }
+    const bool recycles = senses_ ? was_idle && w.offset >= table_.idle + table_.guard : announced_cycle_ == w.cycle && announced_slot_ == w.slot;
+    if (e == nullptr && (is_shared || used || recycles))
+        e = queue_.next([&](const SendQueue::Entry& entry) { return !entry.priv && w.offset <= table_.last_start(entry.frame.length); });
+    if (e == nullptr || (used && in_own_window)) return;
+    e->in_flight = emit(e->frame, {});
+    e->until = begin_of(w.cycle, w.slot) + table_.slot();
+    used_cycle_ = w.cycle, used_slot_ = w.slot;
+}
+
+/// Hands a frame to the link; the window is in this node's time.
+bool Station::emit(const can::Frame& frame, can::Window w) noexcept {
+    if (!windows_) return link_->send(frame, now_) == can::Sent::queued;
+    w.not_before_ns = crystal_.bus(w.not_before_ns);
+    if (w.last_start_ns != INT64_MAX) w.last_start_ns = crystal_.bus(w.last_start_ns);
+    if (w.idle_from_ns != w.idle_until_ns) w.idle_from_ns = crystal_.bus(w.idle_from_ns), w.idle_until_ns = crystal_.bus(w.idle_until_ns);
+    return link_->send_within(frame, w, now_) == can::Sent::queued;
+}
+
+}  // namespace hal::scocan
