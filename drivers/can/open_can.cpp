@@ -6,6 +6,7 @@
 
 #include "can/cane/cane.hpp"
 #include "can/replay/can_replay.hpp"
+#include "can/scocan/scocan_link.hpp"
 #include "can/sim/sim_can.hpp"
 #include "can/slcan/slcan.hpp"
 #include "can/socketcan/socketcan.hpp"
@@ -24,6 +25,7 @@ constexpr link::Driver<Opened, Options, Description> drivers[] = {
     {"slcan", slcan::open, slcan::describe, nullptr, nullptr, "own errors restart receivequeue"},
     {"replay", replay::open, replay::describe, nullptr, nullptr, "own restart sendqueue receivequeue"},
     {"cane", cane::open, cane::describe, cane::is_own_option, cane::own_options, "bitrate datarate own errors restart"},
+    {"scocan", scocan::open, scocan::describe, scocan::is_own_option, scocan::own_options, "bitrate datarate fd own errors stamps restart"},
 };
 
 using link::quoted;
@@ -82,7 +84,7 @@ Opened open(std::string_view address, const Options& given) {
     return link::open_address<Opened, Options, Description>(
         address, given, drivers, apply,
         "a CAN bus; write can:can0 for an interface of this machine, sim:NAME for a bus in memory, "
-        "udp:239.74.163.2:43113, slcan:/dev/ttyACM0, cane:enp3s0 for CAN in Ethernet frames, or replay:FILE");
+        "udp:239.74.163.2:43113, slcan:/dev/ttyACM0, cane:enp3s0 for CAN in Ethernet frames, scocan:NODE for the slots of a node, or replay:FILE");
 }
 
 Description describe(std::string_view address) { return link::describe_address<Opened, Options, Description>(address, drivers); }

@@ -108,7 +108,7 @@ class Dump(Can):
         self.assertEqual("hal can dump: invalid filter 'xyz'; write an identifier in hex, 181, or one with a mask, 180/780\n",
                          self.bad_can("dump", "replay:c.log", "--filter", "xyz"))
         self.assertEqual("hal can dump: 'bus' is not the address of a CAN bus; write can:can0 for an interface of this machine, sim:NAME for a bus in memory, "
-                         "udp:239.74.163.2:43113, slcan:/dev/ttyACM0, cane:enp3s0 for CAN in Ethernet frames, or replay:FILE\n", self.bad_can("dump", "bus"))
+                         "udp:239.74.163.2:43113, slcan:/dev/ttyACM0, cane:enp3s0 for CAN in Ethernet frames, scocan:NODE for the slots of a node, or replay:FILE\n", self.bad_can("dump", "bus"))
         self.assertEqual("hal can dump: 'sim:arm' is a bus in memory, which other programs cannot open; while its machine runs, bridge it to one that they can: "
                          "hal shell loadrt can_bridge a=sim:arm b=udp:239.74.163.2:43113, hal shell addf can-bridge.0.update THREAD, and here "
                          "udp:239.74.163.2:43113\n", self.bad_can("dump", "sim:arm"))

@@ -214,7 +214,7 @@ class WrongWords(Node):
             ("io", "--link", self.bus): "missing --id: use --id 5, or --id none to wait for an LSS master",
             ("io", "--link", self.bus, "--id", "128"): "invalid --id '128'; write 1..127, 0x50, or none to wait for an LSS master",
             ("io", "--link", "bus", "--id", "5"): "'bus' is not the address of a CAN bus; write can:can0 for an interface of this machine, sim:NAME for a bus "
-                                                  "in memory, udp:239.74.163.2:43113, slcan:/dev/ttyACM0, cane:enp3s0 for CAN in Ethernet frames, or replay:FILE",
+                                                  "in memory, udp:239.74.163.2:43113, slcan:/dev/ttyACM0, cane:enp3s0 for CAN in Ethernet frames, scocan:NODE for the slots of a node, or replay:FILE",
             ("io", "--link", self.bus, "--id", "5", "--set", "in-64=1"): "unknown value 'in-64' in --set; write one of: in-0 … in-63, analog-in-0 … analog-in-11",
             ("io", "--link", self.bus, "--id", "5", "--set", "in-6"): "invalid --set 'in-6'; write NAME=VALUE, or NAME=VALUE@2s for later",
             ("bootloader", "--link", self.bus, "--id", "5", "--set", "a=1"): "invalid --set: a bootloader has no settable values",

@@ -13,6 +13,10 @@
 namespace hal::test {
 namespace {
 
+#define SCOCAN_TABLE                                                                                                                 \
+    " table=\"cycle 10ms; slots 10; node clock A sync; node n A; node bridge A bridge; node watch B monitor; mode 0 run; 0 sync; " \
+    "1 private n 0x100; 2 private clock 0x101; message a 0x100 fields x:f64; message b 0x101 fields y:s16,z:u8; "                  \
+    "message c 0x300 node n event 10ms fields w:f32\""
 // Load arguments of components that cannot be made without.
 const std::map<std::string, std::string> arguments{
     {"canopen", "inputs=24831 outputs=24675 slavenodeid=2"},
@@ -20,6 +24,10 @@ const std::map<std::string, std::string> arguments{
     {"dds_subscribe", "topic=rt/pins fields=f:float,b:bit,i:s32,u:u32,l:s64,k:u64 domain=230"},
     {"ethercat", "config=tests/rt/drive.ethercat"},
     {"lcec", "config=tests/rt/ethercat-conf.xml link=sim:rt/lcec"},
+    {"scocan", "link=sim:rt-scocan node=n" SCOCAN_TABLE},
+    {"scocan_bridge", "link=sim:rt-scocan node=bridge pc=sim:rt-pc" SCOCAN_TABLE},
+    {"scocan_monitor", "link=sim:rt-scocan node=watch" SCOCAN_TABLE},
+    {"scocan_sync", "link=sim:rt-scocan node=clock" SCOCAN_TABLE},
     {"segment_record", "link=sim:rt/recorder file=/dev/null"},
     {"tdma", "link=sim:rt/master station=master schedule=\"master:; cycle 2000; slot 0 100\""},
 };

@@ -154,6 +154,7 @@ private:
     Time first_seen_ = INT64_MIN;    ///< first call
     std::uint32_t leader_ = no_node; ///< sender field of the last SYNC
 
+    std::array<std::uint8_t, most_slots> last_index_{};  ///< by slot: identifier sent last
     std::array<std::uint32_t, 2048> foreign_{};
     std::array<bool, most_slots> seen_{}, told_{};  ///< slots of this cycle with a frame, with an announcement
     std::uint32_t foreign_in_cycle_ = 0, foreign_id_ = 0, unannounced_cycles_ = 0, offences_ = 0;

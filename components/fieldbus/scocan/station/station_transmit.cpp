@@ -59,7 +59,15 @@ std::uint32_t Station::mode_of(std::uint64_t cycle) const noexcept {
 }
 
 SendQueue::Entry* Station::next_private(const Use& use, std::uint32_t slot) noexcept {
-    return queue_.next([&](const SendQueue::Entry& e) { return e.priv && (e.slot == no_slot || e.slot == slot) && use.carries(e.frame.id); });
+    const auto fits = [&](const SendQueue::Entry& e) { return e.priv && (e.slot == no_slot || e.slot == slot) && use.carries(e.frame.id); };
+    for (std::size_t k = 1; k <= use.ids.size(); ++k) {  // identifiers that share a slot take turns
+        const auto index = (last_index_[slot] + k) % use.ids.size();
+        SendQueue::Entry* e = queue_.next([&](const SendQueue::Entry& one) { return one.frame.id == use.ids[index] && fits(one); });
+        if (e == nullptr) continue;
+        last_index_[slot] = static_cast<std::uint8_t>(index);
+        return e;
+    }
+    return queue_.next(fits);
 }
 
 void Station::plan(std::uint64_t cycle, std::uint32_t slot) noexcept {

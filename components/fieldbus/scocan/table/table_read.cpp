@@ -201,6 +201,7 @@ private:
                 if (identifier(one, id)) use.ids.push_back(id);
                 else good = false;
             }
+            if (use.ids.size() > 64) return error(Topic::value, w[3].at, "more than 64 identifiers in one slot", "use further slots");
             if (!good) return;
             next = 4;
         } else if (w[1].text == "sync") {

@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: MIT
+// What all SCoCAN components are: a station on a link, with pins, events and faults.
+#pragma once
+
+#include <array>
+#include <deque>
+#include <limits>
+#include <memory>
+#include <optional>
+
+#include "discipline/slot_exchange.hpp"
+#include "event_words.hpp"
+#include "hal/component.hpp"
+#include "hal/discipline.hpp"
+#include "hal/naming.hpp"
+#include "hal/reporter.hpp"
+#include "message_pins.hpp"
+#include "station_pins.hpp"
+#include "table_arguments.hpp"
+
+namespace hal::scocan {
+
+class StationComponent : public hal::Component, protected Sink {
+public:
+    StationComponent(const hal_host* host, const char* fallback_name, std::initializer_list<Role> roles)
+        : Component(host), name_(hal::own_name(fallback_name)) {
+        arguments_.load(roles);
+        if (!arguments_.loaded) return;
+        const Table& t = arguments_.table;
+        words_.emplace(t, arguments_.own, "setp " + name_ + ".reset TRUE");
+        faults_text_.emplace(t, *words_);
+        station_ = std::make_unique<Station>(t, arguments_.own, arguments_.options(), static_cast<Sink&>(*this));
+        reporter_ = std::make_unique<hal::Reporter<Happened>>(name_, [this](const Happened& h) { return (*words_)(h); }, 256, &EventWords::subject);
+        for (const Message& m : t.messages) {
+            if (m.node == arguments_.own) sent_.emplace_back(*this, transmit_, receive_, m);
+            else if (arguments_.wants(m)) received_.emplace_back(*this, receive_, m);
+        }
+    }
+
+    void start() {
+        if (!arguments_.loaded) throw std::runtime_error("missing table: write link=sim:NAME config=FILE.scocan node=NAME");
+        faults_ = hal::extension<hal_faults>("hal.faults/1");
+        const can::Description bus = can::describe(arguments_.link.get());
+        can::Options options{.own_frames = true, .stamps = bus.has_stamps};
+        if (bus.in_memory && bus.has_bit_rate) options.bit_rate = arguments_.table.bit_rate;
+        auto opened = can::open(arguments_.link.get(), options);
+        if (!opened) throw std::runtime_error(opened.problem);
+        const can::Description& d = opened.link->description();
+        if (d.bit_rate != 0 && d.bit_rate != arguments_.table.bit_rate)
+            throw std::runtime_error(arguments_.link.get() + " runs at " + std::to_string(d.bit_rate) + " bit/s, the table is for " +
+                                     std::to_string(arguments_.table.bit_rate) + "; correct one of them");
+        if ((arguments_.ppm != 0.0 || arguments_.tick_ns != 0) && !d.in_memory)
+            throw std::runtime_error("ppm= and tick_ns= are for simulated nodes; " + arguments_.link.get() + " has clocks of its own");
+        exchange_ = can::offer_slots(arguments_.node.get(), d);
+        if (!exchange_) throw std::runtime_error("node " + arguments_.node.get() + " is in this process already; load each node once");
+        try {
+            if (arguments_.follow != 0) clock_.claim();
+        } catch (...) {
+            can::withdraw_slots(*exchange_);
+            throw;
+        }
+        link_ = std::move(opened.link);
+        station_->attach(*link_);
+        discipline_.lose();
+        followed_ = 0;
+        raised_.fill(std::numeric_limits<Time>::min());
+        for (auto& m : sent_) m.begin();
+        for (auto& m : received_) m.begin();
+        reporter_->start();
+    }
+
+    void stop() noexcept {
+        if (exchange_) can::withdraw_slots(*exchange_);
+        exchange_.reset();
+        if (station_) station_->detach();
+        if (reporter_) reporter_->stop();
+        link_.reset();
+    }
+
+    void receive(hal::Cycle cycle) noexcept {
+        if (!link_) return;
+        now_ = cycle.start_ns();
+        if (pins_.reset && !was_reset_) station_->reset(), pins_.fault = false;
+        was_reset_ = pins_.reset;
+        station_->receive(now_);
+        exchange_->state.store(station_->state() == State::running ? can::State::active : can::State::down, std::memory_order_relaxed);
+        for (auto& m : received_) m.show(now_);
+        if (arguments_.follow != 0) follow(cycle.period_ns());
+        pins_.show(*station_);
+        received();
+    }
+
+    void transmit(hal::Cycle cycle) noexcept {
+        if (!link_) return;
+        now_ = cycle.start_ns();
+        for (auto& m : sent_) m.transmit(*station_, now_);
+        exchange_->each([this](can::SlotUser& user) {
+            while (const can::SlotFrame* next = user.outgoing.front()) {
+                const can::Sent result = station_->send(next->frame, false, next->slot);
+                if (result == can::Sent::full) break;  // waits for the next cycle
+                if (result != can::Sent::queued) user.rejected.fetch_add(1, std::memory_order_relaxed);
+                user.outgoing.drop();
+            }
+        });
+        before_slots();
+        station_->transmit(now_, cycle.period_ns());
+    }
+
+protected:
+    virtual void received() noexcept {}      ///< behind receive(). [realtime]
+    virtual void before_slots() noexcept {}  ///< before the slots are planned. [realtime]
+    virtual void passed(const can::Frame&) noexcept {}  ///< a frame of another node. [realtime]
+
+    void on_frame(const can::Frame& frame, Time begin) noexcept override {
+        for (auto& m : received_)
+            if (m.id() == frame.id) m.arrived(frame, begin);
+        exchange_->each([&](can::SlotUser& user) {
+            if (frame.id < request_id || frame.id > answer_id + arguments_.table.nodes.size())
+                if (!user.incoming.push(frame)) user.lost.fetch_add(1, std::memory_order_relaxed);
+        });
+        passed(frame);
+    }
+    void on_sent(const can::Frame& frame, Time) noexcept override {
+        for (auto& m : sent_)
+            if (m.id() == frame.id) m.sent();
+    }
+    void on_event(Event e, std::uint32_t who, std::uint32_t id, Time value) noexcept override {
+        reporter_->tell({e, who, id, value});
+        if (e == Event::running || e == Event::table_agrees || e == Event::bus_on || e == Event::monitor_found) pins_.fault = false;
+        const char* text = faults_text_->of(e, id);
+        if (text == nullptr) return;
+        pins_.fault = true;
+        Time& last = raised_[static_cast<std::size_t>(e)];
+        if (last != std::numeric_limits<Time>::min() && now_ - last < 1'000'000'000) return;  // one a second of each kind
+        last = now_;
+        if (faults_ != nullptr) faults_->raise(faults_, this, text, static_cast<double>(value));
+    }
+
+    /// Synchronises the threads of this process: their cycles begin with slots. [realtime]
+    void follow(Time period) noexcept {
+        const std::uint64_t syncs = station_->count().syncs;
+        if (station_->state() == State::silent || station_->state() == State::listening) return discipline_.lose();
+        if (syncs == followed_ || !station_->clock().known() || station_->leading()) return;
+        followed_ = syncs;
+        Time error = (station_->slot_start(0) - now_) % period;
+        if (error > period / 2) error -= period;
+        if (error < -period / 2) error += period;
+        clock_.step(discipline_.follow(error, arguments_.table.cycle, clock_.limit_ns()));
+    }
+
+    const std::string name_;
+    TableArguments arguments_{*this};
+    hal::Function receive_{*this, "receive", &StationComponent::receive, "receives frames and follows the SYNC; first in the thread"};
+    hal::Function transmit_{*this, "transmit", &StationComponent::transmit, "sends in the slots until the next cycle; last in the thread"};
+    StationPins pins_{*this, receive_};
+    std::deque<SentMessage> sent_;
+    std::deque<ReceivedMessage> received_;
+    std::optional<EventWords> words_;
+    std::optional<FaultWords> faults_text_;
+    std::unique_ptr<Station> station_;
+    std::unique_ptr<hal::Reporter<Happened>> reporter_;  // behind the words that its thread uses
+    std::shared_ptr<can::SlotExchange> exchange_;
+    std::unique_ptr<can::Link> link_;
+    hal::DisciplinedClock clock_;
+    hal::Discipline discipline_;
+    const hal_faults* faults_ = nullptr;
+    std::array<Time, 32> raised_{};
+    std::uint64_t followed_ = 0;
+    Time now_ = 0;
+    bool was_reset_ = false;
+};
+
+}  // namespace hal::scocan

@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: MIT
+#include "scocan_link.hpp"
+
+#include <charconv>
+#include <ctime>
+
+#include "discipline/slot_exchange.hpp"
+#include "link/filtering.hpp"
+
+namespace hal::can::scocan {
+
+namespace {
+
+/// Identifiers of CANopen that the discipline uses itself, and those in their place on the bus, from the unassigned range.
+struct Replaced {
+    std::uint32_t here, there;
+};
+constexpr Replaced replaced[] = {{0x000, 0x77a}, {0x7e4, 0x77b}, {0x7e5, 0x77c}};
+
+std::uint32_t on_bus(std::uint32_t id) noexcept {
+    for (const auto& r : replaced)
+        if (id == r.here) return r.there;
+    return id;
+}
+std::uint32_t of_user(std::uint32_t id) noexcept {
+    for (const auto& r : replaced)
+        if (id == r.there) return r.here;
+    return id;
+}
+
+struct Place {
+    std::string node;
+    std::uint32_t slot = SlotFrame::any_slot;
+    std::string problem{};
+};
+
+Place parse(const std::string& text) {
+    const auto question = std::min(text.find('?'), text.size());
+    Place place{text.substr(0, question)};
+    if (question == text.size()) return place;
+    const std::string option = text.substr(question + 1), value = option.substr(std::min(option.find('=') + 1, option.size()));
+    const auto [end, wrong] = std::from_chars(value.data(), value.data() + value.size(), place.slot);
+    if (wrong != std::errc{} || end != value.data() + value.size() || place.slot == 0 || place.slot > 255)
+        place.problem = "invalid slot '" + value + "'; write the number of a private slot of " + place.node + ", as in scocan:" + place.node + "?slot=3";
+    return place;
+}
+
+Description description_of(const Place& place) {
+    Description d;
+    d.address = "scocan:" + place.node + (place.slot == SlotFrame::any_slot ? "" : "?slot=" + std::to_string(place.slot));
+    d.transport = "time slots on CAN (SCoCAN)";
+    if (const auto exchange = slots_of(place.node)) {
+        d.bit_rate = exchange->description.bit_rate;
+        d.simulated = exchange->description.simulated;
+    }
+    d.has_stamps = true;
+    return d;
+}
+
+class SlotLink final : public FilteringLink {
+public:
+    SlotLink(const Place& place, std::shared_ptr<SlotExchange> exchange, const Options& options)
+        : place_(place), options_(options), exchange_(std::move(exchange)), user_(options.send_capacity, options.receive_capacity) {
+        description_ = description_of(place);
+    }
+    ~SlotLink() override { exchange_->remove(user_); }
+    bool join() { return exchange_->add(user_); }
+
+    Sent send(const Frame& frame, std::int64_t) noexcept override {
+        const auto drop = [this](Sent why) {
+            Counting::add(counting_.dropped);
+            return why;
+        };
+        if (!frame.valid() || frame.fd || frame.extended || options_.listen_only) return drop(Sent::rejected);
+        if (state() == State::down) return drop(Sent::down);
+        SlotFrame outgoing{frame, place_.slot};
+        outgoing.frame.id = on_bus(frame.id);
+        if (!user_.outgoing.push(outgoing)) return drop(Sent::full);
+        counting_.count_sent(frame);
+        return Sent::queued;
+    }
+    void flush(std::int64_t) noexcept override {}
+    std::size_t receive(std::span<Frame> room, std::int64_t) noexcept override {
+        std::size_t count = 0;
+        for (Frame frame; count < room.size() && user_.incoming.pop(frame);) {
+            frame.id = of_user(frame.id);
+            if (!filters_.pass(frame)) continue;
+            counting_.count_received(frame);
+            room[count++] = frame;
+        }
+        return count;
+    }
+
+    Statistics statistics() const noexcept override {
+        auto s = counting_.read(user_.outgoing.size());
+        s.lost += user_.lost.load(std::memory_order_relaxed);
+        s.dropped += user_.rejected.load(std::memory_order_relaxed);
+        s.state = state();
+        return s;
+    }
+    State state() const noexcept override { return exchange_->state.load(std::memory_order_relaxed); }
+    bool wait(std::int64_t at_most_ns) override {
+        constexpr std::int64_t step_ns = 100'000;  // the node does not wake a waiting thread: that would cost its cycle a system call
+        for (; user_.incoming.size() == 0; at_most_ns -= step_ns) {
+            if (at_most_ns <= 0) return false;
+            const timespec pause{0, static_cast<long>(std::min(step_ns, at_most_ns))};
+            nanosleep(&pause, nullptr);
+        }
+        return true;
+    }
+
+private:
+    const Place place_;
+    const Options options_;
+    const std::shared_ptr<SlotExchange> exchange_;
+    SlotUser user_;
+};
+
+}  // namespace
+
+bool is_own_option(std::string_view key) { return key == "slot"; }
+std::string own_options() { return "slot"; }
+
+Description describe(const std::string& place) { return description_of(parse(place)); }
+
+Opened open(const std::string& text, const Options& options) {
+    const Place place = parse(text);
+    if (place.node.empty()) return {nullptr, "missing name of the node; write scocan:motor"};
+    if (!place.problem.empty()) return {nullptr, place.problem};
+    auto exchange = slots_of(place.node);
+    if (!exchange) {
+        std::string names;
+        for (const auto& name : offered_slots()) names += (names.empty() ? "" : ", ") + name;
+        return {nullptr, "no node '" + place.node + "' in this process; " +
+                             (names.empty() ? "load it before: loadrt scocan config=FILE.scocan node=" + place.node : "nodes are " + names)};
+    }
+    auto link = std::make_unique<SlotLink>(place, std::move(exchange), options);
+    if (!link->join()) return {nullptr, "node '" + place.node + "' has 16 links already"};
+    return {std::move(link), {}};
+}
+
+}  // namespace hal::can::scocan
