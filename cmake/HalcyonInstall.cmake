@@ -13,7 +13,7 @@ write_basic_package_version_file("${PROJECT_BINARY_DIR}/HalcyonConfigVersion.cma
 set(HALCYON_PACKAGE_FILES cmake/HalcyonConfig.cmake cmake/HalcyonComponent.cmake cmake/HalcyonTest.cmake cmake/plugin.map)
 install(FILES ${HALCYON_PACKAGE_FILES} "${PROJECT_BINARY_DIR}/HalcyonConfigVersion.cmake" DESTINATION "${HALCYON_PACKAGE_DIR}")
 
-add_dependencies(installed halcyon_text halcyon_link halcyon_cia402 halcyon_can_timing halcyon_canopen halcyon_tdma)
+add_dependencies(installed halcyon_text halcyon_link halcyon_cia402 halcyon_can_timing halcyon_canopen halcyon_tdma halcyon_scocan)
 
 # Pages, and the machines to start from, in the order of the tree, so that links between them are right.
 install(FILES LICENSE README.md DESTINATION "${CMAKE_INSTALL_DOCDIR}")

@@ -30,6 +30,7 @@
 #include "bus/can/sdo_command.hpp"
 #include "bus/can/send.hpp"
 #include "bus/can/sniff.hpp"
+#include "bus/can/scocan.hpp"
 #include "bus/can/tdma.hpp"
 #include "bus/ethercat/options.hpp"
 #include "bus/node/ethercat_line.hpp"
@@ -156,6 +157,7 @@ constexpr Subcommand table[] = {
     command<EthercatCheckOptions, ON_BUS(run_ethercat_check)>("ethercat check", "FILE… [--json]", "check the configuration of a bus and list its pins"),
     command<EthercatPlanOptions, ON_BUS(run_ethercat_plan)>("ethercat plan", "FILE [--json]", "compute frames, wire time, cycle time and latency of a bus"),
 #endif
+    command<ScocanPlanOptions, ON_BUS(run_scocan_plan)>("scocan plan", "FILE [--mode MODE] [--json | --svg FILE]", "print the slots of a CAN bus as a timeline, its load and the worst-case latency of each message"),
     command<TdmaPlanOptions, ON_BUS(run_tdma_plan)>("tdma plan", "FILE [--json | --svg FILE]", "print the slots of an Ethernet segment as a timeline, its load and its input-to-output latency"),
     command<TdmaStatusOptions, run_tdma_status>("tdma status", "[--name NAME] [--json]", "print the stations of a segment as a running machine receives them"),
     command<TdmaPingOptions, run_tdma_ping>("tdma ping", "STATION [-c COUNT] [--from COMPONENT] [--name NAME]", "measure the round-trip time to a station of a segment"),
@@ -184,6 +186,7 @@ constexpr Group groups[] = {
 #ifdef HALCYON_ETHERCAT
     {"ethercat", "EtherCAT bus tools: scan, slaves, states, crc, upload, download, reg-read, reg-write, sii-read, sii-write, alias, pdos, sdos, foe-read, foe-write, config, xml, graph, dc, dump, check, plan"},
 #endif
+    {"scocan", "time slots of a CAN bus: plan"},
     {"tdma", "time slots of an Ethernet segment: plan, status, ping"},
     {"node", "simulated CANopen devices as processes: drive, io, axis-io, safe-io, jr3, bootloader; injectable faults: faults; an EtherCAT line: ethercat"},
 };

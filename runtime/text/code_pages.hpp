@@ -311,6 +311,17 @@ inline constexpr CodePage code_pages[] = {
      "A parameter or an input whose value had been set is missing in the new version of the component, or has a different type. The "
      "reload took effect, and the value is lost.\n\n"
      "A `setp` of this name in the netlist will fail the next time the netlist is loaded."},
+    {"scocan-line",
+     "A line of a SCoCAN table is invalid at its position: an unknown or duplicate key, an incomplete line, or a slot outside of a mode.\n\n"
+     "Keys are bitrate, cycle, slots, guard, idle, lost, node, mode, message; a line that begins with a number is a slot of the mode above it. "
+     "docs/scocan.md lists them."},
+    {"scocan-slots",
+     "The SCoCAN table cannot work: a slot is too short for its frame, is used twice in the same cycle, an identifier has two senders, there is no "
+     "SYNC node, or the guard time is shorter than the clocks require. The message contains the calculation, the help line the remedy.\n\n"
+     "`hal scocan plan FILE` shows a valid table as a timeline."},
+    {"scocan-value",
+     "A value of a SCoCAN table is invalid: a time, a number, a name, an identifier. The help line shows the valid values.\n\n"
+     "Times have a unit: 500us, 10ms. Identifiers are 0x010..0x77F; the others belong to the discipline itself."},
     {"several-nodes",
      "The netlist has `node` lines: it is for several machines, each of which loads its own part.\n\n"
      "`hal run FILE --node NAME` loads one part. `hal check FILE` checks all of them, `hal sim FILE` runs them together in one "

@@ -9,13 +9,12 @@ namespace hal::scocan::plan {
 
 namespace {
 
-constexpr Time samples = 50;  // instants of a slot at which a message may be queued
-
 class Analysis {
 public:
     Analysis(const Table& table, std::uint32_t mode) : t_(table), mode_(*table.mode(mode)) {
         for (const auto& uses : mode_.slots)
             for (const Use& u : uses) cycles_ = std::max(cycles_, u.every);
+        samples_ = std::max<Time>(500 / cycles_, 20);
     }
 
     Plan run() {
@@ -45,8 +44,10 @@ private:
         l.message = index, l.frame = t_.frame(m.bytes);
         if (t_.owner(mode_.number, m.id) != nullptr) private_latency(m, l, p);
         else shared_latency(m, l, p);
-        l.deadline = m.deadline > 0 ? m.deadline : m.period > 0 ? m.period : l.priv ? l.gap * l.turns + t_.slot() : 0;
-        l.in_time = l.worst >= 0 && (l.deadline == 0 || l.worst <= l.deadline);
+        // A value that just missed its slot is sent in the next turn: by itself that is no fault.
+        const Time turn = l.gap * l.turns;
+        l.deadline = m.deadline > 0 ? m.deadline : l.priv ? std::max(m.period, turn) + m.jitter + t_.slot() : m.period;
+        l.in_time = l.worst >= 0 && l.worst <= l.deadline && (!l.priv || m.period == 0 || turn <= m.period);
         return l;
     }
 
@@ -89,9 +90,9 @@ private:
         if (m.period <= 0 || usable <= 0 || load * static_cast<double>(t_.cycle * cycles_) >= static_cast<double>(shared) * static_cast<double>(usable)) return;
         for (std::uint32_t slot = 1; slot < t_.slots * cycles_; ++slot) {
             if (!is_shared(slot)) continue;
-            for (Time n = 0; n <= samples; ++n) {
+            for (Time n = 0; n <= samples_; ++n) {
                 // Queued `from` behind the begin of the slot, which serves from `until` on, the next sample: every instant between is covered.
-                const Time from = std::min(t_.slot() * n / samples, t_.slot()), until = t_.slot() * (n + 1) / samples;
+                const Time from = std::min(t_.slot() * n / samples_, t_.slot()), until = t_.slot() * (n + 1) / samples_;
                 // A frame of lower priority is on the bus if it may have begun by then.
                 const bool blocked = from <= t_.last_start(0);
                 evaluate(m, higher, slot, from, until, blocked ? blocking : 0, usable, l);
@@ -151,6 +152,7 @@ private:
     const Table& t_;
     const Mode& mode_;
     std::uint32_t cycles_ = 1;
+    Time samples_ = 0;  // instants of a slot at which a message may be queued
     mutable bool failed_ = false;
 };
 
