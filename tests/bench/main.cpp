@@ -13,6 +13,7 @@
 #include "linuxcnc.hpp"
 #include "machine.hpp"
 #include "sample.hpp"
+#include "scocan.hpp"
 #include "tdma.hpp"
 
 namespace {
@@ -38,6 +39,7 @@ constexpr Section sections[] = {
     {"can", "CANopen over SocketCAN: SDO, SYNC and PDOs, against a plain raw socket program and the Python package", can, true},
     {"ethernet", "raw Ethernet over a veth pair: round trips and one-way times, against a plain socket program", raw_ethernet},
     {"tdma", "slot jitter of a station whose clock is 200 ppm off, and a backup master that takes over", time_slots},
+    {"scocan", "time slots on a CAN bus in memory: error of a slot's begin, idle slots used, throughput, speed of the simulation", scocan},
     {"cnc", "five axes and 64 I/O over TDMA: refresh, round trip, CPU, most axes and shortest cycle", cnc},
 #ifdef HALCYON_ETHERCAT
     {"ethercat", "50 EtherCAT drives over a veth pair against a plain socket program; start, faults, and how many slaves in memory", ethercat},

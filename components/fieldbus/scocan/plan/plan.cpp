@@ -44,7 +44,7 @@ private:
         l.message = index, l.frame = t_.frame(m.bytes);
         if (t_.owner(mode_.number, m.id) != nullptr) private_latency(m, l, p);
         else shared_latency(m, l, p);
-        // A value that just missed its slot is sent in the next turn: by itself that is no fault.
+        // A value that just missed its slot is sent in the next turn: that is expected.
         const Time turn = l.gap * l.turns;
         l.deadline = m.deadline > 0 ? m.deadline : l.priv ? std::max(m.period, turn) + m.jitter + t_.slot() : m.period;
         l.in_time = l.worst >= 0 && l.worst <= l.deadline && (!l.priv || m.period == 0 || turn <= m.period);

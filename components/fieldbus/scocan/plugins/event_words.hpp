@@ -42,7 +42,7 @@ public:
                    "); receives only; give all nodes the same file";
         case Event::table_agrees: return "table agrees with that of the SYNC node";
         case Event::unknown_mode: return "mode " + value + " of the SYNC is not in the table; receives only";
-        case Event::foreign_frame: return foreign(h.id, h.who) + ", in slot " + value;
+        case Event::foreign_frame: return foreign(h.id, h.who, value);
         case Event::babbling: return "babbling node: " + value + " frames outside of their slots in one cycle, the last " + named(h.id) + owner(h.who);
         case Event::late_frame:
             return "own frame " + named(h.id) + " started " + microseconds(h.value) + " behind its transmit window; use a faster thread, or a longer idle time";
@@ -61,8 +61,8 @@ public:
     /// Subject for rate limiting. [setup]
     static std::string subject(const Happened& h) { return std::to_string(static_cast<int>(h.event)) + ' ' + std::to_string(h.id); }
 
-    std::string foreign(std::uint32_t id, std::uint32_t who) const {
-        return "frame " + named(id) + " outside of its slot" + owner(who);
+    std::string foreign(std::uint32_t id, std::uint32_t who, const std::string& slot) const {
+        return "frame " + named(id) + " in slot " + slot + ", outside of its own" + owner(who);
     }
     std::string sync_node() const {
         for (const Node& n : t_.nodes)
@@ -104,14 +104,14 @@ public:
         text_[Event::bus_off] = "controller off the bus";
         text_[Event::mode_refused] = "mode change cancelled: a node did not agree";
         text_[Event::monitor_lost] = "monitor lost: idle slots are not announced any more";
-        foreign_other_ = "frame of an unknown node in a private slot (slot {})";
-        for (const Message& m : t.messages) foreign_[m.id] = words.foreign(m.id, static_cast<std::uint32_t>(m.node)) + "; it was in slot {}";
+        foreign_other_ = "frame of an unknown node in slot {}, which is private";
+        for (const Message& m : t.messages) foreign_[m.id] = words.foreign(m.id, static_cast<std::uint32_t>(m.node), "{}");
         for (const Mode& mode : t.modes)
             for (const auto& uses : mode.slots)
                 for (const Use& u : uses)
-                    for (const std::uint32_t id : u.ids) foreign_[id] = words.foreign(id, static_cast<std::uint32_t>(u.node)) + "; it was in slot {}";
+                    for (const std::uint32_t id : u.ids) foreign_[id] = words.foreign(id, static_cast<std::uint32_t>(u.node), "{}");
     }
-    /// Returns the message of a fault, or nullptr for an event that is none. [realtime]
+    /// Returns the message of a fault, or nullptr for all other events. [realtime]
     const char* of(Event e, std::uint32_t id) const noexcept {
         if (e == Event::foreign_frame) {
             const auto found = foreign_.find(id);

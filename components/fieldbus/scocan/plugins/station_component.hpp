@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cstring>
 #include <deque>
 #include <limits>
 #include <memory>
@@ -133,7 +134,8 @@ protected:
         Time& last = raised_[static_cast<std::size_t>(e)];
         if (last != std::numeric_limits<Time>::min() && now_ - last < 1'000'000'000) return;  // one a second of each kind
         last = now_;
-        if (faults_ != nullptr) faults_->raise(faults_, this, text, static_cast<double>(value));
+        const bool counts = std::strstr(text, "{}") != nullptr;
+        if (faults_ != nullptr) faults_->raise(faults_, this, text, counts ? static_cast<double>(value) : std::numeric_limits<double>::quiet_NaN());
     }
 
     /// Synchronises the threads of this process: their cycles begin with slots. [realtime]

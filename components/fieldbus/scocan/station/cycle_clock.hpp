@@ -28,6 +28,7 @@ public:
     std::uint32_t pass(Time now, Time wait) noexcept;
 
     bool known() const noexcept { return taken_ >= 2; }
+    bool heard() const noexcept { return taken_ >= 1; }       ///< a first SYNC has arrived: start()
     std::uint32_t lost() const noexcept { return lost_; }     ///< SYNCs lost in a row
     bool seen() const noexcept { return seen_; }              ///< the SYNC of the current cycle has arrived
     std::uint64_t cycle() const noexcept { return cycle_; }   ///< cycles begun so far

@@ -13,6 +13,7 @@ void Station::lead(Time now) noexcept {
     if (leading_ || listen_only_) return;
     if (!clock_.known()) {
         if (now - first_seen_ < table_.cycle * (listen_cycles + backup_)) return;
+        if (clock_.heard() && now - clock_.start() < table_.cycle * listen_cycles) return;  // another node has just begun
         clock_.lead(now);
         counter_ = 0, numbered_ = true;
         next_cycle_ = 0, next_slot_ = 0;

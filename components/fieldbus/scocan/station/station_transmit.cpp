@@ -77,7 +77,7 @@ void Station::plan(std::uint64_t cycle, std::uint32_t slot) noexcept {
     }
     if (!may_send(cycle)) return;
     const Use* use = table_.use(mode_of(cycle), slot, counter_of(cycle));
-    if (!numbered_ && (use == nullptr || use->every > 1)) return;  // the slot may be somebody's
+    if (!numbered_ && (use == nullptr || use->every > 1)) return;  // the slot may be private
     const Time begin = begin_of(cycle, slot);
     if (use == nullptr || use->kind == Kind::shared) return plan_shared(cycle, slot, {.not_before_ns = begin});
     if (use->node == node_)

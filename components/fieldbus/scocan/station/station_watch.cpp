@@ -30,7 +30,7 @@ bool Station::is_foreign(const can::Frame& frame, const Where& w) const noexcept
     return owner != nullptr || frame.id < 0x10;
 }
 
-/// Judges a frame of another node.
+/// Checks a frame of another node.
 void Station::watch(const can::Frame& frame, const Where& w, Time) noexcept {
     if (!w.known || state_ != State::running || clock_.lost() > 0 || !numbered_) return;
     if (frame.id != announce_id) seen_[w.slot] = true;
