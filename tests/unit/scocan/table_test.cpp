@@ -117,9 +117,8 @@ TEST(Plan, of_the_robot) {
     EXPECT_TRUE(p.fits);
     EXPECT_EQ(13U, p.shared_slots);
     const auto& alarm = p.latencies[0];
-    // In slot 19 a frame of 8 bytes begins 277 us behind its begin and ends behind the last start of the alarm, 411 us; then three slots are not
-    // shared: 223 + 1500 + 65 us, and the guard.
-    EXPECT_NEAR(1'792'000, static_cast<double>(alarm.worst), 2'000);
+    // Queued just behind the begin of slot 19: that slot, three that are not shared, its frame, the guard.
+    EXPECT_EQ(500'000 + 1'500'000 + 65'000 + 4'000, alarm.worst);
     const auto& position = p.latencies[2];
     EXPECT_TRUE(position.priv);
     EXPECT_EQ(10'000'000 + 100'000 + 4'000 + 135'000, position.worst);

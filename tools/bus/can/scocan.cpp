@@ -87,8 +87,8 @@ std::string arithmetic(const Table& t, const Latency& l) {
         text += fmt::format("{} to the next turn of its slot{} + {} guard + {} frame", ms(l.gap * l.turns), l.turns > 1 ? fmt::format(" ({} identifiers x {})", l.turns, ms(l.gap)) : "",
                             ms(t.guard), ms(l.frame));
     else
-        text += fmt::format("queued {} behind the begin of a cycle: {} on the bus + {} of higher priority + {} until a shared slot is free + {} guard + {} frame", ms(l.released),
-                            ms(l.blocking), ms(l.interference), ms(l.waiting), ms(t.guard), ms(l.frame));
+        text += fmt::format("queued in the slot at {}: {} without a usable shared slot + {} of higher priority + {} guard + {} frame", ms(l.released), ms(l.waiting),
+                            ms(l.interference), ms(t.guard), ms(l.frame));
     return text + fmt::format(" = {} ms", ms(l.worst));
 }
 

@@ -14,7 +14,6 @@ public:
     Analysis(const Table& table, std::uint32_t mode) : t_(table), mode_(*table.mode(mode)) {
         for (const auto& uses : mode_.slots)
             for (const Use& u : uses) cycles_ = std::max(cycles_, u.every);
-        samples_ = std::max<Time>(500 / cycles_, 20);
     }
 
     Plan run() {
@@ -73,13 +72,9 @@ private:
         std::vector<const Message*> higher;
         std::uint32_t longest = m.bytes;
         double load = static_cast<double>(l.frame) / static_cast<double>(std::max<Time>(m.period, 1));
-        Time blocking = t_.frame(5);  // the configuration message of the SYNC node
         for (const Message& other : t_.messages) {
             if (&other == &m || t_.owner(mode_.number, other.id) != nullptr || other.period <= 0) continue;
-            if (other.id > m.id) {
-                blocking = std::max(blocking, t_.frame(other.bytes));
-                continue;
-            }
+            if (other.id > m.id) continue;
             higher.push_back(&other);
             longest = std::max(longest, other.bytes);
             load += static_cast<double>(t_.frame(other.bytes)) / static_cast<double>(other.period);
@@ -88,50 +83,42 @@ private:
         std::size_t shared = 0;
         for (std::uint32_t slot = 1; slot < t_.slots * cycles_; ++slot) shared += is_shared(slot);
         if (m.period <= 0 || usable <= 0 || load * static_cast<double>(t_.cycle * cycles_) >= static_cast<double>(shared) * static_cast<double>(usable)) return;
-        for (std::uint32_t slot = 1; slot < t_.slots * cycles_; ++slot) {
-            if (!is_shared(slot)) continue;
-            for (Time n = 0; n <= samples_; ++n) {
-                // Queued `from` behind the begin of the slot, which serves from `until` on, the next sample: every instant between is covered.
-                const Time from = std::min(t_.slot() * n / samples_, t_.slot()), until = t_.slot() * (n + 1) / samples_;
-                // A frame of lower priority is on the bus if it may have begun by then.
-                const bool blocked = from <= t_.last_start(0);
-                evaluate(m, higher, slot, from, until, blocked ? blocking : 0, usable, l);
-                if (l.worst < 0 && failed_) return;
-            }
-        }
+        for (std::uint32_t slot = 0; slot < t_.slots * cycles_; ++slot)
+            if (!evaluate(m, higher, slot, usable, l)) return void(l.worst = -1);
         if (l.worst > m.period) l.worst = -1;  // more than one instance would wait
         l.jitter = l.worst < 0 ? -1 : l.worst - m.jitter - shortest(m);
     }
     Time shortest(const Message& m) const { return t_.bits(47 + 8 * m.bytes); }
 
-    void evaluate(const Message& m, const std::vector<const Message*>& higher, std::uint32_t slot, Time from, Time until, Time blocking, Time usable, Latency& l) const {
-        const Time released = t_.slot() * slot + from;
+    /// The message is queued just behind the begin of `slot`: it is offered from the next slot on. Returns false when it never starts.
+    bool evaluate(const Message& m, const std::vector<const Message*>& higher, std::uint32_t slot, Time usable, Latency& l) const {
         const can_timing::Bus bus{.bit_rate = t_.bit_rate};
         Time waited = 0, interference = 0;
-        for (int round = 0; round < 10'000; ++round) {
+        for (;;) {
             interference = 0;
             for (const Message* other : higher)
                 interference += can_timing::times_before(plain_of(*other), waited, bus) * t_.frame(other->bytes);
-            const Time start = served(slot, until, blocking, interference, usable) - released;
-            if (start > 1000 * t_.cycle * cycles_) return void(failed_ = true);
+            const Time start = served(slot + 1, interference, usable) - t_.slot() * slot;
+            if (start > 1000 * t_.cycle * cycles_) return false;
             if (start <= waited) break;
             waited = start;
         }
         const Time worst = m.jitter + waited + l.frame + t_.guard;
-        if (worst <= l.worst) return;
-        l.worst = worst, l.blocking = blocking, l.interference = interference, l.released = released % t_.cycle;
-        l.waiting = waited - blocking - interference;
+        if (worst <= l.worst) return true;
+        l.worst = worst, l.interference = interference, l.released = t_.slot() * (slot % t_.slots);
+        l.waiting = waited - interference;
+        return true;
     }
 
-    /// Returns the instant at which so much has been carried since `from` behind the begin of a slot.
-    Time served(std::uint32_t slot, Time from, Time blocking, Time work, Time usable) const {
-        Time at = from + blocking;  // the frame of lower priority ends in its slot
-        for (std::uint32_t s = slot;; ++s, at = 0) {
-            if (s > slot + 1000U * t_.slots * cycles_) return INT64_MAX / 4;
-            if (!is_shared(s % (t_.slots * cycles_)) || at > usable) continue;
-            if (at + work <= usable) return t_.slot() * s + at + work;
-            work -= usable - at;
+    /// Returns the instant at which the shared slots have carried that much work, from a slot on.
+    Time served(std::uint32_t slot, Time work, Time usable) const {
+        const std::uint32_t all = t_.slots * cycles_;
+        for (std::uint32_t s = slot; s < slot + 2000U * all; ++s) {
+            if (!is_shared(s % all)) continue;
+            if (work <= usable) return t_.slot() * s + work;
+            work -= usable;
         }
+        return INT64_MAX / 4;
     }
 
     static can_timing::Message plain_of(const Message& m) {
@@ -152,8 +139,6 @@ private:
     const Table& t_;
     const Mode& mode_;
     std::uint32_t cycles_ = 1;
-    Time samples_ = 0;  // instants of a slot at which a message may be queued
-    mutable bool failed_ = false;
 };
 
 }  // namespace

@@ -2,9 +2,10 @@
 // What a table guarantees: the load of its slots and the worst-case latency of each message, and beside it that of the same messages on plain
 // CAN. Recycled slots are a gain that nobody is promised: they do not count. Everything is [setup].
 //
-// A private message waits at most for the longest gap between two turns of its slot. A shared message m waits for the shared slots to carry, from
-// the worst instant on: one frame of lower priority that has just begun, and every frame of higher priority that is queued until m starts. In a
-// slot frames start until the last start of the longest of them, so each slot carries at least that much.
+// A private message waits at most for the longest gap between two turns of its slot. A shared message that is queued within a slot is offered to
+// the controller from the next one on. At the begin of a slot all nodes compete, so that no frame of lower priority is in its way; it waits until the
+// shared slots have carried every frame of higher priority that is queued until it starts. Frames start in a slot until the last start of the
+// longest of them, so each slot carries at least that much.
 #pragma once
 
 #include <optional>
@@ -21,7 +22,6 @@ struct Latency {
     bool priv = false;
     std::uint32_t turns = 1;     ///< of a private slot with several identifiers: how many share it
     Time gap = 0;                ///< private: longest time between two turns
-    Time blocking = 0;           ///< shared: frame of lower priority
     Time interference = 0;       ///< shared: frames of higher priority
     Time waiting = 0;            ///< shared: time without a usable slot
     Time released = 0;           ///< shared: worst instant, from the begin of a cycle

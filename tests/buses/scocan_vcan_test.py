@@ -1,0 +1,93 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""scocan_vcan_test.py BUS_TESTS: two processes share a real SocketCAN interface by time slots, in user-mode-linux where the machine has no vcan0: the node
+follows the SYNC, private and shared messages arrive, the SYNC node is killed and returns."""
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from vcan import on_vcan0
+
+# Times of a guest on a busy machine, not of a bus.
+TABLE = """cycle 400ms
+slots 4
+guard 10ms
+idle 60ms
+lost 5
+node clock A sync
+node motor A
+mode 0 run
+0 sync
+1 private motor 0x10A
+message position 0x10A fields a:s32,b:s32
+message lamp 0x300 node clock period 800ms fields on:u8
+"""
+NETLIST = """loadrt threads name1=bus period1=5000000
+loadrt {component} link=can:vcan0 config=slow.scocan node={node}
+addf {instance}.receive bus
+addf {instance}.transmit bus
+start
+"""
+SCRIPT = """set -e
+hal=$1
+is() { # VALUE NAME COMMAND...: waits until the machine answers it
+    value=$1; name=$2; shift 2
+    until [ "$("$hal" shell --name $name "$@" 2>/dev/null)" = "$value" ]; do sleep 0.1; done
+    echo "$name $* $value"
+}
+clock() { "$hal" run clock.hal --name clock >clock.output 2>&1 & clock=$!; }
+clock
+"$hal" run motor.hal --name motor >motor.output 2>&1 & motor=$!
+is TRUE motor getp scocan.0.running
+"$hal" shell --name motor setp scocan.0.position.a -42
+is -42 clock getp scocan-sync.0.position.a
+"$hal" shell --name clock setp scocan-sync.0.lamp.on 1
+is 1 motor getp scocan.0.lamp.on
+kill -9 $clock
+is 2 motor getp scocan.0.state
+is TRUE motor getp scocan.0.fault
+clock
+is 1 motor getp scocan.0.state
+is -42 clock getp scocan-sync.0.position.a
+kill -TERM $motor $clock
+wait $motor $clock
+echo ended
+"""
+EXPECTED = """motor getp scocan.0.running TRUE
+clock getp scocan-sync.0.position.a -42
+motor getp scocan.0.lamp.on 1
+motor getp scocan.0.state 2
+motor getp scocan.0.fault TRUE
+motor getp scocan.0.state 1
+clock getp scocan-sync.0.position.a -42
+ended
+"""
+
+
+def main(hal):
+    if not hal.exists():
+        print(f"{hal} is not built")
+        return 77  # skipped
+    if b"__asan_init" in hal.read_bytes() or b"__tsan_init" in hal.read_bytes():
+        print("a sanitizer inside user-mode-linux is too slow")
+        return 77
+    with tempfile.TemporaryDirectory() as folder:
+        for name, text in (("slow.scocan", TABLE), ("script", SCRIPT),
+                           ("clock.hal", NETLIST.format(component="scocan_sync", node="clock", instance="scocan-sync.0")),
+                           ("motor.hal", NETLIST.format(component="scocan", node="motor", instance="scocan.0"))):
+            Path(folder, name).write_text(text)
+        command = on_vcan0(["env", f"HOME={folder}", f"XDG_RUNTIME_DIR={folder}", "TERM=dumb", "sh", "script", str(hal)], 200)
+        done = subprocess.run(command, cwd=folder, check=False, stdout=subprocess.PIPE, text=True)
+        print(done.stdout)
+        missing = [line for line in EXPECTED.splitlines() if line not in done.stdout.splitlines()]
+        if done.returncode == 0 and not missing:
+            return 0
+        print("missing:", *missing, sep="\n")
+        for output in ("clock.output", "motor.output"):
+            print(f"--- {output}\n{Path(folder, output).read_text() if Path(folder, output).exists() else 'nothing'}")
+        return done.returncode or 1
+
+
+if __name__ == "__main__":
+    sys.exit(main(Path(sys.argv[1]).resolve().parent / "hal"))
