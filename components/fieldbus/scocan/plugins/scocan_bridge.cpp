@@ -63,5 +63,6 @@ slot that the table gives their identifier, only the newest of each, or else in 
     addf scocan-bridge.0.receive bus
     addf scocan-bridge.0.transmit bus
 
+A message of the bridge in the table has pins as in any node; set its `send` to false where only the participant sends it.
 Frames with an identifier of another node are dropped and counted in `rejected`. Otherwise the node is one like any other, see `hal doc scocan`.
 )")
