@@ -51,10 +51,10 @@ public:
         busy_.fetch_sub(1);
     }
 
-    std::atomic<bool> offered{false};            ///< written in setup
-    std::atomic<State> state{State::down};       ///< written by the thread of the node: active while it may send
-    std::atomic<std::int64_t> latest{INT64_MIN}; ///< written by the thread of the node: its time
-    Description description;                     ///< of the link of the node; written by offer_slots()
+    std::atomic<bool> offered{false};  ///< written in setup
+    std::atomic<State> state{State::down};  ///< written by the thread of the node: active while it may send
+    std::atomic<std::int64_t> latest{INT64_MIN};  ///< written by the thread of the node: its time
+    Description description;  ///< of the link of the node; written by offer_slots()
 
 private:
     std::array<std::atomic<SlotUser*>, most_users> users_{};

@@ -78,12 +78,17 @@ void start_error(const Options& options, Report& report) {
             const Time settled = bus.now() + 1000 * ms;
             bus.run(options.quick ? 5'000 * ms : 60'000 * ms, 330 * us, [&] { node.send({0x101, {1}}, true); },
                     [&](const can::Frame& f, Time begin) {
-                        if (f.id == 0) sync = begin;
-                        else if (begin > settled) worst = std::max(worst, std::abs(static_cast<double>(begin - sync - table.slot())));
-                    });
+                if (f.id == 0) sync = begin;
+                else if (begin > settled) worst = std::max(worst, std::abs(static_cast<double>(begin - sync - table.slot())));
+            });
         }
-        report.row({.what = fmt::format("worst error of a slot's begin, clock up to 100 ppm off, {:g} us tick", static_cast<double>(tick) / 1e3), .unit = "us",
-                    .ours = worst / 1e3, .peer = "offset without rate, computed", .theirs = tick == 1000 ? 1.4 : 1.0, .goal = limit(0.5)});
+        report.row(
+            {.what = fmt::format("worst error of a slot's begin, clock up to 100 ppm off, {:g} us tick", static_cast<double>(tick) / 1e3),
+             .unit = "us",
+             .ours = worst / 1e3,
+             .peer = "offset without rate, computed",
+             .theirs = tick == 1000 ? 1.4 : 1.0,
+             .goal = limit(0.5)});
     }
 }
 
@@ -99,7 +104,9 @@ double through_slots(const Options& options, const char* bit_rate, double& idle_
     std::int64_t last = -1;
     const Time settled = bus.now() + 100 * ms, duration = options.quick ? 1'000 * ms : 10'000 * ms;
     bus.run(duration + 100 * ms, table.slot(), [&] {
-        while (node.waiting() < 16) node.send({0x300, std::array<std::uint8_t, 8>{0x5a, 0xc3, static_cast<std::uint8_t>(++number), 0x96, 0x3c, 0xa5, 0x69, 0x5a}}, false);
+        while (node.waiting() < 16)
+            node.send({0x300, std::array<std::uint8_t, 8>{0x5a, 0xc3, static_cast<std::uint8_t>(++number), 0x96, 0x3c, 0xa5, 0x69, 0x5a}},
+                      false);
     }, [&](const can::Frame& f, Time begin) {
         if (f.id == 0) sync = begin, last = -1, cycles += begin > settled;
         if (f.id != 0x300 || begin <= settled) return;
@@ -117,7 +124,9 @@ double plain(const Options& options, std::uint32_t bit_rate) {
     std::uint64_t frames = 0;
     std::uint32_t number = 0;
     for (Time now = 0; now < duration; now += 500 * us) {
-        while (a->statistics().queued < 16) a->send({0x300, std::array<std::uint8_t, 8>{0x5a, 0xc3, static_cast<std::uint8_t>(++number), 0x96, 0x3c, 0xa5, 0x69, 0x5a}}, now);
+        while (a->statistics().queued < 16)
+            a->send({0x300, std::array<std::uint8_t, 8>{0x5a, 0xc3, static_cast<std::uint8_t>(++number), 0x96, 0x3c, 0xa5, 0x69, 0x5a}},
+                    now);
         a->flush(now);
         for (can::Frame f; b->receive(f, now);) ++frames;
     }
@@ -138,7 +147,10 @@ void speed(const Options& options, Report& report) {
             if (nodes[i]->waiting() < 2) nodes[i]->send({0x300 + i, {1, 2, 3, 4, 5, 6, 7, 8}}, false);
     }, [&](const can::Frame&, Time) { ++frames; });
     const double took = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
-    report.row({.what = "simulated time per time, 20 nodes, 1 Mbit/s", .unit = "x", .ours = static_cast<double>(duration) / 1e9 / took, .goal = at_least(50)});
+    report.row({.what = "simulated time per time, 20 nodes, 1 Mbit/s",
+                .unit = "x",
+                .ours = static_cast<double>(duration) / 1e9 / took,
+                .goal = at_least(50)});
     report.note(fmt::format("{:.0f} frames per simulated second", static_cast<double>(frames) * 1e9 / static_cast<double>(duration)));
 }
 
@@ -150,8 +162,15 @@ void scocan(const Options& options, Report& report) {
     for (const auto& [name, rate] : {std::pair{"1M", 1'000'000U}, std::pair{"500k", 500'000U}}) {
         double idle = 0;
         const double slots = through_slots(options, name, idle);
-        report.row({.what = fmt::format("idle private slots that carry shared frames, {}bit/s", name), .unit = "%", .ours = 100 * idle, .goal = at_least(100)});
-        report.row({.what = fmt::format("frames of 8 bytes per second, all slots shared or idle, {}bit/s", name), .unit = "1/s", .ours = slots, .peer = "plain CAN", .theirs = plain(options, rate)});
+        report.row({.what = fmt::format("idle private slots that carry shared frames, {}bit/s", name),
+                    .unit = "%",
+                    .ours = 100 * idle,
+                    .goal = at_least(100)});
+        report.row({.what = fmt::format("frames of 8 bytes per second, all slots shared or idle, {}bit/s", name),
+                    .unit = "1/s",
+                    .ours = slots,
+                    .peer = "plain CAN",
+                    .theirs = plain(options, rate)});
     }
     speed(options, report);
 }

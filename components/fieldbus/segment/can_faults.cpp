@@ -16,7 +16,7 @@ using namespace hal::can;
 
 struct Row {
     const char* name;
-    Fault fault;
+    Fault       fault;
 };
 constexpr Row rows[] = {{"error", Fault::error}, {"loss", Fault::loss}, {"duplicate", Fault::duplicate}, {"delay", Fault::delay}};
 
@@ -26,9 +26,10 @@ constexpr Row rows[] = {{"error", Fault::error}, {"loss", Fault::loss}, {"duplic
 
 /// "error:id=0x10A:from=1s:until=2s".
 Disturbance parse(const std::string& part) {
-    const char* help = "write error, loss, duplicate or delay, with options :id=0x10A:every=50:probability=0.02:count=3:from=1s:until=2s:time=20us";
+    const char* help =
+        "write error, loss, duplicate or delay, with options :id=0x10A:every=50:probability=0.02:count=3:from=1s:until=2s:time=20us";
     std::string_view rest(part);
-    const auto word = rest.substr(0, rest.find(':'));
+    const auto       word = rest.substr(0, rest.find(':'));
     rest.remove_prefix(std::min(word.size() + 1, rest.size()));
     const auto* row = std::find_if(std::begin(rows), std::end(rows), [&](const Row& r) { return word == r.name; });
     if (row == std::end(rows)) reject(part, help);
@@ -67,20 +68,24 @@ std::vector<Disturbance> parse_all(std::string_view text) {
 struct CanFaults final : hal::Component {
     using Component::Component;
 
-    hal::TextArgument link{*this, "link", "sim:can0", "bus in memory, sim:NAME"};
-    hal::TextArgument faults{*this, "faults", "", "faults, comma-separated: error:id=0x10A:from=1s:until=2s,loss:every=50"};
+    hal::TextArgument              link{*this, "link", "sim:can0", "bus in memory, sim:NAME"};
+    hal::TextArgument              faults{*this, "faults", "", "faults, comma-separated: error:id=0x10A:from=1s:until=2s,loss:every=50"};
     const std::vector<Disturbance> list = parse_all(faults.get());
-    hal::Argument seed{*this, "seed", 1, "seed of random faults", {.min = 0, .max = 1'000'000'000}};
-    hal::Argument victim{*this, "victim", 0, "node whose wire `cut` cuts: its number on the bus, in the order in which links were opened", {.min = 0, .max = 63}};
+    hal::Argument                  seed{*this, "seed", 1, "seed of random faults", {.min = 0, .max = 1'000'000'000}};
+    hal::Argument                  victim{*this,
+                         "victim",
+                         0,
+                         "node whose wire `cut` cuts: its number on the bus, in the order in which links were opened",
+                                          {.min = 0, .max = 63}};
 
     hal::Function run{*this, "update", &CanFaults::update, "cuts and reconnects a wire, babbles, counts faults"};
 
-    hal::In<bool> cut{*this, "cut", "TRUE: the wire of node `victim` is cut"};
-    hal::In<bool> bus_off{*this, "bus-off", "rising edge: the next error of node `victim` takes it off the bus"};
-    hal::In<bool> babble{*this, "babble", "TRUE: a node of its own sends `babble-id` at any time"};
+    hal::In<bool>             cut{*this, "cut", "TRUE: the wire of node `victim` is cut"};
+    hal::In<bool>             bus_off{*this, "bus-off", "rising edge: the next error of node `victim` takes it off the bus"};
+    hal::In<bool>             babble{*this, "babble", "TRUE: a node of its own sends `babble-id` at any time"};
     hal::Param<std::uint32_t> babble_id{*this, "babble-id", "identifier of babbled frames", {.initial = 0x150}};
     hal::Param<std::uint32_t> babble_period{*this, "babble-period", "interval between babbled frames", {.initial = 300, .unit = "us"}};
-    hal::Outs<std::uint64_t> hits{*this, "hits-#", static_cast<std::int64_t>(list.size()), "frames affected by this fault of the list"};
+    hal::Outs<std::uint64_t>  hits{*this, "hits-#", static_cast<std::int64_t>(list.size()), "frames affected by this fault of the list"};
 
     void start() {
         auto opened = open(link.get());
@@ -114,8 +119,8 @@ struct CanFaults final : hal::Component {
 
 private:
     std::unique_ptr<Link> link_;
-    std::vector<int> numbers_;
-    bool was_cut_ = false, was_babbling_ = false, was_off_ = false;
+    std::vector<int>      numbers_;
+    bool                  was_cut_ = false, was_babbling_ = false, was_off_ = false;
 };
 
 }  // namespace

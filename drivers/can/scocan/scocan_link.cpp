@@ -41,7 +41,8 @@ Place parse(const std::string& text) {
     const std::string option = text.substr(question + 1), value = option.substr(std::min(option.find('=') + 1, option.size()));
     const auto [end, wrong] = std::from_chars(value.data(), value.data() + value.size(), place.slot);
     if (wrong != std::errc{} || end != value.data() + value.size() || place.slot == 0 || place.slot > 255)
-        place.problem = "invalid slot '" + value + "'; write the number of a private slot of " + place.node + ", as in scocan:" + place.node + "?slot=3";
+        place.problem = "invalid slot '" + value + "'; write the number of a private slot of " + place.node +
+                        ", as in scocan:" + place.node + "?slot=3";
     return place;
 }
 
@@ -131,8 +132,9 @@ Opened open(const std::string& text, const Options& options) {
     if (!exchange) {
         std::string names;
         for (const auto& name : offered_slots()) names += (names.empty() ? "" : ", ") + name;
-        return {nullptr, "no node '" + place.node + "' in this process; " +
-                             (names.empty() ? "load it before: loadrt scocan config=FILE.scocan node=" + place.node : "nodes are " + names)};
+        return {nullptr,
+                "no node '" + place.node + "' in this process; " +
+                    (names.empty() ? "load it before: loadrt scocan config=FILE.scocan node=" + place.node : "nodes are " + names)};
     }
     auto link = std::make_unique<SlotLink>(place, std::move(exchange), options);
     if (!link->join()) return {nullptr, "node '" + place.node + "' has 16 links already"};

@@ -24,8 +24,8 @@ std::string random_table(std::mt19937& random) {
         if (from(0, 2) == 0) text += std::to_string(slot) + " private " + "abc"[from(0, 2)] + " " + id_text(0x100 + slot) + "\n";
     const unsigned count = from(3, 12);
     for (unsigned i = 0; i < count; ++i)
-        messages += "message m" + std::to_string(i) + " " + id_text(0x300 + i * 3) + " node " + "abc"[from(0, 2)] + " bytes " + std::to_string(from(0, 8)) + " event " +
-                    std::to_string(from(4, 60)) + "ms\n";
+        messages += "message m" + std::to_string(i) + " " + id_text(0x300 + i * 3) + " node " + "abc"[from(0, 2)] + " bytes " +
+                    std::to_string(from(0, 8)) + " event " + std::to_string(from(4, 60)) + "ms\n";
     return text + messages;
 }
 
@@ -43,7 +43,8 @@ TEST(Plan, is_never_exceeded_by_the_simulation) {
         std::map<std::uint32_t, Sent> all;
         std::map<std::uint32_t, Time> next;
         const Time begin = bus.now;
-        for (const Message& m : bus.table.messages) next[m.id] = begin + 500 * us * static_cast<Time>(random() % 40);  // some of them together
+        for (const Message& m : bus.table.messages)
+            next[m.id] = begin + 500 * us * static_cast<Time>(random() % 40);  // some of them together
         bus.wire.clear();
         bus.run(1000 * ms, 500 * us, [&] {
             for (const Seen& s : bus.wire) {

@@ -37,7 +37,8 @@ struct Load {
     explicit Load(Member& sender, std::uint32_t identifier) : node(sender), id(identifier) {}
     void operator()() {
         while (node.station.waiting() < 8) {
-            node.station.send({id, std::array<std::uint8_t, 8>{0x55, 0xaa, static_cast<std::uint8_t>(++number), 0x55, 0xaa, 0x55, 0xaa, 0x55}}, false);
+            node.station.send(
+                {id, std::array<std::uint8_t, 8>{0x55, 0xaa, static_cast<std::uint8_t>(++number), 0x55, 0xaa, 0x55, 0xaa, 0x55}}, false);
         }
     }
     Member& node;
@@ -116,7 +117,8 @@ TEST(Slot_start, is_within_half_a_microsecond_with_a_drift_of_100_ppm) {
         Time sync = 0;
         for (const Seen& s : bus.wire) {
             if (s.frame.id == 0) sync = s.begin;
-            if (s.frame.id == 0x10A && s.begin > 1'000'000'000 + 1000 * ms) worst = std::max(worst, std::abs(static_cast<double>(s.begin - sync - 1000 * us)));
+            if (s.frame.id == 0x10A && s.begin > 1'000'000'000 + 1000 * ms)
+                worst = std::max(worst, std::abs(static_cast<double>(s.begin - sync - 1000 * us)));
         }
         EXPECT_LE(worst, 500) << ppm;
         EXPECT_GT(worst, 0);

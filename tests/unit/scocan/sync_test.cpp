@@ -26,7 +26,8 @@ TEST(Backup, replaces_the_sync_node_within_one_cycle) {
     std::vector<Seen> syncs;
     for (const Seen& s : bus.wire)
         if (s.frame.id == 0) syncs.push_back(s);
-    for (std::size_t i = 1; i < syncs.size(); ++i) EXPECT_LE(syncs[i].begin - syncs[i - 1].begin, 5 * ms + 100 * us) << "no cycle without a SYNC";
+    for (std::size_t i = 1; i < syncs.size(); ++i)
+        EXPECT_LE(syncs[i].begin - syncs[i - 1].begin, 5 * ms + 100 * us) << "no cycle without a SYNC";
     EXPECT_GE(syncs.back().begin, lost_at + 90 * ms);
     EXPECT_EQ(0U, motor.station.count().syncs_lost);
     EXPECT_EQ(0U, motor.station.count().missed);
@@ -40,9 +41,7 @@ TEST(Backup, replaces_the_sync_node_within_one_cycle) {
     Time last = 0;
     for (const Seen& s : bus.wire) {
         if (s.frame.id != 0x10A) continue;
-        if (last != 0) {
-            EXPECT_NEAR(5e6, static_cast<double>(s.begin - last), 10) << "private slots keep their times";
-        }
+        if (last != 0) { EXPECT_NEAR(5e6, static_cast<double>(s.begin - last), 10) << "private slots keep their times"; }
         last = s.begin;
     }
 }
@@ -145,9 +144,7 @@ TEST(Mode_change, takes_place_at_one_cycle_without_a_lost_or_double_message) {
         const bool is_motor = s.frame.id == 0x10A;
         EXPECT_NEAR(static_cast<double>(sync + (is_motor == swapped ? 500 : 1000) * us), static_cast<double>(s.begin), 2);
         int& number_of = last[is_motor ? 1 : 0];
-        if (number_of != 0) {
-            EXPECT_EQ(number_of + 1, s.frame.data[0]);
-        }
+        if (number_of != 0) { EXPECT_EQ(number_of + 1, s.frame.data[0]); }
         number_of = s.frame.data[0];
     }
     EXPECT_GT(last[1], 50);

@@ -13,7 +13,8 @@ namespace {
 using namespace scocan;
 
 constexpr double left = 150, width = 870, slots_top = 56, slot_height = 46, bars_top = 170, row = 24, bar = 8;
-constexpr const char *ink = "#223344", *sync_colour = "#ffcf99", *private_colour = "#9ec5fe", *shared_colour = "#e4f1e4", *plain_colour = "#d98880";
+constexpr const char *ink = "#223344", *sync_colour = "#ffcf99", *private_colour = "#9ec5fe", *shared_colour = "#e4f1e4",
+                     *plain_colour = "#d98880";
 
 class Picture {
 public:
@@ -22,10 +23,13 @@ public:
     }
 
     std::string draw() {
-        text(16, 24, 14, "start", fmt::format("A cycle of {:g} ms in {} slots of {:g} us at {} bit/s, mode {}", static_cast<double>(t_.cycle) / 1e6, t_.slots,
-                                              static_cast<double>(t_.slot()) / 1e3, t_.bit_rate, t_.mode(plan_.mode)->name), " font-weight=\"bold\"");
+        text(16, 24, 14, "start",
+             fmt::format("A cycle of {:g} ms in {} slots of {:g} us at {} bit/s, mode {}", static_cast<double>(t_.cycle) / 1e6, t_.slots,
+                         static_cast<double>(t_.slot()) / 1e3, t_.bit_rate, t_.mode(plan_.mode)->name),
+             " font-weight=\"bold\"");
         for (std::uint32_t slot = 0; slot < t_.slots; ++slot) draw_slot(slot);
-        text(16, bars_top - 12, 13, "start", "Worst-case latency of each message, ms: with slots (blue, green), on plain CAN (red)", " font-weight=\"bold\"");
+        text(16, bars_top - 12, 13, "start", "Worst-case latency of each message, ms: with slots (blue, green), on plain CAN (red)",
+             " font-weight=\"bold\"");
         double y = bars_top;
         for (const plan::Latency& l : plan_.latencies) bars(l, y), y += row;
         const double height = y + 20;
@@ -38,12 +42,13 @@ public:
 
 private:
     void text(double x, double y, int size, const char* anchor, const std::string& what, const char* more = "") {
-        body_ += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" font-size=\"{}\" text-anchor=\"{}\" fill=\"{}\"{}>{}</text>\n", x, y, size, anchor, ink, more,
-                             xml_escape(what));
+        body_ += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" font-size=\"{}\" text-anchor=\"{}\" fill=\"{}\"{}>{}</text>\n", x, y, size,
+                             anchor, ink, more, xml_escape(what));
     }
     void box(double x, double y, double wide, double high, const char* fill) {
-        body_ += fmt::format("<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" fill=\"{}\" stroke=\"#8899aa\" stroke-width=\"0.5\"/>\n", x, y,
-                             std::max(wide, 1.0), high, fill);
+        body_ += fmt::format(
+            "<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" fill=\"{}\" stroke=\"#8899aa\" stroke-width=\"0.5\"/>\n", x,
+            y, std::max(wide, 1.0), high, fill);
     }
 
     void draw_slot(std::uint32_t slot) {
@@ -72,7 +77,8 @@ private:
         text(left - 8, y + 13, 11, "end", fmt::format("{} {}", id_text(m.id), m.name));
         const auto one = [&](Time worst, double at, const char* fill) {
             if (worst >= 0) box(left, at, wide(worst), bar, fill);
-            text(left + (worst >= 0 ? wide(worst) : 0) + 4, at + bar, 9, "start", worst < 0 ? "unbounded" : fmt::format("{:.3f}", static_cast<double>(worst) / 1e6));
+            text(left + (worst >= 0 ? wide(worst) : 0) + 4, at + bar, 9, "start",
+                 worst < 0 ? "unbounded" : fmt::format("{:.3f}", static_cast<double>(worst) / 1e6));
         };
         one(l.worst, y + 2, l.priv ? private_colour : "#a3d9a5");
         one(l.plain, y + 2 + bar + 1, plain_colour);

@@ -22,24 +22,26 @@ public:
         for (std::uint32_t slot = 1; slot < t_.slots; ++slot) is_shared(slot) ? ++p.shared_slots : ++p.private_slots;
         std::size_t shared = 0;
         for (std::uint32_t slot = 1; slot < t_.slots * cycles_; ++slot) shared += is_shared(slot);
-        p.capacity = static_cast<double>(shared) * static_cast<double>(std::max<Time>(t_.last_start(8), 0)) / static_cast<double>(t_.cycle * cycles_);
+        p.capacity = static_cast<double>(shared) * static_cast<double>(std::max<Time>(t_.last_start(8), 0)) /
+                     static_cast<double>(t_.cycle * cycles_);
         for (std::size_t i = 0; i < t_.messages.size(); ++i) p.latencies.push_back(latency(i, p));
         plain(p);
-        std::stable_sort(p.latencies.begin(), p.latencies.end(), [&](const Latency& a, const Latency& b) { return t_.messages[a.message].id < t_.messages[b.message].id; });
+        std::stable_sort(p.latencies.begin(), p.latencies.end(),
+                         [&](const Latency& a, const Latency& b) { return t_.messages[a.message].id < t_.messages[b.message].id; });
         p.fits = std::all_of(p.latencies.begin(), p.latencies.end(), [](const Latency& l) { return l.in_time; });
         return p;
     }
 
 private:
     const Use* use(std::uint32_t slot) const { return t_.use(mode_.number, slot % t_.slots, slot / t_.slots % counter_cycles); }
-    bool is_shared(std::uint32_t slot) const {
+    bool       is_shared(std::uint32_t slot) const {
         const Use* u = use(slot);
         return slot % t_.slots != 0 && (u == nullptr || u->kind == Kind::shared);
     }
 
     Latency latency(std::size_t index, Plan& p) const {
         const Message& m = t_.messages[index];
-        Latency l;
+        Latency        l;
         l.message = index, l.frame = t_.frame(m.bytes);
         if (t_.owner(mode_.number, m.id) != nullptr) private_latency(m, l, p);
         else shared_latency(m, l, p);
@@ -63,15 +65,16 @@ private:
             l.gap = std::max(l.gap, i + 1 < turns.size() ? turns[i + 1] - turns[i] : turns.front() + t_.cycle * cycles_ - turns[i]);
         l.worst = m.jitter + l.gap * l.turns + t_.guard + l.frame;
         l.jitter = t_.guard;
-        const double every = m.period > 0 ? static_cast<double>(m.period) : static_cast<double>(t_.cycle * cycles_) / static_cast<double>(turns.size()) * l.turns;
+        const double every = m.period > 0 ? static_cast<double>(m.period)
+                                          : static_cast<double>(t_.cycle * cycles_) / static_cast<double>(turns.size()) * l.turns;
         p.private_load += static_cast<double>(l.frame) / every;
     }
 
     void shared_latency(const Message& m, Latency& l, Plan& p) const {
         if (m.period > 0) p.shared_load += static_cast<double>(l.frame) / static_cast<double>(m.period);
         std::vector<const Message*> higher;
-        std::uint32_t longest = m.bytes;
-        double load = static_cast<double>(l.frame) / static_cast<double>(std::max<Time>(m.period, 1));
+        std::uint32_t               longest = m.bytes;
+        double                      load = static_cast<double>(l.frame) / static_cast<double>(std::max<Time>(m.period, 1));
         for (const Message& other : t_.messages) {
             if (&other == &m || t_.owner(mode_.number, other.id) != nullptr || other.period <= 0) continue;
             if (other.id > m.id) continue;
@@ -79,10 +82,12 @@ private:
             longest = std::max(longest, other.bytes);
             load += static_cast<double>(t_.frame(other.bytes)) / static_cast<double>(other.period);
         }
-        const Time usable = t_.last_start(longest);
+        const Time  usable = t_.last_start(longest);
         std::size_t shared = 0;
         for (std::uint32_t slot = 1; slot < t_.slots * cycles_; ++slot) shared += is_shared(slot);
-        if (m.period <= 0 || usable <= 0 || load * static_cast<double>(t_.cycle * cycles_) >= static_cast<double>(shared) * static_cast<double>(usable)) return;
+        if (m.period <= 0 || usable <= 0 ||
+            load * static_cast<double>(t_.cycle * cycles_) >= static_cast<double>(shared) * static_cast<double>(usable))
+            return;
         for (std::uint32_t slot = 0; slot < t_.slots * cycles_; ++slot)
             if (!evaluate(m, higher, slot, usable, l)) return void(l.worst = -1);
         if (l.worst > m.period) l.worst = -1;  // more than one instance would wait
@@ -93,7 +98,7 @@ private:
     /// The message is queued just behind the begin of `slot`: it is offered from the next slot on. Returns false when it never starts.
     bool evaluate(const Message& m, const std::vector<const Message*>& higher, std::uint32_t slot, Time usable, Latency& l) const {
         const can_timing::Bus bus{.bit_rate = t_.bit_rate};
-        Time waited = 0, interference = 0;
+        Time                  waited = 0, interference = 0;
         for (;;) {
             interference = 0;
             for (const Message* other : higher)
@@ -126,7 +131,7 @@ private:
     }
 
     void plain(Plan& p) const {
-        const auto messages = plain_messages(t_, mode_.number);
+        const auto                 messages = plain_messages(t_, mode_.number);
         const can_timing::Analysis a = can_timing::analyse(messages, {.bit_rate = t_.bit_rate});
         p.plain_load = a.load;
         for (Latency& l : p.latencies) {
@@ -136,8 +141,8 @@ private:
         }
     }
 
-    const Table& t_;
-    const Mode& mode_;
+    const Table&  t_;
+    const Mode&   mode_;
     std::uint32_t cycles_ = 1;
 };
 
@@ -159,7 +164,8 @@ std::vector<can_timing::Message> plain_messages(const Table& t, std::uint32_t mo
                 if (const Use* u = t.use(mode, slot % t.slots, slot / t.slots); u != nullptr && u->carries(m.id)) ++turns;
             period = t.cycle * counter_cycles / static_cast<Time>(std::max<std::size_t>(turns, 1));
         }
-        messages.push_back({.id = m.id, .bytes = static_cast<std::uint8_t>(m.bytes), .period = period, .deadline = m.deadline, .jitter = m.jitter});
+        messages.push_back(
+            {.id = m.id, .bytes = static_cast<std::uint8_t>(m.bytes), .period = period, .deadline = m.deadline, .jitter = m.jitter});
     }
     return messages;
 }

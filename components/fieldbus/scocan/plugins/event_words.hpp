@@ -12,15 +12,16 @@ namespace hal::scocan {
 
 /// An event as the cycle records it.
 struct Happened {
-    Event event = Event::running;
+    Event         event = Event::running;
     std::uint32_t who = no_node, id = 0;
-    Time value = 0;
+    Time          value = 0;
 };
 
 class EventWords {
 public:
     /// The table outlives it. `reset`: the command that resumes a silenced node. [setup]
-    EventWords(const Table& table, std::size_t node, std::string reset) : t_(table), own_(table.nodes[node].name), reset_(std::move(reset)) {}
+    EventWords(const Table& table, std::size_t node, std::string reset)
+        : t_(table), own_(table.nodes[node].name), reset_(std::move(reset)) {}
 
     /// Formats the message of an event. [setup]
     std::string operator()(const Happened& h) const {
@@ -28,7 +29,8 @@ public:
         switch (h.event) {
         case Event::running: return "running: synchronised, sends in its slots";
         case Event::sync_lost:
-            return "no SYNC for " + value + " cycles (limit " + std::to_string(t_.lost) + "); sends nothing until the next SYNC; check node " + sync_node();
+            return "no SYNC for " + value + " cycles (limit " + std::to_string(t_.lost) +
+                   "); sends nothing until the next SYNC; check node " + sync_node();
         case Event::sync_late:
             return "SYNC " + microseconds(std::abs(h.value)) + (h.value > 0 ? " late" : " early") +
                    ", ignored; if this repeats, disable automatic retransmission on node " + sync_node();
@@ -38,18 +40,23 @@ public:
         case Event::leading: return "sends the SYNC";
         case Event::standby: return "on standby: another node sends the SYNC";
         case Event::other_table:
-            return "table differs from that of the SYNC node (CRC " + hexadecimal(t_.crc) + ", there " + hexadecimal(static_cast<std::uint32_t>(h.value)) +
-                   "); receives only; give all nodes the same file";
+            return "table differs from that of the SYNC node (CRC " + hexadecimal(t_.crc) + ", there " +
+                   hexadecimal(static_cast<std::uint32_t>(h.value)) + "); receives only; give all nodes the same file";
         case Event::table_agrees: return "table agrees with that of the SYNC node";
         case Event::unknown_mode: return "mode " + value + " of the SYNC is not in the table; receives only";
         case Event::foreign_frame: return foreign(h.id, h.who, value);
-        case Event::babbling: return "babbling node: " + value + " frames outside of their slots in one cycle, the last " + named(h.id) + owner(h.who);
+        case Event::babbling:
+            return "babbling node: " + value + " frames outside of their slots in one cycle, the last " + named(h.id) + owner(h.who);
         case Event::late_frame:
-            return "own frame " + named(h.id) + " started " + microseconds(h.value) + " behind its transmit window; use a faster thread, or a longer idle time";
+            return "own frame " + named(h.id) + " started " + microseconds(h.value) +
+                   " behind its transmit window; use a faster thread, or a longer idle time";
         case Event::silenced: return "silenced: 3 own frames outside of their slots in 1 s; correct the cause, then type: " + reset_;
         case Event::bus_off: return "controller off the bus; sends nothing until it has recovered";
         case Event::bus_on: return "controller on the bus again";
-        case Event::mode_changed: return "mode " + value + " (" + (t_.mode(static_cast<std::uint32_t>(h.value)) != nullptr ? t_.mode(static_cast<std::uint32_t>(h.value))->name : "") + ")";
+        case Event::mode_changed:
+            return "mode " + value + " (" +
+                   (t_.mode(static_cast<std::uint32_t>(h.value)) != nullptr ? t_.mode(static_cast<std::uint32_t>(h.value))->name : "") +
+                   ")";
         case Event::mode_refused: return refused(h);
         case Event::monitor_lost: return "idle slots are not announced any more: monitor lost; nodes of type B do not use idle slots";
         case Event::monitor_found: return "idle slots are announced again";
@@ -81,13 +88,13 @@ private:
     }
     std::string refused(const Happened& h) const {
         const std::string node = h.who < t_.nodes.size() ? t_.nodes[h.who].name : "?";
-        const bool silent = static_cast<Answer::Reason>(h.value) == Answer::Reason::offline;
+        const bool        silent = static_cast<Answer::Reason>(h.value) == Answer::Reason::offline;
         return "mode change to " + std::to_string(h.id) + " cancelled: node " + node +
                (silent ? " did not answer; check that it runs with the same table" : " has no such mode");
     }
     static std::string hexadecimal(std::uint32_t value) { return id_text(value); }
 
-    const Table& t_;
+    const Table&      t_;
     const std::string own_, reset_;
 };
 
@@ -122,9 +129,9 @@ public:
     }
 
 private:
-    std::map<Event, std::string> text_;
+    std::map<Event, std::string>         text_;
     std::map<std::uint32_t, std::string> foreign_;
-    std::string foreign_other_;
+    std::string                          foreign_other_;
 };
 
 }  // namespace hal::scocan

@@ -53,24 +53,27 @@ public:
     }
 
 private:
-    const Field field_;
+    const Field                         field_;
     std::unique_ptr<Pin<std::uint32_t>> u32_;
-    std::unique_ptr<Pin<std::int32_t>> s32_;
-    std::unique_ptr<Pin<double>> real_;
+    std::unique_ptr<Pin<std::int32_t>>  s32_;
+    std::unique_ptr<Pin<double>>        real_;
 };
 
 /// A message that this node sends.
 class SentMessage {
 public:
     SentMessage(hal::Component& c, const hal::Function& f, const hal::Function& receive, const Message& m)
-        : message_(m), send_(c, f, (m.name + ".send").c_str(), m.event ? "rising edge: queues the message" : "the message is sent in its turn", {.initial = !m.event}),
+        : message_(m),
+          send_(c, f, (m.name + ".send").c_str(), m.event ? "rising edge: queues the message" : "the message is sent in its turn",
+                {.initial = !m.event}),
           sent_(c, receive, (m.name + ".sent").c_str(), "frames of this message sent") {
         for (const Field& field : m.fields) fields_.emplace_back(c, f, m.name + "." + field.name, field);
-        if (m.fields.empty() && m.bytes > 0) data_ = std::make_unique<hal::In<std::uint64_t>>(c, f, (m.name + ".data").c_str(), "data, little endian");
+        if (m.fields.empty() && m.bytes > 0)
+            data_ = std::make_unique<hal::In<std::uint64_t>>(c, f, (m.name + ".data").c_str(), "data, little endian");
     }
     std::uint32_t id() const noexcept { return message_.id; }
-    void begin() noexcept { next_ = INT64_MIN, was_sending_ = false; }
-    void sent() noexcept { sent_ = sent_ + 1; }
+    void          begin() noexcept { next_ = INT64_MIN, was_sending_ = false; }
+    void          sent() noexcept { sent_ = sent_ + 1; }
 
     /// Queues the message when it is due. [realtime]
     void transmit(Station& station, Time now) noexcept {
@@ -102,28 +105,30 @@ private:
             for (std::uint32_t i = 0; i < message_.bytes; ++i) f.data[i] = static_cast<std::uint8_t>(data_->get() >> 8 * i);
         return f;
     }
-    const Message& message_;
-    hal::In<bool> send_;
-    hal::Out<std::uint32_t> sent_;
-    std::deque<FieldPin<hal::In>> fields_;
+    const Message&                          message_;
+    hal::In<bool>                           send_;
+    hal::Out<std::uint32_t>                 sent_;
+    std::deque<FieldPin<hal::In>>           fields_;
     std::unique_ptr<hal::In<std::uint64_t>> data_;
-    Time next_ = INT64_MIN;
-    bool was_sending_ = false;
+    Time                                    next_ = INT64_MIN;
+    bool                                    was_sending_ = false;
 };
 
 /// A message of another node.
 class ReceivedMessage {
 public:
     ReceivedMessage(hal::Component& c, const hal::Function& f, const Message& m)
-        : message_(m), fresh_(c, f, (m.name + ".fresh").c_str(), "the message has arrived since the last cycle", {.safe = false}),
+        : message_(m),
+          fresh_(c, f, (m.name + ".fresh").c_str(), "the message has arrived since the last cycle", {.safe = false}),
           received_(c, f, (m.name + ".received").c_str(), "frames of this message received"),
           age_(c, f, (m.name + ".age").c_str(), "time since the message was sent; 0: never received", {.unit = "s"}),
           interval_(c, f, (m.name + ".interval").c_str(), "time between the begins of the last two frames", {.unit = "us"}) {
         for (const Field& field : m.fields) fields_.emplace_back(c, f, m.name + "." + field.name, field);
-        if (m.fields.empty() && m.bytes > 0) data_ = std::make_unique<hal::Out<std::uint64_t>>(c, f, (m.name + ".data").c_str(), "data, little endian");
+        if (m.fields.empty() && m.bytes > 0)
+            data_ = std::make_unique<hal::Out<std::uint64_t>>(c, f, (m.name + ".data").c_str(), "data, little endian");
     }
     std::uint32_t id() const noexcept { return message_.id; }
-    void begin() noexcept { last_ = INT64_MIN, is_fresh_ = false; }
+    void          begin() noexcept { last_ = INT64_MIN, is_fresh_ = false; }
 
     void arrived(const can::Frame& frame, Time begin) noexcept {
         if (frame.length < message_.bytes || frame.remote) return;
@@ -146,14 +151,14 @@ public:
     }
 
 private:
-    const Message& message_;
-    hal::Out<bool> fresh_;
-    hal::Out<std::uint32_t> received_;
-    hal::Out<double> age_, interval_;
-    std::deque<FieldPin<hal::Out>> fields_;
+    const Message&                           message_;
+    hal::Out<bool>                           fresh_;
+    hal::Out<std::uint32_t>                  received_;
+    hal::Out<double>                         age_, interval_;
+    std::deque<FieldPin<hal::Out>>           fields_;
     std::unique_ptr<hal::Out<std::uint64_t>> data_;
-    Time last_ = INT64_MIN;
-    bool is_fresh_ = false;
+    Time                                     last_ = INT64_MIN;
+    bool                                     is_fresh_ = false;
 };
 
 }  // namespace hal::scocan

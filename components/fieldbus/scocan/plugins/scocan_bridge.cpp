@@ -8,15 +8,18 @@ using namespace hal::scocan;
 struct ScocanBridge : StationComponent {
     explicit ScocanBridge(const hal_host* host) : StationComponent(host, "scocan-bridge.0", {Role::bridge}) {}
 
-    hal::TextArgument pc{*this, "pc", "", "bus of the ordinary CAN participant: udp:239.74.163.2:43113, sim:NAME or can:can1", {.per_instance = true}};
+    hal::TextArgument pc{
+        *this, "pc", "", "bus of the ordinary CAN participant: udp:239.74.163.2:43113, sim:NAME or can:can1", {.per_instance = true}};
 
     hal::Out<std::uint64_t> to_pc{*this, receive_, "to-pc", "frames forwarded from the bus"};
     hal::Out<std::uint64_t> from_pc{*this, transmit_, "from-pc", "frames of the participant that were queued for a slot"};
-    hal::Out<std::uint64_t> rejected{*this, transmit_, "rejected",
-                                     "frames of the participant dropped: identifier of another node or reserved, queue full, or not a classic base frame"};
+    hal::Out<std::uint64_t> rejected{
+        *this, transmit_, "rejected",
+        "frames of the participant dropped: identifier of another node or reserved, queue full, or not a classic base frame"};
 
     void start() {
-        if (pc.get().empty()) throw hal::ArgumentError("pc", "missing pc=; write the bus of the ordinary participant: pc=udp:239.74.163.2:43113");
+        if (pc.get().empty())
+            throw hal::ArgumentError("pc", "missing pc=; write the bus of the ordinary participant: pc=udp:239.74.163.2:43113");
         if (pc.get() == arguments_.link.get()) throw hal::ArgumentError("pc", "pc= and link= are the same bus; name two different ones");
         auto opened = hal::can::open(pc.get(), {.stamps = hal::can::describe(pc.get()).has_stamps});
         if (!opened) throw std::runtime_error(opened.problem);
@@ -50,7 +53,7 @@ private:
 
     std::unique_ptr<hal::can::Link> pc_;
     std::array<hal::can::Frame, 32> buffer_;
-    std::uint64_t to_pc_ = 0, from_pc_ = 0, rejected_ = 0;
+    std::uint64_t                   to_pc_ = 0, from_pc_ = 0, rejected_ = 0;
 };
 
 }  // namespace
@@ -63,6 +66,6 @@ slot that the table gives their identifier, only the newest of each, or else in 
     addf scocan-bridge.0.receive bus
     addf scocan-bridge.0.transmit bus
 
-A message of the bridge in the table has pins as in any node; set its `send` to false where only the participant sends it.
+The messages of the bridge in the table are those of the participant and have no pins.
 Frames with an identifier of another node are dropped and counted in `rejected`. Otherwise the node is one like any other, see `hal doc scocan`.
 )")

@@ -10,7 +10,7 @@ struct ScocanMonitor : StationComponent {
 
     hal::Out<std::uint64_t> idle{*this, receive_, "idle", "private slots whose owner sent nothing"};
     hal::Out<std::uint64_t> announced{*this, receive_, "announced", "idle slots announced to nodes of type B"};
-    hal::Out<double> load{*this, receive_, "load", "share of the time in which the bus is busy, 0..1"};
+    hal::Out<double>        load{*this, receive_, "load", "share of the time in which the bus is busy, 0..1"};
 
 private:
     void received() noexcept override {

@@ -8,9 +8,9 @@ using namespace hal::scocan;
 struct ScocanSync : StationComponent {
     explicit ScocanSync(const hal_host* host) : StationComponent(host, "scocan-sync.0", {Role::sync, Role::backup}) {}
 
-    hal::In<std::uint32_t> mode_command{*this, transmit_, "mode-command", "a new value asks all nodes to change to this mode"};
-    hal::Out<bool> leading{*this, receive_, "leading", "this node sends the SYNC", {.safe = false}};
-    hal::Out<bool> changing{*this, receive_, "changing", "a mode change is being prepared"};
+    hal::In<std::uint32_t>  mode_command{*this, transmit_, "mode-command", "a new value asks all nodes to change to this mode"};
+    hal::Out<bool>          leading{*this, receive_, "leading", "this node sends the SYNC", {.safe = false}};
+    hal::Out<bool>          changing{*this, receive_, "changing", "a mode change is being prepared"};
     hal::Out<std::uint32_t> refused{*this, receive_, "changes-refused", "mode changes that were cancelled"};
 
 private:
@@ -25,7 +25,8 @@ private:
         if (station_->changing() || (station_->state() == State::listening)) return;  // asks when that is over
         commanded_ = wanted;
         if (station_->leading() && wanted != station_->mode() && !station_->change_mode(wanted))
-            on_event(Event::mode_refused, static_cast<std::uint32_t>(station_->node()), wanted, static_cast<Time>(Answer::Reason::unknown_mode));
+            on_event(Event::mode_refused, static_cast<std::uint32_t>(station_->node()), wanted,
+                     static_cast<Time>(Answer::Reason::unknown_mode));
     }
     void on_event(Event e, std::uint32_t who, std::uint32_t id, Time value) noexcept override {
         if (e == Event::mode_refused) ++refusals_;

@@ -31,10 +31,13 @@ public:
         words_.emplace(t, arguments_.own, "setp " + name_ + ".reset TRUE");
         faults_text_.emplace(t, *words_);
         station_ = std::make_unique<Station>(t, arguments_.own, arguments_.options(), static_cast<Sink&>(*this));
-        reporter_ = std::make_unique<hal::Reporter<Happened>>(name_, [this](const Happened& h) { return (*words_)(h); }, 256, &EventWords::subject);
+        reporter_ =
+            std::make_unique<hal::Reporter<Happened>>(name_, [this](const Happened& h) { return (*words_)(h); }, 256, &EventWords::subject);
         for (const Message& m : t.messages) {
-            if (m.node == arguments_.own) sent_.emplace_back(*this, transmit_, receive_, m);
-            else if (arguments_.wants(m)) received_.emplace_back(*this, receive_, m);
+            const bool is_own = m.node == arguments_.own;
+            if (is_own && t.nodes[m.node].role != Role::bridge)
+                sent_.emplace_back(*this, transmit_, receive_, m);  // a bridge sends the participant's
+            else if (!is_own && arguments_.wants(m)) received_.emplace_back(*this, receive_, m);
         }
     }
 
@@ -42,7 +45,7 @@ public:
         if (!arguments_.loaded) throw std::runtime_error("missing table: write link=sim:NAME config=FILE.scocan node=NAME");
         faults_ = hal::extension<hal_faults>("hal.faults/1");
         const can::Description bus = can::describe(arguments_.link.get());
-        can::Options options{.own_frames = true, .stamps = bus.has_stamps};
+        can::Options           options{.own_frames = true, .stamps = bus.has_stamps};
         if (bus.in_memory && bus.has_bit_rate) options.bit_rate = arguments_.table.bit_rate;
         auto opened = can::open(arguments_.link.get(), options);
         if (!opened) throw std::runtime_error(opened.problem);
@@ -135,7 +138,8 @@ protected:
         if (last != std::numeric_limits<Time>::min() && now_ - last < 1'000'000'000) return;  // one a second of each kind
         last = now_;
         const bool counts = std::strstr(text, "{}") != nullptr;
-        if (faults_ != nullptr) faults_->raise(faults_, this, text, counts ? static_cast<double>(value) : std::numeric_limits<double>::quiet_NaN());
+        if (faults_ != nullptr)
+            faults_->raise(faults_, this, text, counts ? static_cast<double>(value) : std::numeric_limits<double>::quiet_NaN());
     }
 
     /// Synchronises the threads of this process: their cycles begin with slots. [realtime]
@@ -151,25 +155,25 @@ protected:
     }
 
     const std::string name_;
-    TableArguments arguments_{*this};
-    hal::Function receive_{*this, "receive", &StationComponent::receive, "receives frames and follows the SYNC; first in the thread"};
+    TableArguments    arguments_{*this};
+    hal::Function     receive_{*this, "receive", &StationComponent::receive, "receives frames and follows the SYNC; first in the thread"};
     hal::Function transmit_{*this, "transmit", &StationComponent::transmit, "sends in the slots until the next cycle; last in the thread"};
-    StationPins pins_{*this, receive_};
-    std::deque<SentMessage> sent_;
-    std::deque<ReceivedMessage> received_;
-    std::optional<EventWords> words_;
-    std::optional<FaultWords> faults_text_;
-    std::unique_ptr<Station> station_;
+    StationPins   pins_{*this, receive_};
+    std::deque<SentMessage>                  sent_;
+    std::deque<ReceivedMessage>              received_;
+    std::optional<EventWords>                words_;
+    std::optional<FaultWords>                faults_text_;
+    std::unique_ptr<Station>                 station_;
     std::unique_ptr<hal::Reporter<Happened>> reporter_;  // behind the words that its thread uses
-    std::shared_ptr<can::SlotExchange> exchange_;
-    std::unique_ptr<can::Link> link_;
-    hal::DisciplinedClock clock_;
-    hal::Discipline discipline_;
-    const hal_faults* faults_ = nullptr;
-    std::array<Time, 32> raised_{};
-    std::uint64_t followed_ = 0;
-    Time now_ = 0;
-    bool was_reset_ = false;
+    std::shared_ptr<can::SlotExchange>       exchange_;
+    std::unique_ptr<can::Link>               link_;
+    hal::DisciplinedClock                    clock_;
+    hal::Discipline                          discipline_;
+    const hal_faults*                        faults_ = nullptr;
+    std::array<Time, 32>                     raised_{};
+    std::uint64_t                            followed_ = 0;
+    Time                                     now_ = 0;
+    bool                                     was_reset_ = false;
 };
 
 }  // namespace hal::scocan

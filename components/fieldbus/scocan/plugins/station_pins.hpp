@@ -10,16 +10,16 @@ namespace hal::scocan {
 struct StationPins {
     StationPins(hal::Component& component, const hal::Function& function) : c(component), f(function) {}
 
-    hal::Component& c;
-    const hal::Function& f;
-    hal::In<bool> reset{c, f, "reset", "rising edge: a silenced node sends again; acknowledges fault"};
-    hal::Out<std::int32_t> state{c, f, "state", "0 listening, 1 running, 2 silent, 3 listen-only, 4 silenced, 5 down"};
-    hal::Out<bool> running{c, f, "running", "the node sends in its slots", {.safe = false}};
-    hal::Out<bool> fault{c, f, "fault", "fault, see show fault; cleared by recovery or by reset"};
+    hal::Component&         c;
+    const hal::Function&    f;
+    hal::In<bool>           reset{c, f, "reset", "rising edge: a silenced node sends again; acknowledges fault"};
+    hal::Out<std::int32_t>  state{c, f, "state", "0 listening, 1 running, 2 silent, 3 listen-only, 4 silenced, 5 down"};
+    hal::Out<bool>          running{c, f, "running", "the node sends in its slots", {.safe = false}};
+    hal::Out<bool>          fault{c, f, "fault", "fault, see show fault; cleared by recovery or by reset"};
     hal::Out<std::uint32_t> mode{c, f, "mode", "mode of the table in use"};
     hal::Out<std::uint32_t> cycle{c, f, "cycle", "counter of the cycle, modulo 64, equal in all nodes"};
-    hal::Out<double> error{c, f, "error", "arrival of the last SYNC against its prediction", {.unit = "us"}};
-    hal::Out<double> drift{c, f, "drift", "rate of this node's clock against that of the SYNC node", {.unit = "ppm"}};
+    hal::Out<double>        error{c, f, "error", "arrival of the last SYNC against its prediction", {.unit = "us"}};
+    hal::Out<double>        drift{c, f, "drift", "rate of this node's clock against that of the SYNC node", {.unit = "ppm"}};
     hal::Out<std::uint64_t> syncs{c, f, "syncs", "SYNCs received or sent"};
     hal::Out<std::uint64_t> syncs_lost{c, f, "syncs-lost", "cycles without a SYNC"};
     hal::Out<std::uint64_t> syncs_ignored{c, f, "syncs-ignored", "SYNCs ignored: late, doubled or invalid"};

@@ -10,8 +10,8 @@ namespace hal::scocan {
 
 struct Crystal {
     double ppm = 0;
-    Time tick = 0;   ///< of received stamps, ns; 0: exact
-    Time epoch = 0;  ///< bus time at which both clocks agree
+    Time   tick = 0;   ///< of received stamps, ns; 0: exact
+    Time   epoch = 0;  ///< bus time at which both clocks agree
 
     Time local(Time bus) const noexcept { return ppm == 0 ? bus : bus + std::llround(static_cast<double>(bus - epoch) * ppm * 1e-6); }
     Time bus(Time local) const noexcept {

@@ -7,8 +7,8 @@
 namespace hal::scocan {
 
 namespace {
-constexpr double a = 0.3, b = 0.03;
-constexpr double largest_drift = 1e-3;  // 1000 ppm: no crystal
+constexpr double        a = 0.3, b = 0.03;
+constexpr double        largest_drift = 1e-3;  // 1000 ppm: no crystal
 constexpr std::uint32_t settling = 8;   // SYNCs until deviations are known
 }  // namespace
 

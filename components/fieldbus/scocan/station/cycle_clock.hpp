@@ -17,7 +17,7 @@ public:
 
     enum class Taken : std::uint8_t { first, good, rejected, duplicate, jumped };
 
-    void clear() noexcept;                    ///< Discards the estimate. [realtime]
+    void clear() noexcept;  ///< Discards the estimate. [realtime]
     /// Begins a cycle of the nominal period at `begin`, without a SYNC of others. [realtime]
     void lead(Time begin) noexcept;
     /// Uses the stamp of a SYNC: the begin of its cycle. [realtime]
@@ -27,27 +27,27 @@ public:
     /// Begins the cycles whose SYNC is `wait` overdue at `now`. Returns how many. [realtime]
     std::uint32_t pass(Time now, Time wait) noexcept;
 
-    bool known() const noexcept { return taken_ >= 2; }
-    bool heard() const noexcept { return taken_ >= 1; }       ///< a first SYNC has arrived: start()
-    std::uint32_t lost() const noexcept { return lost_; }     ///< SYNCs lost in a row
-    bool seen() const noexcept { return seen_; }              ///< the SYNC of the current cycle has arrived
-    std::uint64_t cycle() const noexcept { return cycle_; }   ///< cycles begun so far
+    bool          known() const noexcept { return taken_ >= 2; }
+    bool          heard() const noexcept { return taken_ >= 1; }  ///< a first SYNC has arrived: start()
+    std::uint32_t lost() const noexcept { return lost_; }  ///< SYNCs lost in a row
+    bool          seen() const noexcept { return seen_; }  ///< the SYNC of the current cycle has arrived
+    std::uint64_t cycle() const noexcept { return cycle_; }  ///< cycles begun so far
     /// Returns the time `offset` (nominal ns) behind the begin of cycle `cycle`. [realtime]
-    Time at(std::uint64_t cycle, Time offset) const noexcept;
-    Time start() const noexcept { return at(cycle_, 0); }
-    double period() const noexcept { return period_; }        ///< ns of this node's clock
-    double error() const noexcept { return error_; }          ///< of the last SYNC, ns
-    double sigma() const noexcept;                            ///< rms of the errors, ns
+    Time   at(std::uint64_t cycle, Time offset) const noexcept;
+    Time   start() const noexcept { return at(cycle_, 0); }
+    double period() const noexcept { return period_; }  ///< ns of this node's clock
+    double error() const noexcept { return error_; }  ///< of the last SYNC, ns
+    double sigma() const noexcept;  ///< rms of the errors, ns
     double ppm() const noexcept { return (period_ / nominal_ - 1) * 1e6; }  ///< rate of this clock against that of the SYNC's sender
 
 private:
     void advance(std::uint32_t cycles) noexcept;
 
-    const double nominal_, floor_;
-    Time epoch_ = 0;            // p_ counts from here, so that it keeps fractions of a nanosecond
-    double p_ = 0, period_ = 0, error_ = 0, square_ = 0;
+    const double  nominal_, floor_;
+    Time          epoch_ = 0;  // p_ counts from here, so that it keeps fractions of a nanosecond
+    double        p_ = 0, period_ = 0, error_ = 0, square_ = 0;
     std::uint32_t taken_ = 0, lost_ = 0, rejected_ = 0;
-    bool seen_ = false;
+    bool          seen_ = false;
     std::uint64_t cycle_ = 0;
 };
 

@@ -14,7 +14,7 @@ bool SendQueue::push(const can::Frame& frame, std::uint32_t slot, bool priv, boo
             return true;
         }
     if (size_ == capacity) return false;
-    const auto rank = can::arbitration_rank(frame);
+    const auto  rank = can::arbitration_rank(frame);
     std::size_t at = size_++;
     for (; at > 0 && can::arbitration_rank(entries_[at - 1].frame) > rank; --at) entries_[at] = entries_[at - 1];
     entries_[at] = {frame, slot, priv, state, false, 0, 0};

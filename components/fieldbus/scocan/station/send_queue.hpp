@@ -16,13 +16,13 @@ class SendQueue {
 public:
     static constexpr std::size_t capacity = 128;
     struct Entry {
-        can::Frame frame;
+        can::Frame    frame;
         std::uint32_t slot = no_slot;  ///< requested private slot
-        bool priv = false;             ///< leaves in private slots only
-        bool state = false;            ///< a value: a newer one replaces it
-        bool in_flight = false;
-        Time until = 0;                ///< in flight: when its slot has ended
-        Time due = 0;                  ///< in flight: begin of its window
+        bool          priv = false;             ///< leaves in private slots only
+        bool          state = false;            ///< a value: a newer one replaces it
+        bool          in_flight = false;
+        Time          until = 0;                ///< in flight: when its slot has ended
+        Time          due = 0;                  ///< in flight: begin of its window
     };
 
     /// Queues a frame behind those of the same priority. Returns false when full. [realtime]
@@ -40,14 +40,14 @@ public:
     bool confirm(const can::Frame&, Entry& sent) noexcept;
     /// Ends the flight of frames whose slot is over: they wait again. Returns how many private ones missed theirs. [realtime]
     std::uint32_t expire(Time now) noexcept;
-    void clear() noexcept { size_ = 0; }  ///< [realtime]
-    std::size_t size() const noexcept { return size_; }
-    bool flying() const noexcept;  ///< Returns true while a frame is in flight. [realtime]
+    void          clear() noexcept { size_ = 0; }  ///< [realtime]
+    std::size_t   size() const noexcept { return size_; }
+    bool          flying() const noexcept;  ///< Returns true while a frame is in flight. [realtime]
 
 private:
-    void remove(std::size_t index) noexcept;
+    void                        remove(std::size_t index) noexcept;
     std::array<Entry, capacity> entries_;
-    std::size_t size_ = 0;
+    std::size_t                 size_ = 0;
 };
 
 }  // namespace hal::scocan

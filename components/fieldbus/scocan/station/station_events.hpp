@@ -65,8 +65,8 @@ public:
 };
 
 struct StationOptions {
-    bool single_shot = true;  ///< false: a controller that repeats disturbed frames in private slots
-    bool windows = true;      ///< use the transmit windows of the controller, where it has them
+    bool    single_shot = true;  ///< false: a controller that repeats disturbed frames in private slots
+    bool    windows = true;      ///< use the transmit windows of the controller, where it has them
     Crystal crystal{};        ///< of a simulated node
 };
 

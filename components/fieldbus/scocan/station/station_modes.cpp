@@ -7,14 +7,15 @@ namespace hal::scocan {
 namespace {
 /// Cycles from the request to the switch, and those in which the SYNCs announce it. The answers use shared slots.
 constexpr std::uint32_t change_cycles = 16, pending_cycles = 4;
-}
+}  // namespace
 
 bool Station::change_mode(std::uint32_t mode) noexcept {
     if (!leading_ || change_.active || !table_.has_mode(mode) || mode == mode_) return false;
     change_ = {};
     change_.active = true, change_.mode = mode, change_.at = clock_.cycle() + change_cycles;
     change_.ready[node_] = true;
-    queue_.push(encode(Request{Request::What::prepare, static_cast<std::uint8_t>(mode), table_.crc, static_cast<std::uint8_t>(counter_of(change_.at))}),
+    queue_.push(encode(Request{Request::What::prepare, static_cast<std::uint8_t>(mode), table_.crc,
+                               static_cast<std::uint8_t>(counter_of(change_.at))}),
                 no_slot, false, false);
     return true;
 }

@@ -13,8 +13,15 @@ const char* to_string(State state) noexcept {
 }
 
 Station::Station(const Table& table, std::size_t node, const StationOptions& options, Sink& sink)
-    : table_(table), node_(node), role_(table.nodes[node].role), backup_(table.nodes[node].backup), senses_(table.nodes[node].senses),
-      single_shot_(options.single_shot), wants_windows_(options.windows), sink_(sink), crystal_(options.crystal),
+    : table_(table),
+      node_(node),
+      role_(table.nodes[node].role),
+      backup_(table.nodes[node].backup),
+      senses_(table.nodes[node].senses),
+      single_shot_(options.single_shot),
+      wants_windows_(options.windows),
+      sink_(sink),
+      crystal_(options.crystal),
       clock_(table.cycle, table.bits(4) + options.crystal.tick) {}
 
 void Station::attach(can::Link& link) noexcept {
@@ -60,7 +67,8 @@ void Station::receive(Time now) noexcept {
 void Station::arrived(const can::Frame& frame) noexcept {
     if (frame.error || frame.extended || frame.fd) return;
     const Time length = timed_ ? can::duration_ns({can::frame_bits(frame).nominal - can::intermission_bits, 0}, table_.bit_rate) : 0;
-    const Time bus_begin = frame.time_ns - length, begin = crystal_.stamp(frame.time_ns) - (crystal_.local(frame.time_ns) - crystal_.local(bus_begin));
+    const Time bus_begin = frame.time_ns - length,
+               begin = crystal_.stamp(frame.time_ns) - (crystal_.local(frame.time_ns) - crystal_.local(bus_begin));
     last_begin_ = std::max(last_begin_, begin);
     if (frame.id == sync_id) return sync(frame, begin);
     const Where w = where(begin);
@@ -87,18 +95,14 @@ void Station::sync(const can::Frame& frame, Time begin) noexcept {
     if (!decode(frame, s)) return void(++count_.syncs_ignored);
     if (is_sync_node()) other_sync(s);
     if (leading_) return;
-    const Time stamp = begin - table_.sync_offset(s.sender);
+    const Time          stamp = begin - table_.sync_offset(s.sender);
     const std::uint64_t before = clock_.cycle();
-    const bool was_known = clock_.known();
+    const bool          was_known = clock_.known();
     switch (clock_.take(stamp)) {
     case CycleClock::Taken::first: numbered_ = false; break;
     case CycleClock::Taken::good: break;
-    case CycleClock::Taken::rejected:
-        ++count_.syncs_ignored;
-        return raise(Event::sync_late, no_node, 0, std::llround(clock_.error()));
-    case CycleClock::Taken::duplicate:
-        ++count_.syncs_ignored;
-        return raise(Event::sync_doubled);
+    case CycleClock::Taken::rejected: ++count_.syncs_ignored; return raise(Event::sync_late, no_node, 0, std::llround(clock_.error()));
+    case CycleClock::Taken::duplicate: ++count_.syncs_ignored; return raise(Event::sync_doubled);
     case CycleClock::Taken::jumped: raise(Event::sync_jumped); break;
     }
     ++count_.syncs;
@@ -131,8 +135,8 @@ void Station::echo(const can::Frame& frame, const Where& w, Time bus_begin) noex
     }
     if (w.known) seen_[w.slot] = true;
     SendQueue::Entry sent;
-    const bool known = queue_.confirm(frame, sent);
-    const Use* use = w.known ? table_.use(mode_of(w.cycle), w.slot, w.counter) : nullptr;
+    const bool       known = queue_.confirm(frame, sent);
+    const Use*       use = w.known ? table_.use(mode_of(w.cycle), w.slot, w.counter) : nullptr;
     if (use == nullptr || use->kind == Kind::shared) ++count_.sent_shared;
     else if (use->kind == Kind::priv && use->node == node_) ++count_.sent_private;
     else ++count_.sent_recycled;
@@ -155,7 +159,7 @@ void Station::echo(const can::Frame& frame, const Where& w, Time bus_begin) noex
 Station::Where Station::where(Time local) const noexcept {
     Where w;
     if (!clock_.known()) return w;
-    const Time slack = table_.guard / 2;
+    const Time   slack = table_.guard / 2;
     const double behind = static_cast<double>(local - clock_.start() + slack) / clock_.period();
     const double cycles = std::floor(behind);
     if (cycles < -4 || cycles > 1e6) return w;
@@ -171,7 +175,7 @@ Station::Where Station::where(Time local) const noexcept {
 /// Derives the state from what is known by now.
 void Station::judge(Time now) noexcept {
     const can::State controller = link_->state();
-    const bool down = controller == can::State::bus_off || controller == can::State::down;
+    const bool       down = controller == can::State::bus_off || controller == can::State::down;
     if (down != was_down_) {
         was_down_ = down;
         raise(down ? Event::bus_off : Event::bus_on);
@@ -182,8 +186,12 @@ void Station::judge(Time now) noexcept {
     if (silent && !was_silent_) ++count_.losses, raise(Event::sync_lost, no_node, 0, clock_.lost());
     was_silent_ = silent;
     const State before = state_;
-    state_ = down ? State::down : silenced_ ? State::silenced : listen_only_ || mode_unknown_ ? State::listen_only
-             : !clock_.known() ? State::listening : silent ? State::silent : State::running;
+    state_ = down                            ? State::down
+             : silenced_                     ? State::silenced
+             : listen_only_ || mode_unknown_ ? State::listen_only
+             : !clock_.known()               ? State::listening
+             : silent                        ? State::silent
+                                             : State::running;
     if (state_ == State::running && before != State::running) raise(Event::running);
 }
 

@@ -101,8 +101,6 @@ void Station::other_sync(const Sync& s) noexcept {
 }
 
 /// Sends the CRC of the table to all nodes.
-void Station::announce_table() noexcept {
-    queue_.push(encode(Request{Request::What::table, 0, table_.crc, 0}), no_slot, false, true);
-}
+void Station::announce_table() noexcept { queue_.push(encode(Request{Request::What::table, 0, table_.crc, 0}), no_slot, false, true); }
 
 }  // namespace hal::scocan

@@ -7,9 +7,10 @@
 namespace hal::scocan {
 
 can::Sent Station::send(const can::Frame& frame, bool state, std::uint32_t slot) noexcept {
-    if (frame.extended || frame.fd || !frame.valid() || frame.id < 0x10 || table_.last_start(frame.length) < 0) return ++count_.dropped, can::Sent::rejected;
+    if (frame.extended || frame.fd || !frame.valid() || frame.id < 0x10 || table_.last_start(frame.length) < 0)
+        return ++count_.dropped, can::Sent::rejected;
     const Use* owner = table_.owner(mode_, frame.id);
-    bool priv = owner != nullptr;
+    bool       priv = owner != nullptr;
     if (owner != nullptr && owner->node != node_) return ++count_.dropped, can::Sent::rejected;
     if (slot != no_slot) {
         const Use* use = slot < table_.slots ? table_.use(mode_, slot, counter_) : nullptr;
@@ -54,14 +55,12 @@ bool Station::may_send(std::uint64_t cycle) const noexcept {
     return clock_.cycle() >= armed_.at && clock_.seen();  // whether the mode changes is known from the SYNC of that cycle
 }
 
-std::uint32_t Station::mode_of(std::uint64_t cycle) const noexcept {
-    return armed_.confirmed && cycle >= armed_.at ? armed_.mode : mode_;
-}
+std::uint32_t Station::mode_of(std::uint64_t cycle) const noexcept { return armed_.confirmed && cycle >= armed_.at ? armed_.mode : mode_; }
 
 SendQueue::Entry* Station::next_private(const Use& use, std::uint32_t slot) noexcept {
     const auto fits = [&](const SendQueue::Entry& e) { return e.priv && (e.slot == no_slot || e.slot == slot) && use.carries(e.frame.id); };
     for (std::size_t k = 1; k <= use.ids.size(); ++k) {  // identifiers that share a slot take turns
-        const auto index = (last_index_[slot] + k) % use.ids.size();
+        const auto        index = (last_index_[slot] + k) % use.ids.size();
         SendQueue::Entry* e = queue_.next([&](const SendQueue::Entry& one) { return one.frame.id == use.ids[index] && fits(one); });
         if (e == nullptr) continue;
         last_index_[slot] = static_cast<std::uint8_t>(index);
@@ -93,18 +92,19 @@ void Station::plan(std::uint64_t cycle, std::uint32_t slot) noexcept {
         emit(announcement(slot), {at, at + table_.guard - table_.bits(1), idle_from, idle_until, true});
         return;
     }
-    if (senses_) plan_shared(cycle, slot, {.not_before_ns = begin + table_.idle + table_.guard, .idle_from_ns = idle_from, .idle_until_ns = idle_until});
+    if (senses_)
+        plan_shared(cycle, slot,
+                    {.not_before_ns = begin + table_.idle + table_.guard, .idle_from_ns = idle_from, .idle_until_ns = idle_until});
 }
 
 /// Hands over the shared frames that may fit into a slot, from the begin of the window on. The controller discards those that do not start
 /// in time; they wait for the next slot.
 void Station::plan_shared(std::uint64_t cycle, std::uint32_t slot, const can::Window& window) noexcept {
     const Time begin = begin_of(cycle, slot);
-    Time from = window.not_before_ns;
+    Time       from = window.not_before_ns;
     for (;;) {
-        SendQueue::Entry* e = queue_.next([&](const SendQueue::Entry& entry) {
-            return !entry.priv && from <= begin + table_.last_start(entry.frame.length);
-        });
+        SendQueue::Entry* e = queue_.next(
+            [&](const SendQueue::Entry& entry) { return !entry.priv && from <= begin + table_.last_start(entry.frame.length); });
         if (e == nullptr) return;
         can::Window w = window;
         w.last_start_ns = begin + table_.last_start(e->frame.length);
@@ -134,18 +134,20 @@ void Station::start_now(Time now) noexcept {
     if (!may_send(w.cycle) || queue_.flying()) return;
     const Use* use = table_.use(mode_of(w.cycle), w.slot, w.counter);
     if (!numbered_ && (use == nullptr || use->every > 1)) return;
-    const bool is_shared = use == nullptr || use->kind == Kind::shared;
-    const bool used = used_cycle_ == w.cycle && used_slot_ == w.slot;
+    const bool        is_shared = use == nullptr || use->kind == Kind::shared;
+    const bool        used = used_cycle_ == w.cycle && used_slot_ == w.slot;
     SendQueue::Entry* e = nullptr;
-    bool in_own_window = false;
-    if (!is_shared && use->node == node_ && !used && w.offset <= table_.enabled()) e = next_private(*use, w.slot), in_own_window = e != nullptr;
+    bool              in_own_window = false;
+    if (!is_shared && use->node == node_ && !used && w.offset <= table_.enabled())
+        e = next_private(*use, w.slot), in_own_window = e != nullptr;
     const bool was_idle = last_begin_ < begin_of(w.cycle, w.slot) - table_.guard;
     if (!is_shared && role_ == Role::monitor && !used && was_idle && w.offset >= table_.idle) {
         used_cycle_ = w.cycle, used_slot_ = w.slot;
         emit(announcement(w.slot), {});
         return;
     }
-    const bool recycles = senses_ ? was_idle && w.offset >= table_.idle + table_.guard : announced_cycle_ == w.cycle && announced_slot_ == w.slot;
+    const bool recycles =
+        senses_ ? was_idle && w.offset >= table_.idle + table_.guard : announced_cycle_ == w.cycle && announced_slot_ == w.slot;
     if (e == nullptr && (is_shared || used || recycles))
         e = queue_.next([&](const SendQueue::Entry& entry) { return !entry.priv && w.offset <= table_.last_start(entry.frame.length); });
     if (e == nullptr || (used && in_own_window)) return;

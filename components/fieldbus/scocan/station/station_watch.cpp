@@ -7,7 +7,7 @@ namespace hal::scocan {
 namespace {
 constexpr std::uint32_t babbling_frames = 5;     // outside of their slots in one cycle
 constexpr std::uint32_t most_offences = 3;       // in a second, until a node silences itself
-constexpr Time offence_window = 1'000'000'000;
+constexpr Time          offence_window = 1'000'000'000;
 constexpr std::uint32_t monitor_cycles = 10;     // without announcements until the monitor counts as lost
 }  // namespace
 
@@ -20,8 +20,8 @@ std::uint32_t Station::owner_of(std::uint32_t id) const noexcept {
 bool Station::is_foreign(const can::Frame& frame, const Where& w) const noexcept {
     if (w.slot == 0) return true;
     const std::uint32_t mode = mode_of(w.cycle);
-    const Use* use = table_.use(mode, w.slot, w.counter);
-    const Use* owner = table_.owner(mode, frame.id);
+    const Use*          use = table_.use(mode, w.slot, w.counter);
+    const Use*          owner = table_.owner(mode, frame.id);
     if (use != nullptr && use->kind == Kind::priv) {
         if (use->carries(frame.id) && (owner == nullptr || owner->node == use->node)) return false;
         if (frame.id == announce_id) return false;
@@ -63,8 +63,8 @@ void Station::close_cycle() noexcept {
     if (babbles && !babbled_) raise(Event::babbling, owner_of(foreign_id_), foreign_id_, foreign_in_cycle_);
     babbled_ = babbles;
     foreign_in_cycle_ = 0;
-    std::uint32_t unannounced = 0;
-    const Mode* mode = table_.mode(mode_);
+    std::uint32_t       unannounced = 0;
+    const Mode*         mode = table_.mode(mode_);
     const std::uint32_t counter = (counter_ + counter_cycles - 1) % counter_cycles;
     for (std::uint32_t slot = 0; mode != nullptr && slot < table_.slots; ++slot) {
         const Use* use = table_.use(mode_, slot, counter);

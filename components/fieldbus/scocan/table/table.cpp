@@ -98,9 +98,9 @@ std::string id_text(std::uint32_t id) {
 }
 
 std::string normalised(const Table& t) {
-    const auto ns = [](Time time) { return std::to_string(time) + "ns"; };
-    std::string text = "bitrate " + std::to_string(t.bit_rate) + "\ncycle " + ns(t.cycle) + "\nslots " + std::to_string(t.slots) + "\nguard " +
-                       ns(t.guard) + "\nidle " + ns(t.idle) + "\nlost " + std::to_string(t.lost) + "\n";
+    const auto  ns = [](Time time) { return std::to_string(time) + "ns"; };
+    std::string text = "bitrate " + std::to_string(t.bit_rate) + "\ncycle " + ns(t.cycle) + "\nslots " + std::to_string(t.slots) +
+                       "\nguard " + ns(t.guard) + "\nidle " + ns(t.idle) + "\nlost " + std::to_string(t.lost) + "\n";
     for (const Node& n : t.nodes) {
         text += "node " + n.name + (n.senses ? " A" : " B");
         if (n.role != Role::node) text += std::string(" ") + to_string(n.role);

@@ -27,7 +27,7 @@ enum class Topic : std::uint8_t {
 const char* code_of(Topic);  ///< "scocan-line", …: the diagnostic's code
 
 inline constexpr std::uint32_t sync_id = 0, announce_id = 1, request_id = 0x780, answer_id = 0x781;
-inline constexpr std::size_t most_nodes = 126, most_slots = 256, most_modes = 16, counter_cycles = 64;
+inline constexpr std::size_t   most_nodes = 126, most_slots = 256, most_modes = 16, counter_cycles = 64;
 /// An error flag with its delimiter: bits that the bus is busy after a disturbed frame.
 inline constexpr std::uint32_t error_bits = 20;
 /// Longest SYNC: DLC 2 with all stuff bits and the intermission.
@@ -37,12 +37,12 @@ enum class Role : std::uint8_t { node, sync, backup, monitor, bridge };
 const char* to_string(Role);
 
 struct Node {
-    std::string name;
-    bool senses = true;    ///< type A: detects an idle slot itself; type B waits for the announcement
-    Role role = Role::node;
+    std::string   name;
+    bool          senses = true;    ///< type A: detects an idle slot itself; type B waits for the announcement
+    Role          role = Role::node;
     std::uint32_t backup = 0;  ///< of a backup: 1, 2 …
-    Span at{};
-    friend bool operator==(const Node&, const Node&) = default;
+    Span          at{};
+    friend bool   operator==(const Node&, const Node&) = default;
 };
 
 enum class Kind : std::uint8_t { shared, priv, sync };
@@ -50,62 +50,64 @@ const char* to_string(Kind);
 
 /// What a slot is used for, in every cycle or in some.
 struct Use {
-    Kind kind = Kind::shared;
-    std::size_t node = 0;                ///< of a private slot
+    Kind                       kind = Kind::shared;
+    std::size_t                node = 0;                ///< of a private slot
     std::vector<std::uint32_t> ids{};    ///< of a private slot; none: any identifier
-    std::uint32_t every = 1, offset = 0; ///< used in the cycles with counter % every == offset
-    Span at{};
-    bool active(std::uint32_t counter) const noexcept { return counter % every == offset; }
+    std::uint32_t              every = 1, offset = 0; ///< used in the cycles with counter % every == offset
+    Span                       at{};
+    bool                       active(std::uint32_t counter) const noexcept { return counter % every == offset; }
     /// Returns whether a frame with this identifier belongs into the private slot. [realtime]
-    bool carries(std::uint32_t id) const noexcept { return kind == Kind::priv && (ids.empty() || std::find(ids.begin(), ids.end(), id) != ids.end()); }
+    bool carries(std::uint32_t id) const noexcept {
+        return kind == Kind::priv && (ids.empty() || std::find(ids.begin(), ids.end(), id) != ids.end());
+    }
     friend bool operator==(const Use&, const Use&) = default;
 };
 
 struct Mode {
-    std::string name;
-    std::uint32_t number = 0;
+    std::string                   name;
+    std::uint32_t                 number = 0;
     std::vector<std::vector<Use>> slots{};  ///< by slot; none: shared
-    Span at{};
-    friend bool operator==(const Mode&, const Mode&) = default;
+    Span                          at{};
+    friend bool                   operator==(const Mode&, const Mode&) = default;
 };
 
 /// Part of a message's data, little endian.
 enum class FieldType : std::uint8_t { u8, s8, u16, s16, u32, s32, f32, f64 };
 struct Field {
-    std::string name;
-    FieldType type = FieldType::u8;
+    std::string   name;
+    FieldType     type = FieldType::u8;
     std::uint32_t at = 0;  ///< first byte
-    friend bool operator==(const Field&, const Field&) = default;
+    friend bool   operator==(const Field&, const Field&) = default;
 };
 std::uint32_t size_of(FieldType) noexcept;
-const char* to_string(FieldType);
+const char*   to_string(FieldType);
 
 /// A message of the application.
 struct Message {
-    std::string name;
-    std::uint32_t id = 0;
-    std::uint32_t bytes = 0;
-    std::size_t node = 0;   ///< its sender
-    Time period = 0;        ///< of a cyclic message, or the shortest interval of an event; 0: as often as its slot
-    bool event = false;
-    Time deadline = 0;      ///< 0: the period
-    Time jitter = 0;        ///< queueing jitter
+    std::string        name;
+    std::uint32_t      id = 0;
+    std::uint32_t      bytes = 0;
+    std::size_t        node = 0;   ///< its sender
+    Time               period = 0;        ///< of a cyclic message, or the shortest interval of an event; 0: as often as its slot
+    bool               event = false;
+    Time               deadline = 0;      ///< 0: the period
+    Time               jitter = 0;        ///< queueing jitter
     std::vector<Field> fields{};
-    Span at{};
-    friend bool operator==(const Message&, const Message&) = default;
+    Span               at{};
+    friend bool        operator==(const Message&, const Message&) = default;
 };
 
 struct Table {
-    std::uint32_t bit_rate = 1'000'000;
-    Time cycle = 10'000'000;
-    std::uint32_t slots = 20;
-    Time guard = 0;        ///< gap between two slots, for the clock errors of two nodes
-    Time idle = 0;         ///< T_idle: a private slot without a frame by then is recycled
-    std::uint32_t lost = 10;  ///< SYNCs lost until a node stops sending in private slots
-    std::vector<Node> nodes;
-    std::vector<Mode> modes;
+    std::uint32_t        bit_rate = 1'000'000;
+    Time                 cycle = 10'000'000;
+    std::uint32_t        slots = 20;
+    Time                 guard = 0;        ///< gap between two slots, for the clock errors of two nodes
+    Time                 idle = 0;         ///< T_idle: a private slot without a frame by then is recycled
+    std::uint32_t        lost = 10;  ///< SYNCs lost until a node stops sending in private slots
+    std::vector<Node>    nodes;
+    std::vector<Mode>    modes;
     std::vector<Message> messages;
-    std::uint16_t crc = 0;
+    std::uint16_t        crc = 0;
 
     friend bool operator==(const Table&, const Table&) = default;
 
@@ -125,13 +127,15 @@ struct Table {
     /// Returns the use of a slot in a cycle; nullptr: shared. [realtime]
     const Use* use(std::uint32_t mode, std::uint32_t slot, std::uint32_t counter) const noexcept;
     /// Returns whether the identifier is assigned to a private slot of the mode, and its use. [realtime]
-    const Use* owner(std::uint32_t mode, std::uint32_t id) const noexcept;
-    bool has_mode(std::uint32_t mode) const noexcept { return mode < most_modes && index_[mode] >= 0; }
-    const Mode* mode(std::uint32_t number) const noexcept { return has_mode(number) ? &modes[static_cast<std::size_t>(index_[number])] : nullptr; }
-    const Message* message(std::uint32_t id) const noexcept;
+    const Use*  owner(std::uint32_t mode, std::uint32_t id) const noexcept;
+    bool        has_mode(std::uint32_t mode) const noexcept { return mode < most_modes && index_[mode] >= 0; }
+    const Mode* mode(std::uint32_t number) const noexcept {
+        return has_mode(number) ? &modes[static_cast<std::size_t>(index_[number])] : nullptr;
+    }
+    const Message*             message(std::uint32_t id) const noexcept;
     std::optional<std::size_t> find(std::string_view node) const;
-    std::size_t backups() const noexcept;
-    void index();  ///< [setup] after a change of `modes`
+    std::size_t                backups() const noexcept;
+    void                       index();  ///< [setup] after a change of `modes`
 
 private:
     std::array<int, most_modes> index_{};
@@ -140,9 +144,9 @@ private:
 using Report = text::Message<Topic>;
 
 struct Reading {
-    Table table;
+    Table               table;
     std::vector<Report> messages;  ///< in order of place
-    bool good() const { return text::good(messages); }
+    bool                good() const { return text::good(messages); }
 };
 
 /// Reads and checks a table.

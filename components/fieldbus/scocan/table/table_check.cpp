@@ -25,15 +25,18 @@ public:
     }
 
 private:
-    void error(const Span& at, std::string sentence, std::string help = {}) { report_.error(Topic::slots, at, std::move(sentence), std::move(help)); }
+    void error(const Span& at, std::string sentence, std::string help = {}) {
+        report_.error(Topic::slots, at, std::move(sentence), std::move(help));
+    }
     std::string bits(std::uint32_t count) const { return std::to_string(count) + " bits"; }
 
     void roles() {
-        const Node* sync = nullptr;
-        const Node* monitor = nullptr;
+        const Node*                          sync = nullptr;
+        const Node*                          monitor = nullptr;
         std::map<std::uint32_t, const Node*> backups;
-        const auto duplicate = [&](const Node& n, const Node& first, const std::string& what) {
-            error(n.at, "duplicate " + what + ": node " + quoted(first.name) + " in line " + std::to_string(first.at.line) + " is it", "a bus has one");
+        const auto                           duplicate = [&](const Node& n, const Node& first, const std::string& what) {
+            error(n.at, "duplicate " + what + ": node " + quoted(first.name) + " in line " + std::to_string(first.at.line) + " is it",
+                                            "a bus has one");
         };
         for (const Node& n : t_.nodes) {
             if (n.role == Role::sync) {
@@ -45,7 +48,8 @@ private:
                 else monitor = &n;
             }
             if (n.role == Role::backup)
-                if (const auto [first, is_new] = backups.emplace(n.backup, &n); !is_new) duplicate(n, *first->second, "backup " + std::to_string(n.backup));
+                if (const auto [first, is_new] = backups.emplace(n.backup, &n); !is_new)
+                    duplicate(n, *first->second, "backup " + std::to_string(n.backup));
             if (n.role == Role::bridge && !n.senses) error(n.at, "a bridge is of type A", "write node " + n.name + " A bridge");
         }
         if (sync == nullptr) error(t_.nodes.front().at, "no SYNC node", "add a line: node clock A sync");
@@ -55,29 +59,35 @@ private:
         const Time end = t_.sync_offset(last) + t_.bits(sync_bits + error_bits) + t_.guard;
         if (end > t_.slot())
             error(backups.rbegin()->second->at,
-                  "the SYNC of backup " + std::to_string(last) + " does not fit in slot 0: it ends " + std::to_string(last + 1) + " x (75 + 20 bits + guard) = " +
-                      microseconds(end) + " behind its start, the slot has " + microseconds(t_.slot()),
+                  "the SYNC of backup " + std::to_string(last) + " does not fit in slot 0: it ends " + std::to_string(last + 1) +
+                      " x (75 + 20 bits + guard) = " + microseconds(end) + " behind its start, the slot has " + microseconds(t_.slot()),
                   "use fewer backups or longer slots");
     }
 
     void times() {
         const Span& at = t_.nodes.front().at;
         if (t_.guard < t_.required_guard(t_.cycle))
-            error(at, "guard " + microseconds(t_.guard) + " is too short: 3 bits + 0.3 us + 4 ppm of the cycle = " + microseconds(t_.required_guard(t_.cycle)),
+            error(at,
+                  "guard " + microseconds(t_.guard) +
+                      " is too short: 3 bits + 0.3 us + 4 ppm of the cycle = " + microseconds(t_.required_guard(t_.cycle)),
                   "delete the line guard, or write a longer time");
         if (t_.enabled() < t_.bits(4))
-            error(at, "idle " + microseconds(t_.idle) + " is too short: the owner must start by idle - guard - 2 bits = " + microseconds(t_.enabled()) + ", at least 4 bits",
+            error(at,
+                  "idle " + microseconds(t_.idle) +
+                      " is too short: the owner must start by idle - guard - 2 bits = " + microseconds(t_.enabled()) + ", at least 4 bits",
                   "delete the line idle, or write at least " + microseconds(t_.guard + t_.bits(6)));
         if (t_.slot() < t_.bits(sync_bits + error_bits) + t_.guard)
-            error(at, "slots of " + microseconds(t_.slot()) + " are too short for the SYNC: 75 + 20 bits + guard " + microseconds(t_.guard) + " = " +
-                          microseconds(t_.bits(sync_bits + error_bits) + t_.guard),
+            error(at,
+                  "slots of " + microseconds(t_.slot()) + " are too short for the SYNC: 75 + 20 bits + guard " + microseconds(t_.guard) +
+                      " = " + microseconds(t_.bits(sync_bits + error_bits) + t_.guard),
                   "use fewer slots, a longer cycle or a higher bit rate");
     }
 
     void mode(const Mode& m) {
         const auto is_sync = [](const Use& u) { return u.kind == Kind::sync; };
         if (m.slots[0].size() != 1 || !is_sync(m.slots[0].front()))
-            error(m.slots[0].empty() ? m.at : m.slots[0].front().at, "slot 0 of mode " + quoted(m.name) + " is not the SYNC's", "write a line: 0 sync");
+            error(m.slots[0].empty() ? m.at : m.slots[0].front().at, "slot 0 of mode " + quoted(m.name) + " is not the SYNC's",
+                  "write a line: 0 sync");
         std::map<std::uint32_t, const Use*> owners;
         for (std::size_t slot = 0; slot < m.slots.size(); ++slot) {
             const auto& uses = m.slots[slot];
@@ -90,8 +100,9 @@ private:
                 for (const std::uint32_t id : u.ids) {
                     const auto [first, is_new] = owners.emplace(id, &u);
                     if (!is_new && first->second->node != u.node)
-                        error(u.at, "identifier " + id_text(id) + " has two senders: " + t_.nodes[first->second->node].name + " in line " +
-                                        std::to_string(first->second->at.line) + ", and " + t_.nodes[u.node].name,
+                        error(u.at,
+                              "identifier " + id_text(id) + " has two senders: " + t_.nodes[first->second->node].name + " in line " +
+                                  std::to_string(first->second->at.line) + ", and " + t_.nodes[u.node].name,
                               "two nodes that send the same identifier destroy each other's frames; use another one");
                     if (is_private_fit(id)) continue;
                     error(u.at, too_long(slot, id), "use fewer slots, a longer cycle, a higher bit rate or a shorter message");
@@ -99,7 +110,7 @@ private:
             }
         }
     }
-    bool is_private_fit(std::uint32_t id) const { return t_.last_start(bytes_of(id)) >= 0; }
+    bool          is_private_fit(std::uint32_t id) const { return t_.last_start(bytes_of(id)) >= 0; }
     std::uint32_t bytes_of(std::uint32_t id) const {
         const Message* m = t_.message(id);
         return m != nullptr ? m->bytes : 8;
@@ -107,9 +118,10 @@ private:
     std::string too_long(std::size_t slot, std::uint32_t id) const {
         const auto bytes = bytes_of(id);
         const auto length = can::worst_case_bits(bytes, false).nominal;
-        return "slot " + std::to_string(slot) + " is too short for " + id_text(id) + ": " + std::to_string(bytes) + " bytes take " + bits(length) + " + " +
-               bits(error_bits) + " for an error at " + std::to_string(t_.bit_rate) + " bit/s, with the guard of " + microseconds(t_.guard) + " " +
-               microseconds(t_.frame(bytes) + t_.bits(error_bits) + t_.guard) + "; the slot has " + microseconds(t_.slot());
+        return "slot " + std::to_string(slot) + " is too short for " + id_text(id) + ": " + std::to_string(bytes) + " bytes take " +
+               bits(length) + " + " + bits(error_bits) + " for an error at " + std::to_string(t_.bit_rate) + " bit/s, with the guard of " +
+               microseconds(t_.guard) + " " + microseconds(t_.frame(bytes) + t_.bits(error_bits) + t_.guard) + "; the slot has " +
+               microseconds(t_.slot());
     }
     /// Reports two uses of a slot that are active in the same cycle.
     void meet(std::size_t slot, const Use& a, const Use& b) {
@@ -124,20 +136,23 @@ private:
             const Use* use = t_.owner(mode.number, m.id);
             if (use == nullptr) continue;
             if (use->node != m.node)
-                error(m.at, "message " + quoted(m.name) + " is sent by " + t_.nodes[m.node].name + ", but its slot in line " + std::to_string(use->at.line) + " is of " +
-                                t_.nodes[use->node].name,
+                error(m.at,
+                      "message " + quoted(m.name) + " is sent by " + t_.nodes[m.node].name + ", but its slot in line " +
+                          std::to_string(use->at.line) + " is of " + t_.nodes[use->node].name,
                       "name the same node in both lines");
             return;
         }
-        if (t_.last_start(m.bytes) < 0) error(m.at, too_long(1, m.id), "use fewer slots, a longer cycle, a higher bit rate or a shorter message");
+        if (t_.last_start(m.bytes) < 0)
+            error(m.at, too_long(1, m.id), "use fewer slots, a longer cycle, a higher bit rate or a shorter message");
         if (m.id >= 0x100 && m.id <= 0x2ff)
-            error(m.at, "identifier " + id_text(m.id) + " of " + quoted(m.name) + " is in the range of private slots (0x100..0x2FF) and has none",
+            error(m.at,
+                  "identifier " + id_text(m.id) + " of " + quoted(m.name) + " is in the range of private slots (0x100..0x2FF) and has none",
                   "give it a slot: 3 private " + t_.nodes[m.node].name + " " + id_text(m.id) + ", or use 0x300..0x77F");
     }
 
     static constexpr std::uint32_t most_id = 0x7ff;  // stands for any message: 8 bytes
-    const Table& t_;
-    text::Messages<Topic>& report_;
+    const Table&                   t_;
+    text::Messages<Topic>&         report_;
 };
 
 }  // namespace

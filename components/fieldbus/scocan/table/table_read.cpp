@@ -30,7 +30,7 @@ public:
 private:
     using Take = void (Reader::*)(const Words&);
     struct Key {
-        Take take;
+        Take        take;
         const char* usage;
         std::size_t least, most;
     };
@@ -81,9 +81,12 @@ private:
 
     bool time(const Word& w, Time& out, Time least, Time most, const char* example) {
         const auto value = parse_duration_ns(w.text, 0.0);
-        if (!value) return error(Topic::value, w.at, "invalid time " + quoted(w.text), std::string("write a number with a unit: ") + example), false;
+        if (!value)
+            return error(Topic::value, w.at, "invalid time " + quoted(w.text), std::string("write a number with a unit: ") + example),
+                   false;
         if (*value < least || *value > most)
-            return error(Topic::value, w.at, quoted(w.text) + " is out of range (" + microseconds(least) + ".." + microseconds(most) + ")"), false;
+            return error(Topic::value, w.at, quoted(w.text) + " is out of range (" + microseconds(least) + ".." + microseconds(most) + ")"),
+                   false;
         out = *value;
         return true;
     }
@@ -91,12 +94,16 @@ private:
     bool number(const Word& w, T& out, std::uint64_t least, std::uint64_t most) {
         const auto value = parse_natural(w.text);
         if (!value || *value < least || *value > most)
-            return error(Topic::value, w.at, "invalid number " + quoted(w.text) + ": expected " + std::to_string(least) + ".." + std::to_string(most)), false;
+            return error(Topic::value, w.at,
+                         "invalid number " + quoted(w.text) + ": expected " + std::to_string(least) + ".." + std::to_string(most)),
+                   false;
         out = static_cast<T>(*value);
         return true;
     }
     bool name(const Word& w) {
-        const auto fits = [](char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_'; };
+        const auto fits = [](char c) {
+            return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_';
+        };
         if (std::all_of(w.text.begin(), w.text.end(), fits) && w.text.size() <= 40) return true;
         error(Topic::value, w.at, "invalid name " + quoted(w.text), "use at most 40 letters, digits, '-' and '_'");
         return false;
@@ -124,7 +131,7 @@ private:
     }
 
     void take_bit_rate(const Words& w) {
-        const auto value = parse_quantity(w[1].text);
+        const auto   value = parse_quantity(w[1].text);
         const double scale = !value ? 0 : value->unit == "k" ? 1e3 : value->unit == "M" ? 1e6 : value->unit.empty() ? 1 : 0;
         const double rate = value ? value->number * scale : 0;
         if (rate < 10e3 || rate > 1e6)
@@ -150,9 +157,10 @@ private:
         n.senses = w[2].text == "A";
         if (w.size() > 3) {
             constexpr Role roles[] = {Role::sync, Role::backup, Role::monitor, Role::bridge};
-            const auto* role = std::find_if(std::begin(roles), std::end(roles), [&](Role r) { return w[3].text == to_string(r); });
+            const auto*    role = std::find_if(std::begin(roles), std::end(roles), [&](Role r) { return w[3].text == to_string(r); });
             if (role == std::end(roles))
-                return error(Topic::value, w[3].at, "unknown role " + quoted(w[3].text), suggestion(w[3].text, {"sync", "backup", "monitor", "bridge"}, "roles are"));
+                return error(Topic::value, w[3].at, "unknown role " + quoted(w[3].text),
+                             suggestion(w[3].text, {"sync", "backup", "monitor", "bridge"}, "roles are"));
             n.role = *role;
             if (n.role == Role::backup && w.size() < 5) return error(Topic::line, w[3].at, "the backup has no number", "write backup 1");
             if (n.role == Role::backup && !number(w[4], n.backup, 1, 7)) return;
@@ -179,21 +187,21 @@ private:
             if (!bad_mode_) error(Topic::line, w[0].at, "slot outside a mode", "write a line above it: mode 0 run");
             return;
         }
-        const auto dash = w[0].text.find('-');
+        const auto    dash = w[0].text.find('-');
         std::uint32_t first = 0, last = 0;
-        const auto end = out_.table.slots - 1;
+        const auto    end = out_.table.slots - 1;
         if (!number(text::part(w[0], 0, std::min(dash, w[0].text.size())), first, 0, end)) return;
         last = first;
         if (dash != std::string::npos && !number(text::part(w[0], dash + 1, w[0].text.size()), last, first, end)) return;
         constexpr const char* usage = "write 3 private NODE ID[,ID]|any [every K offset J], 4-7 shared, or 0 sync";
         if (w.size() < 2) return error(Topic::line, w[0].at, "slot without a use", usage);
-        Use use{.at = w[0].at};
+        Use         use{.at = w[0].at};
         std::size_t next = 2;
         if (w[1].text == "private") {
             use.kind = Kind::priv;
             if (w.size() < 4) return error(Topic::line, w[1].at, "private slot without node and identifier", usage);
             const auto owner = node(w[2]);
-            bool good = owner.has_value();
+            bool       good = owner.has_value();
             use.node = owner.value_or(0);
             for (const Word& one : text::list_of(w[3])) {
                 std::uint32_t id = 0;
@@ -207,14 +215,16 @@ private:
         } else if (w[1].text == "sync") {
             use.kind = Kind::sync;
         } else if (w[1].text != "shared") {
-            return error(Topic::line, w[1].at, "unknown use " + quoted(w[1].text), suggestion(w[1].text, {"private", "shared", "sync"}, "uses are"));
+            return error(Topic::line, w[1].at, "unknown use " + quoted(w[1].text),
+                         suggestion(w[1].text, {"private", "shared", "sync"}, "uses are"));
         }
         if (w.size() > next) {
             if (use.kind != Kind::priv || w.size() != next + 4 || w[next].text != "every" || w[next + 2].text != "offset")
                 return error(Topic::line, w[next].at, "unexpected text", usage);
             if (!number(w[next + 1], use.every, 1, counter_cycles) || !number(w[next + 3], use.offset, 0, use.every - 1)) return;
             if ((use.every & (use.every - 1)) != 0)
-                return error(Topic::value, w[next + 1].at, "invalid number " + quoted(w[next + 1].text) + ": the cycle counter is modulo 64",
+                return error(Topic::value, w[next + 1].at,
+                             "invalid number " + quoted(w[next + 1].text) + ": the cycle counter is modulo 64",
                              "write 1, 2, 4, 8, 16, 32 or 64");
         }
         if (mode_->slots.size() < out_.table.slots) mode_->slots.resize(out_.table.slots);
@@ -231,15 +241,17 @@ private:
         bool sender = false, sized = false;
         for (std::size_t i = 3; i < w.size(); i += 2) {
             const std::string& key = w[i].text;
-            if (i + 1 == w.size()) return error(Topic::line, w[i].at, quoted(key) + " has no value", std::string("write ") + keys().at("message").usage);
+            if (i + 1 == w.size())
+                return error(Topic::line, w[i].at, quoted(key) + " has no value", std::string("write ") + keys().at("message").usage);
             const Word& value = w[i + 1];
-            bool good = true;
+            bool        good = true;
             if (key == "node") {
                 const auto found = node(value);
                 good = sender = found.has_value();
                 m.node = found.value_or(0);
             } else if (key == "bytes") good = sized = number(value, m.bytes, 0, 8);
-            else if (key == "period" || key == "event") good = time(value, m.period, 1000, 1'000'000'000'000, "period 10ms"), m.event = key == "event";
+            else if (key == "period" || key == "event")
+                good = time(value, m.period, 1000, 1'000'000'000'000, "period 10ms"), m.event = key == "event";
             else if (key == "deadline") good = time(value, m.deadline, 1000, 1'000'000'000'000, "deadline 10ms");
             else if (key == "jitter") good = time(value, m.jitter, 0, 1'000'000'000'000, "jitter 100us");
             else if (key == "fields") good = fields(value, m);
@@ -252,8 +264,10 @@ private:
         for (const Field& f : m.fields) used += size_of(f.type);
         if (!sized) m.bytes = m.fields.empty() ? 8 : used;
         if (used > m.bytes)
-            return error(Topic::value, w[1].at, "the fields of " + quoted(m.name) + " have " + std::to_string(used) + " bytes, the message has " + std::to_string(m.bytes),
-                         "a CAN frame carries 8 bytes; send the rest in another message");
+            return error(
+                Topic::value, w[1].at,
+                "the fields of " + quoted(m.name) + " have " + std::to_string(used) + " bytes, the message has " + std::to_string(m.bytes),
+                "a CAN frame carries 8 bytes; send the rest in another message");
         if (!sender) unowned_.emplace_back(out_.table.messages.size(), w[1].at);
         out_.table.messages.push_back(std::move(m));
     }
@@ -261,20 +275,27 @@ private:
     bool fields(const Word& value, Message& m) {
         std::uint32_t at = 0;
         for (const Word& one : text::list_of(value)) {
-            const auto colon = one.text.find(':');
-            constexpr FieldType types[] = {FieldType::u8, FieldType::s8, FieldType::u16, FieldType::s16, FieldType::u32, FieldType::s32, FieldType::f32, FieldType::f64};
-            const std::string type_text = colon == std::string::npos ? "" : one.text.substr(colon + 1);
+            const auto          colon = one.text.find(':');
+            constexpr FieldType types[] = {FieldType::u8,  FieldType::s8,  FieldType::u16, FieldType::s16,
+                                           FieldType::u32, FieldType::s32, FieldType::f32, FieldType::f64};
+            const std::string   type_text = colon == std::string::npos ? "" : one.text.substr(colon + 1);
             const auto* type = std::find_if(std::begin(types), std::end(types), [&](FieldType t) { return type_text == to_string(t); });
             if (colon == std::string::npos || colon == 0 || type == std::end(types))
-                return error(Topic::value, one.at, "invalid field " + quoted(one.text), "write NAME:TYPE; types are u8, s8, u16, s16, u32, s32, f32, f64"), false;
+                return error(Topic::value, one.at, "invalid field " + quoted(one.text),
+                             "write NAME:TYPE; types are u8, s8, u16, s16, u32, s32, f32, f64"),
+                       false;
             const Word field_name = text::part(one, 0, colon);
             if (!name(field_name)) return false;
             for (const Field& other : m.fields)
-                if (other.name == field_name.text) return error(Topic::value, field_name.at, "duplicate field " + quoted(field_name.text)), false;
+                if (other.name == field_name.text)
+                    return error(Topic::value, field_name.at, "duplicate field " + quoted(field_name.text)), false;
             m.fields.push_back({field_name.text, *type, at});
             at += size_of(*type);
         }
-        if (at > 8) return error(Topic::value, value.at, "the fields have " + std::to_string(at) + " bytes, a CAN frame carries 8", "send the rest in another message"), false;
+        if (at > 8)
+            return error(Topic::value, value.at, "the fields have " + std::to_string(at) + " bytes, a CAN frame carries 8",
+                         "send the rest in another message"),
+                   false;
         return true;
     }
 
@@ -299,16 +320,17 @@ private:
                 m.node = use->node;
                 return;
             }
-        error(Topic::value, at, "message " + quoted(m.name) + " has no sender", "write node NAME behind it; no private slot has " + id_text(m.id));
+        error(Topic::value, at, "message " + quoted(m.name) + " has no sender",
+              "write node NAME behind it; no private slot has " + id_text(m.id));
     }
 
-    Reading out_;
-    text::Messages<Topic> report_;
-    std::map<std::string, std::uint32_t> given_;
+    Reading                                   out_;
+    text::Messages<Topic>                     report_;
+    std::map<std::string, std::uint32_t>      given_;
     std::vector<std::pair<std::size_t, Span>> unowned_;
-    Mode* mode_ = nullptr;
-    bool bad_mode_ = false;
-    Span cycle_at_, slots_at_;
+    Mode*                                     mode_ = nullptr;
+    bool                                      bad_mode_ = false;
+    Span                                      cycle_at_, slots_at_;
 };
 
 }  // namespace

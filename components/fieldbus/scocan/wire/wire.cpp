@@ -34,7 +34,8 @@ bool decode_announcement(const can::Frame& f, std::uint32_t& slot) noexcept {
 }
 
 can::Frame encode(const Request& r) noexcept {
-    return {request_id, {low(static_cast<std::uint32_t>(r.what)), r.mode, low(r.crc), low(static_cast<std::uint32_t>(r.crc) >> 8), r.at_counter}};
+    return {request_id,
+            {low(static_cast<std::uint32_t>(r.what)), r.mode, low(r.crc), low(static_cast<std::uint32_t>(r.crc) >> 8), r.at_counter}};
 }
 
 bool decode(const can::Frame& f, Request& r) noexcept {
@@ -44,7 +45,8 @@ bool decode(const can::Frame& f, Request& r) noexcept {
 }
 
 can::Frame encode(const Answer& a) noexcept {
-    return {answer_id + a.node, {low(static_cast<std::uint32_t>(a.reason)), a.mode, low(a.crc), low(static_cast<std::uint32_t>(a.crc) >> 8)}};
+    return {answer_id + a.node,
+            {low(static_cast<std::uint32_t>(a.reason)), a.mode, low(a.crc), low(static_cast<std::uint32_t>(a.crc) >> 8)}};
 }
 
 bool decode(const can::Frame& f, Answer& a) noexcept {
