@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <fmt/core.h>
+#include <optional>
 #include <unistd.h>
+#include <utility>
 
 #include "bus/can/scocan_picture.hpp"
 #include "cli/output.hpp"
