@@ -195,6 +195,12 @@ inline constexpr CodePage code_pages[] = {
      "`node` lines are only allowed in the netlist that is passed to `hal run`, `hal sim` or `hal check`. They are not allowed in the "
      "shell, nor in a file that is read by `source`: the contents of such a file belong to the node that reads it.\n\n"
      "Write `node NAME` above the `source` line."},
+    {"mobile-text",
+     "A file of a component for mobile robots has an invalid line. A floor plan (`floor=FILE`) has lines `wall X1 Y1 X2 Y2`, `box X1 Y1 X2 Y2`, "
+     "`circle X Y RADIUS` and `beacon X Y RADIUS`; a list of goals (`loadrt goals file=FILE`) has lines `goal X Y`; all in metres.\n\n"
+     "A program of steps (`loadrt step_program file=FILE`) declares `input` and `output` names, then steps: `step NAME`, and in it `set OUTPUT`, "
+     "`when INPUT and not INPUT -> STEP` and `after 2s -> STEP`; `at 88s -> STEP` counts from the end of the first step. `hal doc step_program` has "
+     "an example."},
     {"model-text",
      "A model file (`loadrt ekf model=FILE`) contains five kinds of lines: `constant NAME = FORMULA`, `input NAME`, `state NAME = "
      "START sigma S noise N`, `NAME' = FORMULA` for the derivative of each state, `measure NAME = FORMULA sigma S`. One of these "

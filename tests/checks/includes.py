@@ -47,6 +47,7 @@ ROWS = {
     "components/estimation": ["components"],
     "components/recording": ["components", "components/recording/mcap"],
     "components/recording/mcap": ["runtime/abi"],
+    "components/mobile": ["components"],
     "components/vision": ["components"],
     "components/dds": ["components", "components/dds/links"],
     "components/dds/links": [],  # what cells gives the components, as data
@@ -71,6 +72,7 @@ ROWS = {
     "components/fieldbus/scocan/station": ["components/fieldbus/scocan/wire"],
     "components/fieldbus/scocan/plan": ["components/fieldbus/scocan/table", "components/fieldbus/can_timing"],
     "components/fieldbus/scocan/plugins": ["components/fieldbus/scocan/station", "runtime/sdk", "drivers/discipline"],
+    "components/fieldbus/messages": ["runtime/sdk", "drivers/link"],
     "components/fieldbus/tdma/wire": ["runtime/sdk", "runtime/text", "drivers/link"],
     "components/fieldbus/tdma/station": ["components/fieldbus/tdma/wire", "drivers/discipline"],
     "components/fieldbus/tdma/config": ["components/fieldbus/tdma/station"],

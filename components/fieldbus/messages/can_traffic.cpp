@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: MIT
+#include <array>
+#include <cmath>
+#include <memory>
+#include <stdexcept>
+#include <vector>
+
+#include "hal/component.hpp"
+#include "link/can.hpp"
+#include "message_fields.hpp"
+
+namespace {
+
+struct CanTraffic : hal::Component {
+    using Component::Component;
+
+    hal::TextArgument address{*this, "link", "sim:can0", "address of the bus, as in sim:can0 or can:can0", {.per_instance = true}};
+    hal::Argument     id{*this, "id", 0x100, "identifier of the first message", {.per_instance = true, .min = 0, .max = 0x1fffffff}};
+    hal::Argument     count{
+        *this, "count", 8, "messages, each with an identifier and a node of its own", {.per_instance = true, .min = 0, .max = 128}};
+    hal::Argument length{*this, "length", 8, "bytes of data of each message", {.per_instance = true, .min = 0, .max = 8}};
+
+    hal::TextArgument data{*this,
+                           "data",
+                           "varied",
+                           "varied: data change from message to message; zeros: many stuff bits, the longest messages",
+                           {.per_instance = true}};
+
+    hal::In<bool>           enable{*this, "enable", "FALSE: no messages", {.initial = true}};
+    hal::Param<double>      period{*this, "period", "time between two releases of all messages together", {.initial = 0.01, .unit = "s"}};
+    hal::Out<std::uint64_t> released{*this, "released", "messages released"};
+    hal::Out<std::uint64_t> sent{*this, "sent", "messages that were on the bus"};
+    hal::Out<std::uint64_t> dropped{*this, "dropped", "messages not queued: queue full, bus down or off"};
+    hal::Out<double>        worst{*this, "worst-response", "longest time from a release to the end of a message", {.unit = "s"}};
+
+    hal::Function run{*this, "update", &CanTraffic::update, "releases the messages when they are due"};
+
+    void start() {
+        if (data.get() != "varied" && data.get() != "zeros")
+            throw hal::ArgumentError("data", "data=" + data.get() + " is unknown; write varied or zeros");
+        varied_ = data.get() == "varied";
+        first_ = hal::messages::identifier(id, count > 0 ? count - 1 : 0);
+        nodes_.resize(static_cast<std::size_t>(count));
+        for (Node& node : nodes_) {
+            auto opened = hal::can::open(address.get(), {.own_frames = true, .send_capacity = 8, .receive_capacity = 64});
+            if (!opened) throw std::runtime_error(opened.problem);
+            node.link = std::move(opened.link);
+            const hal::can::Filter own{
+                .id = first_ + static_cast<std::uint32_t>(&node - nodes_.data()), .mask = 0x1fffffff, .extended = first_ > 0x7ff};
+            node.link->set_filters(std::span(&own, 1));
+        }
+    }
+    void stop() noexcept { nodes_.clear(); }
+
+    void update(hal::Cycle cycle) noexcept {
+        const std::int64_t now = cycle.start_ns();
+        const double       every = period * 1e9;
+        bool               due = false;
+        if (enable && every >= 1.0 && every < 1e18) {
+            const auto step = static_cast<std::int64_t>(std::llround(every));
+            if (!started_) begin_ = now, started_ = true;
+            const std::int64_t instant = (now - begin_) / step;
+            due = instant != last_;
+            last_ = instant;
+        }
+        for (std::size_t i = 0; i < nodes_.size(); ++i) work(nodes_[i], static_cast<std::uint32_t>(i), due, now);
+    }
+
+private:
+    struct Node {
+        std::unique_ptr<hal::can::Link> link;
+        std::array<std::int64_t, 8>     release{};
+        std::uint64_t                   queued = 0, done = 0;
+    };
+    void work(Node& node, std::uint32_t number, bool due, std::int64_t now) noexcept {
+        while (node.link->receive(buffer_, now)) {
+            if (!buffer_.own || node.done == node.queued) continue;
+            const double response = 1e-9 * static_cast<double>(buffer_.time_ns - node.release[node.done++ % node.release.size()]);
+            worst = std::fmax(worst, response);
+            sent = sent + 1;
+        }
+        if (due) {
+            hal::can::Frame frame;
+            frame.id = first_ + number;
+            frame.extended = first_ > 0x7ff;
+            frame.length = static_cast<std::uint8_t>(length);
+            // Data that change from message to message, so that the number of stuff bits does, too (G. Marsaglia, Xorshift RNGs, 2003).
+            random_ ^= random_ << 13, random_ ^= random_ >> 7, random_ ^= random_ << 17;
+            for (unsigned n = 0; n < frame.length && varied_; ++n) frame.data[n] = static_cast<std::uint8_t>(random_ >> (8 * n));
+            released = released + 1;
+            if (node.queued - node.done < node.release.size() && node.link->send(frame, now) == hal::can::Sent::queued)
+                node.release[node.queued++ % node.release.size()] = now;
+            else dropped = dropped + 1;
+        }
+        node.link->flush(now);
+    }
+
+    std::vector<Node> nodes_;
+    hal::can::Frame   buffer_;
+    std::uint64_t     random_ = 0x9E3779B97F4A7C15u;
+    std::uint32_t     first_ = 0;
+    std::int64_t      begin_ = 0, last_ = -1;
+    bool              started_ = false, varied_ = true;
+};
+
+}  // namespace
+
+HAL_COMPONENT(CanTraffic, "can_traffic", "The load of other nodes on a CAN bus", R"(
+`count` messages with consecutive identifiers, each from a node of its own, are released together at multiples of `period`: the critical instant of
+the response-time analysis for every message with a higher identifier. Their data change from message to message, always in the same way; with
+`data=zeros` each has about the largest number of stuff bits.
+
+`worst-response` is the longest time from a release to the last bit of a message on the bus; it must not exceed the computed response time
+(`hal can plan`). A message that is released while eight of its predecessors wait is dropped.
+
+    loadrt can_traffic names=others link=sim:can0 id=0x200 count=18
+    addf others.update bus
+    setp others.period 0.01013
+)")

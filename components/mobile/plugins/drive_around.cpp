@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "hal/component.hpp"
+
+namespace {
+
+constexpr std::size_t sensors = 16;
+constexpr double      pi = std::numbers::pi;
+
+struct DriveAround : hal::Component {
+    using Component::Component;
+
+    hal::In<bool>           enable{*this, "enable", "FALSE commands standstill", {.initial = true}};
+    hal::In<double>         target_x{*this, "target-x", "x of the target", {.unit = "m"}};
+    hal::In<double>         target_y{*this, "target-y", "y of the target", {.unit = "m"}};
+    hal::In<double>         x{*this, "x", "x of the robot", {.unit = "m"}};
+    hal::In<double>         y{*this, "y", "y of the robot", {.unit = "m"}};
+    hal::In<double>         heading{*this, "heading", "heading of the robot", {.unit = "rad"}};
+    hal::Ins<std::uint32_t> reading{*this, "reading-##", sensors, "reading of sensor ## of the infrared ring, 0..4095"};
+    hal::Param<double>      constant{*this, "constant", "reading times the square of distance + offset", {.initial = 40.0}};
+    hal::Param<double>      offset{*this, "offset", "offset of the distance", {.initial = 0.05, .unit = "m"}};
+    hal::Param<double>      apothem{*this, "apothem", "distance of the sensors from the centre", {.initial = 0.22, .unit = "m"}};
+    hal::Param<double> spread{*this, "spread", "distance of the two sensors of a side from its middle", {.initial = 0.045, .unit = "m"}};
+    hal::Param<double> body{*this, "body-radius", "radius of the robot with a margin", {.initial = 0.32, .unit = "m"}};
+    hal::Param<double> horizon{*this, "horizon", "obstacles farther from the centre do not matter", {.initial = 0.85, .unit = "m"}};
+    hal::Param<double> max_speed{*this, "max-speed", "maximum forward speed", {.initial = 0.5, .unit = "m/s"}};
+    hal::Param<double> distance_gain{*this, "distance-gain", "forward speed per remaining distance", {.initial = 1.5, .unit = "1/s"}};
+    hal::Param<double> heading_gain{
+        *this, "heading-gain", "turning speed per angle to the chosen direction", {.initial = 3.0, .unit = "1/s"}};
+    hal::Param<double> max_turn{*this, "max-turn", "maximum turning speed", {.initial = 1.5, .unit = "rad/s"}};
+    hal::Param<double> tolerance{*this, "tolerance", "distance within which the target is reached", {.initial = 0.05, .unit = "m"}};
+
+    hal::Out<double> linear{*this, "linear", "requested forward speed", {.unit = "m/s", .safe = 0.0, .finite = true}};
+    hal::Out<double> angular{
+        *this, "angular", "requested turning speed, positive to the left", {.unit = "rad/s", .safe = 0.0, .finite = true}};
+    hal::Out<double> distance{*this, "distance", "remaining distance", {.unit = "m", .finite = true}};
+    hal::Out<double> nearest{
+        *this, "nearest", "distance of the nearest obstacle from the centre; 1000: none", {.unit = "m", .finite = true}};
+    hal::Out<double> direction{*this, "direction", "chosen direction, relative to the heading", {.unit = "rad", .finite = true}};
+    hal::Out<bool>   reached{*this, "reached", "TRUE at the target"};
+    hal::Out<bool>   avoiding{*this, "avoiding", "TRUE: the direct way is not free"};
+    hal::Out<bool>   blocked{*this, "blocked", "TRUE: no direction is free; the robot turns on the spot"};
+    hal::Out<bool>   invalid{*this, "invalid", "TRUE: an input is NaN, infinite or beyond 1e6 m; standstill is commanded"};
+
+    hal::Function run{*this, "update", &DriveAround::update, "chooses a direction and the speeds"};
+
+    void update(hal::Cycle) noexcept {
+        const double dx = target_x - x, dy = target_y - y, left = std::hypot(dx, dy);
+        invalid = !(left < 1e6 && std::fabs(heading) < 1e6);
+        if (invalid) return rest(0.0, false);
+        look();
+        const bool there = left <= std::fabs(tolerance);
+        if (there || !enable) return rest(left, there);
+        const double wanted = std::remainder(std::atan2(dy, dx) - heading, 2 * pi);
+        const double chosen = choose(wanted, left);
+        const double ahead = std::fmax(0.0, std::cos(direction));
+        // Room in front: no faster than the robot can stop within what is free.
+        const double room = std::clamp((free_ahead() - body) * 2.0, 0.0, 1.0);
+        const double fastest = std::isfinite(max_speed) ? std::fabs(max_speed) : 0.0;
+        linear = blocked ? 0.0
+                         : finite(std::clamp(distance_gain * left, 0.0, fastest) * ahead * ahead *
+                                  (avoiding ? std::fmax(room, 0.15) : std::fmax(room, 0.3)));
+        angular = finite(std::clamp(heading_gain * chosen, -std::fabs(max_turn), std::fabs(max_turn)));
+        distance = left;
+        reached = false;
+    }
+
+private:
+    static constexpr int sectors = 72;  // 5 degrees each
+    struct Obstacle {
+        double angle, distance;  // from the centre, relative to the heading
+    };
+
+    static double finite(double value) noexcept { return std::isfinite(value) ? value : 0.0; }
+    void          rest(double left, bool there) noexcept {
+        linear = 0.0, angular = 0.0, direction = 0.0;
+        distance = left;
+        reached = there;
+        avoiding = false, blocked = false;
+        last_ = 0.0;
+    }
+    /// Where the sensors report something.
+    void look() noexcept {
+        count_ = 0;
+        double least = 1000.0;
+        for (std::size_t i = 0; i < sensors; ++i) {
+            if (reading[i] == 0) continue;
+            const double range = std::sqrt(std::fmax(constant, 0.0) / reading[i]) - offset;
+            if (!(range < 10.0)) continue;
+            const double facing = static_cast<double>(i / 2) * pi / 4, aside = i % 2 == 0 ? -spread : spread.get(),
+                         out = apothem + std::fmax(range, 0.0);
+            const Obstacle one{facing + std::atan2(aside, out), std::hypot(out, aside)};
+            least = std::fmin(least, one.distance);
+            if (one.distance < horizon) seen_[count_++] = one;
+        }
+        nearest = finite(least);
+    }
+    double free_ahead() const noexcept {
+        double least = horizon;
+        for (std::size_t i = 0; i < count_; ++i)
+            if (std::cos(seen_[i].angle) > 0.5) least = std::fmin(least, seen_[i].distance * std::cos(seen_[i].angle) + 0.05);
+        return least;
+    }
+    bool is_free(double angle, double left) const noexcept {
+        for (std::size_t i = 0; i < count_; ++i) {
+            const Obstacle& o = seen_[i];
+            if (o.distance - body > left) continue;  // behind the target
+            const double half = o.distance > body ? std::asin(body / o.distance) : pi / 2;
+            if (std::fabs(std::remainder(o.angle - angle, 2 * pi)) < half) return false;
+        }
+        return true;
+    }
+    /// The free direction with the least cost: away from the target, and away from the direction chosen before, in the room (J. Borenstein,
+    /// Y. Koren, *The vector field histogram*, IEEE Transactions on Robotics and Automation 7, 1991; the cost is that of I. Ulrich's VFH+, 1998).
+    double choose(double wanted, double left) noexcept {
+        const double before = std::remainder(last_ - heading, 2 * pi);
+        if (is_free(wanted, left)) {
+            // Around a convex obstacle: the direct way counts as free when the old direction agrees with it.
+            avoiding = false, blocked = false;
+            direction = wanted;
+            last_ = heading + wanted;
+            return wanted;
+        }
+        double best = 0.0, least = 1e9;
+        for (int i = 0; i < sectors; ++i) {
+            const double angle = std::remainder(i * 2 * pi / sectors, 2 * pi);
+            if (!is_free(angle, left)) continue;
+            const double cost = 2.0 * std::fabs(std::remainder(angle - wanted, 2 * pi)) +
+                                1.5 * (avoiding ? std::fabs(std::remainder(angle - before, 2 * pi)) : 0.0) + 0.3 * std::fabs(angle);
+            if (cost < least) least = cost, best = angle;
+        }
+        blocked = least > 1e8;
+        avoiding = true;
+        direction = blocked ? 0.0 : best;
+        if (!blocked) last_ = heading + best;
+        return blocked ? pi / 4 : best;
+    }
+
+    std::array<Obstacle, sensors> seen_{};
+    std::size_t                   count_ = 0;
+    double                        last_ = 0.0;
+};
+
+}  // namespace
+
+HAL_COMPONENT(DriveAround, "drive_around", "Drives a two-wheeled robot to a point, around obstacles", R"(
+Computes the speeds for `diff_drive` from pose, target and the readings of a ring of 16 infrared sensors: an octagon with two sensors per side, side 1
+forwards, counted to the left.
+
+    distance = sqrt(constant / reading) - offset
+
+Each obstacle closes the directions in which the robot, with `body-radius`, would touch it; of the free ones the robot takes the one nearest to the
+target, and nearest to the one it took before (vector field histogram: J. Borenstein, Y. Koren, IEEE Transactions on Robotics and Automation 7, 1991).
+It drives slower towards what is near. It has no map: a dead end deeper than the range of the sensors can hold it, and `blocked` or a long time without
+`reached` is for the program above.
+
+    loadrt drive_around names=pilot
+    loadrt diff_drive names=base
+    addf base.odometry servo
+    addf pilot.update servo
+    addf base.command servo
+    net x       base.x       => pilot.x
+    net y       base.y       => pilot.y
+    net heading base.heading => pilot.heading
+    net front   => pilot.reading-00
+    net ahead   pilot.linear  => base.linear
+    net turn    pilot.angular => base.angular
+)")

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: MIT
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "hal/component.hpp"
+
+namespace {
+
+struct EchoRange : hal::Component {
+    using Component::Component;
+    static constexpr std::uint32_t per_message = 8, messages = 32;
+
+    hal::In<bool>             begins{*this, "begins", "TRUE: a burst begins, with step"};
+    hal::In<std::uint32_t>    step{*this, "step", "position of the head in this burst"};
+    hal::In<bool>             fresh{*this, "new", "TRUE: a message of the burst arrived"};
+    hal::In<std::uint32_t>    id_offset{*this, "id-offset", "number of the message, modulo 8"};
+    hal::Ins<std::uint32_t>   sample{*this, "sample-#", per_message, "sample # of the message"};
+    hal::Param<std::uint32_t> threshold{*this, "threshold", "smallest amplitude of an echo", {.initial = 16}};
+    hal::Param<double>        sample_length{*this, "sample-length", "distance of two samples", {.initial = 0.01715, .unit = "m"}};
+    hal::Param<std::uint32_t> steps{*this, "steps", "positions of the head per turn", {.initial = 200}};
+
+    hal::Out<double>        range{*this, "range", "distance of the nearest echo of the newest burst; 1000: none", {.unit = "m"}};
+    hal::Out<double>        bearing{*this, "bearing", "direction of the head in that burst, to the left of the heading", {.unit = "rad"}};
+    hal::Out<bool>          range_new{*this, "range-new", "TRUE for the cycle in which a burst is complete"};
+    hal::Out<std::uint32_t> bursts{*this, "bursts", "complete bursts"};
+    hal::Out<std::uint32_t> incomplete{*this, "incomplete", "bursts with a missing or repeated message"};
+
+    hal::Function run{*this, "update", &EchoRange::update, "takes the new message"};
+
+    void update(hal::Cycle) noexcept {
+        range_new = false;
+        if (begins) {
+            if (running_) incomplete = incomplete + 1;
+            running_ = true;
+            got_ = 0;
+            step_ = step;
+            found_ = -1;
+        }
+        if (!fresh || !running_) return;
+        if (id_offset != got_ % 8) {
+            incomplete = incomplete + 1;
+            running_ = false;
+            return;
+        }
+        for (std::uint32_t i = 0; i < per_message && found_ < 0; ++i)
+            if (sample[i] >= threshold) found_ = static_cast<std::int64_t>(got_) * per_message + i;
+        if (++got_ < messages) return;
+        running_ = false;
+        range = found_ < 0 ? 1000.0 : static_cast<double>(found_) * sample_length;
+        bearing = std::remainder(2 * std::numbers::pi * step_ / std::max<std::uint32_t>(steps, 1), 2 * std::numbers::pi);
+        range_new = true;
+        bursts = bursts + 1;
+    }
+
+private:
+    std::int64_t  found_ = -1;
+    std::uint32_t got_ = 0, step_ = 0;
+    bool          running_ = false;
+};
+
+}  // namespace
+
+HAL_COMPONENT(EchoRange, "echo_range", "Distance of the nearest echo in a burst of messages", R"(
+An ultrasonic head reports an echo in 32 messages of eight samples; their number modulo 8 is in the identifier. The distance is that of the first sample
+of at least `threshold`. A burst with a message missing is counted in `incomplete` and gives no range.
+
+    loadrt echo_range names=echo
+    addf echo.update servo
+    net burst-begins => echo.begins
+    net part-arrived => echo.new
+    net part         => echo.id-offset
+    net amplitude0   => echo.sample-0
+    net obstacle     <= echo.range
+)")
