@@ -17,13 +17,13 @@ struct CanTraffic : hal::Component {
     hal::TextArgument address{*this, "link", "sim:can0", "address of the bus, as in sim:can0 or can:can0", {.per_instance = true}};
     hal::Argument     id{*this, "id", 0x100, "identifier of the first message", {.per_instance = true, .min = 0, .max = 0x1fffffff}};
     hal::Argument     count{
-        *this, "count", 8, "messages, each with an identifier and a node of its own", {.per_instance = true, .min = 0, .max = 128}};
+        *this, "messages", 8, "messages, each with an identifier and a node of its own", {.per_instance = true, .min = 0, .max = 128}};
     hal::Argument length{*this, "length", 8, "bytes of data of each message", {.per_instance = true, .min = 0, .max = 8}};
 
     hal::TextArgument data{*this,
                            "data",
                            "varied",
-                           "varied: data change from message to message; zeros: many stuff bits, the longest messages",
+                           "varied: data change from message to message; longest: nearly the largest number of stuff bits",
                            {.per_instance = true}};
 
     hal::In<bool>           enable{*this, "enable", "FALSE: no messages", {.initial = true}};
@@ -36,8 +36,8 @@ struct CanTraffic : hal::Component {
     hal::Function run{*this, "update", &CanTraffic::update, "releases the messages when they are due"};
 
     void start() {
-        if (data.get() != "varied" && data.get() != "zeros")
-            throw hal::ArgumentError("data", "data=" + data.get() + " is unknown; write varied or zeros");
+        if (data.get() != "varied" && data.get() != "longest")
+            throw hal::ArgumentError("data", "data=" + data.get() + " is unknown; write varied or longest");
         varied_ = data.get() == "varied";
         first_ = hal::messages::identifier(id, count > 0 ? count - 1 : 0);
         nodes_.resize(static_cast<std::size_t>(count));
@@ -86,7 +86,8 @@ private:
             frame.length = static_cast<std::uint8_t>(length);
             // Data that change from message to message, so that the number of stuff bits does, too (G. Marsaglia, Xorshift RNGs, 2003).
             random_ ^= random_ << 13, random_ ^= random_ >> 7, random_ ^= random_ << 17;
-            for (unsigned n = 0; n < frame.length && varied_; ++n) frame.data[n] = static_cast<std::uint8_t>(random_ >> (8 * n));
+            for (unsigned n = 0; n < frame.length; ++n)
+                frame.data[n] = varied_ ? static_cast<std::uint8_t>(random_ >> (8 * n)) : std::uint8_t{0x3c};
             released = released + 1;
             if (node.queued - node.done < node.release.size() && node.link->send(frame, now) == hal::can::Sent::queued)
                 node.release[node.queued++ % node.release.size()] = now;
@@ -106,14 +107,14 @@ private:
 }  // namespace
 
 HAL_COMPONENT(CanTraffic, "can_traffic", "The load of other nodes on a CAN bus", R"(
-`count` messages with consecutive identifiers, each from a node of its own, are released together at multiples of `period`: the critical instant of
+`messages=` messages with consecutive identifiers, each from a node of its own, are released together at multiples of `period`: the critical instant of
 the response-time analysis for every message with a higher identifier. Their data change from message to message, always in the same way; with
-`data=zeros` each has about the largest number of stuff bits.
+`data=longest` each has nearly as many stuff bits as a message can have.
 
 `worst-response` is the longest time from a release to the last bit of a message on the bus; it must not exceed the computed response time
 (`hal can plan`). A message that is released while eight of its predecessors wait is dropped.
 
-    loadrt can_traffic names=others link=sim:can0 id=0x200 count=18
+    loadrt can_traffic names=others link=sim:can0 id=0x200 messages=18
     addf others.update bus
     setp others.period 0.01013
 )")

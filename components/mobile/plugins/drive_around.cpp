@@ -27,6 +27,7 @@ struct DriveAround : hal::Component {
     hal::Param<double> spread{*this, "spread", "distance of the two sensors of a side from its middle", {.initial = 0.045, .unit = "m"}};
     hal::Param<double> body{*this, "body-radius", "radius of the robot with a margin", {.initial = 0.32, .unit = "m"}};
     hal::Param<double> horizon{*this, "horizon", "obstacles farther from the centre do not matter", {.initial = 0.85, .unit = "m"}};
+    hal::Param<double> memory{*this, "memory", "time for which an obstacle is remembered", {.initial = 3.0, .unit = "s"}};
     hal::Param<double> max_speed{*this, "max-speed", "maximum forward speed", {.initial = 0.5, .unit = "m/s"}};
     hal::Param<double> distance_gain{*this, "distance-gain", "forward speed per remaining distance", {.initial = 1.5, .unit = "1/s"}};
     hal::Param<double> heading_gain{
@@ -48,11 +49,11 @@ struct DriveAround : hal::Component {
 
     hal::Function run{*this, "update", &DriveAround::update, "chooses a direction and the speeds"};
 
-    void update(hal::Cycle) noexcept {
+    void update(hal::Cycle cycle) noexcept {
         const double dx = target_x - x, dy = target_y - y, left = std::hypot(dx, dy);
         invalid = !(left < 1e6 && std::fabs(heading) < 1e6);
         if (invalid) return rest(0.0, false);
-        look();
+        look(cycle.start_ns());
         const bool there = left <= std::fabs(tolerance);
         if (there || !enable) return rest(left, there);
         const double wanted = std::remainder(std::atan2(dy, dx) - heading, 2 * pi);
@@ -70,7 +71,12 @@ struct DriveAround : hal::Component {
     }
 
 private:
-    static constexpr int sectors = 72;  // 5 degrees each
+    static constexpr int          sectors = 72;  // 5 degrees each
+    static constexpr std::int64_t never = INT64_MIN;
+    struct Point {
+        double       x = 0.0, y = 0.0;
+        std::int64_t at_ns = never;
+    };
     struct Obstacle {
         double angle, distance;  // from the centre, relative to the heading
     };
@@ -83,26 +89,47 @@ private:
         avoiding = false, blocked = false;
         last_ = 0.0;
     }
-    /// Where the sensors report something.
-    void look() noexcept {
-        count_ = 0;
+    /// Where the sensors report something, and reported something a short time ago: an obstacle beside the robot may be between two of them.
+    void look(std::int64_t now) noexcept {
         double least = 1000.0;
         for (std::size_t i = 0; i < sensors; ++i) {
             if (reading[i] == 0) continue;
             const double range = std::sqrt(std::fmax(constant, 0.0) / reading[i]) - offset;
             if (!(range < 10.0)) continue;
-            const double facing = static_cast<double>(i / 2) * pi / 4, aside = i % 2 == 0 ? -spread : spread.get(),
-                         out = apothem + std::fmax(range, 0.0);
-            const Obstacle one{facing + std::atan2(aside, out), std::hypot(out, aside)};
-            least = std::fmin(least, one.distance);
-            if (one.distance < horizon) seen_[count_++] = one;
+            const double facing = static_cast<double>(i / 2) * pi / 4, aside = i % 2 == 0 ? -spread : spread.get();
+            const double out = apothem + std::fmax(range, 0.0), at = std::hypot(out, aside);
+            least = std::fmin(least, at);
+            if (!(at < horizon)) continue;
+            const double direction = heading + facing + std::atan2(aside, out);
+            remember({x + at * std::cos(direction), y + at * std::sin(direction), now});
         }
         nearest = finite(least);
+        count_ = 0;
+        for (const Point& p : points_) {
+            const double at = std::hypot(p.x - x, p.y - y);
+            if (p.at_ns != never && 1e-9 * static_cast<double>(now - p.at_ns) <= memory && at < horizon)
+                seen_[count_++] = {std::atan2(p.y - y, p.x - x) - heading, at};
+        }
+    }
+    /// A point that is nearly known is renewed; another one replaces the oldest.
+    void remember(const Point& seen) noexcept {
+        constexpr double same_m = 0.05;
+        Point*           oldest = points_.data();
+        for (Point& p : points_) {
+            if (p.at_ns != never && std::hypot(p.x - seen.x, p.y - seen.y) < same_m) {
+                p.at_ns = seen.at_ns;
+                return;
+            }
+            if (p.at_ns < oldest->at_ns) oldest = &p;
+        }
+        *oldest = seen;
     }
     double free_ahead() const noexcept {
         double least = horizon;
-        for (std::size_t i = 0; i < count_; ++i)
-            if (std::cos(seen_[i].angle) > 0.5) least = std::fmin(least, seen_[i].distance * std::cos(seen_[i].angle) + 0.05);
+        for (std::size_t i = 0; i < count_; ++i) {  // what is in the lane of the body
+            const double ahead = seen_[i].distance * std::cos(seen_[i].angle), aside = seen_[i].distance * std::sin(seen_[i].angle);
+            if (ahead > 0.0 && std::fabs(aside) < 0.85 * body) least = std::fmin(least, ahead);
+        }
         return least;
     }
     bool is_free(double angle, double left) const noexcept {
@@ -140,9 +167,10 @@ private:
         return blocked ? pi / 4 : best;
     }
 
-    std::array<Obstacle, sensors> seen_{};
-    std::size_t                   count_ = 0;
-    double                        last_ = 0.0;
+    std::array<Point, 192>    points_{};
+    std::array<Obstacle, 192> seen_{};
+    std::size_t               count_ = 0;
+    double                    last_ = 0.0;
 };
 
 }  // namespace
@@ -155,7 +183,8 @@ forwards, counted to the left.
 
 Each obstacle closes the directions in which the robot, with `body-radius`, would touch it; of the free ones the robot takes the one nearest to the
 target, and nearest to the one it took before (vector field histogram: J. Borenstein, Y. Koren, IEEE Transactions on Robotics and Automation 7, 1991).
-It drives slower towards what is near. It has no map: a dead end deeper than the range of the sensors can hold it, and `blocked` or a long time without
+It drives slower towards what is near. An obstacle is remembered for `memory`, because what is beside
+the robot may be between two sensors. There is no map beyond that: a dead end deeper than the range of the sensors can hold it, and `blocked` or a long time without
 `reached` is for the program above.
 
     loadrt drive_around names=pilot
