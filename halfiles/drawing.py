@@ -94,3 +94,20 @@ def floor(axes, path):
             x, y = axes.place(n[0], n[1])
             beacon = words[0] == "beacon"
             axes.picture.circle(x, y, n[2] * scale, "#f59e0b" if beacon else "#c5cad0", INK, 1.2)
+
+
+def simulate(hal, netlist, lines, pins, samples, every_s, ini=None):
+    """Runs a netlist and `lines`, then samples the pins; returns a list of lists of texts. Ends the program when the simulation fails."""
+    import subprocess
+    import sys
+    import tempfile
+    from pathlib import Path
+    script = [f"source {netlist}", *lines] + [f"advance {every_s:g}s", *(f"getp {pin}" for pin in pins)] * samples
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, "run.hal")
+        file.write_text("\n".join(script) + "\n", encoding="utf-8")
+        done = subprocess.run([hal, "sim", *(["-i", ini] if ini else []), file], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, check=False)
+    words = [line for line in done.stdout.splitlines() if " " not in line]  # a line of words is what a component reports
+    if done.returncode != 0:
+        sys.exit(f"hal sim ended with status {done.returncode}:\n{done.stderr}")
+    return [words[i:i + len(pins)] for i in range(0, samples * len(pins), len(pins))]
