@@ -26,6 +26,12 @@ struct CanTraffic : hal::Component {
                            "varied: data change from message to message; longest: nearly the largest number of stuff bits",
                            {.per_instance = true}};
 
+    hal::Argument one_node{*this,
+                           "one_node",
+                           0,
+                           "1: all messages are from one node, in order of their identifiers",
+                           {.per_instance = true, .min = 0, .max = 1}};
+
     hal::In<bool>           enable{*this, "enable", "FALSE: no messages", {.initial = true}};
     hal::Param<double>      period{*this, "period", "time between two releases of all messages together", {.initial = 0.01, .unit = "s"}};
     hal::Out<std::uint64_t> released{*this, "released", "messages released"};
@@ -40,13 +46,16 @@ struct CanTraffic : hal::Component {
             throw hal::ArgumentError("data", "data=" + data.get() + " is unknown; write varied or longest");
         varied_ = data.get() == "varied";
         first_ = hal::messages::identifier(id, count > 0 ? count - 1 : 0);
-        nodes_.resize(static_cast<std::size_t>(count));
+        messages_.assign(static_cast<std::size_t>(count), {});
+        nodes_.resize(one_node != 0 ? std::min<std::size_t>(messages_.size(), 1) : messages_.size());
         for (Node& node : nodes_) {
-            auto opened = hal::can::open(address.get(), {.own_frames = true, .send_capacity = 8, .receive_capacity = 64});
+            auto opened = hal::can::open(address.get(), {.own_frames = true, .send_capacity = 256, .receive_capacity = 256});
             if (!opened) throw std::runtime_error(opened.problem);
             node.link = std::move(opened.link);
+            node.first = static_cast<std::size_t>(&node - nodes_.data());
+            node.end = one_node != 0 ? messages_.size() : node.first + 1;
             const hal::can::Filter own{
-                .id = first_ + static_cast<std::uint32_t>(&node - nodes_.data()), .mask = 0x1fffffff, .extended = first_ > 0x7ff};
+                .id = first_ + static_cast<std::uint32_t>(node.first), .mask = one_node != 0 ? 0 : 0x1fffffffU, .extended = first_ > 0x7ff};
             node.link->set_filters(std::span(&own, 1));
         }
     }
@@ -63,45 +72,67 @@ struct CanTraffic : hal::Component {
             due = instant != last_;
             last_ = instant;
         }
-        for (std::size_t i = 0; i < nodes_.size(); ++i) work(nodes_[i], static_cast<std::uint32_t>(i), due, now);
+        std::uint64_t all_sent = 0, all_dropped = 0;
+        for (Node& node : nodes_) {
+            work(node, due, now);
+            const auto statistics = node.link->statistics();
+            all_sent += statistics.sent;
+            all_dropped += statistics.dropped;
+        }
+        sent = all_sent;
+        dropped = all_dropped + busy_;
     }
 
 private:
+    static constexpr std::size_t most_waiting = 8;
     struct Node {
         std::unique_ptr<hal::can::Link> link;
-        std::array<std::int64_t, 8>     release{};
-        std::uint64_t                   queued = 0, done = 0;
+        std::size_t                     first = 0, end = 0;  // of messages_
     };
-    void work(Node& node, std::uint32_t number, bool due, std::int64_t now) noexcept {
+    /// The last releases of a message that are not known to be sent. A link without echoes leaves them there.
+    struct Message {
+        std::array<std::int64_t, most_waiting> release{};
+        std::uint64_t                          queued = 0, done = 0;
+    };
+    void work(Node& node, bool due, std::int64_t now) noexcept {
         while (node.link->receive(buffer_, now)) {
-            if (!buffer_.own || node.done == node.queued) continue;
-            const double response = 1e-9 * static_cast<double>(buffer_.time_ns - node.release[node.done++ % node.release.size()]);
-            worst = std::fmax(worst, response);
-            sent = sent + 1;
+            const std::size_t number = buffer_.id - first_;
+            if (!buffer_.own || number >= messages_.size()) continue;
+            Message& message = messages_[number];
+            if (message.done == message.queued) continue;
+            worst = std::fmax(worst, 1e-9 * static_cast<double>(buffer_.time_ns - message.release[message.done++ % most_waiting]));
         }
-        if (due) {
-            hal::can::Frame frame;
-            frame.id = first_ + number;
-            frame.extended = first_ > 0x7ff;
-            frame.length = static_cast<std::uint8_t>(length);
-            // Data that change from message to message, so that the number of stuff bits does, too (G. Marsaglia, Xorshift RNGs, 2003).
-            random_ ^= random_ << 13, random_ ^= random_ >> 7, random_ ^= random_ << 17;
-            for (unsigned n = 0; n < frame.length; ++n)
-                frame.data[n] = varied_ ? static_cast<std::uint8_t>(random_ >> (8 * n)) : std::uint8_t{0x3c};
-            released = released + 1;
-            if (node.queued - node.done < node.release.size() && node.link->send(frame, now) == hal::can::Sent::queued)
-                node.release[node.queued++ % node.release.size()] = now;
-            else dropped = dropped + 1;
-        }
+        for (std::size_t i = node.first; due && i < node.end; ++i) release(node, i, now);
         node.link->flush(now);
     }
+    void release(Node& node, std::size_t number, std::int64_t now) noexcept {
+        hal::can::Frame frame;
+        frame.id = first_ + static_cast<std::uint32_t>(number);
+        frame.extended = first_ > 0x7ff;
+        frame.length = static_cast<std::uint8_t>(length);
+        // Data that change from message to message, so that the number of stuff bits does, too (G. Marsaglia, Xorshift RNGs, 2003).
+        random_ ^= random_ << 13, random_ ^= random_ >> 7, random_ ^= random_ << 17;
+        for (unsigned n = 0; n < frame.length; ++n)
+            frame.data[n] = varied_ ? static_cast<std::uint8_t>(random_ >> (8 * n)) : std::uint8_t{0x3c};
+        released = released + 1;
+        if (node.link->statistics().queued >= most_waiting * (node.end - node.first)) {
+            ++busy_;
+            return;
+        }
+        if (node.link->send(frame, now) != hal::can::Sent::queued) return;
+        Message& message = messages_[number];
+        if (message.queued - message.done == most_waiting) ++message.done;
+        message.release[message.queued++ % most_waiting] = now;
+    }
 
-    std::vector<Node> nodes_;
-    hal::can::Frame   buffer_;
-    std::uint64_t     random_ = 0x9E3779B97F4A7C15u;
-    std::uint32_t     first_ = 0;
-    std::int64_t      begin_ = 0, last_ = -1;
-    bool              started_ = false, varied_ = true;
+    std::vector<Node>    nodes_;
+    std::vector<Message> messages_;
+    std::uint64_t        busy_ = 0;
+    hal::can::Frame      buffer_;
+    std::uint64_t        random_ = 0x9E3779B97F4A7C15u;
+    std::uint32_t        first_ = 0;
+    std::int64_t         begin_ = 0, last_ = -1;
+    bool                 started_ = false, varied_ = true;
 };
 
 }  // namespace
@@ -112,7 +143,8 @@ the response-time analysis for every message with a higher identifier. Their dat
 `data=longest` each has nearly as many stuff bits as a message can have.
 
 `worst-response` is the longest time from a release to the last bit of a message on the bus; it must not exceed the computed response time
-(`hal can plan`). A message that is released while eight of its predecessors wait is dropped.
+(`hal can plan`); 0 on a bus that does not report what was sent. A message that is released while eight of its predecessors wait is dropped. With
+`one_node=1` all messages come from one node.
 
     loadrt can_traffic names=others link=sim:can0 id=0x200 messages=18
     addf others.update bus

@@ -1,0 +1,50 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""Pictures and tables that are computed from a simulation: made again, they are the same to the byte."""
+import os
+import subprocess
+import sys
+import unittest
+from pathlib import Path
+
+from harness import HAL, ROOT, Case
+
+
+class Pictures(Case):
+    def make(self, *command):
+        environment = dict(os.environ, HAL_BIN=str(HAL), XDG_RUNTIME_DIR=str(self.folder), PYTHONDONTWRITEBYTECODE="1")
+        done = subprocess.run([sys.executable, *map(str, command)], cwd=self.folder, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.assertEqual(0, done.returncode, done.stderr)
+        return done.stdout
+
+    def same(self, kept, made):
+        self.assertEqual(kept.read_text(encoding="utf-8"), made.read_text(encoding="utf-8"),
+                         f"{kept.relative_to(ROOT)} is not what the simulation gives; run the script beside it again and look at the result")
+
+    def test_path_of_the_robot_in_a_match(self):
+        made = Path(self.folder, "match.svg")
+        said = self.make(ROOT / "halfiles/canopen-robot/picture", made)
+        self.assertRegex(said, r"^largest error of the filter: [1-4]?\d mm; of odometry alone: [2-9]\d\d mm\n$")
+        self.same(ROOT / "halfiles/canopen-robot/match.svg", made)
+
+    def test_path_of_yair(self):
+        made = Path(self.folder, "path.svg")
+        self.assertEqual("round finished: yes\n", self.make(ROOT / "halfiles/yair/picture", made))
+        self.same(ROOT / "halfiles/yair/path.svg", made)
+
+    def test_slots_of_yair(self):
+        made = Path(self.folder, "slots.svg")
+        done = subprocess.run([HAL, "scocan", "plan", "yair.scocan", "--svg", made], cwd=ROOT / "halfiles/yair", stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.assertEqual(0, done.returncode, done.stderr)
+        self.same(ROOT / "halfiles/yair/slots.svg", made)
+
+    def test_jitter_experiment(self):
+        said = self.make(ROOT / "halfiles/jitter/experiment", self.folder)
+        self.assertIn("at every load: passed", said)
+        self.assertIn("No measured delay exceeds the computed bound: passed", said)
+        for name in ("jitter.csv", "jitter-overshoot.svg", "jitter-responses.svg"):
+            self.same(ROOT / "docs" / name, Path(self.folder, name))
+
+
+if __name__ == "__main__":
+    unittest.main()
