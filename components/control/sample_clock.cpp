@@ -97,11 +97,12 @@ and network; `measure` compares the `echo` that comes back with the time at whic
 `jitter` is the difference between the longest and the shortest delay since `reset`. The last 256 samples are known; older echoes are ignored.
 
     loadrt sample_clock names=sampling
+    loadrt sampled_pid names=loop
     addf sampling.sample bus
+    addf loop.update bus
     addf sampling.measure bus
     setp sampling.period 0.01
-    net sampled       sampling.trigger  => sensor.trigger
-    net number        sampling.sequence => sensor.number
-    net effect        actuator.new      => sampling.echo-new
-    net effect-number actuator.number   => sampling.echo
+    net sampled sampling.trigger  => loop.trigger
+    net effect  loop.new          => sampling.echo-new
+    net number  sampling.sequence => sampling.echo
 )")

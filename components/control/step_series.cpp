@@ -89,7 +89,7 @@ For an experiment in which one response is not enough, because a disturbance has
 
     loadrt step_series names=steps
     addf steps.update bus
-    net sampled  sampling.trigger => steps.trigger
-    net position motor.angle      => steps.value
-    net wanted   steps.command    => loop.command
+    net sampled  => steps.trigger
+    net position => steps.value
+    net wanted   <= steps.command
 )")
