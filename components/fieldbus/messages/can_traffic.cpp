@@ -89,7 +89,7 @@ private:
         std::unique_ptr<hal::can::Link> link;
         std::size_t                     first = 0, end = 0;  // of messages_
     };
-    /// The last releases of a message that are not known to be sent. A link without echoes leaves them there.
+    /// The last releases of a message without an echo. A link without echoes never removes them.
     struct Message {
         std::array<std::int64_t, most_waiting> release{};
         std::uint64_t                          queued = 0, done = 0;

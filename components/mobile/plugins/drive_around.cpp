@@ -59,7 +59,7 @@ struct DriveAround : hal::Component {
         const double wanted = std::remainder(std::atan2(dy, dx) - heading, 2 * pi);
         const double chosen = choose(wanted, left);
         const double ahead = std::fmax(0.0, std::cos(direction));
-        // Room in front: no faster than the robot can stop within what is free.
+        // Space in front: no faster than the robot can stop within it.
         const double room = std::clamp((free_ahead() - body) * 2.0, 0.0, 1.0);
         const double fastest = std::isfinite(max_speed) ? std::fabs(max_speed) : 0.0;
         linear = blocked ? 0.0
