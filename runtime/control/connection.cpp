@@ -56,7 +56,7 @@ constexpr Verb verbs[] = {
     {"unprobe", &Connection::State::unprobe, ""},
     {"journal", &Connection::State::journal, ""},
     {"list", &Connection::State::list, "patterns "},
-    {"describe", &Connection::State::describe_kind, "patterns type "},
+    {"describe", &Connection::State::describe_kind, "patterns type histograms "},
     {"complete", &Connection::State::complete, "cursor "},
     {"component", &Connection::State::component, "prefix pins ready timeout_ms every_ms safe "},
     {"exchange", &Connection::State::exchange, "write read alive "},

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "commands/describe.hpp"
+#include "commands/json_text.hpp"
 #include "commands/table.hpp"
 #include "control/connection_state.hpp"
 
@@ -104,8 +105,18 @@ void Connection::State::describe_kind(const Json& body, std::string& reply) {
         type = type_named(text_of(wanted, "type"));
         if (!type) throw RequestError{"type must be bit, float, s32, u32, s64, u64 or port"};
     }
+    const Json& histograms = member(body, "histograms");
+    if (!histograms.is_null() && !(histograms.is_boolean() && kind == Listed::threads))
+        throw RequestError{"histograms must be true or false, and is a member of a request to describe threads"};
     const auto lock = session.lock();
     describe(reply += ",\"objects\":", session, kind, patterns, type);
+    if (!histograms.is_boolean() || !histograms.get<bool>()) return;
+    auto all = nlohmann::ordered_json::object();
+    for (const auto& thread : session.model().threads) {
+        const ThreadHistograms one = session.reports().histograms(*thread);
+        all[thread->name] = {{"wakeup", one.wakeup}, {"busy", one.busy}};
+    }
+    reply += ",\"histograms\":" + json_text(all);
 }
 
 }  // namespace hal

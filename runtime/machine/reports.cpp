@@ -81,6 +81,19 @@ ThreadReport Reports::thread(const Thread& thread) const {
     return report;
 }
 
+ThreadHistograms Reports::histograms(const Thread& thread) const {
+    ThreadHistograms histograms;
+    const Core* const core = state_.core(&thread);
+    if (!core) return histograms;
+    const auto copy = [](const Histogram& from, std::vector<std::uint64_t>& to) {
+        for (std::size_t i = 0; i < Histogram::buckets; ++i)
+            if (const std::uint64_t count = from.count(i); count != 0) to.insert(to.end(), {Histogram::edge(i), count});
+    };
+    copy(core->wakeup, histograms.wakeup);
+    copy(core->busy, histograms.busy);
+    return histograms;
+}
+
 std::vector<ThreadReport> Reports::threads() const {
     std::vector<ThreadReport> reports;
     for (const auto& thread : state_.model.threads) reports.push_back(this->thread(*thread));

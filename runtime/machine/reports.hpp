@@ -30,6 +30,12 @@ struct ThreadReport {
     bool supervised = true;          ///< false with supervise=off
 };
 
+/// The distribution of a thread's durations since its start: lower edge (ns) and count of each bucket that is not empty, in turn. A bucket is an
+/// eighth of a power of two wide, 1 ns below 8 ns.
+struct ThreadHistograms {
+    std::vector<std::uint64_t> wakeup, busy;
+};
+
 /// The external clock reference that disciplines the threads.
 struct ClockReport {
     std::string leader;              ///< the instance that provides it
@@ -57,6 +63,7 @@ public:
 
     std::vector<ThreadReport> threads() const;
     ThreadReport thread(const Thread& thread) const;
+    ThreadHistograms histograms(const Thread& thread) const;
     /// Returns nothing while the threads run by their own clock.
     std::optional<ClockReport> clock() const;
 
