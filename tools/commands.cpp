@@ -52,6 +52,7 @@
 #include "inspect/tdma_status.hpp"
 #include "inspect/top.hpp"
 #include "machine/source_tree.hpp"
+#include "panel/panel.hpp"
 #include "paths.hpp"
 #include "record/plot.hpp"
 #include "run/replay.hpp"
@@ -70,11 +71,11 @@ struct Subcommand {
     const char* usage;    ///< what may follow the name
     const char* summary;
     std::unique_ptr<Options> (*make_options)();
-    int (*run)(const Options&);  ///< nullptr: in hal-bus
+    int (*run)(const Options&);  ///< nullptr: in hal-bus or hal-panel
     bool verbatim;               ///< from the first word on, everything counts as words, including `-1` and `--`
 };
 
-/// Makes a row. `run` takes the command's own options, O; nullptr: the command is in hal-bus.
+/// Makes a row. `run` takes the command's own options, O; nullptr: the command is in another program.
 template <class O, auto run>
 constexpr Subcommand command(const char* name, const char* usage, const char* summary, bool verbatim = false) {
     Subcommand row{name, usage, summary, []() -> std::unique_ptr<Options> { return std::make_unique<O>(); }, nullptr, verbatim};
@@ -83,11 +84,16 @@ constexpr Subcommand command(const char* name, const char* usage, const char* su
 }
 
 // The bus tools are a third of the code and need other libraries. They are in the program hal-bus, which `hal` replaces itself with.
-// This source is compiled for both.
+// The web page is in the program hal-panel in the same way. This source is compiled for all three.
 #ifdef HALCYON_BUS_PROGRAM
 #define ON_BUS(run) run
 #else
 #define ON_BUS(run) nullptr
+#endif
+#ifdef HALCYON_PANEL_PROGRAM
+#define ON_PANEL(run) run
+#else
+#define ON_PANEL(run) nullptr
 #endif
 
 constexpr Subcommand table[] = {
@@ -170,6 +176,7 @@ constexpr Subcommand table[] = {
     command<EthercatLineOptions, ON_BUS(run_node_ethercat)>("node ethercat", "FILE --link ADDRESS [--backup ADDRESS] [--for TIME]", "emulate a line of EtherCAT slaves on a network interface"),
     command<Options, ON_BUS(run_node_faults)>("node faults", "", "list the faults that simulated devices can inject"),
     command<TopOptions, run_top>("top", "", "show all instances on this machine and the network, their threads and faults"),
+    command<PanelOptions, ON_PANEL(run_panel)>("panel", "[FILE] [--write] [--listen ADDRESS]", "show a running machine in a web browser: values, graph, scope, user panels"),
     command<DoctorOptions, run_doctor>("doctor", "", "check whether this machine is fit for real time"),
     command<CompletionOptions, run_completion>("completion", "SHELL", "print a completion script: source <(hal completion bash)"),
 };
@@ -307,12 +314,17 @@ std::optional<int> read(const Subcommand& row, std::vector<std::string> argument
     return std::nullopt;
 }
 
-/// Replaces this process with hal-bus. Returns only when hal-bus cannot be started.
-int become_bus_program(char** argv) {
-    pass_on_capabilities();
-    const auto program = std::filesystem::read_symlink("/proc/self/exe").replace_filename("hal-bus");
+/// Replaces this process with hal-bus or hal-panel. Returns only when that cannot be started.
+int become_other_program(const Subcommand& row, char** argv) {
+    const std::string part = std::string_view(row.name) == "panel" ? "panel" : "bus";
+    if (part == "bus") pass_on_capabilities();
+    const auto program = std::filesystem::read_symlink("/proc/self/exe").replace_filename("hal-" + part);
     ::execv(program.c_str(), argv);
-    if (errno == ENOENT && build_on_demand("bus")) ::execv(program.c_str(), argv);
+    if (errno == ENOENT && build_on_demand(part)) ::execv(program.c_str(), argv);
+    if (part == "panel")
+        return fail(Options{}, fmt::format("cannot start {}: {}; this Halcyon was built without libwebsockets or pugixml; type: sudo apt install "
+                                           "libwebsockets-dev libpugixml-dev, and build again (./hal build panel)",
+                                           program.string(), std::strerror(errno)));
     return fail(Options{}, fmt::format("cannot start {}: {}; it must be in the folder of hal: type ./hal build bus in the source tree, or reinstall Halcyon",
                                        program.string(), std::strerror(errno)));
 }
@@ -327,7 +339,7 @@ int run_command_line(int argc, char** argv) {
     const auto [row, name_words] = find(all);
     if (!row && find_group(all[0]) && (all.size() == 1 || all[1] == "help" || all[1] == "--help" || all[1] == "-h")) return help({all[0]});
     if (!row) return no_such_command(all);
-    if (!row->run) return become_bus_program(argv);
+    if (!row->run) return become_other_program(*row, argv);
     const auto options = row->make_options();
     options->program = fmt::format("hal {}", row->name);
     if (const auto end = read(*row, {all.begin() + static_cast<std::ptrdiff_t>(name_words), all.end()}, *options)) return *end;

@@ -20,7 +20,7 @@ ROWS = {
     "runtime/commands": ["runtime/machine"],
     "runtime/control": ["runtime/commands"],
     "runtime/cells": ["runtime/control", "components/dds/links"],
-    "tools": ["tools/inspect", "tools/comp", "tools/bus"],  # the table of subcommands
+    "tools": ["tools/inspect", "tools/comp", "tools/bus", "tools/panel"],  # the table of subcommands
     "tools/cli": ["runtime/control"],
     "tools/run": ["tools/record", "runtime/cells"],
     "tools/record": ["tools/cli", "drivers/link", "components/recording/mcap"],
@@ -30,6 +30,7 @@ ROWS = {
     "tools/bus": ["tools/cli", "components/canopen/master", "components/canopen/device",
                   "components/fieldbus/tdma/rtcfg", "components/fieldbus/tdma/tunnel", "components/fieldbus/scocan/plan",
                   "components/ethercat/master", "components/ethercat/devices", "components/ethercat/config"],  # hal can, ethercat, node, tdma
+    "tools/panel": ["tools/cli"],
     "tools/python": ["runtime/control"],
     "drivers/link": [],
     "drivers/discipline": ["drivers/link", "runtime/sdk"],
@@ -102,7 +103,8 @@ LIBRARIES = {
     r"CLI/": ["tools/cli"],
     r"editline/|histedit": ["tools/cli"],
     r"fmt/": ["runtime", "tools"],
-    r"pugixml": ["components/canopen", "components/ethercat"],
+    r"pugixml": ["components/canopen", "components/ethercat", "tools/panel"],
+    r"libwebsockets": ["tools/panel"],
     r"nlohmann/": ["runtime/machine", "runtime/commands", "runtime/control", "tools"],
 }
 

@@ -1,0 +1,210 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""The server of `hal panel` without a browser: HTTP and WebSockets by hand, what it must reject, what it serves."""
+import re
+import sys
+import time
+import unittest
+from pathlib import Path
+
+from harness import SERVO, Case, wait_until
+from web import PANEL, WebSocket, request, start_panel
+
+
+class Panel(Case):
+    def begin(self, *words, netlist=SERVO, machine=True):
+        if machine:
+            self.machine = self.start("run", self.write("m.hal", netlist))
+        self.process, self.port, self.token = start_panel(self, *words)
+
+    def page(self, token=None, **how):
+        """A page of a browser that has sent its hello."""
+        socket = WebSocket(self.port, origin=how.pop("origin", f"http://localhost:{self.port}"), **how)
+        self.addCleanup(socket.close)
+        self.assertTrue(socket.accepted, socket.head)
+        socket.send({"hello": {"token": token} if token else {}})
+        return socket
+
+    def ask(self, socket, **body):
+        self.number = getattr(self, "number", 0) + 1
+        socket.send({"id": self.number, **body})
+        return socket.expect(lambda m: isinstance(m, dict) and m.get("id") == self.number)
+
+    def connected(self, token=None):
+        socket = self.page(token)
+        socket.expect(lambda m: m.get("event") == "machine" and m["up"])
+        return socket
+
+    def test_the_page_has_its_files_and_security_headers(self):
+        self.begin(machine=False)
+        status, headers, body = request(self.port)
+        self.assertEqual("HTTP/1.1 200 OK", status)
+        self.assertIn(b"<title>Halcyon</title>", body)
+        self.assertIn("default-src 'none'", headers["content-security-policy"])
+        self.assertEqual("nosniff", headers["x-content-type-options"])
+        self.assertEqual("no-referrer", headers["referrer-policy"])
+        self.assertEqual("no-store", headers["cache-control"])
+        for path in re.findall(rb'(?:href|src)="(\w[^"]*)"', body):
+            self.assertEqual("HTTP/1.1 200 OK", request(self.port, "/" + path.decode())[0], path)
+        self.assertIn("javascript", request(self.port, "/app.js")[1]["content-type"])
+
+    def test_unknown_paths_and_methods_are_rejected(self):
+        self.begin(machine=False)
+        for path in ("/nothing", "/../../etc/passwd", "/..%2f..%2fetc/passwd", "/app.js/", "/?a=%00"):
+            self.assertNotIn(b"root:", request(self.port, path)[2])
+        self.assertEqual("HTTP/1.1 404", request(self.port, "/nothing")[0][:12])
+        self.assertNotIn("200", request(self.port, "/", method="POST", headers=["Content-Length: 2"], body=b"{}")[0])
+
+    def test_the_name_of_another_host_is_rejected(self):  # DNS rebinding
+        self.begin(machine=False)
+        for host in ("evil.example", "localhost.evil.example", f"evil.example:{self.port}", "127.0.0.1.evil.example", "192.168.1.1", "localhost:80x", "[::1"):
+            self.assertEqual("HTTP/1.1 421", request(self.port, host=host)[0][:12], host)
+            self.assertFalse(WebSocket(self.port, host=host, origin=f"http://{host}").accepted, host)
+        for host in ("localhost", "LOCALHOST", f"127.0.0.1:{self.port}"):
+            self.assertEqual("HTTP/1.1 200 OK", request(self.port, host=host)[0], host)
+
+    def test_a_page_of_another_origin_is_rejected(self):  # cross-site requests
+        self.begin(machine=False)
+        for origin in ("http://evil.example", "null", "http://localhost", f"https://localhost:{self.port}", f"http://localhost:{self.port + 1}", f"http://localhost:{self.port}.evil.example"):
+            self.assertFalse(WebSocket(self.port, origin=origin).accepted, origin)
+        self.page()
+
+    def test_other_subprotocols_are_rejected(self):
+        self.begin(machine=False)
+        for name in (None, "chat", "control", "http"):
+            self.assertFalse(WebSocket(self.port, origin=f"http://localhost:{self.port}", subprotocol=name).accepted, name)
+
+    def test_values_arrive_and_are_not_writable_without_write(self):
+        self.begin()
+        page = self.connected()
+        self.assertEqual([5.0, 2.0], self.ask(page, read=["total", "adder.in0"])["values"])
+        number = self.ask(page, subscribe=["total"], every_ms=20)["subscription"]
+        page.expect(lambda m: m.get("event") == "values" and m["subscription"] == number and m["values"] == [5.0])
+        self.assertEqual("read-only: the panel was started without --write", self.ask(page, set={"adder.in0": 7})["error"])
+        self.assertEqual("2", self.value("adder.in0"))
+
+    def test_setting_needs_the_token_and_control(self):
+        self.begin("--write")
+        viewer = self.connected()
+        self.assertEqual("read-only: open the address with the token that hal panel printed", self.ask(viewer, set={"adder.in0": 7})["error"])
+        viewer.send({"take": True})
+        self.assertFalse(self.ask(viewer, set={"adder.in0": 7})["ok"])
+        first = self.connected(self.token)
+        self.assertTrue(self.ask(first, set={"adder.in0": 7})["ok"])
+        self.assertEqual("7", self.value("adder.in0"))
+        second = self.connected(self.token)
+        self.assertEqual("read-only: another page has control; take control first", self.ask(second, set={"adder.in0": 8})["error"])
+        second.send({"take": True})
+        self.assertTrue(self.ask(second, set={"adder.in0": 8})["ok"])
+        self.assertFalse(self.ask(first, set={"adder.in0": 9})["ok"])
+        self.assertEqual("8", self.value("adder.in0"))
+        viewer.expect(lambda m: m.get("event") == "log" and "adder.in0: 7 -> 8" in m["text"])
+        self.assertIn("adder.in0: 2 -> 7\n", (self.folder / "panel.err").read_text())
+
+    def test_a_wrong_token_closes_the_connection(self):
+        self.begin("--write", machine=False)
+        for token in ("0" * 32, "", self.token[:-1], self.token + "0"):
+            page = WebSocket(self.port, origin=f"http://localhost:{self.port}")
+            self.addCleanup(page.close)
+            page.send({"hello": {"token": token}})
+            self.assertIsNone(page.read())
+            self.assertEqual((1008, "wrong token"), page.closed)
+
+    def test_a_program_that_is_not_a_browser_needs_the_token(self):
+        self.begin("--write", machine=False)
+        program = self.page(origin=None)
+        self.assertIsNone(program.read())
+        self.assertEqual(1008, program.closed[0])
+        self.assertEqual("welcome", self.page(self.token, origin=None).read()["event"])
+
+    def test_listening_on_an_address_needs_the_token(self):
+        self.begin("--listen", "127.0.0.2", machine=False)
+        self.assertIsNotNone(self.token)
+        page = WebSocket(self.port, origin=f"http://127.0.0.2:{self.port}", host=f"127.0.0.2:{self.port}", address="127.0.0.2")
+        self.addCleanup(page.close)
+        page.send({"hello": {}})
+        self.assertIsNone(page.read())
+        self.assertEqual(1008, page.closed[0])
+
+    def test_requests_beyond_reading_are_rejected(self):
+        self.begin("--write")
+        page = self.connected(self.token)
+        for body in ({"run": ["unload", "all"]}, {"run": "show pin"}, {"script": "stop"}, {"stop": True}, {"component": "x"}, {"exchange": "x"}, {"options": {}}, {"cancel": True},
+                     {"read": ["total"], "stop": True}, {"read": ["total"], "set": {"adder.in0": 1}}, {}):
+            reply = self.ask(page, **body)
+            self.assertFalse(reply["ok"], body)
+        self.assertEqual([5.0], self.ask(page, read=["total"])["values"])
+
+    def test_invalid_and_huge_messages_close_only_their_connection(self):
+        self.begin()
+        good = self.connected()
+        for message, code in (("[]", 1007), ("{", 1007), (b"\0\1", 1007), ("x" * 70000, 1009)):
+            bad = self.connected()
+            bad.send(message)
+            while bad.read() is not None:
+                pass
+            self.assertEqual(code, bad.closed[0], message[:10])
+        flood = self.connected()
+        try:
+            for _ in range(3000):
+                flood.send({"id": 1, "read": ["total"]})
+        except OSError:
+            pass  # closed meanwhile
+        self.assertEqual([5.0], self.ask(good, read=["total"])["values"])
+
+    def test_a_client_that_does_not_read_delays_no_other(self):
+        self.begin()
+        lazy, good = self.connected(), self.connected()
+        for _ in range(60):
+            lazy.send({"id": 1, "subscribe": ["total"] * 2000, "every_ms": 10})
+            time.sleep(0.005)  # below the limit of messages per second
+        self.ask(good, subscribe=["servo.threadbeat"], every_ms=10)
+        begun = time.monotonic()
+        for _ in range(100):
+            good.expect(lambda m: m.get("event") == "values")
+        self.assertLess(time.monotonic() - begun, 30)
+        memory = int(re.search(r"VmRSS:\s+(\d+)", Path(f"/proc/{self.process.pid}/status").read_text())[1])
+        self.assertLess(memory, 400_000)
+
+    def test_a_killed_machine_is_reported_and_found_again(self):
+        self.begin()
+        page = self.connected()
+        self.end(self.machine, 9)
+        page.expect(lambda m: m.get("event") == "machine" and not m["up"])
+        self.machine = self.start("run", self.write("m.hal", SERVO))
+        page.expect(lambda m: m.get("event") == "machine" and m["up"])
+        self.assertEqual([5.0], self.ask(page, read=["total"])["values"])
+
+    def test_histograms_count_the_cycles(self):
+        self.begin()
+        page = self.connected()
+        reply = wait_until(lambda: (r := self.ask(page, describe="thread", histograms=True)) and r["histograms"]["servo"]["busy"] and r, "cycles")
+        pairs = reply["histograms"]["servo"]["busy"]
+        self.assertGreater(sum(pairs[1::2]), 0)
+        self.assertEqual(sorted(pairs[0::2]), pairs[0::2])
+
+    def test_metrics_are_prometheus_text(self):
+        self.begin()
+        text = request(self.port, "/metrics")[2].decode()
+        self.assertIn("halcyon_up 1\n", text)
+        self.assertRegex(text, r'halcyon_thread_cycles_total\{thread="servo"\} [1-9]')
+        buckets = [int(n) for n in re.findall(r'halcyon_thread_execution_seconds_bucket\{thread="servo",le="[^"]+"\} (\d+)', text)]
+        self.assertEqual(14, len(buckets))
+        self.assertEqual(sorted(buckets), buckets)
+        self.assertEqual(buckets[-1], int(re.search(r'execution_seconds_count\{thread="servo"\} (\d+)', text)[1]))
+        for line in text.splitlines():
+            self.assertRegex(line, r'^(# (HELP|TYPE) [a-z_]+ .+|[a-z_]+(\{[a-z]+="[^"]*"(,[a-z]+="[^"]*")*\})? [-+.e\d]+)$')
+        self.end(self.machine, 9)
+        self.assertIn("halcyon_up 0\n", request(self.port, "/metrics")[2].decode())
+
+    def test_errors_of_the_command_line(self):
+        self.assertEqual("hal panel: --listen: 'here' is not an IPv4 address; use the address of a network interface, or 0.0.0.0 for all\n", self.bad("panel", "--listen", "here"))
+        self.begin(machine=False)
+        self.assertIn(f"cannot listen on 127.0.0.1 port {self.port}", self.bad("panel", "--port", str(self.port)))
+
+
+if __name__ == "__main__":
+    if not PANEL.exists():
+        print("hal-panel is not built: install libwebsockets-dev and libpugixml-dev")
+        sys.exit(77)
+    unittest.main()

@@ -1,0 +1,296 @@
+// SPDX-License-Identifier: MIT
+// The language of .panel files: a line per widget, `row`, `column` and `frame` up to `end`.
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <filesystem>
+#include <fmt/core.h>
+#include <map>
+#include <memory>
+#include <optional>
+
+#include "base/types.hpp"
+#include "cli/output.hpp"
+#include "machine/address.hpp"
+#include "panel/panel_layout.hpp"
+#include "text/config_text.hpp"
+#include "text/suggest.hpp"
+
+namespace hal::tools {
+
+using Json = nlohmann::json;
+using text::Word;
+
+namespace {
+
+constexpr int deepest = 30;
+constexpr std::size_t most_widgets = 2000, most_errors = 50;
+
+/// A widget of the language.
+struct Kind {
+    const char* name;
+    const char* widget;  ///< for the page
+    const char* type;    ///< of its pin; nullptr: it has none
+    bool output;
+    const char* keys;    ///< each followed by a blank; besides label, doc, unit
+};
+
+constexpr Kind kinds[] = {
+    {"gauge", "meter", "float", false, "min max warn alarm of "},
+    {"bar", "bar", "float", false, "min max warn alarm of "},
+    {"number", "number", "float", false, "digits of "},
+    {"integer", "number", "s32", false, "of "},
+    {"led", "led", "bit", false, "on off of "},
+    {"chart", "chart", "float", false, "min max seconds of "},
+    {"button", "button", "bit", true, "safe "},
+    {"toggle", "checkbutton", "bit", true, "initial safe "},
+    {"slider", "scale", "float", true, "min max step initial safe "},
+    {"input", "spinbox", "float", true, "min max step initial safe "},
+    {"dial", "dial", "float", true, "min max step initial safe "},
+    {"text", "label", nullptr, false, ""},
+};
+
+constexpr const char* number_keys[] = {"min", "max", "step", "warn", "alarm", "seconds", "digits"};
+
+/// Splits a line at blanks; "…" keeps blanks together, also behind `key=`. An open quotation mark goes to the end of the line.
+std::vector<Word> words_of_line(const Word& line) {
+    std::vector<Word> words;
+    const std::string& text = line.text;
+    for (std::size_t i = 0; i < text.size();) {
+        if (text[i] == ' ' || text[i] == '\t') {
+            ++i;
+            continue;
+        }
+        Word word = text::part(line, i, i + 1);
+        word.text.clear();
+        bool quoted = false;
+        const std::size_t begin = i;
+        for (; i < text.size() && (quoted || (text[i] != ' ' && text[i] != '\t')); ++i) {
+            if (text[i] == '"') quoted = !quoted;
+            else word.text += text[i];
+        }
+        word.at.length = static_cast<std::uint32_t>(i - begin);
+        words.push_back(std::move(word));
+    }
+    return words;
+}
+
+std::optional<double> number_of(std::string_view text) {
+    double value = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (error != std::errc{} || end != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;
+    return value;
+}
+
+class Reader {
+public:
+    Reader(const std::string& name, std::string& errors) : name_(name), errors_(errors) {}
+
+    PanelLayout read(const std::string& whole) {
+        layout_.root = {{"widget", "vbox"}, {"children", Json::array()}};
+        open_.push_back(&layout_.root);
+        for (text::Lines lines(whole, "#"); auto line = lines.next();) {
+            const auto words = words_of_line(*line);
+            if (!words.empty()) this->line(words);
+        }
+        if (open_.size() > 1) error(opened_.back(), "this container has no end", "add a line: end");
+        return std::move(layout_);
+    }
+
+private:
+    void error(const text::Span& at, const std::string& sentence, const std::string& help = "") {
+        if (++count_ <= most_errors) errors_ += text::message_text(name_, Severity::error, at, sentence, help) + "\n";
+    }
+
+    void line(const std::vector<Word>& words) {
+        const std::string& first = words[0].text;
+        if (first == "component") return setting(words, layout_.component);
+        if (first == "timeout") return timeout(words);
+        if (first == "title") {
+            std::string title;
+            setting(words, title);
+            layout_.root["title"] = title;
+            return;
+        }
+        if (first == "end") {
+            if (open_.size() == 1) return error(words[0].at, "'end' without an open row, column or frame");
+            open_.pop_back();
+            opened_.pop_back();
+            return;
+        }
+        if (first == "row" || first == "column" || first == "frame") return container(words);
+        const auto kind = std::find_if(std::begin(kinds), std::end(kinds), [&](const Kind& k) { return first == k.name; });
+        if (kind != std::end(kinds)) return widget(*kind, words);
+        std::vector<std::string> names{"component", "timeout", "title", "row", "column", "frame", "end"};
+        for (const Kind& k : kinds) names.emplace_back(k.name);
+        error(words[0].at, fmt::format("unknown word '{}'", first.substr(0, 60)), suggestion(first, names, "the words are"));
+    }
+
+    void setting(const std::vector<Word>& words, std::string& to) {
+        if (words.size() != 2)
+            return error(words[0].at, fmt::format("'{}' takes one word", words[0].text), "write names with blanks in quotation marks");
+        to = words[1].text;
+        if (words[0].text == "component" && !good_instance_name(to))
+            error(words[1].at, fmt::format("'{}' is not a valid name of a component", to.substr(0, 60)));
+    }
+
+    void timeout(const std::vector<Word>& words) {
+        const auto ns = words.size() == 2 ? parse_duration_ns(words[1].text) : std::nullopt;
+        if (!ns || *ns < 100'000'000 || *ns > 60'000'000'000)
+            return error(words[0].at, "the timeout must be 100ms to 60s", "write: timeout 500ms");
+        layout_.timeout_ms = *ns / 1'000'000;
+    }
+
+    Json& add(Json node) {
+        Json& children = (*open_.back())["children"];
+        children.push_back(std::move(node));
+        return children.back();
+    }
+
+    void container(const std::vector<Word>& words) {
+        const bool frame = words[0].text == "frame";
+        if (words.size() > 2) return error(words[2].at, "a container has at most a title", "write titles with blanks in quotation marks");
+        if (open_.size() > deepest) return error(words[0].at, "containers are nested more than 30 deep");
+        Json node{{"widget", words[0].text == "row" ? "hbox" : "vbox"}, {"children", Json::array()}};
+        if (words.size() == 2 || frame) {
+            node["widget"] = "labelframe";
+            node["horizontal"] = words[0].text == "row";
+            node["options"] = {{"text", words.size() == 2 ? words[1].text : ""}};
+        }
+        containers_.push_back(std::make_unique<Json>(std::move(node)));
+        // The node is filled in place: pointers into the array of its parent do not survive the next widget.
+        Json& placed = add(Json());
+        placed = {{"index", containers_.size() - 1}};
+        open_.push_back(containers_.back().get());
+        opened_.push_back(words[0].at);
+    }
+
+    void widget(const Kind& kind, const std::vector<Word>& words);
+    void pin(const Kind& kind, const std::vector<Word>& words, const std::map<std::string, Word>& given, Json& options, Json& node);
+    std::optional<Json> value_of(const Kind& kind, const Word& word);
+
+public:
+    /// Puts the containers where they belong.
+    void assemble(Json& node) {
+        for (Json& child : node["children"]) {
+            if (child.contains("index")) child = std::move(*containers_[child["index"].get<std::size_t>()]);
+            if (child.contains("children")) assemble(child);
+        }
+    }
+
+private:
+    std::string name_;
+    std::string& errors_;
+    PanelLayout layout_;
+    std::vector<Json*> open_;
+    std::vector<text::Span> opened_;
+    std::vector<std::unique_ptr<Json>> containers_;
+    std::size_t count_ = 0, widgets_ = 0;
+};
+
+std::optional<Json> Reader::value_of(const Kind& kind, const Word& word) {
+    if (std::string_view(kind.type) == "bit") {
+        if (word.text == "TRUE" || word.text == "1" || word.text == "true") return Json(true);
+        if (word.text == "FALSE" || word.text == "0" || word.text == "false") return Json(false);
+        error(word.at, fmt::format("'{}' is not a bit", word.text.substr(0, 60)), "write TRUE or FALSE");
+        return std::nullopt;
+    }
+    if (const auto number = number_of(word.text)) return Json(*number);
+    error(word.at, fmt::format("'{}' is not a number", word.text.substr(0, 60)));
+    return std::nullopt;
+}
+
+void Reader::pin(const Kind& kind, const std::vector<Word>& words, const std::map<std::string, Word>& given, Json& options, Json& node) {
+    PanelPin pin;
+    pin.name = words[1].text;
+    pin.type = kind.type;
+    pin.output = kind.output;
+    const bool good = !pin.name.empty() && pin.name.size() <= 100 && std::all_of(pin.name.begin(), pin.name.end(), [](unsigned char c) {
+        return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_' || c == '.';
+    });
+    if (!good)
+        return error(words[1].at, fmt::format("'{}' is not a valid name of a pin", pin.name.substr(0, 60)),
+                     "use letters, digits, '-', '_' and '.'");
+    if (std::any_of(layout_.pins.begin(), layout_.pins.end(), [&](const PanelPin& other) { return other.name == pin.name; }))
+        return error(words[1].at, fmt::format("duplicate pin '{}'", pin.name), "each pin of a panel needs a name of its own");
+    if (kind.output && std::string_view(kind.name) == "button") pin.safe = false;
+    for (const auto& [key, word] : given) {
+        if (key != "initial" && key != "safe") continue;
+        if (const auto value = value_of(kind, word)) (key == "initial" ? pin.initial : pin.safe) = *value;
+    }
+    if (given.contains("unit")) pin.unit = given.at("unit").text;
+    if (given.contains("doc")) pin.doc = given.at("doc").text;
+    if (!pin.initial.is_null()) node["initial"] = pin.initial;
+    if (!options.contains("text")) options["text"] = pin.name;
+    node["pin"] = pin.name;
+    layout_.pins.push_back(std::move(pin));
+}
+
+void Reader::widget(const Kind& kind, const std::vector<Word>& words) {
+    if (++widgets_ > most_widgets) return widgets_ == most_widgets + 1 ? error(words[0].at, "more than 2000 widgets") : void();
+    if (words.size() < 2)
+        return error(words[0].at, fmt::format("missing {} of '{}'", kind.type ? "pin" : "text", kind.name),
+                     fmt::format("write: {} NAME", kind.name));
+    std::map<std::string, Word> given;
+    const std::string keys = std::string("label doc unit ") + kind.keys;
+    for (std::size_t i = 2; i < words.size(); ++i) {
+        const std::size_t equals = words[i].text.find('=');
+        const std::string key = words[i].text.substr(0, equals);
+        if (equals == std::string::npos || (" " + keys).find(" " + key + " ") == std::string::npos) {
+            error(words[i].at, fmt::format("'{}' is not an option of '{}'", key.substr(0, 60), kind.name),
+                  fmt::format("the options are: {}", keys.substr(0, keys.size() - 1)));
+            continue;
+        }
+        given[key] = {words[i].text.substr(equals + 1), words[i].at};
+    }
+    Json options = Json::object(), node{{"widget", kind.widget}, {"kind", kind.name}};
+    for (const auto& [key, word] : given) {
+        if (std::find(std::begin(number_keys), std::end(number_keys), key) != std::end(number_keys)) {
+            if (const auto number = number_of(word.text)) options[key] = *number;
+            else error(word.at, fmt::format("{} must be a number, not '{}'", key, word.text.substr(0, 60)));
+        } else if (key == "on" || key == "off" || key == "unit") {
+            options[key] = word.text;
+        }
+    }
+    if (options.contains("min") && options.contains("max") && options["min"].get<double>() >= options["max"].get<double>())
+        error(words[0].at, "min must be less than max");
+    if (options.contains("step") && options["step"].get<double>() <= 0) error(words[0].at, "step must be positive");
+    if (given.contains("label")) options["text"] = given["label"].text;
+    if (!kind.type) {
+        options["text"] = words[1].text;
+    } else if (given.contains("of")) {  // shows a value that exists, without a pin of its own
+        node["of"] = given["of"].text;
+        if (!options.contains("text")) options["text"] = words[1].text;
+    } else {
+        pin(kind, words, given, options, node);
+    }
+    node["options"] = std::move(options);
+    add(std::move(node));
+}
+
+}  // namespace
+
+PanelLayout read_panel_text(const std::string& text, const std::string& name, std::string& errors) {
+    Reader reader(name, errors);
+    PanelLayout layout = reader.read(text);
+    reader.assemble(layout.root);
+    return layout;
+}
+
+PanelLayout read_panel_file(const std::string& path, const std::string& component, std::string& errors) {
+    std::string text;
+    if (!read_file(path, text)) {
+        errors += fmt::format("cannot read '{}': {}\n", path, text);
+        return {};
+    }
+    const std::size_t begin = text.find_first_not_of(" \t\r\n");
+    const bool xml = begin != std::string::npos && (text[begin] == '<' || static_cast<unsigned char>(text[begin]) == 0xEF);
+    PanelLayout layout = xml ? read_pyvcp(text, path, errors) : read_panel_text(text, path, errors);
+    if (!component.empty()) layout.component = component;
+    else if (layout.component.empty()) layout.component = xml ? "pyvcp" : std::filesystem::path(path).stem().string();
+    if (!good_instance_name(layout.component))
+        errors += fmt::format("'{}' is not a valid name of a component; choose one: --component NAME\n", layout.component);
+    return layout;
+}
+
+}  // namespace hal::tools

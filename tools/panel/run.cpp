@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: MIT
+// `hal panel`: from the command line to a running server.
+#include <arpa/inet.h>
+#include <array>
+#include <fmt/core.h>
+#include <thread>
+#include <unistd.h>
+
+#include "cli/output.hpp"
+#include "cli/signals.hpp"
+#include "machine/address.hpp"
+#include "panel/panel.hpp"
+#include "panel/panel_layout.hpp"
+#include "panel/server.hpp"
+
+namespace hal::tools {
+
+namespace {
+
+constexpr const char* loopback = "127.0.0.1";
+
+std::string host_name() {
+    std::array<char, 256> name{};
+    return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "";
+}
+
+Access access_for(const PanelOptions& options) {
+    Access access{{"localhost", loopback}, false, options.origins, random_token(), true, options.write};
+    for (std::string name : options.hosts) {
+        for (char& c : name) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c + ('a' - 'A')) : c;
+        access.hosts.push_back(std::move(name));
+    }
+    if (options.listen.empty()) return access;
+    access.any_address = true;
+    access.open = false;
+    access.hosts.push_back(host_name());
+    return access;
+}
+
+/// What a start prints.
+std::string announcement(const PanelOptions& options, const Access& access, const std::string& instance, int port) {
+    std::string text;
+    const bool all = options.listen == "0.0.0.0";
+    const std::string host = options.listen.empty() ? "localhost" : all ? host_name() : options.listen;
+    if (!options.listen.empty())
+        text += fmt::format(
+            "warning: listening on {}, port {}: every computer that reaches it and has the token can read all values of instance '{}'{}.\n"
+            "The connection is not encrypted: use it on a network of the machine only, or through an SSH tunnel without --listen.\n",
+            all ? "all network interfaces" : options.listen, port, instance, options.write ? " and set them" : "");
+    const bool token = options.write || !access.open;
+    text += fmt::format("http://{}:{}/{}\n", host, port, token ? "#t=" + access.token : "");
+    text += fmt::format("programs and Foxglove: ws://{}:{}/?t={}\n", host, port, access.token);
+    if (!options.write) text += "read-only; with --write, values can be set\n";
+    return text;
+}
+
+}  // namespace
+
+int run_panel(const PanelOptions& options) {
+    if (options.words.size() > 1) return fail(options, fmt::format("unexpected argument '{}'; see: hal help panel", options.words[1]));
+    in_addr address{};
+    if (!options.listen.empty() && ::inet_pton(AF_INET, options.listen.c_str(), &address) != 1)
+        return fail(options,
+                    fmt::format("--listen: '{}' is not an IPv4 address; use the address of a network interface, or 0.0.0.0 for all",
+                                options.listen));
+    const std::string instance = instance_wanted(options.name);
+    if (!good_instance_name(instance)) return fail(options, fmt::format("'{}' is not a valid instance name", instance));
+    PanelLayout layout;
+    if (!options.words.empty()) {
+        std::string errors;
+        layout = read_panel_file(options.words[0], options.component, errors);
+        if (!errors.empty()) {
+            write_all(STDERR_FILENO, errors);
+            return fail(options, fmt::format("'{}' has errors", options.words[0]));
+        }
+    } else if (!options.component.empty()) {
+        return fail(options, "--component names the component of a user panel; add its file");
+    }
+    const Access access = access_for(options);
+    StopRequest stop;
+    PanelServer server(access, instance);
+    if (const std::string problem = server.open(options.listen.empty() ? loopback : options.listen, options.port); !problem.empty())
+        return fail(options, problem);
+    if (!options.words.empty()) server.load(std::move(layout));
+    if (!print(announcement(options, access, instance, server.port()))) return 1;
+    std::thread ending([&] {
+        stop.wait_ns(options.for_ns);
+        server.interrupt();
+    });
+    server.run();
+    stop.request();
+    ending.join();
+    return 0;
+}
+
+}  // namespace hal::tools

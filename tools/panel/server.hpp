@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: MIT
+// The web server of `hal panel`: one event loop, one thread. HTTP for the page and metrics, WebSockets for pages and Foxglove.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "panel/event_log.hpp"
+#include "panel/guard.hpp"
+#include "panel/web_client.hpp"
+
+struct lws;
+struct lws_context;
+struct lws_vhost;
+
+namespace hal::tools {
+
+class Metrics;
+class PanelClient;
+class UserPanel;
+struct PanelLayout;
+struct EventLoop;
+
+class PanelServer {
+public:
+    PanelServer(Access access, std::string instance);
+    ~PanelServer();
+    PanelServer(const PanelServer&) = delete;
+
+    /// Opens the port, 0 for any. Returns a sentence when that fails.
+    std::string open(const std::string& address, int port);
+    int port() const;
+    void load(PanelLayout layout);
+    /// Serves until interrupt() is called.
+    void run();
+    void interrupt() noexcept;  ///< [any]
+
+    const Access& access() const { return access_; }
+    const std::string& instance() const { return instance_; }
+    lws_vhost* host() const { return host_; }
+    EventLog& log() { return log_; }
+    UserPanel* panel() { return panel_.get(); }
+    Metrics& metrics() { return *metrics_; }
+
+    /// At most one page has control at a time.
+    const PanelClient* controller() const { return controller_; }
+    bool controls(const PanelClient& client) const { return controller_ == &client; }
+    void take_control(PanelClient& client);
+    void offer_control(PanelClient& client);
+    void release(PanelClient& client);
+    /// Returns false when too many clients are connected. One with the token displaces the oldest one without it.
+    bool admit(WebClient& client);
+
+    // Called by the event loop.
+    void add(std::unique_ptr<WebClient> client) { clients_.push_back(std::move(client)); }
+    void remove(WebClient* client);
+    std::uint64_t next_number() { return ++numbers_; }
+    std::size_t connections() const { return clients_.size(); }
+    void tick();
+
+    static constexpr std::size_t most_clients = 32, most_connections = 48;
+
+private:
+    void tell_control();
+
+    Access access_;
+    std::string instance_;
+    lws_context* context_ = nullptr;
+    lws_vhost* host_ = nullptr;
+    EventLog log_;
+    std::unique_ptr<EventLoop> loop_;
+    std::unique_ptr<Metrics> metrics_;
+    std::unique_ptr<UserPanel> panel_;
+    std::vector<std::unique_ptr<WebClient>> clients_;
+    PanelClient* controller_ = nullptr;
+    std::uint64_t numbers_ = 0;
+    bool stop_ = false;
+};
+
+}  // namespace hal::tools

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: MIT
+// The user panel of a server: its pins are a component of the machine, its values go to the pages.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "panel/control_link.hpp"
+#include "panel/panel_layout.hpp"
+
+namespace hal::tools {
+
+class EventLog;
+
+class UserPanel : ControlLink::User {
+public:
+    UserPanel(lws_vhost* host, const std::string& instance, PanelLayout layout, EventLog& log);
+
+    std::int64_t timeout_ms() const { return layout_.timeout_ms; }
+    /// Returns the layout as JSON, for the page.
+    const std::string& layout() const { return text_; }
+    /// Returns the event with all values.
+    std::string values() const;
+    /// Receives the event with the values that have changed.
+    std::function<void(const std::string&)> on_values;
+
+    /// Sets an output pin. Returns a sentence when the pin or the value is invalid.
+    std::string write(std::string_view name, const nlohmann::json& value);
+    /// Sends what was written to the machine.
+    void flush();
+    /// A page with control is connected.
+    void page_active();
+    /// No page controls the panel: its outputs take their safe values.
+    void page_lost();
+    /// Exchanges values with the machine. Call it every 50 ms.
+    void tick(std::int64_t now_ms);
+
+private:
+    void machine_up(std::string_view hello) override;
+    void machine_down() override;
+    void machine_line(std::string_view line, std::string_view payload) override;
+    void inputs(const nlohmann::json& values);
+
+    PanelLayout layout_;
+    std::string text_;
+    EventLog& log_;
+    ControlLink link_;
+    std::vector<std::string> shown_;   ///< the newest value of each pin, as JSON
+    std::vector<std::size_t> inputs_;  ///< the pins that exchange reads, in order
+    std::vector<std::size_t> changed_; ///< outputs that the machine does not have yet
+    bool registered_ = false, waiting_ = false, active_ = false;
+    std::int64_t retried_ms_ = 0;
+};
+
+}  // namespace hal::tools
