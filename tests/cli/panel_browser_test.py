@@ -4,7 +4,7 @@
 import sys
 import unittest
 
-from harness import SERVO, Case
+from harness import SERVO, Case, wait_until
 from web import PANEL, Browser, have_browser, start_panel
 
 WAVE = SERVO + """loadrt siggen names=wave
@@ -78,6 +78,58 @@ class Page(Case):
         self.browser.open("about:blank")
         self.browser.open(address)
         self.browser.wait("document.querySelector('[data-value=\"wave.sine\"]')?.textContent.length > 1")
+
+    def test_the_graph_shows_boxes_values_and_the_latency_of_a_reader(self):
+        self.begin(netlist=WAVE + "loadrt sum2 names=next\naddf next servo\nnet total next.in0\n", view="graph?pin=total")
+        self.browser.wait("Number(document.querySelector('canvas').dataset.boxes) === 3 && Number(document.querySelector('canvas').dataset.values) >= 1")
+        self.browser.wait("/next\\.in0[^]*0 cycles/.test(document.querySelector('.floating').innerText)")
+        self.assertIn("written by adder.out", self.browser.evaluate("document.querySelector('.floating').innerText"))
+
+    def test_the_scope_triggers_on_the_right_sample(self):
+        self.begin(view="scope?ch=sine:0.5:0&mode=normal&trigger=sine&edge=rising&level=0.5&base=0.02")
+        self.browser.wait("window.halcyonScope?.shownAt && halcyonScope.rows > 50 && halcyonScope.lost === 0")
+        # The samples on both sides of the trigger, which is at 20 % of the record.
+        before, after = self.browser.evaluate("""(() => { const s = halcyonScope, at = s.shownAt - s.pre * 4, [g, c] = s.store.place.get('sine'), row = g.row(at);
+            return [g.value(c, row - 1), g.value(c, row)]; })()""")
+        self.assertLess(before, 0.5 + 1e-9)
+        self.assertGreaterEqual(after, 0.5 - 1e-9)
+        frequency = self.browser.wait("parseFloat(document.querySelector('[data-channel=sine]').children[5].textContent)")
+        self.assertAlmostEqual(5, frequency, delta=1)
+
+    def test_a_batch_of_a_probe_is_read_to_the_last_bit(self):
+        self.begin()
+        result = self.browser.evaluate("""(async () => {
+            const {Store, Trigger, measure} = await import('./scope_data.js'), store = new Store(), rows = 1000, view = new DataView(new ArrayBuffer(rows * 32));
+            store.layout([{columns: [0, 1]}], ['x', 'n']);
+            for (let i = 0; i < rows; i++) {
+                view.setBigUint64(32 * i, BigInt(i < 500 ? i : i + 3), true);
+                view.setBigInt64(32 * i + 8, 1000000000000n + BigInt(i) * 100000n, true);
+                view.setFloat64(32 * i + 16, Math.sin(2 * Math.PI * 50 * i * 1e-4), true);
+                view.setBigInt64(32 * i + 24, BigInt(-i), true);
+            }
+            store.samples({parts: [{group: 0, rows, lost: 3}], until_ns: 1000000000000 + rows * 100000}, view, {columns: [{type: 'float'}, {type: 's32'}]});
+            const edges = new Trigger('x', 'rising', 0).scan(store), seen = measure(store, 'x', 0, 1);
+            return {rows: store.rows, lost: store.lost, gaps: store.gaps, least: measure(store, 'n', 0, 1).min, edges: edges.map(t => Math.round(t * 1e6)), rms: seen.rms, frequency: seen.frequency};
+        })()""")
+        self.assertEqual({"rows": 1000, "lost": 3, "gaps": 1, "least": -999, "edges": [20000, 40000, 60000, 80000]},
+                         {key: result[key] for key in ("rows", "lost", "gaps", "least", "edges")})
+        self.assertAlmostEqual(0.5 ** 0.5, result["rms"], places=4)
+        self.assertAlmostEqual(50, result["frequency"], places=4)
+
+    def test_a_button_of_a_user_panel_is_true_while_it_is_pressed(self):
+        self.write("jog.panel", "component jog\nbutton go\nslider speed min=-1 max=1 safe=0\ngauge total of=total max=10\n")
+        self.begin("jog.panel", "--write", view="panel")
+        self.browser.wait("document.querySelector('[data-pin=go]') && !document.querySelector('[data-pin=go]').disabled")
+        self.browser.wait("document.querySelector('[data-widget=meter]').dataset.value === '5'")
+        x, y = self.browser.evaluate("(r => [r.x + 5, r.y + 5])(document.querySelector('[data-pin=go]').getBoundingClientRect())")
+        self.browser.call("Input.dispatchMouseEvent", type="mousePressed", x=x, y=y, button="left", clickCount=1)
+        wait_until(lambda: self.value("jog.go") == "TRUE", "pressed")
+        self.browser.call("Input.dispatchMouseEvent", type="mouseReleased", x=x, y=y, button="left", clickCount=1)
+        wait_until(lambda: self.value("jog.go") == "FALSE", "released")
+        self.browser.evaluate("const s = document.querySelector('input[type=range]'); s.value = 0.5; s.dispatchEvent(new Event('input'))")
+        wait_until(lambda: self.value("jog.speed") == "0.5", "moved")
+        self.browser.open("about:blank")
+        wait_until(lambda: self.value("jog.speed") == "0", "the page is lost")
 
     def test_names_of_the_machine_are_text(self):
         self.begin(netlist=SERVO + "newsig <img/src=x> float\n", view="watch?filter=img")

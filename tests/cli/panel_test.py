@@ -197,6 +197,103 @@ class Panel(Case):
         self.end(self.machine, 9)
         self.assertIn("halcyon_up 0\n", request(self.port, "/metrics")[2].decode())
 
+    def test_a_user_panel_is_a_component_whose_outputs_need_control(self):
+        self.write("jog.panel", "component jog\ntimeout 300ms\nslider speed min=-1 max=1 safe=0 initial=0.25\nbutton go\nnumber load unit=%\ntoggle keep\n")
+        self.begin("jog.panel", "--write")
+        wait_until(lambda: self.value("jog.speed") == "0.25", "the pins exist")
+        self.assertIn("jog.go", self.good("shell", "list", "pin"))
+        viewer, page = self.connected(), self.page(self.token)
+        welcome = page.expect(lambda m: m.get("event") == "welcome")
+        self.assertEqual(["go", "keep", "load", "speed"], sorted(welcome["panel"]["pins"]))
+        page.expect(lambda m: m.get("event") == "control" and m["held"])
+        viewer.send({"id": 1, "panel": {"write": {"speed": 1}}})
+        self.assertFalse(viewer.expect(lambda m: m.get("id") == 1)["ok"])
+        page.send({"panel": {"write": {"speed": 0.5, "go": True, "keep": True}}})
+        page.expect(lambda m: m.get("event") == "log" and "safe values" in m["text"])  # no further message within 300 ms
+        for name, value in (("jog.speed", "0"), ("jog.go", "FALSE"), ("jog.keep", "TRUE")):
+            wait_until(lambda name=name, value=value: self.value(name) == value, name)
+        for name, value in (("speed", "high"), ("speed", True), ("go", 1), ("load", 1.0), ("nothing", 1)):
+            page.send({"id": 2, "panel": {"write": {name: value}}})
+            self.assertIn(f"'{name}'", page.expect(lambda m: m.get("id") == 2)["error"])
+        self.good("shell", "setp", "jog.load", "42")
+        viewer.expect(lambda m: m.get("event") == "panel" and m["values"].get("load") == 42)
+
+    def test_the_loss_of_a_page_sets_safe_values(self):
+        self.write("jog.panel", "component jog\ntimeout 60s\nslider speed min=-1 max=1 safe=0\n")
+        self.begin("jog.panel", "--write")
+        page = self.page(self.token)
+        page.expect(lambda m: m.get("event") == "panel" and m["ready"])
+        page.send({"panel": {"write": {"speed": 0.5}}})
+        wait_until(lambda: self.value("jog.speed") == "0.5", "the value arrives")
+        page.close()
+        wait_until(lambda: self.value("jog.speed") == "0", "the safe value")
+
+    def test_pyvcp_pins_have_their_names_types_and_directions(self):
+        self.write("p.xml", """<pyvcp><vbox><led/><rectled halpin="lamp" disable_pin="True"/><led/><number/><s32 halpin="count"/><u32/>
+            <checkbutton/><checkbutton halpin="c"><initval>1</initval></checkbutton><radiobutton><choices>["one","two"]</choices></radiobutton>
+            <scale><min_>100</min_><max_>0</max_><initval>50</initval></scale><spinbox halpin="s" param_pin="1"/><dial/><dial halpin="d" halparam="d-in"/>
+            <jogwheel halpin="w"><clear_pin>1</clear_pin><scale_pin>1</scale_pin></jogwheel><jogwheel/><meter/><bar/><timer/><button/>
+            <multilabel><legends>["A","B"]</legends></multilabel><label><text>"x"</text></label></vbox></pyvcp>""")
+        self.begin("p.xml")
+        wait_until(lambda: self.value("pyvcp.scale.0-f") == "100", "the pins exist")
+        found = self.ask(self.connected(), describe="pin", patterns=["pyvcp."])["objects"]
+        pins = sorted((pin["name"].removeprefix("pyvcp."), pin["type"], pin["dir"], pin["value"]) for pin in found)
+        self.assertEqual(sorted([
+            ("bar.0", "float", "IN", 0.0), ("button.0", "bit", "OUT", False), ("c", "bit", "OUT", True), ("c.changepin", "bit", "IN", False),
+            ("checkbutton.0", "bit", "OUT", False), ("checkbutton.0.changepin", "bit", "IN", False), ("count", "s32", "IN", 0), ("d", "float", "OUT", 0.0),
+            ("d-in", "float", "IN", 0.0), ("dial.0.out", "float", "OUT", 0.0), ("dial.0.param_pin", "float", "IN", 0.0), ("jogwheel.0.count", "float", "OUT", 0.0),
+            ("lamp", "bit", "IN", False), ("lamp.disable", "bit", "IN", False), ("led.0", "bit", "IN", False), ("led.1", "bit", "IN", False),
+            ("meter.0.value", "float", "IN", 0.0), ("multilabel.0.legend0", "bit", "IN", True), ("multilabel.0.legend1", "bit", "IN", False),
+            ("number.0", "float", "IN", 0.0), ("number.1", "u32", "IN", 0), ("radiobutton.0.one", "bit", "OUT", True), ("radiobutton.0.two", "bit", "OUT", False),
+            ("s", "float", "OUT", 0.0), ("scale.0-f", "float", "OUT", 100.0), ("scale.0-i", "s32", "OUT", 100), ("spinbox.0.param_pin", "float", "IN", 0.0),
+            ("timer.0.reset", "bit", "IN", False), ("timer.0.run", "bit", "IN", False), ("w", "float", "OUT", 0.0), ("w.reset", "bit", "IN", False),
+            ("w.scale", "float", "IN", 1.0)]), pins)
+
+    def test_errors_in_panels_have_their_place(self):
+        self.write("bad.panel", "gauge x min=5 max=1\nled x\nslider s step=0 sfae=1\nrow\nfrobnicate\ntimeout 1ms\n")
+        self.assertEqual("""bad.panel:1:1: error: min must be less than max
+bad.panel:2:5: error: duplicate pin 'x'; each pin of a panel needs a name of its own
+bad.panel:3:17: error: 'sfae' is not an option of 'slider'; the options are: label doc unit min max step initial safe
+bad.panel:3:1: error: step must be positive
+bad.panel:5:1: error: unknown word 'frobnicate'; the words are: component, timeout, title, row, column, frame, end, gauge, bar, number, integer, led, … (7 more)
+bad.panel:6:1: error: the timeout must be 100ms to 60s; write: timeout 500ms
+bad.panel:4:1: error: this container has no end; add a line: end
+hal panel: 'bad.panel' has errors
+""", self.bad("panel", "bad.panel"))
+        self.write("bad.xml", "<pyvcp>\n<vbox>\n <ledd><led/></ledd>\n <led><size>__import__('os')</size></led>\n</vbox></pyvcp>")
+        self.assertEqual("""bad.xml:3:3: error: unknown element <ledd> in <vbox>; did you mean 'led'?
+bad.xml:4:8: error: invalid value of option 'size': '__import__('os')'; use a string in quotation marks, a number, a list or a constant of Tk
+hal panel: 'bad.xml' has errors
+""", self.bad("panel", "bad.xml"))
+
+    def test_foxglove_clients_get_channels_values_and_parameters(self):
+        self.begin("--write")
+        for name in ("foxglove.sdk.v1", "foxglove.websocket.v1"):
+            client = WebSocket(self.port, subprotocol=name, path=f"/?t={self.token}")
+            self.addCleanup(client.close)
+            self.assertIn(f"sec-websocket-protocol: {name}", client.head.decode().lower())
+            info = client.read()
+            self.assertEqual(("serverInfo", True), (info["op"], "time" in info["capabilities"]))
+            channels = client.expect(lambda m: m.get("op") == "advertise" and any(c["topic"] == "/total" for c in m["channels"]))["channels"]
+            channel = next(c for c in channels if c["topic"] == "/total")
+            client.send({"op": "subscribe", "subscriptions": [{"id": 7, "channelId": channel["id"]}]})
+            times = []
+            while len(times) < 3:
+                message = client.expect(lambda m: isinstance(m, bytes))
+                if message[0] == 2:
+                    times.append(int.from_bytes(message[1:9], "little"))
+                else:
+                    self.assertEqual((1, 7, times[-1], b'{"value":5.0}'), (message[0], int.from_bytes(message[1:5], "little"), int.from_bytes(message[5:13], "little"), message[13:]))
+            self.assertEqual(sorted(times), times)
+            self.assertLess(abs(times[-1] / 1e9 - time.time()), 60)
+        client.send({"op": "getParameters", "parameterNames": ["servo.time"], "id": "a"})
+        answer = client.expect(lambda m: isinstance(m, dict) and m.get("op") == "parameterValues")
+        self.assertEqual(("a", "servo.time"), (answer["id"], answer["parameters"][0]["name"]))
+        bare = WebSocket(self.port, subprotocol="foxglove.sdk.v1")
+        self.addCleanup(bare.close)
+        self.assertIsNone(bare.read())
+        self.assertEqual(1008, bare.closed[0])
+
     def test_errors_of_the_command_line(self):
         self.assertEqual("hal panel: --listen: 'here' is not an IPv4 address; use the address of a network interface, or 0.0.0.0 for all\n", self.bad("panel", "--listen", "here"))
         self.begin(machine=False)

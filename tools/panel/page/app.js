@@ -9,6 +9,7 @@ const views = {
   graph: ['Graph', () => import('./graph.js')],
   scope: ['Scope', () => import('./scope.js')],
   watch: ['Watch', () => import('./watch.js')],
+  networks: ['Networks', () => import('./networks.js')],
   log: ['Log', () => import('./log.js')],
 };
 

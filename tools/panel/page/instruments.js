@@ -3,6 +3,8 @@
 import {colour, h, number, surface} from './dom.js';
 import {follow, formatted} from './widgets.js';
 
+const nice = size => { const e = 10 ** Math.floor(Math.log10(size)); return e * (size / e <= 1 ? 1 : size / e <= 2 ? 2 : size / e <= 5 ? 5 : 10); };
+
 /// The ranges of a bar or meter as [low, high, colour]: PyVCP's, or from `warn` and `alarm` of a .panel file.
 function ranges(options, low, high, name) {
   const given = [1, 2, 3].map(i => options[name + i]).filter(range => Array.isArray(range) && range.length === 3);
@@ -53,7 +55,7 @@ export function makeBar(node, pins) {
 
 export function makeMeter(node, pins) {
   const options = node.options ?? {}, low = options.min_ ?? options.min ?? 0, high = options.max_ ?? options.max ?? 100, size = options.size ?? (node.kind ? 170 : 200);
-  const unit = options.unit ?? pins.panel.pins[node.pin]?.unit ?? '', major = options.majorscale ?? (high - low) / 10, minor = options.minorscale ?? 0;
+  const unit = options.unit ?? pins.panel.pins[node.pin]?.unit ?? '', major = options.majorscale ?? (node.kind ? nice((high - low) / 8) : (high - low) / 10), minor = options.minorscale ?? 0;
   let now = 0;
   const from = Math.PI * (.5 + 37 / 180), span = Math.PI * 286 / 180, angle = value => from + span * (value - low) / (high - low);
   const {canvas, picture} = drawn(node, pins, size, size, (context, width, height) => {
@@ -78,7 +80,9 @@ export function makeMeter(node, pins) {
     context.textBaseline = 'middle';
     if (minor > 0 && (high - low) / minor < 200) for (let v = low; v <= high + minor / 1e6; v += minor) ray(v, radius * .87, radius * .95, 1);
     if (major > 0 && (high - low) / major < 50)
-      for (let v = low; v <= high + major / 1e6; v += major) {
+      for (let i = node.kind ? Math.ceil(low / major - 1e-9) : 0; ; i++) {
+        const v = (node.kind ? 0 : low) + i * major;
+        if (v > high + major / 1e6) break;
         ray(v, radius * .84, radius * .97, 1.5);
         context.fillText(number(Number(v.toPrecision(4))), x + radius * .68 * Math.cos(angle(v)), y + radius * .68 * Math.sin(angle(v)));
       }

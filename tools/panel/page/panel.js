@@ -109,6 +109,7 @@ export function show(main) {
   const pins = new Pins(panel), note = h('p', {class: 'dim', role: 'status'});
   const root = build(panel.root, pins, 'p');
   root.classList.add('w-root');
+  root.classList.toggle('w-pyvcp', Boolean(panel.root.pyvcp));
   main.append(panel.root.title ? h('h2', {}, panel.root.title) : '', note, root);
   const ends = [on('panel', event => {
     for (const [name, value] of Object.entries(event.values)) if (pins.value(name) !== value) pins.set(name, value);
