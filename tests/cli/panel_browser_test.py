@@ -86,7 +86,7 @@ class Page(Case):
         self.assertIn("written by adder.out", self.browser.evaluate("document.querySelector('.floating').innerText"))
 
     def test_the_scope_triggers_on_the_right_sample(self):
-        self.begin(view="scope?ch=sine:0.5:0&mode=normal&trigger=sine&edge=rising&level=0.5&base=0.02")
+        self.begin(view="scope?ch=sine:0.5:0&mode=normal&trigger=sine&edge=rising&level=0.5&base=0.1")
         self.browser.wait("window.halcyonScope?.shownAt && halcyonScope.rows > 50 && halcyonScope.lost === 0")
         # The samples on both sides of the trigger, which is at 20 % of the record.
         before, after = self.browser.evaluate("""(() => { const s = halcyonScope, at = s.shownAt - s.pre * 4, [g, c] = s.store.place.get('sine'), row = g.row(at);

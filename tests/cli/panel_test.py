@@ -255,7 +255,7 @@ class Panel(Case):
 bad.panel:2:5: error: duplicate pin 'x'; each pin of a panel needs a name of its own
 bad.panel:3:17: error: 'sfae' is not an option of 'slider'; the options are: label doc unit min max step initial safe
 bad.panel:3:1: error: step must be positive
-bad.panel:5:1: error: unknown word 'frobnicate'; the words are: component, timeout, title, row, column, frame, end, gauge, bar, number, integer, led, … (7 more)
+bad.panel:5:1: error: unknown word 'frobnicate'; the words are: component, timeout, title, row, column, frame, end, gauge, bar, number, integer, led, chart, button, … (5 more)
 bad.panel:6:1: error: the timeout must be 100ms to 60s; write: timeout 500ms
 bad.panel:4:1: error: this container has no end; add a line: end
 hal panel: 'bad.panel' has errors
@@ -283,7 +283,7 @@ hal panel: 'bad.xml' has errors
                 if message[0] == 2:
                     times.append(int.from_bytes(message[1:9], "little"))
                 else:
-                    self.assertEqual((1, 7, times[-1], b'{"value":5.0}'), (message[0], int.from_bytes(message[1:5], "little"), int.from_bytes(message[5:13], "little"), message[13:]))
+                    self.assertEqual((1, 7, times[-1], b'{"value":5}'), (message[0], int.from_bytes(message[1:5], "little"), int.from_bytes(message[5:13], "little"), message[13:]))
             self.assertEqual(sorted(times), times)
             self.assertLess(abs(times[-1] / 1e9 - time.time()), 60)
         client.send({"op": "getParameters", "parameterNames": ["servo.time"], "id": "a"})
