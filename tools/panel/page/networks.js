@@ -70,7 +70,7 @@ export function show(main, query) {
         const chip = h('span', {class: 'station'}, node);
         line.append(chip);
         const paint = what => (value, element) => {
-          if (what === 'online') chip.classList.toggle('online', Boolean(value));
+          if (what === 'online') { chip.classList.toggle('online', Boolean(value)); if (!pins.has('operational')) chip.classList.toggle('operational', Boolean(value)); }
           if (what === 'operational') chip.classList.toggle('operational', Boolean(value));
           if (what === 'fault' || what === 'emcy') { chip.classList.toggle('faulty', Boolean(value)); element.classList.toggle('bad', Boolean(value)); }
           if (what === 'online') element.className = value ? 'n good' : 'n bad';
