@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Generates the source that puts the files of page/ into the program, by the assembler's .incbin.
-set(types ".html=text/html; charset=utf-8" ".css=text/css; charset=utf-8" ".js=text/javascript; charset=utf-8" ".svg=image/svg+xml")
+set(types ".html=text/html" ".css=text/css" ".js=text/javascript" ".svg=image/svg+xml")
 file(GLOB assets CONFIGURE_DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/panel/page/*.html" "${CMAKE_CURRENT_SOURCE_DIR}/panel/page/*.css"
      "${CMAKE_CURRENT_SOURCE_DIR}/panel/page/*.js" "${CMAKE_CURRENT_SOURCE_DIR}/panel/page/*.svg")
 set(data "")
