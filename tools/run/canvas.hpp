@@ -5,9 +5,11 @@
 #include <string>
 #include <vector>
 
+#include "cli/raster.hpp"
+
 namespace hal::tools {
 
-/// A dot drawing for the terminal: 2 x 4 dots per character (Braille), or 1 x 2 without Unicode.
+/// A dot drawing for the terminal in square coordinates.
 class Canvas {
 public:
     /// `columns` x `rows` characters.
@@ -19,13 +21,11 @@ public:
     void circle(double x, double y, double radius);
 
     /// Returns one text per row, each of `columns` characters.
-    std::vector<std::string> rows() const;
+    std::vector<std::string> rows() const { return raster_.rows(); }
 
 private:
-    std::size_t columns_, rows_, dots_x_, dots_y_;
-    bool unicode_;
-    double half_;               // dots from the centre to the side of the square
-    std::vector<bool> dots_;
+    Raster raster_;
+    double half_;  // dots from the centre to the side of the square
 };
 
 }  // namespace hal::tools

@@ -7,13 +7,13 @@
 #include <fmt/core.h>
 #include <mutex>
 #include <numbers>
-#include <strings.h>
 #include <sys/ioctl.h>
 #include <thread>
 #include <unistd.h>
 
 #include "base/types.hpp"
 #include "cli/output.hpp"
+#include "cli/screen.hpp"
 #include "run/canvas.hpp"
 
 namespace hal::tools {
@@ -80,12 +80,6 @@ const Motif motifs[] = {
     {{"arm-angle", "pendulum-angle"}, draw_furuta},
     {{"axis-position"}, draw_axis},
 };
-
-bool unicode_terminal() {
-    for (const char* name : {"LC_ALL", "LC_CTYPE", "LANG"})
-        if (const char* value = std::getenv(name); value && *value) return ::strcasestr(value, "utf-8") || ::strcasestr(value, "utf8");
-    return false;
-}
 
 }  // namespace
 
