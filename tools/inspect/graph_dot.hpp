@@ -3,12 +3,12 @@
 
 #include <string>
 
-#include "model/model.hpp"
+#include "inspect/graph_view.hpp"
 
 namespace hal::tools {
 
-/// The netlist as a Graphviz drawing: a table per instance with a port per pin, functions with their place in their
-/// thread, edges coloured by type; dashed where the value is one cycle old, dotted where it comes from another thread.
-std::string as_dot(const Model& model, const std::string& title);
+/// The selected part of a netlist as a Graphviz drawing: a table per instance with a port per pin, functions with their place in their
+/// thread, edges coloured by type; dashed and marked z⁻¹ where the value is one cycle old, dotted where it comes from another thread.
+std::string as_dot(const Model& model, const GraphView& view, const std::string& title);
 
 }  // namespace hal::tools
