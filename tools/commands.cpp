@@ -102,7 +102,7 @@ constexpr Subcommand table[] = {
     command<RemoteShellOptions, run_shell>("shell", "[COMMAND…]", "command a running instance: one command, a file of commands, or interactively", true),
     command<CheckOptions, run_check>("check", "FILE… [--assume NAME]", "check netlists without running them"),
     command<FmtOptions, run_fmt>("fmt", "FILE…", "format netlists"),
-    command<GraphOptions, run_graph>("graph", "FILE… [-o OUT]", "draw netlists"),
+    command<GraphOptions, run_graph>("graph", "FILE… [-o OUT] [--cluster KIND] [--around NAME [--depth N]]", "draw netlists"),
     command<DocOptions, run_doc>("doc", "[COMPONENT…] [--all --output DIR]", "print the manual page of a component"),
     command<NewOptions, run_new>("new", "component NAME [--folder DIR]", "create a component to start from: source, CMakeLists.txt, test"),
     command<CompileOptions, run_compile>("compile", "FILE… [--output DIR] [--check-rt [-- ARGUMENT=VALUE…]]", "build a plugin from one source file and install it"),

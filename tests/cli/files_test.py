@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""What works on files without running them: check, fmt, graph, doc."""
+"""What works on files without running them: check, fmt, doc."""
 import json
 import os
 import re
-import shutil
 import stat
 import unittest
 
@@ -106,57 +105,6 @@ class Format(Case):
 
     def test_missing_file(self):
         self.assertEqual("hal fmt: cannot read 'nowhere.hal': No such file or directory\n", self.bad("fmt", "nowhere.hal"))
-
-
-class Graph(Case):
-    LOOP = """loadrt threads name1=base period1=100000 fp1=0 name2=servo period2=1000000
-loadrt sum2 names=first,second,other
-addf first servo
-addf second servo
-addf other base
-net forward first.out => second.in0 other.in0
-net back second.out => first.in0
-net loose second.in1
-"""
-
-    def test_dot_has_a_port_per_pin_and_styles(self):
-        text = self.good("graph", self.write("loop.hal", self.LOOP))
-        self.assertTrue(text.startswith("digraph "))
-        ports = {label: port for port, label in re.findall(r'<td port="(p\d+)"[^>]*><font[^>]*>([^<]+)</font>', text)}
-        self.assertLessEqual({"in0", "in1", "out", "offset"}, set(ports) | {"offset"})
-        edges = re.findall(r'-> .*style=(\w+), tooltip="([^"]+)"', text)
-        self.assertIn(("solid", "forward"), edges)
-        self.assertIn(("dotted", "forward"), edges)
-        self.assertIn(("dashed", "back"), edges)
-        self.assertIn("1. in servo", text)
-        self.assertIn("2. in servo", text)
-        self.assertIn('label="loose"', text)
-
-    @unittest.skipUnless(shutil.which("dot"), "Graphviz is not installed")
-    def test_svg(self):
-        self.good("graph", self.write("loop.hal", self.LOOP), "-o", "loop.svg")
-        drawing = (self.folder / "loop.svg").read_text()
-        self.assertIn("<svg", drawing)
-        self.assertIn("forward", drawing)
-
-    def test_svg_without_graphviz_names_the_package(self):
-        error = self.bad("graph", self.write("loop.hal", self.LOOP), "-o", "loop.svg", environment={"PATH": str(self.folder)})
-        self.assertIn("apt install graphviz", error)
-
-    def test_dot_file(self):
-        path = self.write("loop.hal", self.LOOP)
-        self.good("graph", path, "-o", "loop.dot")
-        self.assertEqual(self.good("graph", path), (self.folder / "loop.dot").read_text())
-
-    def test_names_are_escaped(self):
-        text = self.good("graph", self.write("odd.hal", 'loadrt sum2 names=a<b&c\nnewsig s<&>x float\nnet s<&>x a<b&c.out\n'))
-        self.assertIn("<b>a&lt;b&amp;c</b>", text)
-        self.assertIn('label="s<&>x"', text)
-
-    def test_rejects_other_endings_and_bad_netlists(self):
-        path = self.write("loop.hal", self.LOOP)
-        self.assertIn("neither .svg nor .dot", self.bad("graph", path, "-o", "loop.png"))
-        self.assertIn("bad.hal:3", self.bad("graph", self.write("bad.hal", BAD)))
 
 
 class Doc(Case):
