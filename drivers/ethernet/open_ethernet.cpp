@@ -6,6 +6,7 @@
 #include "ethernet/raw/raw_ethernet.hpp"
 #include "ethernet/replay/ethernet_replay.hpp"
 #include "ethernet/sim/sim_ethernet.hpp"
+#include "ethernet/udp/ethernet_udp.hpp"
 #include "link/address.hpp"
 #include "link/ethernet.hpp"
 
@@ -16,6 +17,8 @@ namespace {
 constexpr link::Driver<Opened, Options, Description> drivers[] = {
     {"eth", rawether::open, rawether::describe},
     {"sim", simbus::open, simbus::describe},
+    {"udp", udp::open, udp::describe, nullptr, nullptr,
+     "policy pacer priority cpu promiscuous txstamps speed forward noise mac sendqueue"},
     {"replay", replay::open, replay::describe},
 };
 
@@ -83,7 +86,7 @@ std::string apply(std::string_view key, std::string_view value, bool has_value, 
 Opened open(std::string_view address, const Options& given) {
     return link::open_address<Opened, Options, Description>(address, given, drivers, apply,
                                                "an Ethernet segment; write eth:enp3s0 for an interface of this machine, "
-                                               "sim:NAME for a segment in memory or replay:FILE");
+                                               "sim:NAME for a segment in memory, udp:HOST for UDP datagrams or replay:FILE");
 }
 
 Description describe(std::string_view address) { return link::describe_address<Opened, Options, Description>(address, drivers); }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The seam to every Ethernet segment: frames, launch times, timestamps, link state, statistics. An address picks the driver:
-// `eth:enp3s0` a real interface, `sim:NAME` a segment in memory with exact wire times, `replay:FILE` a capture. A user of `sim:NAME` is
-// a station of its own; all users of `sim:NAME/STATION` share that station's line and address, as the users of one interface do.
+// `eth:enp3s0` a real interface, `sim:NAME` a segment in memory with exact wire times, `udp:HOST` frames in UDP datagrams, `replay:FILE` a
+// capture. A user of `sim:NAME` is a station of its own; all users of `sim:NAME/STATION` share that station's line and address, as the users of one interface do.
 //
 //     auto opened = hal::ethernet::open("eth:enp3s0", {.types = {0x9021}});   // [setup]
 //     if (!opened) throw std::runtime_error(opened.problem);
@@ -115,6 +115,7 @@ struct Options {
     int pacer_priority = 80, pacer_cpu = -1;
     bool transmit_stamps = false;        ///< the kernel stamps sent frames: exact times in Statistics, for two system calls per frame
     bool promiscuous = false;            ///< also receives frames for other stations
+    bool listen = false;                 ///< the end that others address: `udp:` binds to HOST. Ignored on other transports
     std::uint32_t speed = 0;             ///< Mbit/s of a segment in memory; 0: unchanged, 100 for a new one
     std::int64_t forward_ns = -1;        ///< delay of its switch; -1: unchanged, 2 us for a new one
     std::int64_t noise_ns = 0;           ///< noise (sigma) of the timestamps of this port on a segment in memory, as of a kernel
@@ -125,11 +126,13 @@ struct Options {
 /// Description of a port and its capabilities.
 struct Description {
     std::string address;    ///< as opened, without options: equal for all ports that share a line
-    std::string transport;  ///< "raw Ethernet", "segment in memory", "capture"
+    std::string transport;  ///< "raw Ethernet", "segment in memory", "frames in UDP datagrams", "capture"
     std::string interface{};
     bool simulated = false; ///< no hardware, time is the runtime's
     std::string remark{};   ///< a missing capability, as a sentence; empty: none
     bool in_memory = false; ///< a segment in memory: a user may choose its own address
+    bool datagrams = false; ///< UDP: has a link while a program listens at the other end
+    bool recorded = false;  ///< a capture: frames sent reach nobody
     bool paced = false;     ///< Options::pacer gives it a thread that launches frames
 };
 

@@ -129,7 +129,7 @@ std::unique_ptr<Recorder> record(const std::string& file, std::string_view inter
 namespace replay {
 
 Description describe(const std::string& file) {
-    return {.address = "replay:" + file, .transport = "capture", .interface = file, .simulated = true};
+    return {.address = "replay:" + file, .transport = "capture", .interface = file, .simulated = true, .recorded = true};
 }
 
 Opened open(const std::string& file, const Options& options) {
