@@ -36,6 +36,7 @@ ROWS = {
     "drivers/discipline": ["drivers/link", "runtime/sdk"],
     "drivers/capture": ["drivers/link"],
     "drivers/netlink": ["drivers/link"],
+    "drivers/tap": ["drivers/link", "runtime/sdk"],
     "drivers/can": ["drivers/discipline", "drivers/capture", "drivers/netlink", "runtime/sdk", "runtime/text"],
     "drivers/ethernet": ["drivers/capture", "drivers/netlink", "runtime/sdk", "runtime/text"],
     "components/logic": ["components"],
@@ -64,7 +65,7 @@ ROWS = {
     "components/ethercat/devices": ["components/ethercat/esc", "components/ethercat/esi", "components/sim", "components/cia402"],
     "components/ethercat/master": ["components/ethercat/wire", "runtime/sdk", "drivers/link"],
     "components/ethercat/config": ["components/ethercat/master", "components/ethercat/esi", "components/cia402"],
-    "components/ethercat/plugins": ["components/ethercat/config", "components/ethercat/devices"],
+    "components/ethercat/plugins": ["components/ethercat/config", "components/ethercat/devices", "drivers/tap"],
     "components/canopen/plugins": ["components/canopen/master", "components/canopen/device"],
     "components/fieldbus/can_timing": ["drivers/link"],
     "components/fieldbus/segment": ["runtime/sdk", "runtime/text", "drivers/link"],
@@ -78,7 +79,7 @@ ROWS = {
     "components/fieldbus/tdma/station": ["components/fieldbus/tdma/wire", "drivers/discipline"],
     "components/fieldbus/tdma/config": ["components/fieldbus/tdma/station"],
     "components/fieldbus/tdma/rtcfg": ["components/fieldbus/tdma/config"],
-    "components/fieldbus/tdma/tunnel": ["components/fieldbus/tdma/config"],
+    "components/fieldbus/tdma/tunnel": ["components/fieldbus/tdma/config", "drivers/tap"],
     "components/fieldbus/tdma/plugins": ["components/fieldbus/tdma/rtcfg", "components/fieldbus/tdma/tunnel"],
 }
 
