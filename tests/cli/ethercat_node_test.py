@@ -162,7 +162,7 @@ class WrongWords(Case):
         self.write("bad.line", "coupler\nservoo axes=2\nservo axes=9\n")
         self.write("empty.line", "# nothing\n")
         say = "hal node ethercat: "
-        self.assertEqual(say + "missing --link; add --link eth:enp3s0, the interface towards the master\n", self.bad("node", "ethercat", "good.line"))
+        self.assertEqual(say + "missing --link; add --link eth:enp3s0, the interface towards the master, or --link udp:127.0.0.1 for one on this machine\n", self.bad("node", "ethercat", "good.line"))
         self.assertEqual(say + "cannot read 'none.line': No such file or directory\n", self.bad("node", "ethercat", "none.line", "--link", "eth:m0"))
         first, second = self.bad("node", "ethercat", "bad.line", "--link", "eth:m0").splitlines()
         self.assertRegex(first, r"^hal node ethercat: bad\.line:2:1: unknown device 'servoo'; use one of: coupler, digital_in, ")

@@ -154,7 +154,7 @@ void replies(std::span<const std::uint8_t> in) {
     slave.bus.timeouts.mailbox_response = 20;
     master::Mailboxes mailboxes{1};
     master::RequestServer server{mailboxes, [&](std::uint16_t) { return &slave.bus; }, 1};
-    const std::array<std::uint16_t, 1> with_eoe{0};
+    const std::array<master::EoePort, 1> with_eoe{};
     master::EoeSwitch frames(mailboxes, with_eoe);
     server.set_switch(&frames);
     server.set_poll_interval(5'000'000);

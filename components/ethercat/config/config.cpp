@@ -35,6 +35,7 @@ public:
         if (slaves_.empty() && bus_ != nullptr)
             report_.error(Topic::line, bus_->at, "the configuration has no slave", "write [slave 0 NAME] and below it esi = FILE");
         check_bus(out_.buses[0], report_);
+        check_eoe(out_.buses[0], report_);
         out_.messages = std::move(report_.all);
         text::sort(out_.messages);  // a line of a type is read once for each slave of it
         return std::move(out_);
@@ -101,6 +102,12 @@ private:
                                 "programs on other computers can read and write the objects of the slaves through the gateway",
                                 "its protocol has no password; write 127.0.0.1 to allow only programs on this computer");
         }
+        if (Line* line = keys.find("dc-loss")) {
+            if (same_word(line->value.text, "safeop")) bus.setup.dc_loss = master::DcLoss::safeop;
+            else if (!same_word(line->value.text, "report")) keys.reject(*line, "report or safeop");
+        }
+        keys.take_time("dc-loss-time", bus.setup.dc_loss_ns, 1'000'000, 60'000'000'000);
+        read_eoe_switch(keys, bus);
         if (Line* line = keys.find("other-slaves")) {
             if (same_word(line->value.text, "accept")) bus.setup.accept_other_slaves = true;
             else if (!same_word(line->value.text, "fault")) keys.reject(*line, "fault or accept");
@@ -109,7 +116,8 @@ private:
             report_.error(Topic::value, keys.find("backup")->value.at, "the backup is the link itself: '" + bus.link + "'",
                           "write the address of the second port, which closes the ring");
         unknown_keys(keys, "[bus]",
-                     {"link", "backup", "cycle", "clock", "reference", "frame-timeout", "sync-window", "other-slaves", "gateway"});
+                     {"link", "backup", "cycle", "clock", "reference", "frame-timeout", "sync-window", "dc-loss", "dc-loss-time",
+                      "other-slaves", "gateway", "eoe-switch"});
     }
 
     void domain(Section& s) {

@@ -39,6 +39,13 @@ struct PinInfo {
     std::string unit, about;
 };
 
+/// An interface of the host for Ethernet over EtherCAT.
+struct HostInterface {
+    std::string   name;  ///< empty: none
+    std::uint32_t ip = 0;  ///< its address, C0A80201h for 192.168.2.1; 0: configured by other means
+    unsigned      prefix = 24;
+};
+
 /// A slave as the user sees it; the slave of the same number in the setup is how the master sees it.
 struct SlaveInfo {
     std::string                                  type;  ///< order code or name of its device, for messages and lists
@@ -46,6 +53,7 @@ struct SlaveInfo {
     unsigned                                     cia402_axes = 0;  ///< drives of CiA 402
     std::vector<std::pair<std::string, PinInfo>> pins;  ///< by name
     Span                                         at{};
+    HostInterface                                eoe;  ///< of a slave with EoE, unless the bus has a switch
     const PinInfo*                               find(std::string_view pin) const;
 };
 
@@ -55,6 +63,7 @@ struct Bus {
     std::string            link = "sim:ethercat", backup;  ///< link addresses; a backup closes a ring
     std::string            gateway;  ///< IPv4 address on which the mailbox gateway listens; empty: no gateway
     std::uint16_t          gateway_port = 34980;
+    HostInterface          eoe_switch;  ///< of all slaves with EoE; without a name each has its own
     bool                   cycle_given = false;  ///< setup.cycle_ns is from the file; else it is that of the thread
     master::Setup          setup;
     std::vector<SlaveInfo> slaves;  ///< as many as in setup.slaves

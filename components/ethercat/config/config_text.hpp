@@ -93,6 +93,13 @@ struct SlaveInput {
 };
 void read_slave(SlaveInput);
 
+/// Reads `eoe` of a slave: the settings of its IP stack and the interface of the host.
+void read_eoe(SlaveInput);
+/// Reads `eoe-switch` of a bus.
+void read_eoe_switch(Keys&, Bus&);
+/// Checks the rules between the slaves with EoE, and completes what they leave out.
+void check_eoe(Bus&, Report&);
+
 /// Device descriptions by their path, each read once.
 class Descriptions {
 public:

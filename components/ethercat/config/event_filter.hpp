@@ -46,6 +46,8 @@ private:
         case Event::state_refused:
         case Event::state_timeout:
         case Event::startup_write_failed:
+        case Event::no_eoe:
+        case Event::eoe_failed:
         case Event::mapping_failed:
         case Event::mapping_differs:
         case Event::too_many_entries:

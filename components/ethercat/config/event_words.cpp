@@ -8,6 +8,7 @@
 #include "ethercat/wire/al_status_codes.hpp"
 #include "ethercat/wire/coe.hpp"
 #include "ethercat/wire/soe.hpp"
+#include "link/ethernet.hpp"
 
 namespace hal::ethercat::config {
 
@@ -182,6 +183,11 @@ std::string of_slave(const Happened& w, const master::Setup& setup, const std::s
                ": raise its time-out, or power-cycle it";
     case Event::fell_back: return "left its state and is in " + state_words(first) + ", " + al_words(second);
     case Event::startup_write_failed: return write_words(first, second, slave);
+    case Event::no_eoe: return "has no Ethernet over EtherCAT, but the configuration has `eoe`; delete that line";
+    case Event::eoe_failed:
+        if (first == 0) return "does not answer its IP settings; power-cycle it, or write `eoe = yes` to leave them as they are";
+        return "rejects its IP settings with EoE result " + hex(first, 4) + " (" + eoe::to_string(static_cast<eoe::Result>(first)) +
+               "); write `eoe = yes` to leave them as they are";
     case Event::mapping_failed: return rejected_mapping_words(first, second);
     case Event::mapping_differs:
         return "did not keep the PDO mapping: " + object_words(first) + " is " + hex(second, 8) + " instead of " + hex(first >> 24, 8) +
@@ -202,7 +208,11 @@ std::string of_slave(const Happened& w, const master::Setup& setup, const std::s
     case Event::dc_timeout:
         return "deviates by " + microseconds(first) + " from the reference clock, more than the window of " + microseconds(second) +
                "; it is not started: check the cycle of the thread, or raise `sync-window`";
+    case Event::dc_recovered: return "has a clock within the window again, after " + std::to_string(second) + " ms";
     case Event::dc_lost:
+        if (setup.dc_loss == master::DcLoss::safeop)
+            return "has a clock that deviates by " + microseconds(first) + " from the reference clock, more than " + microseconds(second) +
+                   "; it is taken to SAFE-OP until its clock is within the window again: check that the thread misses no cycles";
         return "is operational, but its clock deviates by " + microseconds(first) + " from the reference clock, more than " +
                microseconds(second) + "; check that the thread misses no cycles, and its manual for what it does without synchronisation";
     case Event::ring_broken:
@@ -223,9 +233,12 @@ std::string of_slave(const Happened& w, const master::Setup& setup, const std::s
 std::string of_bus(const Happened& w, const master::Setup& setup, const std::string& link, const std::string& backup) {
     const auto first = w.first, second = w.second;
     switch (w.event) {
-    case Event::link_lost: return (first == 0 ? link : backup) + " has no link; check the cable to the first slave";
+    case Event::link_lost: return no_link_words(first == 0 ? link : backup);
     case Event::link_restored: return (first == 0 ? link : backup) + " has a link again";
-    case Event::no_slaves: return "no slave answers on " + link + "; check cable and supply of the first slave";
+    case Event::no_slaves:
+        return "no slave answers on " + link + "; check " +
+               (ethernet::describe(link).datagrams ? "the address, and that a line of slaves is served there"
+                                                   : "cable and supply of the first slave");
     case Event::scanned:
         return "found " + std::to_string(first) + (first == 1 ? " slave" : " slaves") + " on " + link;  // others name what is missing
     case Event::too_many_slaves:
@@ -257,6 +270,15 @@ std::string of_bus(const Happened& w, const master::Setup& setup, const std::str
 }
 
 }  // namespace
+
+std::string no_link_words(const std::string& link) {
+    if (!ethernet::describe(link).datagrams) return link + " has no link; check the cable to the first slave";
+    return link + " has no link: no program listens there; emulate a line, as in: hal node ethercat FILE --link " + link;
+}
+
+std::string recorded_words(const std::string& link) {
+    return link + " is a capture, whose slaves do not answer; to see what is in it: hal ethercat dump FILE";
+}
 
 std::string slave_words(std::uint32_t slave, const master::Setup& setup) {
     if (slave >= Events::of_position && slave != Events::bus) return "slave at position " + std::to_string(slave - Events::of_position);

@@ -24,4 +24,10 @@ std::string event_words(const Happened& what, const master::Setup& setup, const 
 /// Returns "slave 3 (x-axis)", or "slave at position 3" where the setup does not name it. [setup]
 std::string slave_words(std::uint32_t slave, const master::Setup& setup);
 
+/// Returns the sentence for a link without carrier, or one to which nothing listens. [setup]
+std::string no_link_words(const std::string& link);
+
+/// Returns the sentence for a link that is a capture, for a program that needs answers. [setup]
+std::string recorded_words(const std::string& link);
+
 }  // namespace hal::ethercat::config

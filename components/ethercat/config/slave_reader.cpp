@@ -21,6 +21,7 @@ public:
         const bool described = describe();
         identity();
         settings();
+        read_eoe(in_);
         clocks();
         description_writes();
         if (!described) {  // unknown objects follow from it and are not reported
@@ -356,7 +357,8 @@ private:
         constexpr const char* keys =
             "type esi device axes modules vendor product revision serial optional lrw complete-access entries-per-pdo preop-timeout "
             "op-timeout "
-            "mailbox-timeout watchdog state domain dc sync0-cycle sync1-cycle sync1-shift assign-activate outputs inputs pdo-order sdo idn "
+            "mailbox-timeout watchdog state domain eoe dc sync0-cycle sync1-cycle sync1-shift assign-activate outputs inputs pdo-order sdo "
+            "idn "
             "aoe register";
         std::vector<std::string> all;
         for (const Word& word : words_of({keys, {}})) all.push_back(word.text);

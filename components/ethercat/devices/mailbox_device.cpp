@@ -54,7 +54,7 @@ Parts make_mailbox_device(const DeviceOptions& o) {
     foe->add("firmware", bytes_of_text("firmware 1.0"), 0x1234, true);
     foe->add("parameters", bytes_of_text("gain = 1\n"));
     b.design().services.push_back(std::move(foe));
-    b.design().services.push_back(std::make_unique<EoeEcho>());
+    b.design().services.push_back(std::make_unique<EoeHost>());
     std::vector<Idn> idns;
     idns.push_back(
         idn_of<std::uint16_t>(1, a::bytes_2 | a::is_unsigned | a::protected_safeop_op, "Control unit cycle time", "us", {1000}, 62, 65000));

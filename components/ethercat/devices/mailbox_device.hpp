@@ -50,8 +50,8 @@ private:
     bool              writing_ = false, busy_ = false;
 };
 
-/// Returns every frame with source and destination exchanged; keeps IP settings.
-class EoeEcho : public MailboxService {
+/// An IP stack that answers ARP and ping once it has an address; keeps IP settings.
+class EoeHost : public MailboxService {
 public:
     MailboxType    type() const noexcept override { return MailboxType::eoe; }
     void           reset() noexcept override { splitter_ = {}, joiner_ = {}; }
@@ -60,6 +60,8 @@ public:
     const eoe::Ip& ip() const noexcept { return ip_; }
 
 private:
+    std::size_t answer(std::size_t length) noexcept;  // to the frame in frame_; returns its length, 0: none
+
     eoe::Joiner                                  joiner_;
     eoe::Splitter                                splitter_;
     std::array<std::uint8_t, eoe::largest_frame> frame_{};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// EoE, SoE, AoE and VoE of the device with every protocol.
+// SoE, AoE and VoE of the device with every protocol.
 #include <algorithm>
 #include <cstring>
 #include <utility>
@@ -7,46 +7,6 @@
 #include "ethercat/devices/mailbox_device.hpp"
 
 namespace hal::ethercat::devices {
-
-void EoeEcho::take(const MailboxMessage& message, State, Outbox& out) noexcept {
-    const auto h = eoe::read(message.payload);
-    if (!h) return out.send(MailboxType::error, write_mailbox_error(out.payload(), MailboxError::too_short));
-    eoe::Header answer;
-    answer.port = h->port, answer.last = true;
-    const auto respond = [&](eoe::Type type, eoe::Result result) {
-        answer.type = type, answer.word = static_cast<std::uint16_t>(result);
-        eoe::write(out.payload(), answer);
-        out.send(MailboxType::eoe, eoe::header_bytes);
-    };
-    switch (h->type) {
-    case eoe::Type::fragment: {
-        const auto frame = joiner_.take(message.payload);
-        if (frame.size() < 14 || !splitter_.done()) return;
-        std::memcpy(frame_.data(), frame.data(), frame.size());
-        std::memcpy(frame_.data(), frame.data() + 6, 6), std::memcpy(frame_.data() + 6, frame.data(), 6);
-        splitter_ = eoe::Splitter({frame_.data(), frame.size()}, ++number_, out.mailbox(), h->port);
-        return;
-    }
-    case eoe::Type::set_ip:
-        if (const auto ip = eoe::read_ip(message.payload.subspan(eoe::header_bytes))) {
-            ip_ = *ip;
-            return respond(eoe::Type::set_ip_response, eoe::Result::ok);
-        }
-        return respond(eoe::Type::set_ip_response, eoe::Result::unspecified);
-    case eoe::Type::get_ip:
-        answer.type = eoe::Type::get_ip_response;
-        eoe::write(out.payload(), answer);
-        out.send(MailboxType::eoe, eoe::header_bytes + eoe::write_ip(out.payload() + eoe::header_bytes, ip_));
-        return;
-    case eoe::Type::set_filter: return respond(eoe::Type::set_filter_response, eoe::Result::no_filter);
-    case eoe::Type::get_filter: return respond(eoe::Type::get_filter_response, eoe::Result::no_filter);
-    default: return;
-    }
-}
-
-void EoeEcho::pump(Outbox& out) noexcept {
-    if (const auto length = splitter_.next(out.payload())) out.send(MailboxType::eoe, length);
-}
 
 Idn* SoeServer::find(std::uint16_t number) noexcept {
     for (auto& i : idns_)

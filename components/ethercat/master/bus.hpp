@@ -33,7 +33,8 @@ struct Device {
     bool         times_read = false;  ///< its receive times are those of the newest latch
     bool         clock_set = false;  ///< offset and delay are written
     bool         synchronised = false;  ///< its clock was within the window
-    bool         drifted = false;  ///< its clock is far beyond the window, while it is operational
+    bool         drifted = false;  ///< it was reported as not in step, while it is operational
+    std::int64_t drifts_since_ns = 0;  ///< when its clock left the window; 0: it is there
     bool         to_boot = false;  ///< it is to be in BOOT, for its firmware; only a slave that the setup does not name
     bool         helping = false;  ///< the task on its channel works for that of the bus
     std::int64_t began_ns = 0;  ///< of the newest start-up

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the start-up of a slave needs of CoE; the mailbox clients implement it.
+// What the start-up of a slave needs of its mailbox; the mailbox clients implement it.
 #pragma once
 
 #include <cstddef>
@@ -40,6 +40,8 @@ public:
     virtual Task<SdoResult> write_other(Channel&, BusSlave&, const StartupWrite&) noexcept {
         co_return SdoResult{SdoResult::Outcome::refused};
     }
+    /// Writes the settings of the IP stack (EoE). [realtime]
+    virtual Task<SdoResult> set_ip(Channel&, BusSlave&, const eoe::Ip&) noexcept { co_return SdoResult{SdoResult::Outcome::refused}; }
 };
 
 }  // namespace hal::ethercat::master

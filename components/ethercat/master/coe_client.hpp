@@ -6,6 +6,7 @@
 #include <span>
 
 #include "ethercat/master/aoe_client.hpp"
+#include "ethercat/master/eoe_client.hpp"
 #include "ethercat/master/mailbox.hpp"
 #include "ethercat/master/soe_client.hpp"
 #include "ethercat/wire/coe.hpp"
@@ -62,6 +63,9 @@ public:
     Task<SdoResult> download(Channel&, BusSlave&, std::uint16_t index, std::uint8_t sub, bool complete,
                              std::span<const std::uint8_t> from) noexcept override;
     Task<SdoResult> write_other(Channel&, BusSlave&, const StartupWrite&) noexcept override;  ///< An IDN by SoE, an object by AoE.
+    Task<SdoResult> set_ip(Channel& channel, BusSlave& slave, const eoe::Ip& ip) noexcept override {
+        return eoe_.set_ip(channel, slave, ip);
+    }
 
     /// Reads a list of indexes; `length` of the result counts bytes, two for each index.
     Task<MailboxResult> list(Channel&, BusSlave&, coe::List which, std::span<std::uint8_t> to) noexcept;
@@ -83,6 +87,7 @@ private:
     Mailboxes& mailboxes_;
     SoeClient  soe_{mailboxes_};
     AoeClient  aoe_{mailboxes_};
+    EoeClient  eoe_{mailboxes_};
 };
 
 }  // namespace hal::ethercat::master

@@ -16,24 +16,26 @@ bool accepts_eoe(const Expected& expected, std::span<const std::uint8_t> payload
 
 }  // namespace
 
-EoeSwitch::EoeSwitch(Mailboxes& mailboxes, std::span<const std::uint16_t> slaves, std::size_t depth)
-    : mailboxes_(mailboxes), port_by_slave_(mailboxes.size(), -1), to_host_(depth * 4), from_host_(depth * 4) {
-    for (const auto number : slaves) {
-        if (number >= mailboxes.size()) continue;
-        port_by_slave_[number] = static_cast<int>(ports_.size());
-        ports_.push_back(std::make_unique<Port>(number, depth));
-        mailboxes.at(number).set_sink(MailboxType::eoe, this);
+EoeSwitch::EoeSwitch(Mailboxes& mailboxes, std::span<const EoePort> ports, std::size_t depth) : mailboxes_(mailboxes) {
+    for (const EoePort& port : ports) {
+        while (hosts_.size() <= port.host) hosts_.push_back(std::make_unique<Host>(depth * 4));
+        if (port_by_slave_.size() <= port.slave) port_by_slave_.resize(port.slave + std::size_t{1}, -1);
+        port_by_slave_[port.slave] = static_cast<int>(ports_.size());
+        ports_.push_back(std::make_unique<Port>(port.host, depth));
     }
+    for (std::size_t n = 0; n < mailboxes.size(); ++n) mailboxes.at(n).set_sink(MailboxType::eoe, this);
 }
 
 EoeSwitch::Port* EoeSwitch::port_of(const BusSlave& slave) const noexcept {
-    if (slave.number >= port_by_slave_.size() || port_by_slave_[slave.number] < 0) return nullptr;
-    return ports_[static_cast<std::size_t>(port_by_slave_[slave.number])].get();
+    const auto n = static_cast<std::size_t>(slave.configured);
+    if (slave.configured < 0 || n >= port_by_slave_.size() || port_by_slave_[n] < 0) return nullptr;
+    return ports_[static_cast<std::size_t>(port_by_slave_[n])].get();
 }
 
 bool EoeSwitch::pending(const BusSlave& slave) const noexcept {
     const Port* port = port_of(slave);
-    return port != nullptr && port->queue.size() != 0;
+    const bool  mailbox_works = slave.state == State::preop || slave.state == State::safeop || slave.state == State::op;
+    return port != nullptr && mailbox_works && port->queue.size() != 0;
 }
 
 EoeCounters EoeSwitch::counters(const BusSlave& slave) const noexcept {
@@ -42,11 +44,14 @@ EoeCounters EoeSwitch::counters(const BusSlave& slave) const noexcept {
 }
 
 void EoeSwitch::pump() noexcept {
-    for (std::size_t left = from_host_.capacity(); left-- != 0;) {
-        const EthernetFrame* frame = from_host_.front();
-        if (frame == nullptr) return;
-        if (frame->length <= frame->bytes.size()) forward(host, {frame->bytes.data(), frame->length});
-        from_host_.drop();
+    for (std::uint16_t n = 0; n < hosts_.size(); ++n) {
+        Queue<EthernetFrame>& queue = hosts_[n]->from;
+        for (std::size_t left = queue.capacity(); left-- != 0;) {
+            const EthernetFrame* frame = queue.front();
+            if (frame == nullptr) break;
+            if (frame->length <= frame->bytes.size()) forward(n, the_host, {frame->bytes.data(), frame->length});
+            queue.drop();
+        }
     }
 }
 
@@ -59,40 +64,40 @@ bool EoeSwitch::take(const BusSlave& slave, const MailboxMessage& message) noexc
     const auto frame = port->joiner.take(message.payload);
     if (frame.empty()) return true;
     ++port->counters.from_slave;
-    forward(static_cast<unsigned>(port_by_slave_[slave.number]), frame);
+    forward(port->host, static_cast<unsigned>(port_by_slave_[static_cast<std::size_t>(slave.configured)]), frame);
     return true;
 }
 
-EoeSwitch::Learned& EoeSwitch::slot_of(const std::uint8_t* address) noexcept {
-    unsigned sum = 0;
+EoeSwitch::Learned& EoeSwitch::slot_of(std::uint16_t host, const std::uint8_t* address) noexcept {
+    unsigned sum = host;
     for (unsigned i = 0; i < 6; ++i) sum = sum * 31 + address[i];
     return learned_[sum % learned_.size()];
 }
 
-void EoeSwitch::forward(unsigned from, std::span<const std::uint8_t> frame) noexcept {
+void EoeSwitch::forward(std::uint16_t host, unsigned from, std::span<const std::uint8_t> frame) noexcept {
     if (frame.size() < ethernet_addresses) return;
     const std::uint8_t* to = frame.data();
     const std::uint8_t* source = frame.data() + 6;
     if ((source[0] & 1) == 0) {
-        Learned& slot = slot_of(source);
+        Learned& slot = slot_of(host, source);
         std::memcpy(slot.address.data(), source, 6);
-        slot.port = static_cast<std::uint16_t>(from), slot.used = true;
+        slot.host = host, slot.port = from, slot.used = true;
     }
-    const Learned& known = slot_of(to);
-    if ((to[0] & 1) == 0 && known.used && std::memcmp(known.address.data(), to, 6) == 0) {
-        if (known.port != from) deliver(known.port, frame);
+    const Learned& known = slot_of(host, to);
+    if ((to[0] & 1) == 0 && known.used && known.host == host && std::memcmp(known.address.data(), to, 6) == 0) {
+        if (known.port != from) deliver(host, known.port, frame);
         return;
     }
-    if (from != host) deliver(host, frame);
+    if (from != the_host) deliver(host, the_host, frame);
     for (unsigned i = 0; i < ports_.size(); ++i)
-        if (i != from) deliver(i, frame);
+        if (i != from && ports_[i]->host == host) deliver(host, i, frame);
 }
 
-void EoeSwitch::deliver(unsigned port, std::span<const std::uint8_t> frame) noexcept {
-    Queue<EthernetFrame>& queue = port == host ? to_host_ : ports_[port]->queue;
+void EoeSwitch::deliver(std::uint16_t host, unsigned port, std::span<const std::uint8_t> frame) noexcept {
+    Queue<EthernetFrame>& queue = port == the_host ? hosts_[host]->to : ports_[port]->queue;
     EthernetFrame*        place = queue.place();
     if (place == nullptr) {
-        if (port != host) ++ports_[port]->counters.lost;
+        if (port != the_host) ++ports_[port]->counters.lost;
         return;
     }
     place->length = static_cast<std::uint16_t>(frame.size());

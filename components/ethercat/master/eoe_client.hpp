@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Ethernet over EtherCAT as the master uses it (ETG.1000.6, clause 5.7): the IP settings of slaves, and a learning switch between slaves
-// and one interface of the host. The interface itself, such as a TAP, belongs to a thread that exchanges frames through two queues.
+// Ethernet over EtherCAT as the master uses it (ETG.1000.6, clause 5.7): the IP settings of slaves, and learning switches, each between
+// slaves and one interface of the host. The interface itself, such as a TAP, belongs to a thread that exchanges frames through two queues.
 #pragma once
 
 #include <array>
@@ -26,30 +26,42 @@ struct EoeCounters {
     std::uint32_t lost = 0;                      ///< frames that found a queue full
 };
 
+/// A slave with EoE, and the interface of the host that it is connected to.
+struct EoePort {
+    std::uint16_t slave = 0;  ///< index in Setup::slaves
+    std::uint16_t host = 0;   ///< slaves of the same interface reach each other too
+};
+
 /// See the top of this file.
 class EoeSwitch final : public MailboxSink {
 public:
-    static constexpr unsigned host = 0xffff;
+    /// Allocates queues of `depth` frames for each slave in `ports`, and of four times as many for each of their interfaces. [setup]
+    EoeSwitch(Mailboxes& mailboxes, std::span<const EoePort> ports, std::size_t depth = 8);
 
-    /// Allocates queues of `depth` frames for the host and for each slave in `slaves`, the numbers of those with EoE. [setup]
-    EoeSwitch(Mailboxes& mailboxes, std::span<const std::uint16_t> slaves, std::size_t depth = 8);
-
-    /// Moves the frames of the host to the queues of the slaves. Call once per cycle. [realtime]
+    /// Moves the frames of the interfaces to the queues of the slaves. Call once per cycle. [realtime]
     void pump() noexcept;
-    /// Returns whether frames wait for a slave. [realtime]
+    /// Returns whether a slave has EoE. [realtime]
+    bool has(const BusSlave& slave) const noexcept { return port_of(slave) != nullptr; }
+    /// Returns whether frames wait for a slave that can take them. [realtime]
     bool pending(const BusSlave& slave) const noexcept;
     /// Sends the oldest frame for a slave. [realtime]
     Task<MailboxResult> serve(Channel&, BusSlave&) noexcept;
     bool                take(const BusSlave&, const MailboxMessage&) noexcept override;
 
-    Queue<EthernetFrame>& to_host() noexcept { return to_host_; }      ///< Returns the frames for the host; read by its thread. [any]
-    Queue<EthernetFrame>& from_host() noexcept { return from_host_; }  ///< Returns the frames of the host; written by its thread. [any]
+    std::size_t hosts() const noexcept { return hosts_.size(); }  ///< Returns the number of interfaces. [any]
+    /// Return the frames for an interface, read by its thread, and those from it, written by that thread. [any]
+    Queue<EthernetFrame>& to_host(std::size_t n = 0) noexcept { return hosts_[n]->to; }
+    Queue<EthernetFrame>& from_host(std::size_t n = 0) noexcept { return hosts_[n]->from; }
     EoeCounters           counters(const BusSlave& slave) const noexcept;        ///< [any]
 
 private:
+    struct Host {
+        explicit Host(std::size_t depth) : to(depth), from(depth) {}
+        Queue<EthernetFrame> to, from;
+    };
     struct Port {
-        explicit Port(std::uint16_t number, std::size_t depth) : slave(number), queue(depth) {}
-        std::uint16_t        slave;
+        explicit Port(std::uint16_t of, std::size_t depth) : host(of), queue(depth) {}
+        std::uint16_t        host;
         Queue<EthernetFrame> queue;
         eoe::Joiner          joiner;
         EoeCounters          counters;
@@ -57,19 +69,21 @@ private:
     };
     struct Learned {
         std::array<std::uint8_t, 6> address{};
-        std::uint16_t               port = 0;
+        std::uint16_t               host = 0;  // of the switch
+        unsigned                    port = 0;
         bool                        used = false;
     };
-    Port*    port_of(const BusSlave& slave) const noexcept;
-    void     forward(unsigned from, std::span<const std::uint8_t> frame) noexcept;
-    Learned& slot_of(const std::uint8_t* address) noexcept;
-    void     deliver(unsigned port, std::span<const std::uint8_t> frame) noexcept;
+    static constexpr unsigned the_host = 0xffff;  // as a port of a switch
+    Port*                     port_of(const BusSlave& slave) const noexcept;
+    void                      forward(std::uint16_t host, unsigned from, std::span<const std::uint8_t> frame) noexcept;
+    Learned&                  slot_of(std::uint16_t host, const std::uint8_t* address) noexcept;
+    void                      deliver(std::uint16_t host, unsigned port, std::span<const std::uint8_t> frame) noexcept;
 
     Mailboxes&                         mailboxes_;
+    std::vector<std::unique_ptr<Host>> hosts_;
     std::vector<std::unique_ptr<Port>> ports_;
-    std::vector<int>                   port_by_slave_;
+    std::vector<int>                   port_by_slave_;  // by index in Setup::slaves
     std::array<Learned, 256>           learned_{};
-    Queue<EthernetFrame>               to_host_, from_host_;
 };
 
 /// The IP settings of slaves. All functions [realtime]. A result other than ok ends as `aborted` with its code (eoe::Result).

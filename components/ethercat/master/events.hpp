@@ -29,6 +29,8 @@ enum class Event : std::uint8_t {
     state_timeout,                 ///< [State requested, AL status]
     fell_back,                     ///< left its state by itself [AL status, AL status code]
     startup_write_failed,          ///< [index << 8 | sub, abort code]
+    no_eoe,                        ///< configured, but the slave has no EoE [MailboxProtocols, -]
+    eoe_failed,                    ///< rejects its IP settings [eoe::Result; 0: no answer, -]
     mapping_failed,                ///< [value << 24 | index << 8 | sub, abort code]
     mapping_differs,               ///< read back other than written [value << 24 | index << 8 | sub, value read]
     too_many_entries,              ///< [PDO, entries]
@@ -43,6 +45,7 @@ enum class Event : std::uint8_t {
     dc_timeout,                    ///< clock not within the window in time [deviation ns, window ns]
     dc_not_set,                    ///< the time of its clock could not be set [ms waited, -]
     dc_lost,                       ///< clock far beyond the window while operational [deviation ns, window ns]
+    dc_recovered,                  ///< clock in the window again after dc_lost [deviation ns, ms it was beyond it]
     dc_synchronised,               ///< all slaves [largest deviation ns, -]
     ring_broken,
     ring_closed,      ///< `slave` is the one before the break [position, responding to the primary port]

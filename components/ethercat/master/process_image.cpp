@@ -23,6 +23,7 @@ ProcessImage::ProcessImage(const Setup& setup, const std::array<std::uint8_t, 6>
     : slaves_(setup.slaves.size()),
       domains_(std::max<std::size_t>(setup.domains.size(), 1)),
       source_(source),
+      most_(std::clamp<std::size_t>(setup.frame_bytes, 200, largest_frame_bytes)),
       write_clock_(setup.lead == ClockLead::thread) {
     lay_out(setup);
     // Each block needs at most two datagrams and one per frame's worth of bytes; each of them could need a frame of its own.
@@ -35,7 +36,7 @@ ProcessImage::ProcessImage(const Setup& setup, const std::array<std::uint8_t, 6>
 
 /// Data bytes of one process datagram in a frame that also carries the clock, if two of them (LWR and LRD) share the frame.
 std::size_t ProcessImage::room() const noexcept {
-    constexpr std::size_t payload = largest_frame_bytes - ethernet_header_bytes - ecat_header_bytes;
+    const std::size_t payload = most_ - ethernet_header_bytes - ecat_header_bytes;
     return payload - (write_clock_ ? 2 : 1) * (clock_bytes + datagram_overhead) - 2 * datagram_overhead;
 }
 
@@ -125,7 +126,7 @@ void ProcessImage::build_frames(unsigned every) noexcept {
         frame->every = every;
         frame->first = static_cast<unsigned>(datagrams_used_);
         frame->clock_write = frame->clock_read = 0;
-        writer.emplace(frame->bytes, source_);
+        writer.emplace(frame->bytes, source_, most_);
         const auto clock = [&] {
             return static_cast<std::uint16_t>(writer->add(Command::nop, 0, at_station(0, registers::dc_system_time), clock_bytes) -
                                               datagram_header_bytes - frame->bytes.data());

@@ -117,6 +117,7 @@ private:
     std::vector<DomainStatus>   domains_;
     std::size_t                 datagrams_used_ = 0, frames_used_ = 0;
     std::array<std::uint8_t, 6> source_;
+    std::size_t                 most_;  ///< bytes of the longest frame
     bool                        write_clock_ = false;
     std::uint16_t               reference_ = 0;
     bool                        write_time_ = false;

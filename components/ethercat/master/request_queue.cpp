@@ -10,6 +10,7 @@ namespace hal::ethercat::master {
 namespace {
 
 using Stage = MailboxRequest::Stage;
+constexpr std::int64_t  eoe_poll_interval_ns = 10'000'000;
 constexpr MailboxResult nobody{MailboxResult::Outcome::lost, 0, 0};
 
 // Type, 1 for CoE: the reply to a request of the gateway, never an unrequested message.
@@ -105,10 +106,12 @@ void RequestServer::step(std::int64_t now_ns) noexcept {
                 slot.last = nullptr;
                 continue;
             }
-            const bool frames = switch_ != nullptr && switch_->pending(*slave);
             const bool full = slave->mailbox_status != nullptr && (*slave->mailbox_status & 0x08) != 0;
-            const bool due = slave->mailbox_status == nullptr && poll_interval_ns_ != 0 && slave->present &&
-                             now_ns - slot.polled_ns >= poll_interval_ns_;
+            const bool frames = !full && switch_ != nullptr && switch_->pending(*slave);  // what it sent comes first: it may wait for that
+            const auto interval =
+                switch_ != nullptr && switch_->has(*slave) ? std::min(poll_interval_ns_, eoe_poll_interval_ns) : poll_interval_ns_;
+            const bool due =
+                slave->mailbox_status == nullptr && poll_interval_ns_ != 0 && slave->present && now_ns - slot.polled_ns >= interval;
             if (slot.first == nullptr && !frames && !full && !due) continue;
             if (slot.first == nullptr && mailboxes_.at(n).held()) continue;  // its holder reads the mailbox
             slot.busy = true, slot.polled_ns = now_ns;

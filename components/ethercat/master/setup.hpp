@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "ethercat/wire/eoe.hpp"
 #include "ethercat/wire/states.hpp"
 
 namespace hal::ethercat::master {
@@ -116,8 +117,10 @@ struct Slave {
     bool     use_lrw = true;  ///< the SII's "no LRW" wins over true
     bool     complete_access = false;  ///< for mapping and assignment
     unsigned entries_per_pdo = 0;  ///< limit; 0: none known
-    State    target = State::op;  ///< the state to bring it to
-    std::uint32_t line = 0;  ///< of the configuration, for messages
+    bool     eoe = false;  ///< exchanges Ethernet frames with an interface of the host
+    std::optional<eoe::Ip> eoe_ip;  ///< settings of its IP stack, written in PRE-OP
+    State                  target = State::op;  ///< the state to bring it to
+    std::uint32_t          line = 0;  ///< of the configuration, for messages
 };
 
 struct Domain {
@@ -131,6 +134,12 @@ enum class ClockLead : std::uint8_t {
     none,  ///< neither: the slaves follow the reference clock, which runs free
 };
 
+/// What happens to a slave in OP whose clock is beyond the window for Setup::dc_loss_ns.
+enum class DcLoss : std::uint8_t {
+    report,  ///< it stays in OP
+    safeop,  ///< SAFE-OP, where its outputs are off, until its clock is in the window again
+};
+
 struct Setup {
     std::vector<Slave>           slaves;
     std::vector<Domain>          domains{Domain{}};
@@ -139,7 +148,10 @@ struct Setup {
     std::optional<std::uint16_t> reference_slave;  ///< index of its Slave; not set: the first one with a 64-bit clock
     std::int64_t                 frame_timeout_ns = 0;  ///< 0: until the next cycle
     bool          accept_other_slaves = false;  ///< slaves on the bus that the setup does not name are left in PRE-OP, without a fault
+    std::size_t   frame_bytes = 1514;  ///< longest frame, from the destination address on, without check sequence
     std::uint16_t most_slaves = 0;  ///< capacity of the bus; 0: the slaves named here and 64 more
+    DcLoss        dc_loss = DcLoss::report;
+    std::int64_t  dc_loss_ns = 500'000'000;
     std::int64_t  sync_window_ns = 1000;  ///< clock deviation below which a slave counts as synchronised
 };
 

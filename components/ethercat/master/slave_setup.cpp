@@ -119,9 +119,24 @@ Task<bool> set_process_data(Channel& c, Bus& bus, Device& d) noexcept {
     co_return true;
 }
 
+static Task<bool> set_ip(Channel& c, Bus& bus, Device& d, const Slave& config) noexcept {
+    if (!d.slave.mailbox.usable() || (d.slave.protocols & eoe_supported) == 0) {
+        bus.report(Event::no_eoe, d, d.slave.protocols);
+        co_return false;
+    }
+    if (!config.eoe_ip) co_return true;
+    const SdoResult r = co_await bus.coe.set_ip(c, d.slave, *config.eoe_ip);
+    if (!r) bus.report(Event::eoe_failed, d, r.abort);
+    co_return bool(r);
+}
+
 Task<bool> startup_writes(Channel& c, Bus& bus, Device& d, State before) noexcept {
     const Slave* config = bus.config(d);
     if (config == nullptr) co_return true;
+    if (config->eoe && before == State::safeop) {
+        const bool ok = co_await set_ip(c, bus, d, *config);
+        if (!ok) co_return false;
+    }
     for (const StartupWrite& w : config->startup) {
         if (w.before != before) continue;
         const std::int64_t object = w.index << 8 | w.sub;

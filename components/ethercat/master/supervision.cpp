@@ -10,7 +10,7 @@ namespace hal::ethercat::master {
 namespace {
 
 constexpr std::int64_t  look_every_ns = 10 * millisecond, empty_retry_ns = 100 * millisecond, rediscover_every_ns = 50 * millisecond;
-constexpr std::int64_t  counters_every_ns = 1'000 * millisecond;
+constexpr std::int64_t  counters_every_ns = 1'000 * millisecond, clocks_every_ns = 100 * millisecond;
 constexpr std::uint16_t spare_station = 0x0fff;
 constexpr std::uint8_t  counter_high = 0x80;
 constexpr std::uint64_t other_master_frames = 10;  ///< in a second: fewer may be damaged ones
@@ -224,17 +224,69 @@ Task<void> supervise(Channel& c, Bus& bus) noexcept {
     }
 }
 
-/// Reports a slave that is not in step any more although it is in OP.
-static void judge_clock(Bus& bus, Device& d) noexcept {
+/// Takes a slave to SAFE-OP, where its outputs are off, until its clock is in the window again.
+static Task<void> resynchronise(Channel& c, Bus& bus, Device& d) noexcept {
+    d.status.operational = false;
+    d.began_ns = c.now_ns();
+    bool ok = co_await request_state(c, bus, d, State::safeop, d.slave.timeouts.op_to_safeop);
+    if (ok) ok = co_await synchronise(c, bus, d);
+    if (ok) ok = co_await request_state(c, bus, d, State::op, d.slave.timeouts.to_safeop_op);
+    if (!ok) {
+        co_await boot(c, bus, d);
+        co_return;
+    }
+    d.status.operational = true;
+    bus.report(Event::slave_operational, d, d.slave.position, (c.now_ns() - d.began_ns) / millisecond);
+}
+
+/// Reports a slave that is not in step for some time although it is in OP, and stops it where the setup says so; reports it when it is again.
+static void judge_clock(Bus& bus, Device& d, std::int64_t now_ns) noexcept {
     const Slave*       config = bus.config(d);
     const std::int64_t window = std::max(bus.setup.sync_window_ns, tolerable_deviation_ns), deviation = d.status.dc_deviation_ns;
-    if (config == nullptr || !config->dc || d.slave.number == bus.reference) return;
-    if (d.status.operational && !d.drifted && deviation > window) {
+    if (config == nullptr || !config->dc || d.slave.number == bus.reference || !d.status.operational) {
+        d.drifted = false, d.drifts_since_ns = 0;
+    } else if (deviation > window) {
+        if (d.drifts_since_ns == 0) d.drifts_since_ns = now_ns;
+        if (d.drifted || now_ns - d.drifts_since_ns < bus.setup.dc_loss_ns || d.channel.busy()) return;
         d.drifted = true;
         bus.report(Event::dc_lost, d, deviation, window);
-    } else if (deviation <= bus.setup.sync_window_ns || !d.status.operational) {
-        d.drifted = false;
+        if (bus.setup.dc_loss == DcLoss::safeop) bus.run(d, [&] { return resynchronise(d.channel, bus, d); });
+    } else if (!d.drifted) {
+        d.drifts_since_ns = 0;
+    } else if (deviation <= bus.setup.sync_window_ns) {
+        bus.report(Event::dc_recovered, d, deviation, (now_ns - d.drifts_since_ns) / millisecond);
+        d.drifted = false, d.drifts_since_ns = 0;
     }
+}
+
+/// Reads the deviation of every clock that is set.
+static Task<void> look_at_clocks(Channel& c, Bus& bus) noexcept {
+    std::uint32_t largest = 0;
+    bool          any = false, all = true;
+    for (const auto& device : bus.devices) {
+        Device& d = *device;
+        if (!d.slave.present || !d.identified) continue;
+        const Slave* config = bus.config(d);
+        all &= config == nullptr || !config->dc || d.clock_set || d.refused;
+        if (!d.clock_set) continue;
+        const Answer a = co_await read(c, d.slave, registers::dc_system_time_difference, 4);
+        if (a.wkc != 1) continue;
+        d.status.dc_deviation_ns = get<std::uint32_t>(c.data()) & 0x7fff'ffff;
+        judge_clock(bus, d, c.now_ns());
+        if (d.slave.number != bus.reference) largest = std::max(largest, d.status.dc_deviation_ns);
+        any = true;
+    }
+    bus.status.dc_deviation_ns = any ? largest : UINT32_MAX;
+    const bool synchronised = any && all && largest <= bus.setup.sync_window_ns;
+    if (synchronised && !bus.status.dc_synchronised) bus.report(Event::dc_synchronised, largest);
+    bus.status.dc_synchronised = synchronised;
+}
+
+/// Returns whether a clock of the line may be far beyond the window: one datagram reads them all, as the OR of their deviations.
+static Task<bool> may_drift(Channel& c, Bus& bus) noexcept {
+    std::memset(c.data(), 0, 4);
+    const Answer a = co_await c.exchange(Command::brd, at_position(0, registers::dc_system_time_difference), 4);
+    co_return a.wkc != 0 && (get<std::uint32_t>(c.data()) & 0x7fff'ffff) > std::max(bus.setup.sync_window_ns, tolerable_deviation_ns);
 }
 
 /// Returns what is at the other end of the cable at a port, as events name slaves.
@@ -254,14 +306,10 @@ Task<void> watch(Channel& c, Bus& bus) noexcept {
         const std::uint64_t more = bus.status.foreign - std::exchange(foreign, bus.status.foreign);
         const bool          was_other = std::exchange(other, more >= other_master_frames);
         if (other && !was_other) bus.report(Event::other_master, static_cast<std::int64_t>(more));
-        std::uint32_t largest = 0;
-        bool          any = false, all = true;
         for (const auto& device : bus.devices) {
             Device& d = *device;
             if (!d.slave.present || !d.identified) continue;
-            const Slave* config = bus.config(d);
-            all &= config == nullptr || !config->dc || d.clock_set || d.refused;
-            Answer a = co_await read(c, d.slave, registers::rx_errors, 20);
+            const Answer a = co_await read(c, d.slave, registers::rx_errors, 20);
             if (a.wkc == 1) {
                 std::array<std::uint8_t, 20> now{};
                 std::memcpy(now.data(), c.data(), now.size());
@@ -288,21 +336,17 @@ Task<void> watch(Channel& c, Bus& bus) noexcept {
                     for (auto& last : d.last_errors) last.fill(0);
                 }
             }
-            if (d.clock_set) {
-                a = co_await read(c, d.slave, registers::dc_system_time_difference, 4);
-                if (a.wkc == 1) {
-                    d.status.dc_deviation_ns = get<std::uint32_t>(c.data()) & 0x7fff'ffff;
-                    judge_clock(bus, d);
-                    if (d.slave.number != bus.reference) largest = std::max(largest, d.status.dc_deviation_ns);
-                    any = true;
-                }
-            }
         }
-        bus.status.dc_deviation_ns = any ? largest : UINT32_MAX;
-        const bool synchronised = any && all && largest <= bus.setup.sync_window_ns;
-        if (synchronised && !bus.status.dc_synchronised) bus.report(Event::dc_synchronised, largest);
-        bus.status.dc_synchronised = synchronised;
-        co_await c.sleep(std::max<std::int64_t>(began + counters_every_ns - c.now_ns(), 0));
+        co_await look_at_clocks(c, bus);
+        while (c.now_ns() - began < counters_every_ns) {
+            const std::int64_t pause = std::min(clocks_every_ns, began + counters_every_ns - c.now_ns());
+            co_await c.sleep(pause);
+            const bool any = std::any_of(bus.devices.begin(), bus.devices.end(), [](const auto& d) { return d->clock_set; });
+            if (!any || pause < clocks_every_ns) continue;
+            const bool looks = co_await may_drift(c, bus);
+            const bool drifts = std::any_of(bus.devices.begin(), bus.devices.end(), [](const auto& d) { return d->drifts_since_ns != 0; });
+            if (looks || drifts) co_await look_at_clocks(c, bus);
+        }
     }
 }
 

@@ -127,6 +127,7 @@ bool WireEngine::pack(AcyclicFrame& frame, std::uint8_t index, bool& backup, std
         if (frame.count != 0 && both != backup) continue;
         const std::size_t needed = c.length() + datagram_overhead;
         if (bytes + needed > most && !(first && frame.count == 0)) continue;
+        if (bytes + needed > setup_.frame_bytes + frame_overhead && frame.count != 0) continue;
         if (c.length() > writer.space() || (c.length() == 0 && writer.space() == 0)) continue;
         std::uint8_t* data = writer.add(c.command(), index, c.address(), c.length());
         if (data == nullptr) continue;

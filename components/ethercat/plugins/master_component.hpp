@@ -4,6 +4,7 @@
 
 #include <pthread.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <ctime>
@@ -21,6 +22,7 @@
 #include "ethercat/master/request_queue.hpp"
 #include "ethercat/plugins/emergencies.hpp"
 #include "ethercat/plugins/entry_pins.hpp"
+#include "ethercat/plugins/eoe_interfaces.hpp"
 #include "ethercat/plugins/ethercat_arguments.hpp"
 #include "ethercat/wire/registers.hpp"
 #include "hal/clock.hpp"
@@ -59,7 +61,9 @@ public:
             missing_words_.push_back(who + " is not on the bus");
             ambiguous_words_.push_back(who + " is not unique; no slave with its number is started");
             failed_words_.push_back(who + " did not start; it is tried again");
-            clock_words_.push_back(who + " is out of step, its clock deviates by {} us");
+            const bool stops = bus_.setup.dc_loss == master::DcLoss::safeop;
+            clock_words_.push_back(who + " is out of step, its clock deviates by {} us" +
+                                   (stops ? "; its outputs are off until it is in step again" : ""));
             left_words_.push_back(who + " left its state with AL status code {x}; its outputs are off");
         }
         areas_.resize(places_.size());
@@ -80,12 +84,11 @@ public:
         faults_ = hal::extension<hal_faults>("hal.faults/1");
         hal::ethernet::Options options;
         options.types = {ethertype};
-        auto primary = hal::ethernet::open(bus_.link, options);
-        if (!primary) throw std::runtime_error(primary.problem);
-        hal::ethernet::Opened backup;
-        if (!bus_.backup.empty() && !(backup = hal::ethernet::open(bus_.backup, options))) throw std::runtime_error(backup.problem);
+        auto              primary = open(bus_.link, options);
+        decltype(primary) backup;
+        if (!bus_.backup.empty()) backup = open(bus_.backup, options);
         if (bus_.setup.lead == master::ClockLead::reference && has_clocks()) clock_.emplace().claim();
-        primary_ = std::move(primary.port), backup_ = std::move(backup.port);
+        primary_ = std::move(primary), backup_ = std::move(backup);
         simulated_ = primary_->description().simulated;
         mailboxes_ = std::make_unique<master::Mailboxes>(bus_.setup.slaves.size() + spare_slaves);
         emergencies_ = std::make_unique<Emergencies>(bus_.setup.slaves.size(), static_cast<master::Events&>(*this));
@@ -93,7 +96,15 @@ public:
         server_ = std::make_unique<master::RequestServer>(
             *mailboxes_, [this](std::uint16_t n) { return master_->status().scanned ? master_->numbered(n) : nullptr; }, 2);
         server_->set_poll_interval(emergencies_every_ns);
-        master_ = std::make_unique<Master>(bus_.setup, primary_->address(), static_cast<master::Events&>(*this), server_->coe());
+        if (has_eoe()) {
+            eoe_ = std::make_unique<EoeInterfaces>(name_, bus_, *mailboxes_);
+            server_->set_switch(&eoe_->frames());
+            eoe_->start();
+        }
+        master::Setup setup = bus_.setup;
+        for (const auto* port : {primary_.get(), backup_.get()})
+            if (port != nullptr) setup.frame_bytes = std::min(setup.frame_bytes, hal::ethernet::header_bytes + port->statistics().mtu);
+        master_ = std::make_unique<Master>(std::move(setup), primary_->address(), static_cast<master::Events&>(*this), server_->coe());
         for (std::size_t n = 0; n < server_->workers(); ++n) master_->add(server_->channel(n));
         for (std::size_t n = 0; n < places_.size(); ++n) areas_[n] = master_->data(places_[n].slave, places_[n].sync_manager);
         if (!simulated_) master_->set_epoch(since_2000_ns() - hal::monotonic_ns());
@@ -111,6 +122,7 @@ public:
         if (primary_ && master_) release_slaves();
         if (server_) server_->stop();
         gateway_.reset();
+        eoe_.reset();
         master_.reset();
         server_.reset();
         mailboxes_.reset();
@@ -142,6 +154,7 @@ public:
         if (apart_ == tolerated_cycles) raise(apart_words_);
         if (unreceived_ > 2 || apart_ > 2) return;  // outputs must not move without their inputs
         entries_.take(areas_);
+        if (eoe_) eoe_->step(*master_);
         server_->step(cycle.start_ns());
         master_->transmit(cycle.start_ns());
     }
@@ -157,6 +170,13 @@ private:
     struct Place {
         std::size_t slave = 0, sync_manager = 0;
     };
+
+    static std::unique_ptr<hal::ethernet::Port> open(const std::string& address, const hal::ethernet::Options& options) {
+        if (hal::ethernet::describe(address).recorded) throw std::runtime_error(config::recorded_words(address));
+        auto opened = hal::ethernet::open(address, options);
+        if (!opened) throw std::runtime_error(opened.problem);
+        return std::move(opened.port);
+    }
 
     /// Lets other programs reach the mailboxes of the slaves. [setup]
     void open_gateway() {
@@ -174,6 +194,11 @@ private:
         slaves_changed_ = true;
     }
 
+    bool has_eoe() const {
+        for (const master::Slave& s : bus_.setup.slaves)
+            if (s.eoe) return true;
+        return false;
+    }
     bool has_clocks() const {
         for (const master::Slave& s : bus_.setup.slaves)
             if (s.dc) return true;
@@ -287,6 +312,7 @@ private:
     std::unique_ptr<Emergencies>           emergencies_;
     std::unique_ptr<master::RequestServer> server_;
     std::unique_ptr<Master>                master_;
+    std::unique_ptr<EoeInterfaces>         eoe_;
     std::unique_ptr<master::GatewaySlaves> gateway_slaves_;
     std::unique_ptr<master::Gateway>       gateway_;
     bool                                   slaves_changed_ = false;

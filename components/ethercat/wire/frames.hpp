@@ -86,7 +86,9 @@ private:
 /// Writes a frame of datagrams into a buffer of largest_frame_bytes. [realtime]
 class FrameWriter {
 public:
-    FrameWriter(std::span<std::uint8_t, largest_frame_bytes> buffer, const std::array<std::uint8_t, 6>& source) noexcept;
+    /// `most`: bytes of the longest frame.
+    FrameWriter(std::span<std::uint8_t, largest_frame_bytes> buffer, const std::array<std::uint8_t, 6>& source,
+                std::size_t most = largest_frame_bytes) noexcept;
     /// Adds a datagram with zeroed data and WKC 0. Returns its data, or nullptr if the frame has no space left.
     std::uint8_t* add(Command command, std::uint8_t index, std::uint32_t address, std::uint16_t length) noexcept;
     /// Returns the space left for data of one more datagram; 0: none.
@@ -97,6 +99,7 @@ public:
 
 private:
     std::span<std::uint8_t, largest_frame_bytes> buffer_;
+    std::size_t                                  most_;
     std::size_t                                  used_ = ethernet_header_bytes + ecat_header_bytes;
     std::uint8_t*                                last_ = nullptr;  ///< header of the last datagram
 };

@@ -204,5 +204,61 @@ TEST(EthercatConfig, Any_bytes_are_read_without_harm) {
     }
 }
 
+TEST(EthercatConfig, Ethernet_over_EtherCAT_has_settings_for_the_slave_and_an_interface_here) {
+    const std::string bus = "[bus]\nlink = sim:line\n", rest = "vendor = 1\nproduct = 2\noutputs = none\ninputs = none\n";
+    const Bus one = good(bus + "[slave 0 panel]\n" + rest + "eoe = 192.168.2.10/28 host 192.168.2.1 dns 10.0.0.1\n[slave 1 b]\n" + rest +
+                         "eoe = dhcp interface eth7\n[slave 2 c]\n" + rest + "eoe = yes\n[slave 3 d]\n" + rest + "eoe = no\n");
+    const auto& slaves = one.setup.slaves;
+    ASSERT_TRUE(slaves[0].eoe && slaves[0].eoe_ip);
+    const eoe::Ip& ip = *slaves[0].eoe_ip;
+    EXPECT_EQ(ip.flags, 0x1fU) << "without gaps";
+    EXPECT_EQ(ip.address, 0xc0a8020aU);
+    EXPECT_EQ(ip.mask, 0xfffffff0U);
+    EXPECT_EQ(ip.gateway, 0U);
+    EXPECT_EQ(ip.dns, 0x0a000001U);
+    EXPECT_EQ(ip.mac[0], 2) << "locally administered";
+    EXPECT_EQ(one.slaves[0].eoe.name, "eoe-panel");
+    EXPECT_EQ(one.slaves[0].eoe.ip, 0xc0a80201U);
+    EXPECT_EQ(one.slaves[0].eoe.prefix, 28U);
+    ASSERT_TRUE(slaves[1].eoe_ip);
+    EXPECT_EQ(slaves[1].eoe_ip->flags, 1U) << "the MAC address only";
+    EXPECT_NE(slaves[1].eoe_ip->mac, ip.mac);
+    EXPECT_EQ(one.slaves[1].eoe.name, "eth7");
+    EXPECT_TRUE(slaves[2].eoe && !slaves[2].eoe_ip);
+    EXPECT_FALSE(slaves[3].eoe);
+    const Bus two = good(bus + "eoe-switch = eoe0 192.168.2.1/24\n[slave 0 a]\n" + rest + "eoe = 192.168.2.10/24\n");
+    EXPECT_EQ(two.eoe_switch.name, "eoe0");
+    EXPECT_EQ(two.eoe_switch.ip, 0xc0a80201U);
+
+    const std::string usual =
+        "expected yes, dhcp, or an address with its prefix, as in 192.168.2.10/24; gateway ADDRESS, dns ADDRESS, mac "
+        "ADDRESS, interface NAME and host ADDRESS may follow";
+    for (const char* wrong : {"192.168.2.10", "192.168.2.10/33", "192.168.2.10/24 gateway", "192.168.2.10/24 gateway x",
+                              "yes gateway 10.0.0.1", "yes mac 01:00:00:00:00:01", "yes interface a/b", "maybe"})
+        EXPECT_NE(errors(bus + "[slave 0 a]\n" + rest + "eoe = " + wrong + "\n").find(usual), std::string::npos)
+            << errors(bus + "[slave 0 a]\n" + rest + "eoe = " + wrong + "\n");
+    EXPECT_EQ(errors(bus + "[slave 0 a-very-long-name]\n" + rest + "eoe = yes\n"),
+              "m.ethercat:3:1: error: 'eoe-a-very-long-name' is too long for the name of an interface: at most 15 characters; write a "
+              "shorter one "
+              "at the end of `eoe`: interface eoe0");
+    EXPECT_EQ(
+        errors(bus + "[slave 0 a]\n" + rest + "eoe = 10.0.0.2/8\n[slave 1 b]\n" + rest + "eoe = 10.0.0.2/8 interface eoe-a\n"),
+        "m.ethercat:9:1: error: duplicate interface 'eoe-a'; first in line 3; for one interface of all, write eoe-switch = eoe-a in [bus]\n"
+        "m.ethercat:9:1: error: duplicate IP address 10.0.0.2; first in line 3");
+    EXPECT_EQ(
+        errors(bus + "eoe-switch = eoe0\n[slave 0 a]\n" + rest + "eoe = yes interface x\n"),
+        "m.ethercat:4:1: error: `interface` and `host` of 'a' do not apply: all slaves are at eoe0; delete them from `eoe`, or delete "
+        "`eoe-switch` in [bus]");
+}
+
+TEST(EthercatConfig, Reaction_to_a_clock_out_of_step_is_chosen) {
+    const std::string slave = "[slave 0 a]\nvendor = 1\nproduct = 2\noutputs = none\ninputs = none\n";
+    EXPECT_EQ(good("[bus]\n" + slave).setup.dc_loss, master::DcLoss::report);
+    const Bus bus = good("[bus]\ndc-loss = safeop\ndc-loss-time = 20ms\n" + slave);
+    EXPECT_EQ(bus.setup.dc_loss, master::DcLoss::safeop);
+    EXPECT_EQ(bus.setup.dc_loss_ns, 20'000'000);
+    EXPECT_NE(errors("[bus]\ndc-loss = stop\n" + slave).find("report or safeop"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace hal::ethercat::config

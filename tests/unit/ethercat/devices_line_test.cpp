@@ -257,21 +257,68 @@ TEST_F(Devices, Other_protocols_answer) {
     const Bytes answer = ask(MailboxType::aoe, ads);
     ASSERT_EQ(answer.size(), aoe::header_bytes + 12U);
     EXPECT_EQ(get<std::uint32_t>(&answer[40]), sii.product);
-    Bytes frame(300);
-    for (std::size_t i = 0; i < frame.size(); ++i) frame[i] = static_cast<std::uint8_t>(i);
-    eoe::Splitter out(frame, 1, sii.mailboxes.receive.size);
-    for (Bytes b(sii.mailboxes.receive.size); const auto n = out.next(b.data());)
-        post(MailboxType::eoe, {b.begin(), b.begin() + static_cast<std::ptrdiff_t>(n)});
-    eoe::Joiner in;
-    Bytes back;
-    for (unsigned n = 0; n < 10 && back.empty(); ++n) {
-        const Bytes fragment = fetch(MailboxType::eoe);
-        const auto whole = in.take(fragment);
-        back.assign(whole.begin(), whole.end());
-    }
-    ASSERT_EQ(back.size(), frame.size());
-    EXPECT_EQ(back[0], 6);
-    EXPECT_EQ(back[299], frame[299]);
+}
+
+TEST_F(Devices, Mailbox_device_answers_ARP_and_echo_once_it_has_an_address) {
+    start("mailbox_device");
+    to_preop();
+    const auto exchange = [&](const Bytes& frame) {
+        eoe::Splitter out(frame, 1, sii.mailboxes.receive.size);
+        for (Bytes b(sii.mailboxes.receive.size); const auto n = out.next(b.data());)
+            post(MailboxType::eoe, {b.begin(), b.begin() + static_cast<std::ptrdiff_t>(n)});
+        eoe::Joiner in;
+        Bytes back;
+        for (unsigned n = 0; n < 10 && back.empty(); ++n) {
+            const Bytes fragment = fetch(MailboxType::eoe);
+            if (fragment.empty()) break;
+            const auto whole = in.take(fragment);
+            back.assign(whole.begin(), whole.end());
+        }
+        return back;
+    };
+    const Bytes host{2, 0, 0, 0, 0, 9}, own{2, 0xec, 0xa7, 0, 0, 1};
+    const auto joined = [](std::initializer_list<Bytes> parts) {
+        Bytes all;
+        for (const Bytes& p : parts) all.insert(all.end(), p.begin(), p.end());
+        return all;
+    };
+    const Bytes everyone(6, 0xff), host_ip{192, 168, 2, 1}, own_ip{192, 168, 2, 10};
+    const Bytes ask_mac = joined({everyone, host, {8, 6, 0, 1, 8, 0, 6, 4, 0, 1}, host, host_ip, Bytes(6), own_ip, Bytes(18)});
+    EXPECT_TRUE(exchange(ask_mac).empty()) << "it has no address yet";
+
+    eoe::Ip ip;
+    ip.flags = 0x1f, ip.address = 0xc0a8020a, ip.mask = 0xffffff00;
+    std::copy(own.begin(), own.end(), ip.mac.begin());
+    Bytes settings(eoe::header_bytes + eoe::largest_ip);
+    eoe::Header h;
+    h.type = eoe::Type::set_ip, h.last = true;
+    eoe::write(settings.data(), h);
+    settings.resize(eoe::header_bytes + eoe::write_ip(&settings[eoe::header_bytes], ip));
+    EXPECT_EQ(ask(MailboxType::eoe, settings), (Bytes{3, 1, 0, 0}));
+
+    EXPECT_EQ(exchange(ask_mac), joined({host, own, {8, 6, 0, 1, 8, 0, 6, 4, 0, 2}, own, own_ip, host, host_ip, Bytes(18)}));
+    Bytes other = ask_mac;
+    other[41] = 11;
+    EXPECT_TRUE(exchange(other).empty()) << "the address of somebody else";
+
+    // Echo request with 300 bytes; checksums computed by hand: 0x0000 - sum over the words.
+    const auto summed = [](Bytes bytes, std::size_t at) {
+        std::uint32_t sum = 0;
+        for (std::size_t n = 0; n < bytes.size(); n += 2) sum += static_cast<std::uint32_t>(bytes[n] << 8 | bytes[n + 1]);
+        while (sum > 0xffff) sum = (sum & 0xffff) + (sum >> 16);
+        bytes[at] = static_cast<std::uint8_t>(~sum >> 8), bytes[at + 1] = static_cast<std::uint8_t>(~sum);
+        return bytes;
+    };
+    const auto ping = [&](std::uint8_t type, std::uint8_t time_to_live, const Bytes& to, const Bytes& from, const Bytes& to_ip,
+                          const Bytes& from_ip) {
+        const Bytes header = summed(joined({{0x45, 0, 1, 0x48, 0, 1, 0x40, 0, time_to_live, 1, 0, 0}, from_ip, to_ip}), 10);
+        return joined({to, from, {8, 0}, header, summed(joined({{type, 0, 0, 0, 7, 7, 0, 1}, Bytes(300, 0x5a)}), 2)});
+    };
+    EXPECT_EQ(exchange(ping(8, 32, own, host, own_ip, host_ip)), ping(0, 64, host, own, host_ip, own_ip));
+    Bytes damaged = ping(8, 32, own, host, own_ip, host_ip);
+    damaged[100] ^= 1;
+    EXPECT_TRUE(exchange(damaged).empty());
+    EXPECT_TRUE(exchange(Bytes(14, 0xff)).empty());
 }
 
 TEST_F(Devices, Servo_reports_switch_on_disabled_in_PRE_OP_on_every_axis) {

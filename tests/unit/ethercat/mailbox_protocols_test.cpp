@@ -198,7 +198,7 @@ TEST(EthercatAoe, Reads_and_writes_an_object) {
 
 TEST(EthercatEoe, Switch_learns_and_joins_frames_and_IP_settings_are_sent_whole) {
     Served f(128);
-    const std::array<std::uint16_t, 1> with_eoe{0};
+    const std::array<EoePort, 1> with_eoe{};
     EoeSwitch frames(f.mailboxes, with_eoe);
     f.server.set_switch(&frames);
     f.server.set_poll_interval(1'000'000);
@@ -246,6 +246,49 @@ TEST(EthercatEoe, Switch_learns_and_joins_frames_and_IP_settings_are_sent_whole)
     EXPECT_EQ(settings[13], 0xc0);
 }
 
+TEST(EthercatEoe, Frames_stay_at_their_interface_and_reach_the_slave_that_was_learned) {
+    Mailboxes mailboxes(4);
+    const std::array<EoePort, 3> ports{{{0, 0}, {1, 0}, {3, 1}}};  // two slaves at one interface, one at another
+    EoeSwitch frames(mailboxes, ports);
+    ASSERT_EQ(frames.hosts(), 2U);
+    std::array<BusSlave, 4> slaves;
+    for (int n = 0; n < 4; ++n) slaves[static_cast<std::size_t>(n)].configured = n, slaves[static_cast<std::size_t>(n)].state = State::op;
+    const auto frame = [](std::uint8_t to, std::uint8_t from) {
+        EthernetFrame f;
+        f.length = 60;
+        if (to == 0xff) std::fill_n(f.bytes.begin(), 6, std::uint8_t{0xff});
+        else f.bytes[0] = 2, f.bytes[5] = to;
+        f.bytes[6] = 2, f.bytes[11] = from;
+        return f;
+    };
+    const auto sent_by = [&](std::size_t slave, const EthernetFrame& f) {
+        eoe::Splitter splitter({f.bytes.data(), f.length}, 1, 256);
+        Bytes p(256);
+        const std::size_t length = splitter.next(p.data());
+        EXPECT_TRUE(frames.take(slaves[slave], {.type = MailboxType::eoe, .payload = {p.data(), length}}));
+    };
+    const auto waiting = [&] {
+        std::string text;
+        for (std::size_t n = 0; n < 4; ++n) text += frames.pending(slaves[n]) ? '1' : '0';
+        return text + " " + std::to_string(frames.to_host(0).size()) + std::to_string(frames.to_host(1).size());
+    };
+    ASSERT_TRUE(frames.from_host(0).push(frame(0xff, 100)));
+    frames.pump();
+    EXPECT_EQ(waiting(), "1100 00") << "a broadcast reaches all slaves of that interface";
+    slaves[1].state = State::init;
+    EXPECT_EQ(waiting(), "1000 00") << "not before its mailbox works";
+    slaves[1].state = State::op;
+    sent_by(3, frame(0xff, 3));
+    EXPECT_EQ(waiting(), "1100 01");
+    sent_by(1, frame(100, 1));
+    EXPECT_EQ(waiting(), "1100 11") << "to the host, which was learned, only";
+    sent_by(0, frame(1, 0));
+    EXPECT_EQ(waiting(), "1100 11") << "from slave to slave";
+    sent_by(3, frame(1, 3));
+    EXPECT_EQ(waiting(), "1100 12") << "an address that was learned at another interface is unknown here";
+    EXPECT_FALSE(frames.has(slaves[2]));
+}
+
 TEST(EthercatRequest, Unknown_slave_stopped_server_and_a_passed_message) {
     Served f;
     f.request.slave = 7;
@@ -272,7 +315,7 @@ TEST(EthercatRequest, Random_messages_end_every_protocol) {
     std::mt19937 random(11);
     for (unsigned round = 0; round < 2000; ++round) {
         Served f(48);
-        const std::array<std::uint16_t, 1> with_eoe{0};
+        const std::array<EoePort, 1> with_eoe{};
         EoeSwitch frames(f.mailboxes, with_eoe);
         EmergencyQueue emergencies;
         emergencies.attach(f.mailboxes);

@@ -27,6 +27,7 @@ struct MailboxSlave {
 
     MailboxSlave(std::uint16_t size = 64) {
         bus.number = 0, bus.station = 0x1001, bus.present = true;
+        bus.configured = 0, bus.state = State::preop;
         bus.mailbox = {0x1000, size, 0x1400, size};
         bus.timeouts.mailbox_response = 100;
     }

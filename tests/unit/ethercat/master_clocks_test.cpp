@@ -122,6 +122,72 @@ TEST(EthercatClocks, A_clock_that_leaves_the_window_in_OP_is_reported_once) {
     EXPECT_EQ(w.log.count(Event::dc_lost), 2U) << "again";
 }
 
+TEST(EthercatClocks, A_clock_that_is_back_in_the_window_is_reported_and_a_short_excursion_is_not) {
+    World w;
+    for (unsigned n = 0; n < 2; ++n) w.add(0x100 + n);
+    w.begin(with_clocks(2));
+    ASSERT_TRUE(w.operational(3000)) << w.log.text();
+    w.run(3000);
+    w.line.controller(1).jump_clock(60'000, w.now_ns);  // its filter takes about 250 us/s back
+    w.run(3000);
+    EXPECT_EQ(w.log.count(Event::dc_lost) + w.log.count(Event::dc_recovered), 0U) << w.log.text();
+    w.line.controller(1).jump_clock(400'000, w.now_ns);
+    w.run(1000);
+    ASSERT_EQ(w.log.count(Event::dc_lost), 1U) << w.log.text();
+    EXPECT_EQ(w.log.count(Event::dc_recovered), 0U);
+    EXPECT_TRUE(w.master->status().operational) << "it stays in OP";
+    w.run(3000);
+    ASSERT_EQ(w.log.count(Event::dc_recovered), 1U) << w.log.text();
+    EXPECT_EQ(w.log.last(Event::dc_recovered)->slave, 1U);
+    EXPECT_LE(w.log.last(Event::dc_recovered)->first, 1000);
+    EXPECT_GE(w.log.last(Event::dc_recovered)->second, 900);
+    EXPECT_EQ(w.log.count(Event::dc_lost), 1U);
+}
+
+TEST(EthercatClocks, A_slave_out_of_step_waits_in_SAFE_OP_where_the_setup_says_so) {
+    World w;
+    for (unsigned n = 0; n < 3; ++n) w.add(0x100 + n);
+    auto setup = with_clocks(3);
+    setup.dc_loss = DcLoss::safeop, setup.dc_loss_ns = 200'000'000;
+    w.begin(setup);
+    ASSERT_TRUE(w.operational(3000)) << w.log.text();
+    w.run(3000);
+    const auto state = [&](unsigned n) { return w.line.controller(n).al_status() & 0x1f; };
+    w.line.controller(1).jump_clock(400'000, w.now_ns);
+    ASSERT_TRUE(w.until([&] { return w.log.count(Event::dc_lost) == 1; }, 600)) << w.log.text();
+    ASSERT_TRUE(w.until([&] { return state(1) == 4; }, 50));
+    w.run(700);
+    EXPECT_EQ(state(1), 4) << "its clock is still beyond the window";
+    EXPECT_FALSE(w.master->slave_status(1).operational);
+    EXPECT_EQ(w.log.count(Event::dc_lost), 1U);
+    for (const unsigned other : {0U, 2U}) {
+        EXPECT_TRUE(w.master->slave_status(other).operational);
+        EXPECT_EQ(state(other), 8);
+    }
+    ASSERT_TRUE(w.operational(3000)) << w.log.text();
+    EXPECT_EQ(state(1), 8);
+    const auto apart = w.line.controller(1).clock().system_time(w.now_ns) - w.line.controller(0).clock().system_time(w.now_ns);
+    EXPECT_LT(std::abs(apart), 2000);
+    w.run(2000);
+    EXPECT_EQ(w.log.count(Event::dc_lost), 1U);
+    w.line.controller(1).jump_clock(400'000, w.now_ns);
+    w.run(1000);
+    EXPECT_EQ(w.log.count(Event::dc_lost), 2U) << "again";
+}
+
+TEST(EthercatClocks, A_slave_that_stays_out_of_step_is_started_anew) {
+    World w;
+    for (unsigned n = 0; n < 2; ++n) w.add(0x100 + n);
+    auto setup = with_clocks(2);
+    setup.dc_loss = DcLoss::safeop;
+    w.begin(setup);
+    ASSERT_TRUE(w.operational(3000)) << w.log.text();
+    w.line.controller(1).set_drift(50'000, w.now_ns);
+    ASSERT_TRUE(w.until([&] { return w.log.count(Event::dc_timeout) != 0; }, 30000)) << w.log.text();
+    w.line.controller(1).set_drift(0, w.now_ns);
+    ASSERT_TRUE(w.operational(30000)) << w.log.text();
+}
+
 TEST(EthercatClocks, A_ring_of_slaves_that_were_switched_on_at_other_times_is_in_step) {
     World w;
     for (unsigned n = 0; n < 4; ++n) w.add(0x100 + n, 0, false, {.clock_start_ns = 777'000'000LL * n});

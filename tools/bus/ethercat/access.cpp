@@ -5,6 +5,7 @@
 #include <fmt/core.h>
 
 #include "cli/output.hpp"
+#include "ethercat/config/event_words.hpp"
 #include "ethercat/wire/frames.hpp"
 #include "hal/clock.hpp"
 
@@ -64,6 +65,8 @@ bool EthercatAccess::open(const EthercatOptions& options, bool alone) {
                                              address_)),
                    false;
     }
+    const ethernet::Description about = ethernet::describe(address_);
+    if (about.recorded) return fail(options, ethercat::config::recorded_words(address_)), false;
     ethernet::Options how;
     how.types = {ethercat::ethertype};
     auto opened = ethernet::open(address_, how);
@@ -72,7 +75,9 @@ bool EthercatAccess::open(const EthercatOptions& options, bool alone) {
     if (emulated()) return true;
     now_ns_ = monotonic_ns();
     if (!port_->statistics().up)
-        return fail(options, fmt::format("{} has no link; check the cable and the supply of the first slave", address_)), false;
+        return fail(options, about.datagrams ? ethercat::config::no_link_words(address_)
+                                             : fmt::format("{} has no link; check the cable and the supply of the first slave", address_)),
+               false;
     if (alone && receive(now_ns_ + listening_ns))
         return fail(options,
                     fmt::format("another EtherCAT master is active on {}, and this command changes states; stop it, or, for objects, use "

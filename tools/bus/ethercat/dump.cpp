@@ -97,8 +97,10 @@ int dump_file(const EthercatDumpOptions& options, const std::string& file) {
 int run_ethercat_dump(const EthercatDumpOptions& options) {
     if (options.words.size() != 1) return fail(options, "type: hal ethercat dump eth:INTERFACE, or a capture: FILE.pcapng, FILE.pcap");
     const std::string& what = options.words.front();
-    if (std::filesystem::is_regular_file(what) || what.ends_with(".pcapng") || what.ends_with(".pcap")) return dump_file(options, what);
-    if (ethernet::describe(what).in_memory)
+    const ethernet::Description about = ethernet::describe(what);
+    const bool is_capture = what.ends_with(".pcapng") || what.ends_with(".pcap");
+    if (std::filesystem::is_regular_file(what) || (about.transport.empty() && is_capture)) return dump_file(options, what);
+    if (about.in_memory)
         return fail(
             options,
             fmt::format("'{}' is a segment in memory, which belongs to another process; record it with the component segment_record",
@@ -122,6 +124,7 @@ int run_ethercat_dump(const EthercatDumpOptions& options) {
             bytes.assign(arrival->bytes.begin(), arrival->bytes.end());
             more = dump.frame(arrival->time_ns, bytes);
         }
+        if (about.recorded && !opened.port->statistics().up) break;  // all of it was printed
     }
     const std::uint64_t lost = opened.port->statistics().lost;
     if (lost != 0) write_all(2, fmt::format("{} frames were lost here: the output could not keep up; use --filter\n", lost));

@@ -47,6 +47,7 @@ bool EthercatSession::open(const EthercatOptions& options, bool objects) {
     master::Setup setup;
     setup.cycle_ns = cycle_ns;
     setup.most_slaves = most_slaves;
+    setup.frame_bytes = ethernet::header_bytes + port->statistics().mtu;
     master_ = std::make_unique<master::Master>(setup, port->address(), static_cast<master::Events&>(*this), server_.coe());
     master_->add(channel_);
     for (std::size_t n = 0; n < server_.workers(); ++n) master_->add(server_.channel(n));

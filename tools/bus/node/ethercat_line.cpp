@@ -51,9 +51,13 @@ std::unique_ptr<ethernet::Port> open_interface(const Options& options, const std
                                   "netlist of the master: loadrt ethercat_segment link={}", address, address));
         return nullptr;
     }
+    if (about.recorded) {
+        fail(options, fmt::format("'{}' is a capture, which no master can reach; write --link eth:enp3s0 or --link udp:127.0.0.1", address));
+        return nullptr;
+    }
     ethernet::Options how;
     how.types = {0x88a4};
-    how.promiscuous = true;
+    how.promiscuous = how.listen = true;
     how.policy = ethernet::Policy::block;
     how.send_capacity = how.receive_capacity = 256;
     ethernet::Opened opened = ethernet::open(address, how);
@@ -150,7 +154,7 @@ bool read_devices(const Options& options, std::vector<devices::Device>& to) {
 }  // namespace
 
 int run_node_ethercat(const EthercatLineOptions& options) {
-    if (options.link.empty()) return fail(options, "missing --link; add --link eth:enp3s0, the interface towards the master");
+    if (options.link.empty()) return fail(options, "missing --link; add --link eth:enp3s0, the interface towards the master, or --link udp:127.0.0.1 for one on this machine");
     std::vector<devices::Device> devices;
     if (!read_devices(options, devices)) return 1;
     StopRequest stop;

@@ -15,8 +15,8 @@ struct EthercatLineOptions : Options {
 
     void declare(OptionSet& set) override {
         set.words("FILE", "the devices of the line, one per line: coupler, servo axes=2, digital_in bits=16 …");
-        set.value("--link", link, "ADDRESS", "interface of the first slave, to the master: eth:enp3s0");
-        set.value("--backup", backup, "ADDRESS", "interface of the last slave, to the second port of the master, which closes a ring: eth:enp4s0");
+        set.value("--link", link, "ADDRESS", "link of the first slave to the master: eth:enp3s0, or udp:127.0.0.1 without privileges");
+        set.value("--backup", backup, "ADDRESS", "link of the last slave to the second port of the master, which closes a ring: eth:enp4s0, udp:127.0.0.1:34981");
         set.for_how_long(for_ns, "end after 10s, 2min … (default: until Ctrl-C)");
     }
 };
