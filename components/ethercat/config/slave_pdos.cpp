@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "ethercat/config/pdo_rules.hpp"
+
 namespace hal::ethercat::config {
 
 using master::Type;
@@ -44,6 +46,7 @@ void SlavePdos::read() {
 void SlavePdos::direction(bool output) {
     const std::string   key = output ? "outputs" : "inputs";
     Keys&               keys = in_.keys;
+    const std::size_t   before = keys.report().all.size();
     master::SyncManager sm;
     sm.output = output;
     std::uint64_t     number = output ? 2 : 3;
@@ -95,8 +98,9 @@ void SlavePdos::direction(bool output) {
             assign(p, *at);
         }
     }
-    check_exclusions(line, sm);
-    if (!sm.pdos.empty()) in_.slave.sync_managers.push_back(std::move(sm));
+    if (!sm.pdos.empty()) more.insert(more.begin(), std::move(sm));
+    if (device_ != nullptr && keys.report().all.size() == before)
+        check_pdos(*device_, in_.info.type, more, output, key, line != nullptr ? line->value.at : in_.info.at, keys.report());
     for (auto& s : more) in_.slave.sync_managers.push_back(std::move(s));
 }
 
@@ -118,20 +122,6 @@ void SlavePdos::assign(const esi::Pdo& from, master::SyncManager& to) {
         p.entries.push_back(std::move(entry));
     }
     to.pdos.push_back(std::move(p));
-}
-
-void SlavePdos::check_exclusions(const Line* line, const master::SyncManager& sm) {
-    if (device_ == nullptr || line == nullptr) return;
-    for (const master::Pdo& p : sm.pdos) {
-        const esi::Pdo* described_pdo = device_->find_pdo(p.index);
-        if (described_pdo == nullptr) continue;
-        for (const master::Pdo& other : sm.pdos)
-            if (std::find(described_pdo->exclude.begin(), described_pdo->exclude.end(), other.index) != described_pdo->exclude.end())
-                in_.keys.report().error(Topic::object, line->value.at,
-                                        "PDOs " + address_text(p.index, 0).substr(0, 4) + " and " +
-                                            address_text(other.index, 0).substr(0, 4) + " of '" + in_.info.type + "' exclude each other",
-                                        "assign only one of them");
-    }
 }
 
 void SlavePdos::list(const Line& line, master::SyncManager& sm) {
@@ -248,34 +238,51 @@ void SlavePdos::place(const Line& line, master::SyncManager& sm, std::vector<mas
             return;
         }
     }
-    if (device_ != nullptr && !(device_->mailbox && device_->mailbox->coe)) {
-        std::vector<std::string> names;
-        for (const esi::Pdo& p : pdos) names.push_back(address_text(p.index, 0).substr(0, 4));
+    std::vector<std::string> names;
+    for (const esi::Pdo& p : pdos) names.push_back(pdo_text(p.index));
+    const std::string instead = names.empty() ? "delete the line" : "delete the line, or assign PDOs: " + listed(names);
+    if (device_ != nullptr && !(device_->mailbox && device_->mailbox->coe))
         return keys.report().error(Topic::object, line.value.at,
-                                   "the PDOs of '" + in_.info.type + "' are fixed: it has no CoE mailbox to map objects with",
-                                   names.empty() ? "delete the line" : "delete the line, or assign PDOs: " + listed(names));
-    }
-    std::vector<std::uint16_t> free;
-    for (int pass = 0; pass < 2; ++pass)  // the ones assigned by default first
-        for (const esi::Pdo& p : pdos)
-            if (!p.fixed && p.sync_manager.has_value() == (pass == 0)) free.push_back(p.index);
+                                   "the PDOs of '" + in_.info.type + "' are fixed: it has no CoE mailbox to map objects with", instead);
+    if (device_ != nullptr && !device_->mailbox->pdo_config)
+        return keys.report().error(Topic::object, line.value.at,
+                                   "the PDOs of '" + in_.info.type + "' are fixed: its description has no PdoConfig", instead);
+    std::vector<std::uint16_t> free = device_ != nullptr ? mappable(*device_, sm.output) : std::vector<std::uint16_t>{};
+    std::erase_if(free, [&](std::uint16_t f) {  // with PDOs that the line names
+        return std::any_of(sm.pdos.begin(), sm.pdos.end(), [&](const master::Pdo& p) {
+            const esi::Pdo *a = device_->find_pdo(p.index), *b = device_->find_pdo(f);
+            return p.index == f || (a != nullptr && b != nullptr && exclude_each_other(*a, *b));
+        });
+    });
     if (!pdos.empty() && free.empty())
         return keys.report().error(Topic::object, line.value.at, "all PDOs of '" + in_.info.type + "' in this direction are fixed",
-                                   "assign one of them, as in " + line.key.text + " = " + address_text(pdos[0].index, 0).substr(0, 4));
+                                   "assign one of them, as in " + line.key.text + " = " + pdo_text(pdos[0].index));
     const std::string key = line.key.text + ".pdo";
     if (Line* chosen = keys.find(key)) {
         const auto at = address(chosen->value.text);
         if (!at || at->has_sub) return keys.reject(*chosen, "the index of a PDO, as in 1601");
+        if (device_ != nullptr && std::find(free.begin(), free.end(), at->index) == free.end())
+            return keys.report().error(Topic::object, chosen->value.at,
+                                       "PDO " + pdo_text(at->index) + " of '" + in_.info.type + "' cannot be mapped",
+                                       "write " + key + " = " + pdo_text(free[0]) + ", or delete the line");
         free.assign(1, at->index);
     }
-    std::uint16_t next = free.empty() ? (sm.output ? 0x1600 : 0x1a00) : free[0];
-    std::size_t   used = 0;
-    for (std::size_t i = 0; i < entries.size();) {
+    const auto  first = static_cast<std::uint16_t>(free.empty() ? (sm.output ? 0x1600 : 0x1a00) : free[0]);
+    const auto  all = entries.size();
+    std::string taken;  // of the PDOs, for a message
+    for (std::size_t i = 0, used = 0; i < all; ++used) {
+        if (!pdos.empty() && used == free.size())
+            return keys.report().error(
+                Topic::object, line.value.at,
+                counted(static_cast<unsigned>(all), "object") + " do not fit in the PDOs of '" + in_.info.type + "': " + taken,
+                "leave out " + std::to_string(all - i) + " of them" + (limit_ != 0 ? ", or raise entries-per-pdo" : ""));
         master::Pdo p;
-        p.index = used < free.size() ? free[used] : static_cast<std::uint16_t>(next + used);
+        p.index = used < free.size() ? free[used] : static_cast<std::uint16_t>(first + used);
         p.write_mapping = true;
-        for (; i < entries.size() && (limit_ == 0 || p.entries.size() < limit_); ++i) p.entries.push_back(std::move(entries[i]));
-        ++used;
+        const std::uint64_t described_limit = device_ != nullptr ? most_entries(*device_, p.index) : 0;
+        const std::uint64_t limit = limit_ == 0 ? described_limit : described_limit == 0 ? limit_ : std::min(limit_, described_limit);
+        for (; i < all && (limit == 0 || p.entries.size() < limit); ++i) p.entries.push_back(std::move(entries[i]));
+        taken += (taken.empty() ? "" : ", ") + pdo_text(p.index) + " takes " + std::to_string(limit);
         sm.pdos.push_back(std::move(p));
     }
 }

@@ -33,7 +33,6 @@ private:
     void                         place(const Line&, master::SyncManager&, std::vector<master::Entry>&);
     const std::vector<esi::Pdo>& described(bool output) const;
     void                         assign(const esi::Pdo&, master::SyncManager&);
-    void                         check_exclusions(const Line*, const master::SyncManager&);
     void                         name_pins();
     void                         pin_options();
     void                         option(const Line&);

@@ -154,6 +154,9 @@ std::string why_not_emulated(const esi::Device& d) {
         if (used > 1)
             return std::string("several sync managers with ") + (type == sii::SmType::outputs ? "outputs" : "inputs") + " are not emulated";
     }
+    for (const auto* pdos : {&d.rx, &d.tx})
+        for (const esi::Pdo& pdo : *pdos)
+            if (std::string sentence = esi::longer_entry(d, pdo); !sentence.empty()) return sentence;
     for (const esi::SyncManager& s : d.sync_managers)
         if ((s.type == sii::SmType::mailbox_out || s.type == sii::SmType::mailbox_in) && s.default_size > largest_mailbox)
             return "a mailbox of " + std::to_string(s.default_size) + " bytes is longer than a datagram";

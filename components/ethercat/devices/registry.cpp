@@ -101,7 +101,7 @@ std::string read_description(DeviceOptions& o, const FindFile& find, std::string
         return "'" + path + "': " + problem;
     }
     if (std::string why = why_not_emulated(*device); !why.empty()) {
-        help = "choose another device";
+        help = "choose another device, or correct the description";
         return "'" + path + "', device '" + device->order + "': " + why;
     }
     o.description = std::make_shared<const esi::File>(std::move(file));

@@ -152,6 +152,9 @@ File read(std::string_view xml);
 /// Returns a modular device with its modules in place, one for each slot from the first on; 0: an empty slot. An unknown ident adds nothing.
 Device with_modules(const File&, const Device&, const std::vector<std::uint32_t>& idents);
 
+/// Returns which entry of a PDO has more bits than its object in the dictionary, as a sentence; empty: none.
+std::string longer_entry(const Device&, const Pdo&);
+
 /// Returns what the SII of the device contains.
 sii::Contents sii_contents(const File&, const Device&);
 /// Returns the EEPROM image of the device: that of the file if it has a whole one, else one made from the description.

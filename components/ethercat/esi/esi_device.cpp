@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What is found in a device description, modules in their slots, and the SII of a device.
 #include <algorithm>
+#include <cstdio>
 
 #include "ethercat/esi/esi.hpp"
 #include "ethercat/wire/byte_order.hpp"
@@ -81,6 +82,18 @@ Device with_modules(const File& file, const Device& device, const std::vector<st
         }
     }
     return out;
+}
+
+std::string longer_entry(const Device& device, const Pdo& pdo) {
+    for (const Entry& e : pdo.entries) {
+        const Value* value = e.index == 0 ? nullptr : device.find(e.index, e.sub);
+        if (value == nullptr || value->bits == 0 || e.bits <= value->bits) continue;
+        char text[96];
+        std::snprintf(text, sizeof text, "PDO %04X maps %u bits of object %04X:%X, which has %u", pdo.index, e.bits, e.index, e.sub,
+                      value->bits);
+        return text;
+    }
+    return {};
 }
 
 namespace {
