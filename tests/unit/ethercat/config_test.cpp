@@ -157,15 +157,50 @@ TEST(EthercatConfig, Errors_name_the_place_and_what_to_write) {
 
 TEST(EthercatConfig, Plan_shows_the_arithmetic) {
     const Plan p = plan(good(servo));
-    EXPECT_EQ(p.frames, 1U);
     EXPECT_EQ(p.text,
-              "domain default: 22 bytes out, 12 bytes in, every cycle, working counter 6\n"
-              "domain io: 1 bytes out, 1 bytes in, every 4 cycles, working counter 3\n"
-              "1 frame, 114 bytes: (114 + 1 x 24) x 80 ns = 11.04 us at 100 Mbit/s\n"
+              "frame 1, every cycle: 84 bytes\n"
+              "  FRMW  10 + 8 + 2 = 20 bytes: time of the reference clock\n"
+              "  LRW   10 + 36 + 2 = 48 bytes: domain default, 22 out, 12 in, 2 mailbox states, working counter 6\n"
+              "frame 2, every 4 cycles: 60 bytes\n"
+              "  FRMW  10 + 8 + 2 = 20 bytes: time of the reference clock\n"
+              "  LRW   10 + 3 + 2 = 15 bytes: domain io, 1 out, 1 in, 1 mailbox state, working counter 3\n"
+              "states and mailboxes, counted in every cycle: 60 bytes, more where the cycle has time\n"
+              "cycle 0 of 4: frame 1, frame 2, states and mailboxes, 22.08 us\n"
+              "cycles 1 to 3 of 4: frame 1, states and mailboxes, 15.36 us\n"
+              "longest cycle: 3 frames, 204 bytes: (204 + 3 x 24) x 80 ns = 22.08 us at 100 Mbit/s\n"
               "through 3 slaves x 1.00 us = 3.00 us\n"
-              "cycle 1000.00 us: wire load 1.1 %, needed 100.00 us + 11.04 us + 3.00 us = 114.04 us\n"
-              "input to output at most 5 x 1000.00 us + 114.04 us = 5114.04 us\n");
+              "cycle 1000.00 us: wire load 2.2 %, needed 100.00 us + 22.08 us + 3.00 us = 125.08 us\n"
+              "input to output, default to default, at most 3 x 1000.00 us = 3000.00 us, at SYNC0\n"
+              "input to output, default to io, at most 6 x 1000.00 us = 6000.00 us, at SYNC0\n"
+              "input to output, io to default, at most 6 x 1000.00 us = 6000.00 us, at SYNC0\n"
+              "input to output, io to io, at most 8 x 1000.00 us + 125.08 us = 8125.08 us\n");
+    EXPECT_EQ(p.frames, 3U);
+    EXPECT_EQ(p.input_to_output_ns, 8'125'080);
     EXPECT_TRUE(p.fits);
+}
+
+TEST(EthercatConfig, Plan_has_the_frames_that_the_master_sends) {
+    std::string text = "[bus]\ncycle = 2ms\nclock = thread\n[defaults]\ndevice = cia402\noutputs = 2000:1 u32\ninputs = 2001:1 u32\n";
+    for (int n = 0; n < 200; ++n) text += "[slave " + std::to_string(n) + " s" + std::to_string(n) + "]\n" + (n == 199 ? "lrw = no\n" : "");
+    const Bus bus = good(text);
+    const Plan p = plan(bus);
+    std::size_t outputs = 0, inputs = 0, states = 0;
+    unsigned wkc = 0;
+    ASSERT_EQ(p.cyclic.size(), 2U) << "1800 bytes";
+    for (const PlannedFrame& f : p.cyclic) {
+        EXPECT_LE(f.bytes, 1514U);
+        for (const PlannedDatagram& d : f.datagrams) {
+            outputs += d.output_bytes, inputs += d.input_bytes, states += d.mailbox_states, wkc += d.expected_wkc;
+            EXPECT_EQ(d.data_bytes, d.domain.empty() ? 8 : d.output_bytes + d.input_bytes + d.mailbox_states);
+        }
+    }
+    EXPECT_EQ(outputs, 800U);
+    EXPECT_EQ(inputs, 800U);
+    EXPECT_EQ(states, 200U);
+    EXPECT_EQ(wkc, 199U * 3 + 2) << "the last one by LWR and LRD";
+    EXPECT_EQ(p.cyclic[0].datagrams[0].command, "NOP") << "no slave has dc";
+    EXPECT_EQ(p.trips.size(), 1U);
+    EXPECT_EQ(p.trips[0].cycles, 2U);
 }
 
 TEST(EthercatConfig, Written_file_is_read_again_without_errors) {

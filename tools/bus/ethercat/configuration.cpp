@@ -2,7 +2,9 @@
 // `hal ethercat pdos` and `config`: process data as the EEPROM has it, and a configuration from it. `check` and `plan`: of a configuration.
 #include <algorithm>
 #include <filesystem>
+#include <fmt/ranges.h>
 
+#include "bus/ethercat/bus_file.hpp"
 #include "bus/ethercat/plan_picture.hpp"
 #include "bus/ethercat/wire.hpp"
 #include "bus/ethercat/words.hpp"
@@ -16,6 +18,29 @@ namespace {
 
 namespace config = ethercat::config;
 
+std::string plan_json(const config::Plan& p) {
+    std::string cyclic, slots, trips;
+    for (const auto& f : p.cyclic) {
+        std::string datagrams;
+        for (const auto& d : f.datagrams)
+            datagrams += fmt::format(R"({}{{"command":"{}","domain":{},"data_bytes":{},"output_bytes":{},"input_bytes":{},"mailbox_states":{},"wkc":{}}})",
+                                     datagrams.empty() ? "" : ",", d.command, d.domain.empty() ? "null" : json_string(d.domain), d.data_bytes,
+                                     d.output_bytes, d.input_bytes, d.mailbox_states, d.expected_wkc);
+        cyclic += fmt::format(R"({}{{"every":{},"bytes":{},"wire_ns":{},"datagrams":[{}]}})", cyclic.empty() ? "" : ",", f.every, f.bytes, f.wire_ns,
+                              datagrams);
+    }
+    for (const auto& s : p.slots)
+        slots += fmt::format(R"({}{{"cycles":[{}],"frames":[{}],"wire_ns":{}}})", slots.empty() ? "" : ",", fmt::join(s.cycles, ","),
+                             fmt::join(s.frames, ","), s.wire_ns);
+    for (const auto& t : p.trips)
+        trips += fmt::format(R"({}{{"from":{},"to":{},"cycles":{},"synchronised":{},"worst_ns":{}}})", trips.empty() ? "" : ",", json_string(t.from),
+                             json_string(t.to), t.cycles, t.synchronised, t.worst_ns);
+    return fmt::format(R"({{"frames":{},"frame_bytes":{},"wire_ns":{},"propagation_ns":{},"cycle_ns":{},"shortest_cycle_ns":{},)", p.frames,
+                       p.frame_bytes, p.wire_ns, p.propagation_ns, p.cycle_ns, p.shortest_cycle_ns) +
+           fmt::format(R"("input_to_output_ns":{},"load":{:.4f},"fits":{},"period":{},"cyclic":[{}],"slots":[{}],"trips":[{}]}})",
+                       p.input_to_output_ns, p.load, p.fits, p.period, cyclic, slots, trips);
+}
+
 /// Returns a line per pin, each behind `lead`.
 std::string pin_lines(const config::Bus& bus, const std::string& lead) {
     std::string text;
@@ -27,7 +52,8 @@ std::string pin_lines(const config::Bus& bus, const std::string& lead) {
     return text;
 }
 
-/// Reads a configuration. Returns false after printing what is wrong with it.
+}  // namespace
+
 bool read_bus_file(const Options& options, const std::string& path, config::Reading& reading) {
     std::string text;
     if (!config::read_from_disk(path, text)) return fail(options, fmt::format("cannot read '{}': {}", path, text)), false;
@@ -39,8 +65,6 @@ bool read_bus_file(const Options& options, const std::string& path, config::Read
             write_all(2, fmt::format("{}:{}:{}: warning: {}{}{}\n", path, m.at.line, m.at.column, m.sentence, m.help.empty() ? "" : "; ", m.help));
     return reading.good();
 }
-
-}  // namespace
 
 int run_ethercat_pdos(const EthercatOptions& options) {
     EthercatWire wire;
@@ -139,11 +163,8 @@ int run_ethercat_plan(const EthercatPlanOptions& options) {
     for (const config::Bus& bus : reading.buses) {
         const config::Plan p = config::plan(bus);
         fits = fits && p.fits;
-        text += p.text;
-        json +=
-            fmt::format(R"({}{{"frames":{},"frame_bytes":{},"wire_ns":{},"propagation_ns":{},"cycle_ns":{},"shortest_cycle_ns":{},)",
-                        json.empty() ? "[" : ",\n ", p.frames, p.frame_bytes, p.wire_ns, p.propagation_ns, p.cycle_ns, p.shortest_cycle_ns);
-        json += fmt::format(R"("input_to_output_ns":{},"load":{:.4f},"fits":{}}})", p.input_to_output_ns, p.load, p.fits);
+        text += (reading.buses.size() == 1 ? "" : "master " + bus.name + ":\n") + p.text;
+        json += (json.empty() ? "[" : ",\n ") + plan_json(p);
     }
     if (!print(options.json ? (json.empty() ? "[" : json) + "]\n" : text)) return 1;
     if (fits) return 0;

@@ -21,19 +21,21 @@ std::string micro(std::int64_t ns) { return fmt::format("{:g} us", static_cast<d
 class TimingPicture {
 public:
     TimingPicture(const config::Bus& bus, const config::Plan& plan, const config::PlanOptions& assumed)
-        : bus_(bus), plan_(plan), assumed_(assumed), span_(2.3 * static_cast<double>(plan.cycle_ns)) {}
+        : bus_(bus), plan_(plan), assumed_(assumed),
+          cycles_(static_cast<double>(plan.input_to_output_ns) > 2.3 * static_cast<double>(plan.cycle_ns) ? 3 : 2),
+          span_((cycles_ + 0.3) * static_cast<double>(plan.cycle_ns)) {}
 
     std::string draw() {
         const auto& slaves = bus_.setup.slaves;
         const std::size_t shown = std::min(slaves.size(), most_rows);
         const double bottom = y(2 + shown);
-        for (int k = 0; k < 3; ++k) {
+        for (int k = 0; k <= cycles_; ++k) {
             const double at = x(k * plan_.cycle_ns);
             line(at, top - 14, at, bottom, "#c5ccd3", "");
             text(at, top - 20, k == 0 ? "start of the cycle" : "+ " + micro(k * plan_.cycle_ns), "start");
         }
         text(left - 10, y(0) + 13, "thread", "end"), text(left - 10, y(1) + 13, "wire", "end");
-        for (int k = 0; k < 2; ++k) {
+        for (int k = 0; k < cycles_; ++k) {
             const std::int64_t begin = k * plan_.cycle_ns, sent = begin + assumed_.master_ns;
             box(begin, sent, 0, thread_colour, "receive, components, transmit: at most " + micro(assumed_.master_ns), k == 0);
             box(sent, sent + plan_.wire_ns, 1, wire_colour,
@@ -101,6 +103,7 @@ private:
     const config::Bus& bus_;
     const config::Plan& plan_;
     const config::PlanOptions& assumed_;
+    int cycles_;  // shown in full
     double span_;
     bool synchronised_ = false;
     std::string body_;
