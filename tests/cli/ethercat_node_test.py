@@ -7,6 +7,7 @@ import signal
 import subprocess
 import unittest
 
+import ethercat_line
 from harness import HAL, ROOT, SANITIZED, Case, wait_until
 from own_network import VARIABLE, own_network
 
@@ -20,14 +21,9 @@ class Line(Case):
             self.skipTest("no network namespaces here; run it as root, or where user namespaces are allowed")
         if SANITIZED:
             self.skipTest("a master under a sanitizer misses its cycles")
-        pair = ["ip", "link", "add", "m0", "type", "veth", "peer", "name", "s0"]
-        if subprocess.run(pair, capture_output=True).returncode != 0:
+        if not ethercat_line.veth():
             self.skipTest("no veth pairs here")
         self.addCleanup(subprocess.run, ["ip", "link", "delete", "m0"])
-        for name in ("m0", "s0"):
-            subprocess.run(["ip", "link", "set", name, "up"], check=True)
-        for name in ("m0", "s0"):
-            wait_until(lambda: ",LOWER_UP" in subprocess.run(["ip", "link", "show", name], capture_output=True, text=True).stdout, f"{name} is up")
         self.write("servo.line", (MACHINE / "servo.line").read_text())
         self.write("servo.ethercat", (MACHINE / "servo.ethercat").read_text().replace("sim:servo", "eth:m0"))
         self.write("servo.hal", "".join(line for line in (MACHINE / "servo.hal").read_text().splitlines(True)
@@ -56,8 +52,8 @@ class Line(Case):
         wait_until(lambda: len(re.findall(pattern, self.said(process))) >= times or process.poll() is not None, f"{pattern} in {self.said(process)}")
         self.assertGreaterEqual(len(re.findall(pattern, self.said(process))), times, self.said(process))
 
-    def node(self):
-        node = self.start("node", "ethercat", "servo.line", "--link", "eth:s0")
+    def node(self, *words):
+        node = self.start("node", "ethercat", "servo.line", "--link", "eth:s0", *words)
         self.expect(node, "press Ctrl-C to end")
         return node
 
@@ -80,6 +76,51 @@ class Line(Case):
         self.expect(dump, r"  <-  BWR  all slaves 0120  \[2\] 11 00  WKC 2  AL control: INIT, acknowledge\n")
         self.expect(dump, r"  <-  FPWR station 0x1002 0120  \[2\] 02 00  WKC 1  AL control: PRE-OP\n")
         self.assertEqual((0, 0, ""), (self.end(dump), self.end(filtered), self.said(filtered)))
+
+    def test_commands_by_position_leave_a_running_master_alone(self):
+        self.node("--fault", "1:drift=20")
+        machine = self.machine()
+        self.both("ethercat.0.*.operational", "TRUE")
+        self.both("*.active", "TRUE")
+        self.assertEqual("0    OP\n1    OP\n", self.good("ethercat", "states", "eth:m0"))
+        self.assertRegex(self.good("ethercat", "slaves", "eth:m0"), r"^0 +0:0 +OP +\+ Halcyon servo\n1 +0:1 +OP +\+ Halcyon servo\n$")
+        self.assertRegex(self.good("ethercat", "scan", "eth:m0"), r"^0  OP  Halcyon servo  .*\n  1  OP  Halcyon servo  at port 1 of slave 0  delay [1-9]\d* ns\n$")
+        self.assertEqual("0x08 0x00\n", self.good("ethercat", "reg-read", "eth:m0", "-p", "1", "0x130"))
+        self.assertIn("6040:0 UINT, 16 bit", self.good("ethercat", "pdos", "eth:m0"))
+        image = json.loads(self.good("ethercat", "sii-read", "eth:m0", "-p", "1", "--json"))["bytes"].split()
+        self.assertEqual(["0xff", "0xff", "0xff", "0x00"], image[16:20], "the vendor, at word 8")
+        self.assertIn("no port has counted errors of its own\n", self.good("ethercat", "crc", "eth:m0"))
+        rows = json.loads(self.good("ethercat", "dc", "eth:m0", "--json"))
+        self.assertEqual([(0, True), (1, True)], [(row["position"], row["sync"]) for row in rows])
+        self.assertEqual(0, rows[0]["delay_ns"])
+        self.assertGreater(rows[1]["delay_ns"], 0)
+        self.assertTrue(all(abs(row["deviation_ns"]) < 1_000_000 for row in rows), rows)
+        for command, words in (("upload", ("-p", "1", "0x1000", "0")), ("states", ("PREOP",)), ("foe-read", ("-p", "1", "x"))):
+            self.assertIn("another EtherCAT master is active on eth:m0, and this command changes states; stop it, or, for objects, use its mailbox gateway: "
+                          "gateway:127.0.0.1 instead of eth:m0\n", self.bad("ethercat", command, "eth:m0", *words))
+        self.both("ethercat.0.*.operational", "TRUE")
+        self.assertEqual(["TRUE"] * 2, [self.pin("left.active"), self.pin("right.active")], self.said(machine))
+        self.assertNotIn("another EtherCAT master", self.said(machine))
+
+    def test_dc_shows_clocks_that_run_apart(self):
+        self.write("servo.ethercat", (self.folder / "servo.ethercat").read_text().replace("dc      = sync0\n", ""))
+        self.node("--fault", "1:drift=500")
+        self.machine()
+        self.both("ethercat.0.*.operational", "TRUE")
+        rows = json.loads(self.good("ethercat", "dc", "eth:m0", "--json"))
+        self.assertEqual([False, False], [row["sync"] for row in rows], "no SYNC without dc in the configuration")
+        self.assertRegex(self.good("ethercat", "dc", "eth:m0"), r"^0  deviation -?\d+ ns  delay \d+ ns  SYNC off  Halcyon servo\n1  deviation ")
+
+    def test_crc_names_the_cable_with_errors(self):
+        self.write("servo.line", "coupler\nservo\nservo\n")
+        self.node("--fault", "2:corrupt-every=7")
+        for _ in range(3):
+            self.run_program("ethercat", "states", "eth:m0")
+        report = self.good("ethercat", "crc", "eth:m0")
+        self.assertRegex(report, r"(?m)^ +2 +0 +[1-9]\d* +0 +0 +0$")
+        self.assertIn("      check the cable between slave 2 port 0 and slave 1 port 1\n", report)
+        self.assertEqual(1, report.count("check the cable"), report)
+        self.assertEqual(["check the cable between slave 2 port 0 and slave 1 port 1"], json.loads(self.good("ethercat", "crc", "eth:m0", "--json"))["cables"])
 
     def test_firmware_is_written_in_BOOT(self):
         self.write("servo.line", "servo\nmailbox_device\n")
@@ -168,6 +209,13 @@ class WrongWords(Case):
         self.assertRegex(first, r"^hal node ethercat: bad\.line:2:1: unknown device 'servoo'; use one of: coupler, digital_in, ")
         self.assertRegex(second, r"^hal node ethercat: bad\.line:3:7: invalid value '9' of axes; use 1\.\.8; options of servo: ")
         self.assertEqual(say + "empty.line: the line has no device; write one device per line\n", self.bad("node", "ethercat", "empty.line", "--link", "eth:m0"))
+        fault = lambda text: self.bad("node", "ethercat", "good.line", "--link", "eth:m0", "--fault", text)
+        self.assertEqual(say + "invalid --fault 'corrupt'; write --fault 1:corrupt-every=9\n", fault("corrupt"))
+        self.assertEqual(say + "--fault 1:drift=1: no slave 1; the last one of 1 is 0\n", fault("1:drift=1"))
+        self.assertEqual(say + "--fault 0:drift=x: invalid drift 'x'; write -1000..1000 ppm\n", fault("0:drift=x"))
+        self.assertEqual(say + "--fault 0:lose-every=0: invalid number '0'; write 1..1000000000\n", fault("0:lose-every=0"))
+        self.assertEqual(say + "--fault 0:loose-every=2: unknown fault 'loose-every'; write one of: lose-every, corrupt-every, double-every, noise-every, drift\n",
+                         fault("0:loose-every=2"))
         self.assertEqual(say + "'sim:line' is a segment in memory, which other programs cannot open; write --link eth:enp3s0, or emulate the line in the "
                                "netlist of the master: loadrt ethercat_segment link=sim:line\n",
                          self.bad("node", "ethercat", "good.line", "--link", "sim:line"))

@@ -6,13 +6,11 @@ import os
 import shutil
 import subprocess
 import sys
-import tempfile
-import time
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / "cli"))
-from own_network import own_network  # noqa: E402
+import ethercat_line  # noqa: E402
 
 HAL = sys.argv[1]
 TARGET = HERE.parents[1] / "build" / "peers" / "ethercrab"
@@ -32,26 +30,10 @@ if "HALCYON_ETHERCRAB" not in os.environ:  # before the namespace, which has no 
     if build.returncode != 0:
         skip(f"ethercrab cannot be built here: {(build.stderr.strip().splitlines() or ['no reason given'])[-1]}")
     os.environ["HALCYON_ETHERCRAB"] = str(TARGET / "release" / "ethercrab_master")
-if not own_network():
-    skip("no network namespaces here; run it as root, or where user namespaces are allowed")
-if subprocess.run(["ip", "link", "add", "m0", "type", "veth", "peer", "name", "s0"], capture_output=True).returncode != 0:
-    skip("no veth pairs here")
-for interface in ("m0", "s0"):
-    subprocess.run(["ip", "link", "set", interface, "up"], check=True)
-with tempfile.TemporaryDirectory(prefix="hal-ethercrab-") as folder:
-    line, output = Path(folder) / "peer.line", Path(folder) / "log"
-    line.write_text("servo\ndigital_out bits=8\ndigital_in bits=8\n")
-    with open(output, "w", encoding="utf-8") as out:
-        node = subprocess.Popen([HAL, "node", "ethercat", line, "--link", "eth:s0"], stdin=subprocess.DEVNULL, stdout=out, stderr=out)
-    try:
-        end = time.monotonic() + 30
-        while "press Ctrl-C" not in output.read_text() and time.monotonic() < end:
-            time.sleep(0.01)
-        master = subprocess.run([os.environ["HALCYON_ETHERCRAB"], "m0"], capture_output=True, text=True, timeout=60)
-    finally:
-        node.terminate()
-        node.wait(60)
-    log = output.read_text()
+ethercat_line.network()
+with ethercat_line.line(HAL, "servo\ndigital_out bits=8\ndigital_in bits=8\n") as node:
+    master = subprocess.run([os.environ["HALCYON_ETHERCRAB"], "m0"], capture_output=True, text=True, timeout=60)
+    log = node.said()
 print(master.stdout + master.stderr, end="")
 checks = master.stdout.splitlines()
 checks.append("ok   outputs arrive" if "slave 1 (digital_out): outputs 10100101\n" in log else f"FAIL outputs arrive {log}")

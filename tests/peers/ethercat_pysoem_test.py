@@ -3,15 +3,14 @@
 """ethercat_pysoem_test.py HAL: the Python package pysoem (SOEM) is master of `hal node ethercat` over a veth pair: scan, SDO, FoE, other PDOs,
 distributed clocks, process data in OP, and what the slaves do when it stops. 77: the package or network namespaces are missing."""
 import re
-import subprocess
 import sys
-import tempfile
 import time
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "cli"))
+import ethercat_line  # noqa: E402
 import peers  # noqa: E402
-from own_network import own_network  # noqa: E402
+from ethercat_line import wait_for  # noqa: E402
 
 (pysoem,) = peers.package("pysoem")
 HAL = sys.argv[1]
@@ -21,15 +20,6 @@ checks = []
 def check(name, holds, *seen):
     checks.append(bool(holds))
     print(f"{'ok  ' if holds else 'FAIL'} {name} {' '.join(map(str, seen)) if not holds else ''}", flush=True)
-
-
-def wait_for(condition, seconds=30.0):
-    end = time.monotonic() + seconds
-    while time.monotonic() < end:
-        if condition():
-            return True
-        time.sleep(0.002)
-    return False
 
 
 def abort_code(transfer):
@@ -115,28 +105,14 @@ def run(log):
     check("and it is printed", wait_for(lambda: re.search(r"slave 2 \(digital_out\): SAFE-OP, error 0x001B", log.read_text())), log.read_text())
 
 
-if not own_network():
-    print("no network namespaces here; run it as root, or where user namespaces are allowed")
-    sys.exit(77)
-if subprocess.run(["ip", "link", "add", "m0", "type", "veth", "peer", "name", "s0"], capture_output=True).returncode != 0:
-    print("no veth pairs here")
-    sys.exit(77)
-for interface in ("m0", "s0"):
-    subprocess.run(["ip", "link", "set", interface, "up"], check=True)
-with tempfile.TemporaryDirectory(prefix="hal-pysoem-") as folder:
-    line, output = Path(folder) / "peer.line", Path(folder) / "log"
-    line.write_text("servo\nmailbox_device\ndigital_out bits=8\ndigital_in bits=8\n")
-    with open(output, "w", encoding="utf-8") as out:
-        node = subprocess.Popen([HAL, "node", "ethercat", line, "--link", "eth:s0"], stdin=subprocess.DEVNULL, stdout=out, stderr=out)
+ethercat_line.network()
+with ethercat_line.line(HAL, "servo\nmailbox_device\ndigital_out bits=8\ndigital_in bits=8\n") as node:
     master = pysoem.Master()
     try:
-        check("the line starts", wait_for(lambda: "press Ctrl-C" in output.read_text()), output.read_text())
         master.open("m0")
         check("four slaves", wait_for(lambda: master.config_init() == 4), len(master.slaves))
-        run(output)
+        run(node.log)
     finally:
         master.close()
-        node.terminate()
-        check("the line ends", node.wait(60) == 0)
 print(f"{sum(checks)} of {len(checks)} checks hold")
 sys.exit(0 if checks and all(checks) else 1)

@@ -15,7 +15,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tests/cli"))
-from own_network import own_network  # noqa: E402
+import ethercat_line  # noqa: E402
 
 MACHINE = ROOT / "halfiles/ethercat-servo"
 HAL = str(Path(sys.argv[1]).resolve())
@@ -151,10 +151,5 @@ def main():
 if __name__ == "__main__":
     if shutil.which("tshark") is None:
         skip("no tshark; type: sudo apt install tshark")
-    if not own_network():
-        skip("no network namespaces here; run it as root, or where user namespaces are allowed")
-    if subprocess.run(["ip", "link", "add", "m0", "type", "veth", "peer", "name", "s0"], capture_output=True).returncode != 0:
-        skip("no veth pairs here")
-    for interface in ("m0", "s0"):
-        subprocess.run(["ip", "link", "set", interface, "up"], check=True)
+    ethercat_line.network()
     sys.exit(main())

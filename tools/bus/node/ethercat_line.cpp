@@ -18,6 +18,7 @@
 #include "ethercat/wire/registers.hpp"
 #include "link/ethernet.hpp"
 #include "link/system.hpp"
+#include "text/numbers.hpp"
 
 namespace hal::tools {
 
@@ -151,12 +152,51 @@ bool read_devices(const Options& options, std::vector<devices::Device>& to) {
     return good;
 }
 
+/// Reads `N:NAME=VALUE` as a command to the line. Returns what is wrong, or an empty text.
+std::string read_fault(const std::string& text, std::size_t slaves, esc::LineCommand& to) {
+    struct Row {
+        const char* name;
+        esc::LineFault fault;
+    };
+    static constexpr Row rows[] = {{"lose-every", esc::LineFault::loss},
+                                   {"corrupt-every", esc::LineFault::corruption},
+                                   {"double-every", esc::LineFault::duplicate},
+                                   {"noise-every", esc::LineFault::noise}};
+    const auto colon = text.find(':'), equals = text.find('=');
+    const auto slave = parse_natural(text.substr(0, colon));
+    if (colon == text.npos || equals == text.npos || equals < colon || !slave)
+        return fmt::format("invalid --fault '{}'; write --fault 1:corrupt-every=9", text);
+    if (*slave >= slaves) return fmt::format("--fault {}: no slave {}; the last one of {} is {}", text, *slave, slaves, slaves - 1);
+    const std::string name = text.substr(colon + 1, equals - colon - 1), value = text.substr(equals + 1);
+    to.slave = static_cast<unsigned>(*slave);
+    if (name == "drift") {
+        const auto ppm = parse_real(value);
+        if (!ppm || *ppm < -1000 || *ppm > 1000) return fmt::format("--fault {}: invalid drift '{}'; write -1000..1000 ppm", text, value);
+        to.kind = esc::LineCommand::Kind::drift, to.value = *ppm;
+        return {};
+    }
+    for (const Row& row : rows) {
+        if (name != row.name) continue;
+        const auto every = parse_natural(value);
+        if (!every || *every < 1 || *every > 1'000'000'000) return fmt::format("--fault {}: invalid number '{}'; write 1..1000000000", text, value);
+        to.kind = esc::LineCommand::Kind::disturb;
+        to.disturbance = {.fault = row.fault, .slave = static_cast<int>(*slave), .port = 0, .every = static_cast<std::uint32_t>(*every)};
+        return {};
+    }
+    return fmt::format("--fault {}: unknown fault '{}'; write one of: lose-every, corrupt-every, double-every, noise-every, drift", text, name);
+}
+
 }  // namespace
 
 int run_node_ethercat(const EthercatLineOptions& options) {
     if (options.link.empty()) return fail(options, "missing --link; add --link eth:enp3s0, the interface towards the master, or --link udp:127.0.0.1 for one on this machine");
     std::vector<devices::Device> devices;
     if (!read_devices(options, devices)) return 1;
+    if (options.faults.size() > esc::Line::most_disturbances)
+        return fail(options, fmt::format("at most {} faults are possible", esc::Line::most_disturbances));
+    std::vector<esc::LineCommand> faults(options.faults.size());
+    for (std::size_t n = 0; n < faults.size(); ++n)
+        if (const std::string problem = read_fault(options.faults[n], devices.size(), faults[n]); !problem.empty()) return fail(options, problem);
     StopRequest stop;
     stop.listen();
     const auto primary = open_interface(options, options.link);
@@ -170,6 +210,7 @@ int run_node_ethercat(const EthercatLineOptions& options) {
         return fail(options, "--backup: the last device has no second port; put one with two ports at the end");
     const std::int64_t began = link::monotonic_ns(), end = options.for_ns >= 0 ? began + options.for_ns : INT64_MAX;
     line.power_on(began);
+    for (const esc::LineCommand& fault : faults) line.execute(fault, began);
 
     std::string text = fmt::format("EtherCAT line of {} slave{} on {}{}{} ({}); press Ctrl-C to end\n", devices.size(), devices.size() == 1 ? "" : "s",
                                    primary->description().address, secondary ? " and " : "", secondary ? secondary->description().address : "",
