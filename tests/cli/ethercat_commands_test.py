@@ -41,8 +41,20 @@ class Slaves(Ethercat):
         (self.folder / "line.txt").write_text("coupler\ndigital_out bits=4\n")
         self.assertEqual(2, len(self.on("slaves", line="line.txt").splitlines()))
 
+    def test_all_errors_of_a_line_have_their_place_and_warnings_are_no_errors(self):
+        (self.folder / "wrong.line").write_text("coupler\nservoo\n\nservo axes=9 alias=x\n")
+        said = self.refused("slaves", line="wrong.line").splitlines()
+        self.assertEqual(["hal ethercat slaves: wrong.line:2:1", "hal ethercat slaves: wrong.line:4:7", "hal ethercat slaves: wrong.line:4:14"],
+                         [line.split(": unknown")[0].split(": invalid")[0] for line in said])
+        self.assertEqual(["hal ethercat slaves: --emulate, device 1", "hal ethercat slaves: --emulate, device 3"],
+                         [line.split(": unknown")[0].split(": invalid")[0] for line in self.refused("slaves", line="servoo, servo, servo axes=9").splitlines()])
+        run = self.run_program("ethercat", "slaves", "--emulate", "servo alias=3, servo alias=3")
+        self.assertEqual((0, 2), (run.returncode, len(run.stdout.splitlines())))
+        self.assertEqual("hal ethercat slaves: --emulate, device 2: warning: duplicate alias 3; give each device its own alias, unless the fault is wanted\n",
+                         run.stderr)
+
     def test_a_missing_comma_is_named(self):
-        self.assertEqual("hal ethercat slaves: --emulate: 'digital_in' is a device of its own; write it on the next line, or after a comma; options of servo: "
+        self.assertEqual("hal ethercat slaves: --emulate, device 1: 'digital_in' is a device of its own; write it on the next line, or after a comma; options of servo: "
                          "axes dc modes alias serial\n", self.refused("slaves", line="servo digital_in"))
 
     def test_start_up_writes_by_AoE_and_a_missing_link_are_reported_with_their_place(self):
@@ -53,8 +65,8 @@ class Slaves(Ethercat):
         (self.folder / "ethercat-conf.xml").write_text('<masters><master idx="0"/></masters>')
         (self.folder / "no-link.hal").write_text("loadrt lcec\n")
         said = self.bad("check", "no-link.hal")
-        self.assertIn("no-link.hal:1:8: error: component 'lcec' cannot make 'lcec.0': link= is missing: this format has no interface [construct-failed]\n", said)
-        self.assertIn("help: write link=eth:enp3s0, or link=sim:NAME for an emulated line\n", said)
+        self.assertIn("no-link.hal:1:8: error: component 'lcec' cannot make 'lcec.0': link= is missing: this format has no interface, and no file ethercat.conf has MASTER0_DEVICE [construct-failed]\n", said)
+        self.assertIn("help: write link=eth:enp3s0, or link=sim:NAME for an emulated line; or MASTER0_DEVICE=\"enp3s0\" in an ethercat.conf beside 'ethercat-conf.xml'\n", said)
 
     def test_states_requests_one_and_says_why_it_is_refused(self):
         self.assertEqual("0    INIT\n1    INIT\n2    INIT\n3    INIT\n", self.on("states"))
@@ -180,7 +192,7 @@ class Configuration(Ethercat):
                              "of the device"),
                             ("esi file=none.xml", "cannot read 'none.xml': No such file or directory; write esi file=FILE.xml device=NAME, with the order code "
                              "or product code of the device")):
-            self.assertEqual(f"hal ethercat slaves: --emulate: {printed}\n", self.refused("slaves", line=wrong))
+            self.assertEqual(f"hal ethercat slaves: --emulate, device 1: {printed}\n", self.refused("slaves", line=wrong))
 
     def test_config_links_an_axis_to_each_drive(self):
         self.on("config", "drives", line="servo axes=2, servo, digital_out bits=16")
@@ -196,9 +208,11 @@ class Configuration(Ethercat):
     def test_plan_shows_the_arithmetic(self):
         self.on("config", "small", line="coupler, digital_in bits=8")
         plan = self.good("ethercat", "plan", "small.ethercat")
-        self.assertIn("1 frame, 60 bytes: (60 + 1 x 24) x 80 ns = 6.72 us at 100 Mbit/s\n", plan)
+        self.assertIn("2 frames, 120 bytes: (120 + 2 x 24) x 80 ns = 13.44 us at 100 Mbit/s\n", plan)
         report = json.loads(self.good("ethercat", "plan", "small.ethercat", "--json"))[0]
-        self.assertEqual((1, 60, 6720, True), (report["frames"], report["frame_bytes"], report["wire_ns"], report["fits"]))
+        self.assertEqual((2, 120, 13440, True), (report["frames"], report["frame_bytes"], report["wire_ns"], report["fits"]))
+        self.assertEqual([["NOP", "LRD"]], [[d["command"] for d in frame["datagrams"]] for frame in report["cyclic"]])
+        self.assertEqual({"cycles": [0], "frames": [0], "wire_ns": 13440}, report["slots"][0])
         text = (self.folder / "small.ethercat").read_text().replace("cycle = 1ms", "cycle = 50us")
         (self.folder / "fast.ethercat").write_text(text)
         self.assertIn("fast.ethercat: the cycle is too short; raise `cycle`", self.bad("ethercat", "plan", "fast.ethercat"))
@@ -212,7 +226,7 @@ class Configuration(Ethercat):
         self.assertEqual("", self.good("ethercat", "plan", ROOT / "halfiles/ethercat-cnc/cnc.ethercat", "--svg", "cnc.svg"))
         texts = [t.text for t in ElementTree.parse(self.folder / "cnc.svg").iter("{http://www.w3.org/2000/svg}text")]
         self.assertIn("SYNC0", texts)
-        self.assertIn("Wire load 1.6 %; shortest cycle 123.48 us; worst case from an input to the output that answers it 2123.48 us.", texts)
+        self.assertIn("Wire load 2.2 %; shortest cycle 129.24 us; worst case from an input to the output that answers it 3000 us.", texts)
         self.assertEqual("hal ethercat plan: --json and --svg exclude each other\n",
                          self.bad("ethercat", "plan", ROOT / "halfiles/ethercat-cnc/cnc.ethercat", "--svg", "x.svg", "--json"))
 
@@ -283,7 +297,7 @@ class Wrong(Ethercat):
         self.assertEqual("hal ethercat scan: missing address: type eth:INTERFACE, or --emulate \"coupler, servo\" to try it without hardware\n",
                          self.bad("ethercat", "scan"))
         self.assertIn("is a segment in memory", self.bad("ethercat", "scan", "sim:line"))
-        self.assertIn("--emulate: ", self.refused("scan", line="toaster"))
+        self.assertIn("--emulate, device 1: ", self.refused("scan", line="toaster"))
 
 
 if __name__ == "__main__":

@@ -28,12 +28,16 @@ bool EthercatAccess::emulate(const EthercatOptions& options) {
             if (c == ',') c = '\n';
     }
     const auto description = ethercat::devices::read_line(text, in_file ? ethercat::devices::beside(options.emulate) : ethercat::devices::FindFile());
+    bool good = true;
     for (const auto& m : description.messages) {
         const bool is_error = m.severity == Severity::error;
-        fail(options, fmt::format("{}: {}{}; {}", in_file ? fmt::format("{}:{}:{}", options.emulate, m.at.line, m.at.column) : "--emulate",
-                                  is_error ? "" : "warning: ", m.sentence, m.help));
-        if (is_error) return false;
+        const std::string place = in_file            ? fmt::format("{}:{}:{}", options.emulate, m.at.line, m.at.column)
+                                  : m.at.line == 0 ? "--emulate"
+                                                     : fmt::format("--emulate, device {}", m.at.line);
+        fail(options, fmt::format("{}: {}{}{}{}", place, is_error ? "" : "warning: ", m.sentence, m.help.empty() ? "" : "; ", m.help));
+        good = good && !is_error;
     }
+    if (!good) return false;
     devices_ = ethercat::devices::make_line(description);
     ethernet::Options how;
     how.promiscuous = true;
