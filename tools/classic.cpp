@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: MIT
 #include "classic.hpp"
 
+#include <algorithm>
 #include <cstdlib>
 #include <fmt/core.h>
 #include <getopt.h>
+#include <vector>
 
 #include "cli/output.hpp"
+#include "commands.hpp"
 #include "comp/halcompile.hpp"
 #include "control/client.hpp"
 #include "inspect/play.hpp"
@@ -173,8 +176,18 @@ bool take_streamer_letter(int, std::uint64_t, PlayOptions&) { return false; }
 int halsampler(int argc, char** argv) { return sampler_or_streamer(argc, argv, "halsampler", "c:n:tN:", take_sampler_letter, run_record); }
 int halstreamer(int argc, char** argv) { return sampler_or_streamer(argc, argv, "halstreamer", "c:N:", take_streamer_letter, run_play); }
 
-constexpr Classic table[] = {
-    {"halcmd", halcmd}, {"halcompile", halcompile}, {"halrun", halrun}, {"halsampler", halsampler}, {"halstreamer", halstreamer}};
+/// The configuration program of LinuxCNC's EtherCAT component.
+int lcec_conf(int argc, char** argv) {
+    std::string hal = "hal", group = "ethercat", command = "lcec-conf";
+    std::vector<char*> line{hal.data(), group.data(), command.data()};
+    line.insert(line.end(), argv + std::min(argc, 1), argv + argc);
+    const int words = static_cast<int>(line.size());
+    line.push_back(nullptr);
+    return run_command_line(words, line.data());
+}
+
+constexpr Classic table[] = {{"halcmd", halcmd},         {"halcompile", halcompile},   {"halrun", halrun},
+                             {"halsampler", halsampler}, {"halstreamer", halstreamer}, {"lcec_conf", lcec_conf}};
 
 }  // namespace
 

@@ -162,6 +162,7 @@ constexpr Subcommand table[] = {
     command<EthercatDumpOptions, ON_BUS(run_ethercat_dump)>("ethercat dump", "ADDRESS|FILE [--filter WORD] [--for TIME] [--count N] [--json]", "print the datagrams of a bus or of a capture in words"),
     command<EthercatCheckOptions, ON_BUS(run_ethercat_check)>("ethercat check", "FILE… [--json]", "check the configuration of a bus and list its pins"),
     command<EthercatPlanOptions, ON_BUS(run_ethercat_plan)>("ethercat plan", "FILE [--json]", "compute frames, wire time, cycle time and latency of a bus"),
+    command<EthercatLcecOptions, ON_BUS(run_ethercat_lcec_conf)>("ethercat lcec-conf", "FILE [--name NAME]", "check the configuration of the component lcec, for loadusr (lcec_conf)"),
 #endif
     command<ScocanPlanOptions, ON_BUS(run_scocan_plan)>("scocan plan", "FILE [--mode MODE] [--json | --svg FILE]", "print the slots of a CAN bus as a timeline, its load and the worst-case latency of each message"),
     command<TdmaPlanOptions, ON_BUS(run_tdma_plan)>("tdma plan", "FILE [--json | --svg FILE]", "print the slots of an Ethernet segment as a timeline, its load and its input-to-output latency"),

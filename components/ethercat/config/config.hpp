@@ -60,6 +60,8 @@ struct SlaveInfo {
 /// One bus with its master.
 struct Bus {
     std::string            name;  ///< of its pins in LinuxCNC's format; empty in a `.ethercat` file
+    bool                   lcec = false;  ///< of LinuxCNC's format
+    unsigned               index = 0;  ///< of the master in LinuxCNC's format: MASTER0_DEVICE of ethercat.conf
     std::string            link = "sim:ethercat", backup;  ///< link addresses; a backup closes a ring
     std::string            gateway;  ///< IPv4 address on which the mailbox gateway listens; empty: no gateway
     std::uint16_t          gateway_port = 34980;

@@ -96,23 +96,34 @@ std::string mapped_words(std::int64_t value, std::int64_t object) {
            " bits";
 }
 
-std::string rejected_mapping_words(std::int64_t first, std::int64_t code) {
+std::string rejected_mapping_words(std::int64_t first, std::int64_t code, bool lcec) {
     const std::int64_t value = first >> 24, object = first & 0xff'ffff, entry = object & 0xff, index = object >> 8;
     std::string        text = "rejects " + mapped_words(value, object) + " at " + object_words(object) + ": " + abort_words(code);
     if (code == 0) return text + "; power-cycle it";
     const bool assignment = index >= 0x1c00, input = index >= 0x1a00;
-    text += std::string("; correct `") +
-            (assignment ? "outputs` or `inputs` or their `sync-manager"
-             : input    ? "inputs"
-                        : "outputs") +
-            "` in its section";
+    if (lcec)
+        text += std::string("; correct its ") +
+                (assignment ? "<syncManager>"
+                 : input    ? "<syncManager dir=\"in\">"
+                            : "<syncManager dir=\"out\">") +
+                " or its <modParam>";
+    else
+        text += std::string("; correct `") +
+                (assignment ? "outputs` or `inputs` or their `sync-manager"
+                 : input    ? "inputs"
+                            : "outputs") +
+                "` in its section";
     const auto number = static_cast<std::uint32_t>(code);
     // Slaves report a full PDO in several ways; few entries fit into any.
     const bool full = number == coe::abort::pdo_too_long ||
                       (entry == 0 && (number == coe::abort::range || number == coe::abort::too_high)) ||
                       (entry > 4 && number == coe::abort::no_sub);
     const std::int64_t fits = entry == 0 ? (value & 0xff) - 1 : entry - 1;
-    if (full && !assignment && fits > 0) text += ", or, if the PDO is full, write `entries-per-pdo = " + std::to_string(fits) + "`";
+    if (full && !assignment && fits > 0)
+        text += ", or, if the PDO is full, write " +
+                (lcec ? std::string("the modParam ") + (input ? "ciaTxPDOEntryLimit" : "ciaRxPDOEntryLimit") + " value=\"" +
+                            std::to_string(fits) + "\""
+                      : "`entries-per-pdo = " + std::to_string(fits) + "`");
     return text;
 }
 
@@ -124,9 +135,11 @@ std::string microseconds(std::int64_t ns) {
     return text;
 }
 
-std::string identity_words(const char* what, std::int64_t found, std::int64_t expected, const char* key) {
-    return std::string("has the ") + what + " " + hex(found, 8) + ", the configuration expects " + hex(expected, 8) +
-           "; it stays in INIT: connect the right device, or write `" + key + " = " + hex(found, 8) + "` or the `esi` of this device";
+std::string identity_words(const char* what, std::int64_t found, std::int64_t expected, const char* key, const char* attribute = nullptr) {
+    const std::string text = std::string("has the ") + what + " " + hex(found, 8) + ", the configuration expects " + hex(expected, 8) +
+                             "; it stays in INIT: connect the right device, or write ";
+    if (attribute != nullptr) return text + attribute + "=\"" + hex(found, 8).substr(2) + "\"";
+    return text + "`" + key + " = " + hex(found, 8) + "` or the `esi` of this device";
 }
 
 /// A cable, seen from one of the two slaves that it connects.
@@ -148,17 +161,23 @@ std::string emergency_words(std::int64_t first, std::int64_t bytes) {
 }
 
 /// What happened to one slave; it follows the slave's name.
-std::string of_slave(const Happened& w, const master::Setup& setup, const std::string& link) {
+std::string of_slave(const Happened& w, const master::Setup& setup, const std::string& link, bool lcec) {
     static const master::Slave unnamed;
     const master::Slave&       slave = w.slave < setup.slaves.size() ? setup.slaves[w.slave] : unnamed;
     const auto                 first = w.first, second = w.second;
     switch (w.event) {
-    case Event::slave_missing: return "is not on the bus; check its supply and cable, or write `optional = yes` in its section";
+    case Event::slave_missing:
+        return std::string("is not on the bus; check its supply and cable, or ") +
+               (lcec ? "delete its <slave>" : "write `optional = yes` in its section");
     case Event::unknown_slave:
+        if (lcec)
+            return "is not in the configuration (vendor " + hex(first, 8) + ", product " + hex(second, 8) + "); add <slave idx=\"" +
+                   std::to_string(w.slave - Events::of_position) + "\" type=\"generic\" vid=\"" + hex(first, 8).substr(2) + "\" pid=\"" +
+                   hex(second, 8).substr(2) + "\"/>";
         return "is not in the configuration (vendor " + hex(first, 8) + ", product " + hex(second, 8) + "); add [slave " +
                std::to_string(w.slave - Events::of_position) + " NAME], or write `other-slaves = accept` in [bus]";
-    case Event::wrong_vendor: return identity_words("vendor", first, second, "vendor");
-    case Event::wrong_product: return identity_words("product code", first, second, "product");
+    case Event::wrong_vendor: return identity_words("vendor", first, second, "vendor", lcec ? "vid" : nullptr);
+    case Event::wrong_product: return identity_words("product code", first, second, "product", lcec ? "pid" : nullptr);
     case Event::wrong_revision: return identity_words("revision", first, second, "revision");
     case Event::wrong_serial: return identity_words("serial number", first, second, "serial");
     case Event::duplicate_alias:
@@ -171,12 +190,15 @@ std::string of_slave(const Happened& w, const master::Setup& setup, const std::s
                    "), so that its application does not run; write the contents anew with a tool of its maker, then power-cycle it";
         return "has an unreadable EEPROM (status " + hex(first, 4) + " at word " + hex(second, 2) + "); power-cycle it";
     case Event::no_mailbox:
-        return "has no mailbox, but the configuration writes " + object_words(first) + " at start; delete its `sdo` and `idn` lines";
+        return "has no mailbox, but the configuration writes " + object_words(first) + " at start; delete its " +
+               (lcec ? "<sdoConfig>, <idnConfig> and <initCmds>" : "`sdo` and `idn` lines");
     case Event::too_few_fmmus:
         return "has " + std::to_string(first) + " FMMUs, its process data needs " + std::to_string(second) + "; use fewer sync managers";
     case Event::too_few_sync_managers:
         return "has " + std::to_string(first) + (first == 1 ? " sync manager" : " sync managers") + ", the configuration needs " +
-               std::to_string(second) + "; correct `outputs.sync-manager` or `inputs.sync-manager` in its section, which count from 0";
+               std::to_string(second) + "; correct " +
+               (lcec ? "idx of its <syncManager>" : "`outputs.sync-manager` or `inputs.sync-manager` in its section") +
+               ", which count from 0";
     case Event::state_refused: return "rejects " + state_words(first) + " with " + al_words(second) + configured_words(second, slave);
     case Event::state_timeout:
         return "did not reach " + state_words(first) + " in time; it is in " + state_words(second) +
@@ -188,7 +210,7 @@ std::string of_slave(const Happened& w, const master::Setup& setup, const std::s
         if (first == 0) return "does not answer its IP settings; power-cycle it, or write `eoe = yes` to leave them as they are";
         return "rejects its IP settings with EoE result " + hex(first, 4) + " (" + eoe::to_string(static_cast<eoe::Result>(first)) +
                "); write `eoe = yes` to leave them as they are";
-    case Event::mapping_failed: return rejected_mapping_words(first, second);
+    case Event::mapping_failed: return rejected_mapping_words(first, second, lcec);
     case Event::mapping_differs:
         return "did not keep the PDO mapping: " + object_words(first) + " is " + hex(second, 8) + " instead of " + hex(first >> 24, 8) +
                "; this PDO is fixed: list its own entries";
@@ -201,13 +223,16 @@ std::string of_slave(const Happened& w, const master::Setup& setup, const std::s
     case Event::slave_lost: return "does not answer; check its supply and the cable to it";
     case Event::slave_returned: return "answers again";
     case Event::slave_operational: return "is operational after " + std::to_string(second) + " ms";
-    case Event::dc_unsupported: return "has no distributed clock, but the configuration has `dc`; remove that line";
+    case Event::dc_unsupported:
+        return std::string("has no distributed clock, but the configuration has ") +
+               (lcec ? "<dcConf>; delete it" : "`dc`; remove that line");
     case Event::dc_not_set:
         return "has a clock that could not be set within " + std::to_string(first) +
-               " ms: its receive times were not readable, or the ring is broken; it is not started: check its cables, or remove `dc`";
+               " ms: its receive times were not readable, or the ring is broken; it is not started: check its cables, or " +
+               (lcec ? "delete its <dcConf>" : "remove `dc`");
     case Event::dc_timeout:
         return "deviates by " + microseconds(first) + " from the reference clock, more than the window of " + microseconds(second) +
-               "; it is not started: check the cycle of the thread, or raise `sync-window`";
+               "; it is not started: check the cycle of the thread" + (lcec ? "" : ", or raise `sync-window`");
     case Event::dc_recovered: return "has a clock within the window again, after " + std::to_string(second) + " ms";
     case Event::dc_lost:
         if (setup.dc_loss == master::DcLoss::safeop)
@@ -290,10 +315,11 @@ std::string slave_words(std::uint32_t slave, const master::Setup& setup) {
     return "slave " + where + (s.name.empty() ? "" : " (" + s.name + ")");
 }
 
-std::string event_words(const Happened& what, const master::Setup& setup, const std::string& link, const std::string& backup) {
+std::string event_words(const Happened& what, const master::Setup& setup, const std::string& link, const std::string& backup,
+                        Format format) {
     const std::string bus = of_bus(what, setup, link, backup);
     if (!bus.empty()) return bus;
-    const std::string text = of_slave(what, setup, link);
+    const std::string text = of_slave(what, setup, link, format == Format::lcec);
     return text.empty() ? text : slave_words(what.slave, setup) + " " + text;
 }
 

@@ -17,9 +17,13 @@ struct Happened {
     std::int64_t  first = 0, second = 0;
 };
 
+/// Which configuration the user is told to change.
+enum class Format : std::uint8_t { ethercat, lcec };
+
 /// Returns the sentence for an event, without a final stop; empty for one that needs none. `link` and `backup` are the addresses of the
 /// ports. [setup]
-std::string event_words(const Happened& what, const master::Setup& setup, const std::string& link, const std::string& backup = {});
+std::string event_words(const Happened& what, const master::Setup& setup, const std::string& link, const std::string& backup = {},
+                        Format = Format::ethercat);
 
 /// Returns "slave 3 (x-axis)", or "slave at position 3" where the setup does not name it. [setup]
 std::string slave_words(std::uint32_t slave, const master::Setup& setup);

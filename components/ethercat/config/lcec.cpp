@@ -2,24 +2,24 @@
 // LinuxCNC's ethercat-conf.xml (the format of the lcec component): generic slaves and the class basic_cia402.
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <set>
 
 #include "ethercat/config/lcec_cia402.hpp"
-#include "ethercat/esi/esi_xml.hpp"
+#include "ethercat/config/lcec_init_commands.hpp"
+#include "ethercat/config/lcec_xml.hpp"
 #include "ethercat/master/soe_client.hpp"
 
 namespace hal::ethercat::config {
 
 namespace {
 
-using esi::Xml;
 using master::StartupWrite;
 using master::Type;
 
-class Lcec {
+class Lcec : private LcecXml {
 public:
-    explicit Lcec(std::string_view text) : text_(text) {}
+    Lcec(std::string_view text, const std::string& path, const ReadFile& read_file)
+        : LcecXml(text), folder_(path.find('/') == path.npos ? "" : path.substr(0, path.rfind('/') + 1)), read_file_(read_file) {}
 
     Reading read() {
         out_.lcec = true;
@@ -55,55 +55,6 @@ private:
         return std::move(out_);
     }
 
-    void error(Topic topic, const Xml& at, std::string sentence, std::string help = {}) {
-        if (!report_.failed() || report_.all.size() <= text::most_errors)
-            report_.error(topic, esi::span_of(at, text_), std::move(sentence), std::move(help));
-    }
-    /// Reports attributes that the element does not have.
-    void attributes(const Xml& node, const std::vector<std::string>& known) {
-        for (const auto a : node.attributes())
-            if (std::find(known.begin(), known.end(), a.name()) == known.end())
-                error(Topic::line, node, "unknown attribute '" + std::string(a.name()) + "' of <" + node.name() + ">",
-                      known.empty() ? "the element has none" : suggestion(a.name(), known, "the attributes are"));
-    }
-    void children(const Xml& node, const std::vector<std::string>& known, const std::function<void(const Xml&)>& read) {
-        for (const Xml child : node.children()) {
-            if (child.type() != pugi::node_element) continue;
-            if (std::find(known.begin(), known.end(), child.name()) != known.end()) read(child);
-            else
-                error(Topic::line, child, "unknown element <" + std::string(child.name()) + "> in <" + node.name() + ">",
-                      known.empty() ? "the element is empty" : suggestion(child.name(), known, "the elements are"));
-        }
-    }
-
-    std::optional<std::int64_t> number(const Xml& node, const char* name, std::int64_t least, std::int64_t most, bool hexadecimal = false,
-                                       bool required = false) {
-        const std::string_view value = trimmed(node.attribute(name).value());
-        if (!node.attribute(name)) {
-            if (required)
-                error(Topic::value, node, "missing attribute '" + std::string(name) + "' of <" + node.name() + ">",
-                      "write " + std::string(name) + "=\"" + (hexadecimal ? "6040" : "0") + "\"");
-            return {};
-        }
-        const bool prefixed = value.starts_with("0x") || value.starts_with("0X") || !hexadecimal;
-        const auto n = esi::number(prefixed ? std::string(value) : "0x" + std::string(value));
-        if (n && *n >= least && *n <= most) return n;
-        char range[96];
-        std::snprintf(range, sizeof range, hexadecimal ? "a hexadecimal number of %llX..%llX" : "a number of %lld..%lld",
-                      static_cast<long long>(least), static_cast<long long>(most));
-        error(Topic::value, node, "invalid " + std::string(name) + " '" + std::string(value) + "' of <" + node.name() + ">",
-              "write " + std::string(range));
-        return {};
-    }
-    bool flag(const Xml& node, const char* name, bool otherwise) {
-        const std::string_view value = node.attribute(name).value();
-        if (value.empty()) return otherwise;
-        if (same_word(value, "true") || value == "1") return true;
-        if (!same_word(value, "false") && value != "0")
-            error(Topic::value, node, "invalid " + std::string(name) + " '" + std::string(value) + "' of <" + node.name() + ">",
-                  "write true or false");
-        return false;
-    }
     /// A time in ns, or `*N`: N cycles.
     std::optional<std::int64_t> cycles(const Xml& node, const char* name) {
         const std::string_view value = node.attribute(name).value();
@@ -123,6 +74,7 @@ private:
         bus.at = esi::span_of(node, text_);
         const auto idx = number(node, "idx", 0, 255).value_or(0);
         bus.name = node.attribute("name") ? node.attribute("name").value() : std::to_string(idx);
+        bus.lcec = true, bus.index = static_cast<unsigned>(idx);
         bus.link = "sim:ethercat" + std::to_string(idx);
         if (const auto period = number(node, "appTimePeriod", 10'000, 1'000'000'000)) bus.setup.cycle_ns = *period;
         bus.cycle_given = true;
@@ -170,7 +122,7 @@ private:
             else if (name == "watchdog") watchdog(child, s);
             else if (name == "sdoConfig") sdo(child, s);
             else if (name == "idnConfig") idn(child, s);
-            else if (name == "initCmds") error(Topic::line, child, "<initCmds> is unsupported", "write an <sdoConfig> for each object");
+            else if (name == "initCmds") init_commands(child, s);
             else if (name == "modParam") parameter(child, drive);
             else if (generic) sync_manager(child, s);
             else error(Topic::line, child, "<syncManager> applies only to type=\"generic\"", "delete it, or write type=\"generic\"");
@@ -238,6 +190,24 @@ private:
                   "write state=\"PREOP\" or state=\"SAFEOP\", the state in which the IDN is written");
         w.data = raw_data(node, "idnDataRaw");
         if (!w.data.empty()) s.startup.push_back(std::move(w));
+    }
+    void init_commands(const Xml& node, master::Slave& s) {
+        attributes(node, {"filename"});
+        const std::string given = node.attribute("filename").value(), path = given.starts_with('/') ? given : folder_ + given;
+        if (given.empty())
+            return error(Topic::value, node, "missing attribute 'filename' of <initCmds>", "write filename=\"drive-init.xml\"");
+        std::string text;
+        if (!read_file_(path, text))
+            return error(Topic::value, node, "cannot read '" + path + "': " + text, "write the path of a file beside this one");
+        const auto report = [&](bool is_error, std::uint32_t line, const std::string& sentence, std::string help) {
+            const std::string where = "'" + path + "', line " + std::to_string(line) + ": " + sentence;
+            if (is_error) error(Topic::value, node, where, std::move(help));
+            else report_.warning(Topic::value, esi::span_of(node, text_), where, std::move(help));
+        };
+        for (StartupWrite& w : read_init_commands(text, report)) {
+            w.line = esi::span_of(node, text_).line;
+            s.startup.push_back(std::move(w));
+        }
     }
     /// Returns the bytes of the elements `name`; reports when there are none.
     std::vector<std::uint8_t> raw_data(const Xml& node, const char* name) {
@@ -375,8 +345,8 @@ private:
         }
     }
 
-    std::string_view                   text_;
-    Report                             report_;
+    std::string                        folder_;  // of the file, with a slash at its end
+    const ReadFile&                    read_file_;
     Reading                            out_;
     Bus*                               bus_ = nullptr;
     SlaveInfo                          info_;
@@ -387,6 +357,6 @@ private:
 
 }  // namespace
 
-Reading read_lcec(std::string_view xml, const std::string&, const ReadFile&) { return Lcec(xml).read(); }
+Reading read_lcec(std::string_view xml, const std::string& path, const ReadFile& read_file) { return Lcec(xml, path, read_file).read(); }
 
 }  // namespace hal::ethercat::config

@@ -16,10 +16,7 @@ using Lcec = hal::ethercat::MasterComponent<Names>;
 }  // namespace
 
 HAL_COMPONENT(Lcec, "lcec", "EtherCAT master with the names of LinuxCNC's lcec", R"(
-The component `ethercat` with the pins and functions of the lcec component, for netlists that exist. It reads `ethercat-conf.xml` beside the netlist, or
-the file of `config=`: the pins of a slave are `lcec.MASTER.SLAVE.PIN`.
-
-`ethercat-conf.xml`:
+The component `ethercat` with the pins and functions of the lcec component, for netlists that exist. `ethercat-conf.xml`:
 
     <masters>
       <master idx="0" appTimePeriod="1000000" refClockSyncCycles="-1">
@@ -30,20 +27,24 @@ the file of `config=`: the pins of a slave are `lcec.MASTER.SLAVE.PIN`.
       </master>
     </masters>
 
-The netlist, with an emulated drive; `link=eth:enp3s0` is the interface of a machine. It replaces `loadusr -W lcec_conf ethercat-conf.xml`.
+The netlist, with an emulated drive. On a machine the first line and the last `addf` are left out:
 
     loadrt ethercat_segment devices="servo" link=sim:drives
+    loadusr -W lcec_conf ethercat-conf.xml
     loadrt lcec link=sim:drives
     addf lcec.read-all servo-thread
     addf lcec.write-all servo-thread
     addf ethercat-segment.0.update servo-thread
     net x-status lcec.0.x.srv-cia-statusword
 
-With several masters in the file: `loadrt lcec count=2 master=0,1 link=eth:enp3s0,eth:enp4s0`; a master that has a name in the file needs it as the
-name of its instance: `names=lcec.NAME`.
+Without `link=`, the interface of a master is `MASTER0_DEVICE` of the file `ethercat.conf` beside `ethercat-conf.xml`, or else of `/etc/ethercat.conf`,
+the file of the IgH master: a MAC address, an interface (`enp3s0`) or a link address (`eth:enp3s0`, `sim:NAME`). `MASTER0_BACKUP` closes a ring. Without
+`loadusr lcec_conf`, the file is `config=`, or `ethercat-conf.xml` beside the netlist.
 
-The elements that are read, and the differences to lcec, are in docs/ethercat-configuration.md. There is no `lcec_conf` program, and no `lcec.0.read` and
-`lcec.0.write`: `read-all` and `write-all` serve all masters.
+With several masters in the file there is an instance for each, `lcec.0`, `lcec.1`; `link=` is then a list. A master that has a name in the file needs it
+as the name of its instance: `names=lcec.NAME master=0`.
+
+The elements that are read, and the differences to lcec, are in docs/ethercat-configuration.md.
 
 EtherCAT is a registered trademark and patented technology, licensed by Beckhoff Automation GmbH, Germany.
 )")

@@ -68,7 +68,8 @@ public:
         }
         areas_.resize(places_.size());
         period_words_ = "the period of the thread is {} us, the cycle of the configuration " + std::to_string(bus_.setup.cycle_ns / 1000) +
-                        " us; change one of them: cycle in [bus]; nothing is exchanged";
+                        " us; change one of them: " + (bus_.lcec ? "appTimePeriod of <master>" : "cycle in [bus]") +
+                        "; nothing is exchanged";
         unknown_words_ = "a slave on " + bus_.link + " is not in the configuration";
         nobody_words_ = "no slave answers on " + bus_.link;
         link_words_ = bus_.link + " has no link; no process data is exchanged";
@@ -281,7 +282,7 @@ private:
     }
 
     const std::string       name_ = hal::own_name(Names::own);
-    EthercatArguments       arguments_{*this, Names::file};
+    EthercatArguments       arguments_{*this, Names::file, Names::shared};
     config::Bus             bus_ = arguments_.read();
     hal::Function           receive_{*this,
                            Names::receive,
@@ -319,7 +320,7 @@ private:
     std::optional<hal::DisciplinedClock>   clock_;
     hal::Discipline                        discipline_;
     hal::Reporter<config::Happened>        reporter_{name_, [this](const config::Happened& h) {
-        return config::event_words(h, bus_.setup, bus_.link, bus_.backup);
+        return config::event_words(h, bus_.setup, bus_.link, bus_.backup, bus_.lcec ? config::Format::lcec : config::Format::ethercat);
     }, 256, [](const config::Happened& h) { return std::to_string(static_cast<int>(h.event)) + " " + std::to_string(h.slave); }};
     const hal_faults*                      faults_ = nullptr;
     bool                                   unknown_raised_ = false, was_fresh_ = false, simulated_ = false, period_reported_ = false;

@@ -143,4 +143,30 @@ TEST(EthercatAlStatus, Every_code_has_a_cause_and_a_remedy_and_they_are_in_order
     EXPECT_EQ(al_status(0), nullptr);
 }
 
+TEST(EthercatEventWords, With_LinuxCNCs_format_the_advice_is_in_its_elements) {
+    master::Setup setup;
+    setup.slaves.resize(1);
+    setup.slaves[0].name = "x";
+    const auto told = [&](Event event, std::uint32_t slave, std::int64_t first = 0, std::int64_t second = 0) {
+        return config::event_words({event, slave, first, second}, setup, "eth:enp3s0", "", config::Format::lcec);
+    };
+    EXPECT_EQ(told(Event::wrong_product, 0, 0x402, 0x04020001),
+              "slave 0 (x) has the product code 0x00000402, the configuration expects 0x04020001; it stays in INIT: connect the right "
+              "device, or write pid=\"00000402\"");
+    EXPECT_EQ(told(Event::wrong_vendor, 0, 0xcafe, 2),
+              "slave 0 (x) has the vendor 0x0000CAFE, the configuration expects 0x00000002; it stays in INIT: connect the right device, or "
+              "write vid=\"0000CAFE\"");
+    EXPECT_EQ(told(Event::slave_missing, 0), "slave 0 (x) is not on the bus; check its supply and cable, or delete its <slave>");
+    EXPECT_EQ(told(Event::unknown_slave, Events::of_position + 3, 0xcafe, 0x402),
+              "slave at position 3 is not in the configuration (vendor 0x0000CAFE, product 0x00000402); add <slave idx=\"3\" "
+              "type=\"generic\" vid=\"0000CAFE\" pid=\"00000402\"/>");
+    EXPECT_EQ(told(Event::no_mailbox, 0, 0x606000),
+              "slave 0 (x) has no mailbox, but the configuration writes 0x6060:0 at start; delete its <sdoConfig>, <idnConfig> and "
+              "<initCmds>");
+    EXPECT_EQ(told(Event::dc_unsupported, 0), "slave 0 (x) has no distributed clock, but the configuration has <dcConf>; delete it");
+    EXPECT_EQ(told(Event::mapping_failed, 0, std::int64_t{0x60410010} << 24 | 0x160002, 0x06040041),
+              "slave 0 (x) rejects object 0x6041:0 with 16 bits at 0x1600:2: SDO abort 0x06040041 (object cannot be mapped to a PDO); "
+              "correct its <syncManager dir=\"out\"> or its <modParam>");
+}
+
 }  // namespace

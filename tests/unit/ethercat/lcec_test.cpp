@@ -2,6 +2,8 @@
 #include <random>
 
 #include "ethercat/config/config.hpp"
+#include "ethercat/config/igh_conf.hpp"
+#include "ethercat/config/lcec_init_commands.hpp"
 
 namespace hal::ethercat::config {
 namespace {
@@ -130,6 +132,87 @@ TEST(Lcec, Idn_configuration_is_written_by_SoE_in_its_state) {
               "c.xml:2:72: error: invalid data '7'; write hexadecimal bytes in the order of the wire, as in data=\"E8 03\"");
 }
 
+constexpr const char* init_file = R"(<?xml version="1.0"?>
+<EtherCATMailbox>
+  <CoE><InitCmds>
+    <InitCmd><Transition>PS</Transition><Timeout>0</Timeout><Ccs>1</Ccs><Index>24672</Index><SubIndex>0</SubIndex><Data>08</Data></InitCmd>
+    <InitCmd CompleteAccess="true"><Transition>IP</Transition><Index>#x8000</Index><SubIndex>1</SubIndex><Data>d0 07</Data></InitCmd>
+    <InitCmd><Transition>PS</Transition><Index>1</Index><Data>00</Data><Disabled>1</Disabled></InitCmd>
+    <InitCmd><Transition>PS</Transition><Ccs>2</Ccs><Index>1</Index></InitCmd>
+    <InitCmd><Transition>SO</Transition><Transition>OS</Transition><Index>8193</Index><Data>0500</Data></InitCmd>
+  </InitCmds></CoE>
+  <SoE><InitCmds>
+    <InitCmd><Transition>PS</Transition><OpCode>3</OpCode><DriveNo>1</DriveNo><IDN>32918</IDN><Data>0700</Data></InitCmd>
+  </InitCmds></SoE>
+</EtherCATMailbox>
+)";
+
+TEST(Lcec, Init_commands_of_TwinCAT_are_written_at_their_transitions) {
+    const auto with = [](const std::string& file) {
+        return read(
+            "<masters><master idx=\"0\"><slave idx=\"0\" type=\"generic\" vid=\"1\" pid=\"2\">\n"
+            "<initCmds filename=\"init.xml\"/></slave></master></masters>",
+            "folder/c.xml", [&](const std::string& path, std::string& text) {
+            text = file.empty() ? "no such file" : file;
+            return path == "folder/init.xml" && !file.empty();
+        });
+    };
+    const Reading r = with(init_file);
+    ASSERT_EQ(to_string(r, "c.xml"), "");
+    ASSERT_EQ(r.messages.size(), 1U);
+    EXPECT_EQ(r.messages[0].sentence, "'folder/init.xml', line 8: a command at transition 'OS' is left out");
+    EXPECT_EQ(r.messages[0].severity, Severity::warning);
+    const auto& writes = r.buses.at(0).setup.slaves.at(0).startup;
+    ASSERT_EQ(writes.size(), 4U);
+    EXPECT_EQ(writes[0].index, 0x8000) << "IP before PS";
+    EXPECT_TRUE(writes[0].complete);
+    EXPECT_EQ(writes[0].data, (std::vector<std::uint8_t>{0xd0, 7}));
+    EXPECT_EQ(writes[1].index, 0x6060);
+    EXPECT_EQ(writes[1].before, State::safeop);
+    EXPECT_EQ(writes[1].line, 2U) << "of the configuration";
+    EXPECT_EQ(writes[2].protocol, master::StartupWrite::Protocol::soe);
+    EXPECT_EQ(writes[2].index, 0x8096);
+    EXPECT_EQ(writes[2].sub, 1);
+    EXPECT_EQ(writes[3].index, 0x2001);
+    EXPECT_EQ(writes[3].before, State::op);
+
+    const auto wrong = [&](const std::string& command) {
+        return to_string(with("<EtherCATMailbox><CoE><InitCmds>\n" + command + "</InitCmds></CoE></EtherCATMailbox>"), "c.xml");
+    };
+    EXPECT_EQ(wrong("<InitCmd><Transition>PS</Transition><Data>00</Data></InitCmd>"),
+              "c.xml:2:2: error: 'folder/init.xml', line 2: missing <Index> in <InitCmd>; write the number in decimal, or as #x6040");
+    EXPECT_EQ(wrong("<InitCmd><Transition>PS</Transition><Index>x</Index><Data>00</Data></InitCmd>"),
+              "c.xml:2:2: error: 'folder/init.xml', line 2: invalid Index 'x'; write a number of 0..65535 in decimal, or as #x6040");
+    EXPECT_EQ(wrong("<InitCmd><Transition>PS</Transition><Index>1</Index><Data>0</Data></InitCmd>"),
+              "c.xml:2:2: error: 'folder/init.xml', line 2: invalid <Data> in <InitCmd>; write hexadecimal bytes in the order of the wire, "
+              "as in <Data>e803</Data>");
+    EXPECT_EQ(wrong("<InitCmd><Index>1</Index><Data>00</Data></InitCmd>"),
+              "c.xml:2:2: error: 'folder/init.xml', line 2: missing <Transition> in <InitCmd>; write <Transition>PS</Transition>");
+    EXPECT_EQ(wrong(""),
+              "c.xml:2:2: error: 'folder/init.xml', line 1: the file writes nothing; it has <CoE><InitCmds><InitCmd> or "
+              "<SoE><InitCmds><InitCmd>");
+    EXPECT_EQ(to_string(with("<masters/>"), "c.xml"),
+              "c.xml:2:2: error: 'folder/init.xml', line 1: the root element is 'masters', not EtherCATMailbox; export the start-up "
+              "commands of the slave in TwinCAT");
+    EXPECT_EQ(to_string(with(""), "c.xml"),
+              "c.xml:2:2: error: cannot read 'folder/init.xml': no such file; write the path of a file beside this one");
+}
+
+TEST(Lcec, Interfaces_come_from_ethercat_conf) {
+    const std::string text =
+        "# MASTER0_DEVICE=\"no\"\nMASTER0_DEVICE=\"00:11:22:aa:bb:cc\" # comment\n MASTER1_DEVICE = enp3s0 # x\n"
+        "MASTER1_BACKUP='sim:ring'\nMASTER12_DEVICE=\"eth:x\"\n";
+    EXPECT_EQ(device_of(text, 0, false), "00:11:22:aa:bb:cc");
+    EXPECT_EQ(device_of(text, 0, true), "");
+    EXPECT_EQ(device_of(text, 1, false), "enp3s0");
+    EXPECT_EQ(device_of(text, 1, true), "sim:ring");
+    EXPECT_EQ(device_of(text, 2, false), "");
+    EXPECT_EQ(link_of_device("enp3s0"), "eth:enp3s0");
+    EXPECT_EQ(link_of_device("sim:ring"), "sim:ring");
+    EXPECT_EQ(link_of_device("00:11:22:aa:bb:cc", "no-such-folder"), "");
+    EXPECT_EQ(link_of_device("00:00:00:00:00:00"), "eth:lo") << "the loopback interface has this address";
+}
+
 TEST(Lcec, Any_bytes_are_read_without_harm) {
     std::mt19937 random(4);
     for (int n = 0; n < 3000; ++n) {
@@ -141,6 +224,9 @@ TEST(Lcec, Any_bytes_are_read_without_harm) {
             else text.insert(at, text.substr(random() % text.size(), random() % 40));
         }
         read(text, "c.xml");
+        std::string init = init_file;
+        for (int i = 0; i < 1 + n % 5; ++i) init.insert(random() % init.size(), init.substr(random() % init.size(), random() % 40));
+        read_init_commands(init, [](bool, std::uint32_t, const std::string&, const std::string&) {});
     }
 }
 

@@ -92,6 +92,15 @@ struct EthercatPlanOptions : Options {
     }
 };
 
+struct EthercatLcecOptions : Options {
+    std::string name;  ///< of the instance; empty: the one that started this program
+
+    void declare(OptionSet& set) override {
+        set.words("FILE", "LinuxCNC's ethercat-conf.xml");
+        set.value("--name", name, "NAME", "instance of the machine (default: the one that started this program)");
+    }
+};
+
 struct EthercatDumpOptions : Options {
     std::string filter;
     std::int64_t for_ns = -1;  ///< -1: not given
@@ -130,5 +139,6 @@ int run_ethercat_dc(const EthercatOptions&);
 int run_ethercat_dump(const EthercatDumpOptions&);
 int run_ethercat_check(const EthercatCheckOptions&);
 int run_ethercat_plan(const EthercatPlanOptions&);
+int run_ethercat_lcec_conf(const EthercatLcecOptions&);
 
 }  // namespace hal::tools
