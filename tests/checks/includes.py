@@ -110,8 +110,7 @@ LIBRARIES = {
 }
 
 INCLUDE_ROOTS = ["runtime", "runtime/abi", "runtime/sdk", "drivers", "components", "tools", "."]  # as the compiler searches
-SINGLE = {"paths.hpp": ["runtime/machine", "runtime/commands", "runtime/control", "tools", "tools/run", "tools/inspect", "tools/comp"]}  # headers that belong to no folder
-SINGLE = {"paths.hpp": ["runtime/machine", "runtime/commands", "runtime/control", "tools", "tools/inspect", "tools/comp", "tools/panel"]}  # headers that belong to no folder
+SINGLE = {"paths.hpp": ["runtime/machine", "runtime/commands", "runtime/control", "tools", "tools/run", "tools/inspect", "tools/comp", "tools/panel"]}  # headers that belong to no folder
 # Which transport an address names is the drivers' matter: others ask describe().
 ADDRESS_PREFIX = re.compile(r'(?:\b(?:starts_with|r?find|compare)\(\s*|[=!]=\s*|\b\w+ = )"(?:can|sim|udp|slcan|cane|replay|eth):"')
 INCLUDE = re.compile(r'^\s*#\s*include\s*(["<])([^">]+)[">]')

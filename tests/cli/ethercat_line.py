@@ -37,7 +37,7 @@ def network():
 
 
 def wait_for(condition, seconds=30.0):
-    """Asks until `condition` answers something true, or for so long. Returns its last answer."""
+    """Calls `condition` until it returns something true, for at most this time. Returns its last result."""
     end = time.monotonic() + seconds
     while not (answer := condition()) and time.monotonic() < end:
         time.sleep(0.002)
@@ -74,4 +74,4 @@ def line(hal, devices):
             yield node
         finally:
             if (status := node.end()) != 0:
-                raise AssertionError(f"the line ended with status {status}: {node.said()}")
+                raise AssertionError(f"the line ended with status {status}: " + node.said())

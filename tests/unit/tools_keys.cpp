@@ -12,7 +12,7 @@ Key letter(char c) { return {Code::character, c, false}; }
 
 TEST(Keys, letters_and_controls) {
     EXPECT_EQ(keys("q?\r\t\x7f"), (std::vector<Key>{letter('q'), letter('?'), {Code::enter}, {Code::tab}, {Code::backspace}}));
-    EXPECT_EQ(keys("\x01\xc3\xa4"), std::vector<Key>{}) << "other control characters and non-ASCII are no keys";
+    EXPECT_EQ(keys("\x01\xc3\xa4"), std::vector<Key>{}) << "other control characters and non-ASCII are ignored";
 }
 
 TEST(Keys, arrows_come_as_csi_or_ss3_with_and_without_shift) {

@@ -17,7 +17,7 @@ struct Happened {
     std::int64_t  first = 0, second = 0;
 };
 
-/// Which configuration the user is told to change.
+/// Which configuration the messages advise to change.
 enum class Format : std::uint8_t { ethercat, lcec };
 
 /// Returns the sentence for an event, without a final stop; empty for one that needs none. `link` and `backup` are the addresses of the

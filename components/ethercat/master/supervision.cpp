@@ -239,7 +239,7 @@ static Task<void> resynchronise(Channel& c, Bus& bus, Device& d) noexcept {
     bus.report(Event::slave_operational, d, d.slave.position, (c.now_ns() - d.began_ns) / millisecond);
 }
 
-/// Reports a slave that is not in step for some time although it is in OP, and stops it where the setup says so; reports it when it is again.
+/// Reports a slave that is not in step for some time although it is in OP, and stops it where the setup requires it; reports it when it is again.
 static void judge_clock(Bus& bus, Device& d, std::int64_t now_ns) noexcept {
     const Slave*       config = bus.config(d);
     const std::int64_t window = std::max(bus.setup.sync_window_ns, tolerable_deviation_ns), deviation = d.status.dc_deviation_ns;

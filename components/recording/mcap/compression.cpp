@@ -36,7 +36,7 @@ void        Compressor::compress(std::string_view bytes, std::string& to) { to =
 bool expand(std::string_view compression, std::string_view bytes, std::uint64_t size, std::string& to, std::string& problem) {
     if (compression.empty()) {
         to = bytes;
-        problem = "a chunk has another size than its header says";
+        problem = "a chunk and its header disagree on the size";
         return bytes.size() == size;
     }
 #ifdef HALCYON_ZSTD

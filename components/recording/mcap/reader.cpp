@@ -208,9 +208,9 @@ bool Reader::load_chunk(const ChunkIndex& chunk, std::string& records) {
     std::string bytes;
     if (chunk.length < record_head || chunk.length > most_chunk || chunk.size > most_chunk) return fail("a chunk is larger than 256 MiB");
     if (!source_->read(chunk.offset, static_cast<std::size_t>(chunk.length), bytes))
-        return fail("a chunk is not where the index says, or the file is cut off");
+        return fail("missing chunk at the position in the index: the file is damaged or truncated");
     Fields fields(bytes);
-    if (fields.get<std::uint8_t>() != op_chunk) return fail("a chunk is not where the index says");
+    if (fields.get<std::uint8_t>() != op_chunk) return fail("missing chunk at the position in the index");
     Fields content(fields.blob());
     content.get<std::uint64_t>();
     content.get<std::uint64_t>();

@@ -299,7 +299,7 @@ TEST_F(Devices, Mailbox_device_answers_ARP_and_echo_once_it_has_an_address) {
     EXPECT_EQ(exchange(ask_mac), joined({host, own, {8, 6, 0, 1, 8, 0, 6, 4, 0, 2}, own, own_ip, host, host_ip, Bytes(18)}));
     Bytes other = ask_mac;
     other[41] = 11;
-    EXPECT_TRUE(exchange(other).empty()) << "the address of somebody else";
+    EXPECT_TRUE(exchange(other).empty()) << "the address of another host";
 
     // Echo request with 300 bytes; checksums computed by hand: 0x0000 - sum over the words.
     const auto summed = [](Bytes bytes, std::size_t at) {
