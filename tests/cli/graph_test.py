@@ -111,7 +111,7 @@ net back d.out => a.in0
         self.assertIn('bgcolor="#fff2a8"><b>b</b>', text)
         self.assertIn("← d.out z⁻¹", text)  # the writer of a.in0 is outside
         self.assertIn("→ cd +1", text)
-        self.assertIn("unlinked pins", text)
+        self.assertIn("unlinked pin<", text)
         self.assertEqual(["b"], self.instances("--around", "b", "--depth", "0")[1])
         self.assertEqual(["a", "b", "c", "d"], self.instances("--around", "b", "--depth", "2")[1])
 
@@ -164,7 +164,7 @@ net back d.out => a.in0
         self.assertNotIn(">FF0<", text)
         self.assertIn(">FF0<", self.good("graph", path, "--pins", "all"))
         self.good("graph", path, "-o", "axes.svg")
-        drawing = (self.folder / "axes.svg").read_text()
+        drawing = (self.folder / "axes.svg").read_text().replace("&#45;", "-")
         self.assertIn("enable-all", drawing)
         self.assertLess(len(drawing), 3_000_000)
 

@@ -299,11 +299,11 @@ std::uint32_t neighbour(const Bus& bus, const Device& d, unsigned port) noexcept
 }
 
 Task<void> watch(Channel& c, Bus& bus) noexcept {
-    std::uint64_t foreign = bus.status.foreign;
+    std::uint64_t foreign = bus.status.foreign_control;
     bool          other = false;
     while (true) {
         const std::int64_t  began = c.now_ns();
-        const std::uint64_t more = bus.status.foreign - std::exchange(foreign, bus.status.foreign);
+        const std::uint64_t more = bus.status.foreign_control - std::exchange(foreign, bus.status.foreign_control);
         const bool          was_other = std::exchange(other, more >= other_master_frames);
         if (other && !was_other) bus.report(Event::other_master, static_cast<std::int64_t>(more));
         for (const auto& device : bus.devices) {

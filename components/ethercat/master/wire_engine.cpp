@@ -23,6 +23,14 @@ constexpr bool only_reads(Command c) noexcept {
     return c == Command::aprd || c == Command::fprd || c == Command::brd || c == Command::lrd || c == Command::nop;
 }
 
+/// Returns whether a frame of another program exchanges process data, distributes time or requests states, as a master does; `hal ethercat`
+/// only reads beside a running master.
+bool controls_slaves(std::span<const std::uint8_t> bytes) noexcept {
+    const auto command = static_cast<Command>(bytes[first_datagram]);
+    return is_logical(command) || command == Command::frmw || command == Command::armw ||
+           (!only_reads(command) && get<std::uint16_t>(&bytes[first_datagram + 4]) == registers::al_control);
+}
+
 }  // namespace
 
 void WireEngine::attach(ethernet::Port& primary, ethernet::Port* backup) {
@@ -163,7 +171,10 @@ void WireEngine::arrived(std::span<const std::uint8_t> bytes, unsigned number) n
     if (bytes.size() < ethernet::smallest_frame || bytes[12] != ethertype >> 8 || bytes[13] != (ethertype & 0xff)) return;
     Flight& f = flights_[bytes[first_datagram + 1]];
     switch (f.kind) {
-    case Flight::Kind::none: f.merged ? ++status_.duplicates : ++status_.foreign; return;
+    case Flight::Kind::none:
+        if (f.merged) ++status_.duplicates;
+        else count_foreign(bytes);
+        return;
     case Flight::Kind::expired: ++status_.late; return;
     case Flight::Kind::cyclic:
         if (!image_.matches(image_.frames()[f.place], bytes)) break;
@@ -174,7 +185,12 @@ void WireEngine::arrived(std::span<const std::uint8_t> bytes, unsigned number) n
         return;
     case Flight::Kind::acyclic: return arrived_acyclic(f, bytes, number);
     }
+    count_foreign(bytes);
+}
+
+void WireEngine::count_foreign(std::span<const std::uint8_t> bytes) noexcept {
     ++status_.foreign;
+    status_.foreign_control += controls_slaves(bytes) ? 1 : 0;
 }
 
 /// Counts a copy of a frame in flight; the second one at the same port is a duplicate.
@@ -223,7 +239,7 @@ void WireEngine::arrived_acyclic(Flight& f, std::span<const std::uint8_t> bytes,
     };
     if (bytes.size() < frame.size || std::memcmp(&bytes[12], &frame.bytes[12], 4) != 0 ||
         !std::all_of(frame.items.begin(), frame.items.begin() + static_cast<std::ptrdiff_t>(frame.count), same)) {
-        ++status_.foreign;
+        count_foreign(bytes);
         return;
     }
     if (!accept(f, number)) return;

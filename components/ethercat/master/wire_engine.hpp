@@ -80,6 +80,7 @@ private:
     void         arrived(std::span<const std::uint8_t> bytes, unsigned number) noexcept;
     void         arrived_cyclic(Flight&, std::span<const std::uint8_t> bytes) noexcept;
     void         arrived_acyclic(Flight&, std::span<const std::uint8_t> bytes, unsigned number) noexcept;
+    void         count_foreign(std::span<const std::uint8_t> bytes) noexcept;
     bool         accept(Flight&, unsigned number) noexcept;
     void         complete_cyclic(Flight&, const std::uint8_t* answer) noexcept;
     void         complete_acyclic(Flight&) noexcept;

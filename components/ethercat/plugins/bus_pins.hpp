@@ -26,7 +26,7 @@ struct BusPins {
           incomplete(c, f, "cycles-incomplete", "cycles in which a slave that is started did not exchange its process data"),
           sent(c, f, "frames-sent", "frames sent"),
           lost(c, f, "frames-lost", "frames that did not return in time"),
-          foreign(c, f, "frames-foreign", "EtherCAT frames of another master, or damaged ones"),
+          foreign(c, f, "frames-foreign", "EtherCAT frames of other programs, or damaged ones"),
           dc_synchronised(c, f, "dc-synchronised", "every slave with a clock is within the window"),
           dc_deviation(c, f, "dc-sync-diff", "largest deviation of the slaves' clocks; 4294967295: no data", {.unit = "ns"}),
           phase(c, f, "pll-err", "how late the cycle begins on the grid of the reference clock", {.unit = "ns"}),
