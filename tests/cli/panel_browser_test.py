@@ -81,7 +81,7 @@ class Page(Case):
 
     def test_the_graph_shows_boxes_values_and_the_latency_of_a_reader(self):
         self.begin(netlist=WAVE + "loadrt sum2 names=next\naddf next servo\nnet total next.in0\n", view="graph?pin=total")
-        self.browser.wait("Number(document.querySelector('canvas').dataset.boxes) === 3 && Number(document.querySelector('canvas').dataset.values) >= 1")
+        self.browser.wait("Number(document.querySelector('canvas')?.dataset.boxes) === 3 && Number(document.querySelector('canvas')?.dataset.values) >= 1")
         self.browser.wait("/next\\.in0[^]*0 cycles/.test(document.querySelector('.floating').innerText)")
         self.assertIn("written by adder.out", self.browser.evaluate("document.querySelector('.floating').innerText"))
 
