@@ -11,7 +11,8 @@ failed=
 changed_before=$build/.changed-before
 sh "$root/tests/checks/clean_tree.sh" "$root" >"$changed_before"
 
-need gtest/gtest.h=libgtest-dev python3=python3 git=git python3-config=python3-dev pybind11/pybind11.h=pybind11-dev pugixml.hpp=libpugixml-dev \
+need gtest/gtest.h=libgtest-dev python3=python3 git=git python3-config=python3-dev pybind11/pybind11.h=pybind11-dev pugixml.hpp=libpugixml-dev zstd.h=libzstd-dev \
+    libwebsockets.h=libwebsockets-dev chromium=chromium \
     cmark-gfm.h=libcmark-gfm-dev cmark-gfm-core-extensions.h=libcmark-gfm-extensions-dev \
     /usr/lib/python3/dist-packages/can=python3-can /usr/lib/python3/dist-packages/msgpack=python3-msgpack \
     /usr/lib/python3/dist-packages/serial=python3-serial "$(python3 -c 'import os; print(os.__file__[:-6])' 2>/dev/null)/ensurepip=python3-venv" \
@@ -25,7 +26,7 @@ peers() {
     stamp_of_peers=$build/peers/installed
     wanted="$root $(cat "$root/tests/peers/requirements.txt")"
     if [ -f "$stamp_of_peers" ] && [ "$(cat "$stamp_of_peers")" = "$wanted" ]; then return; fi
-    say "installing the Python packages that tests/peers talks to (canopen, python-can, pysoem, kickcat, cyclonedds, rosbags) into build/peers"
+    say "installing the Python packages that tests/peers talks to (canopen, python-can, pysoem, kickcat, cyclonedds, rosbags, mcap) into build/peers"
     rm -rf "${build:?}/peers"
     if { python3 -m venv "$build/peers" && "$build/peers/bin/python" -m pip install --disable-pip-version-check --retries 1 --timeout 30 \
         -r "$root/tests/peers/requirements.txt"; } >"$build/peers.log" 2>&1 </dev/null; then
