@@ -16,7 +16,9 @@ using Lcec = hal::ethercat::MasterComponent<Names>;
 }  // namespace
 
 HAL_COMPONENT(Lcec, "lcec", "EtherCAT master with the names of LinuxCNC's lcec", R"(
-The component `ethercat` with the pins and functions of the lcec component, for netlists that exist. `ethercat-conf.xml`:
+The component `ethercat` with the pins and functions of the lcec component, for netlists that exist.
+
+`ethercat-conf.xml`:
 
     <masters>
       <master idx="0" appTimePeriod="1000000" refClockSyncCycles="-1">

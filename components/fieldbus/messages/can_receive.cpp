@@ -94,7 +94,7 @@ remains and the others are counted in `overwritten`; with `one-by-one` they wait
 
 With `ids=8` eight consecutive identifiers are received; `id-offset` is that of the newest message.
 
-    loadrt can_receive names=position link=sim:robot id=0x10a fields=a:s32,b:s32
+    loadrt can_receive link=sim:robot names=position id=0x10a fields=a:s32,b:s32
     addf position.update servo
     setp position.timeout 0.05
     net left-counts  <= position.a

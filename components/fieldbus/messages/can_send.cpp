@@ -95,7 +95,7 @@ are not those sent last (at the start: zeros). Each instance is a node of its
 own on a `sim:` bus, so the messages of several instances are sent in order of their identifiers, as by a controller with a buffer for each. With
 `ids=8` the pin `id-offset` selects one of eight consecutive identifiers.
 
-    loadrt can_send names=position link=sim:robot id=0x10a fields=a:s32,b:s32
+    loadrt can_send link=sim:robot names=position id=0x10a fields=a:s32,b:s32
     addf position.update servo
     setp position.period 0.01
     net left-counts  => position.a

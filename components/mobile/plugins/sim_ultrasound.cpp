@@ -90,13 +90,13 @@ recorded.
 
 The amplitude is that of the nearest surface in nine rays over 24 degrees. The floor plan is that of `sim_diff_base`.
 
-    loadrt sim_ultrasound names=head
-    loadrt can_send names=echo link=sim:yair id=0x310 ids=8 fields=s0:u8,s1:u8
-    addf head.update servo
+    loadrt sim_ultrasound names=sonar
+    loadrt can_send link=sim:yair names=echo id=0x310 ids=8 fields=s0:u8,s1:u8
+    addf sonar.update servo
     addf echo.update servo
-    net true-x     => head.x
-    net next-part  head.message   => echo.trigger
-    net part       head.id-offset => echo.id-offset
-    net amplitude0 head.sample-0  => echo.s0
-    net amplitude1 head.sample-1  => echo.s1
+    net true-x     => sonar.x
+    net next-part  sonar.message   => echo.trigger
+    net part       sonar.id-offset => echo.id-offset
+    net amplitude0 sonar.sample-0  => echo.s0
+    net amplitude1 sonar.sample-1  => echo.s1
 )")

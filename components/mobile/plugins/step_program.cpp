@@ -97,9 +97,10 @@ public:
 }  // namespace
 
 HAL_COMPONENT(StepProgram, "step_program", "Runs a program of steps with conditions and times", R"(
-A sequence in a text file, in the manner of a sequential function chart (IEC 61131-3):
+A sequence in a text file, in the manner of a sequential function chart (IEC 61131-3).
 
-    # match.program
+`match.program`:
+
     input  cord reached full          # bit pins that conditions read
     output drive collect              # bit pins that steps set
     step wait                         # the program begins in its first step
@@ -116,8 +117,8 @@ A sequence in a text file, in the manner of a sequential function chart (IEC 611
 At most one transition is taken per cycle. A pin `in-STEP` for each step is TRUE in that step. At most 64 inputs, 64 outputs, 128 steps and 32
 transitions per step. Names have a to z, 0 to 9 and `-`.
 
-    loadrt step_program names=match
+    loadrt step_program file=match.program names=match
     addf match.update servo
-    net cord => match.start
-    net drive <= match.run
+    net cord => match.cord
+    net drive <= match.drive
 )")

@@ -125,7 +125,7 @@ std::int64_t Bus::earliest() noexcept {
         }
         if (const Frame* f = n->outgoing.front()) first = std::min(first, std::max(f->time_ns, n->hold_until));
         else if (n->leaving) n->cut.store(true, std::memory_order_relaxed);
-        if (n->babble_period > 0) first = std::min(first, std::max(n->babble_at, n->hold_until));
+        if (n->babble_period > 0 && !n->cut.load(std::memory_order_relaxed)) first = std::min(first, std::max(n->babble_at, n->hold_until));
     }
     return first;
 }

@@ -266,7 +266,7 @@ TEST(EthercatConfig, Ethernet_over_EtherCAT_has_settings_for_the_slave_and_an_in
     EXPECT_EQ(two.eoe_switch.ip, 0xc0a80201U);
 
     const std::string usual =
-        "expected yes, dhcp, or an address with its prefix, as in 192.168.2.10/24; gateway ADDRESS, dns ADDRESS, mac "
+        "write yes, dhcp, or an address with its prefix, as in 192.168.2.10/24; gateway ADDRESS, dns ADDRESS, mac "
         "ADDRESS, interface NAME and host ADDRESS may follow";
     for (const char* wrong : {"192.168.2.10", "192.168.2.10/33", "192.168.2.10/24 gateway", "192.168.2.10/24 gateway x",
                               "yes gateway 10.0.0.1", "yes mac 01:00:00:00:00:01", "yes interface a/b", "maybe"})

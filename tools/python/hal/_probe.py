@@ -48,7 +48,7 @@ class probe:
     def __init__(self, names, every=1, batch_ms=20, buffer_ms=2000):
         self._core = _core.Probe([names] if isinstance(names, str) else list(names), every, batch_ms, buffer_ms)
         self._columns = self._core.columns()
-        self._waiting = []
+        self._waiting, self._lost = [], 0
 
     @property
     def units(self):
@@ -56,8 +56,8 @@ class probe:
 
     @property
     def lost(self):
-        """Rows lost since the probe was attached."""
-        return self._core.lost()
+        """Rows lost since the probe was attached; after close(), until then."""
+        return self._lost if self._core is None else self._core.lost()
 
     def unix_ns(self, time_ns):
         """Returns the Unix time of a time of the machine's clock."""
@@ -68,7 +68,7 @@ class probe:
         return [Rows(self._columns, *part) for part in self._core.next(int(timeout * 1000))]
 
     def close(self):
-        self._core = None
+        self._lost, self._core = self.lost, None
 
     def __iter__(self):
         return self

@@ -16,19 +16,19 @@ Divides ordinary CAN into time slots. A SYNC begins each cycle; a private slot b
 without waiting for any other; all nodes share the remaining slots by arbitration, and the private slots that are idle. A table, the same file for all
 nodes, defines slots and messages:
 
-```
-bitrate 1M
-cycle 10ms
-slots 20
-node clock A sync
-node motor A
-node panel A
-mode 0 run
-0 sync
-2 private motor 0x10A
-message position 0x10A fields a:s32,b:s32
-message lamp 0x300 node panel event 100ms fields on:u8
-```
+`robot.scocan`:
+
+    bitrate 1M
+    cycle 10ms
+    slots 20
+    node clock A sync
+    node motor A
+    node panel A
+    mode 0 run
+    0 sync
+    2 private motor 0x10A
+    message position 0x10A fields a:s32,b:s32
+    message lamp 0x300 node panel event 100ms fields on:u8
 
 A complete bus in memory, also on the virtual clock:
 

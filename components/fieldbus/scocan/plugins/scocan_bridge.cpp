@@ -62,6 +62,16 @@ HAL_COMPONENT(ScocanBridge, "scocan_bridge", "Bridge between a CAN bus with time
 A node with two controllers: an ordinary participant on `pc=`, which knows nothing of slots, takes part in the bus. Its frames are held and sent in the private
 slot that the table gives their identifier, only the newest of each, or else in shared slots; frames from the bus are forwarded at once.
 
+`robot.scocan`:
+
+    node clock A sync
+    node pc A bridge
+    mode 0 run
+    0 sync
+    2 private pc 0x10B
+
+The netlist:
+
     loadrt scocan_bridge link=sim:robot pc=udp:239.74.163.2:43113 config=robot.scocan node=pc
     addf scocan-bridge.0.receive bus
     addf scocan-bridge.0.transmit bus

@@ -26,6 +26,17 @@ HAL_COMPONENT(ScocanMonitor, "scocan_monitor", "Monitor of a CAN bus with time s
 Announces each private slot whose owner has not sent by the idle time of the table, by a frame with identifier 1 and the number of the slot: nodes of type B,
 which cannot detect that themselves, then share the rest of it. It counts idle slots and frames outside of their slots, and reports their senders by the table.
 
+`robot.scocan`:
+
+    node clock A sync
+    node motor A
+    node watch B monitor
+    mode 0 run
+    0 sync
+    2 private motor 0x10A
+
+The netlist:
+
     loadrt scocan_monitor link=sim:robot config=robot.scocan node=watch
     addf scocan-monitor.0.receive bus
     addf scocan-monitor.0.transmit bus

@@ -43,6 +43,17 @@ Sends the SYNC that begins each cycle. The node with the role `sync` in the tabl
 which no SYNC came, so that no cycle passes without one. A primary first listens for 3 cycles; when it returns, it takes over from the backup at a cycle whose
 counter is a multiple of 8. A primary that hears another one is on standby until that one is lost.
 
+`robot.scocan`:
+
+    node clock A sync
+    node spare A backup 1
+    node motor A
+    mode 0 run
+    0 sync
+    2 private motor 0x10A
+
+The netlist:
+
     loadrt scocan_sync link=sim:robot,sim:robot config=robot.scocan node=clock,spare
     addf scocan-sync.0.receive bus
     addf scocan-sync.1.receive bus
