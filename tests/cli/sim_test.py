@@ -79,7 +79,7 @@ class Sim(Case):
         wait_until(lambda: self.shell("getp", "servo.threadbeat", instance="long").stdout.strip() not in ("", "0"), "it runs")
         out, err = self.end(machine, signal.SIGINT)
         self.assertEqual((1, ""), (machine.returncode, out))
-        self.assertRegex(err, r"^simulated [\d.]+ s in .*; no faults\n$")
+        self.assertRegex(err, r"^simulated [\d.]+ m?s in .*; no faults\n$")
 
 
 if __name__ == "__main__":

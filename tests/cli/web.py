@@ -165,7 +165,8 @@ class Browser:
         return result.get("result", {}).get("value")
 
     def wait(self, expression):
-        return wait_until(lambda: self.evaluate(expression), expression)
+        # What the expression reads may not exist yet.
+        return wait_until(lambda: self.evaluate(f"(() => {{ try {{ return {expression}; }} catch {{ return false; }} }})()"), expression)
 
     def screenshot(self, path):
         path.write_bytes(base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"]))

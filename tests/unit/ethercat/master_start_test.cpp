@@ -194,7 +194,7 @@ TEST(EthercatMaster, Two_masters_that_begin_together_notice_each_other) {
     hal::ethercat::master::Master other(drives(1), second.mine, log, w.objects);
     w.begin(drives(1));
     other.attach(second);
-    for (unsigned n = 0; n < 6000; ++n) {
+    for (unsigned n = 0; n < 13000; ++n) {
         w.cycle();
         other.receive(w.now_ns), other.transmit(w.now_ns);
     }

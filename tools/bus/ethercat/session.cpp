@@ -52,7 +52,7 @@ bool EthercatSession::open(const EthercatOptions& options, bool objects) {
     master_->add(channel_);
     for (std::size_t n = 0; n < server_.workers(); ++n) master_->add(server_.channel(n));
     master_->attach(*port);
-    if (!until([&] { return master_->status().scanned; }, 2 * second)) {
+    if (!until([&] { return master_->status().scanned && master_->found() != 0; }, 2 * second)) {
         const auto& status = master_->status();
         if (status.responding == 0)
             return fail(options,
