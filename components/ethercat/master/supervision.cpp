@@ -13,9 +13,8 @@ constexpr std::int64_t  look_every_ns = 10 * millisecond, empty_retry_ns = 100 *
 constexpr std::int64_t  counters_every_ns = 1'000 * millisecond, clocks_every_ns = 100 * millisecond;
 constexpr std::uint16_t spare_station = 0x0fff;
 constexpr std::uint8_t  counter_high = 0x80;
-constexpr std::uint64_t other_master_frames = 10;  ///< in a second: fewer may be damaged ones
-constexpr std::uint64_t other_master_controls = 3;  ///< the same of frames that only a master sends
-constexpr unsigned      commands_last_s = 10;       ///< commands of `hal ethercat` that only read are not another master
+constexpr std::uint64_t other_master_frames = 10;  ///< in a second: fewer may be damaged or late ones
+constexpr unsigned      commands_last_s = 10;      ///< commands of `hal ethercat` that only read are not another master
 
 /// Finds the tree; `changed`: the ports may have changed since the slaves were identified.
 Task<void> find_ports(Channel& c, Bus& bus, bool changed) noexcept {
@@ -310,7 +309,7 @@ Task<void> watch(Channel& c, Bus& bus) noexcept {
         const std::uint64_t controls = bus.status.foreign_control - std::exchange(control, bus.status.foreign_control);
         seconds = more >= other_master_frames ? seconds + 1 : 0;
         const bool was_other = other;
-        other = controls >= other_master_controls || seconds > commands_last_s || (was_other && seconds != 0);
+        other = controls >= other_master_frames || seconds > commands_last_s || (was_other && seconds != 0);
         if (other && !was_other) bus.report(Event::other_master, static_cast<std::int64_t>(more));
         for (const auto& device : bus.devices) {
             Device& d = *device;
