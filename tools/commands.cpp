@@ -60,6 +60,8 @@
 #include "run/fmt.hpp"
 #include "run/run.hpp"
 #include "run/sim.hpp"
+#include "scope/scope.hpp"
+#include "scope/watch.hpp"
 #include "text/diagnostic.hpp"
 
 namespace hal::tools {
@@ -177,6 +179,8 @@ constexpr Subcommand table[] = {
     command<EthercatLineOptions, ON_BUS(run_node_ethercat)>("node ethercat", "FILE --link ADDRESS [--backup ADDRESS] [--for TIME]", "emulate a line of EtherCAT slaves on a network interface"),
     command<Options, ON_BUS(run_node_faults)>("node faults", "", "list the faults that simulated devices can inject"),
     command<TopOptions, run_top>("top", "", "show all instances on this machine and the network, their threads and faults"),
+    command<WatchOptions, run_watch>("watch", "NAME… [--for TIME] [--once]", "show values of a running instance live, with minimum, maximum and rate"),
+    command<ScopeOptions, run_scope>("scope", "NAME… [--trigger TRIGGER] [--pre TIME] [--post TIME] [--svg FILE] [--csv FILE] [--png FILE]", "show signals of a running instance over time, with trigger and measurements"),
     command<PanelOptions, ON_PANEL(run_panel)>("panel", "[FILE] [--write] [--listen ADDRESS]", "show a running machine in a web browser: values, graph, scope, user panels"),
     command<DoctorOptions, run_doctor>("doctor", "", "check whether this machine is fit for real time"),
     command<CompletionOptions, run_completion>("completion", "SHELL", "print a completion script: source <(hal completion bash)"),

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: MIT
+// The scope's picture in the terminal and what its keys change. Knows no terminal: tests give it keys and read its lines.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "cli/keys.hpp"
+#include "cli/raster.hpp"
+#include "scope/acquisition.hpp"
+
+namespace hal::tools {
+
+constexpr int divisions_x = 10, divisions_y = 8;
+
+/// How a channel is drawn.
+struct Trace {
+    double per_division = 1;  ///< of the channel's unit
+    double centre = 0;        ///< the value in the middle of the picture
+    bool shown = true;
+};
+
+class ScopeView {
+public:
+    /// Changes the acquisition by its keys. `colour` false: one colour, channels are marked by numbers only.
+    ScopeView(Acquisition& acquisition, bool unicode, bool colour);
+
+    enum class Action { none, quit, save };
+    Action key(const Key& key);
+    /// Draws columns x rows characters; at least 40 x 10, otherwise one line that asks for more. `lost`: samples.
+    std::vector<std::string> frame(std::size_t columns, std::size_t rows, std::uint64_t lost = 0);
+    /// Shows a sentence below the picture until the next key.
+    void say(std::string sentence) { message_ = std::move(sentence); }
+
+    /// Fits all channels into lanes, one above the other.
+    void fit_all();
+    /// Fits a channel into the whole height.
+    void fit(std::size_t channel);
+
+    const std::vector<Trace>& traces() const { return traces_; }
+    std::size_t selected() const { return selected_; }
+    /// Returns the record that is drawn: of the trigger, or the newest samples while there is none and in roll mode.
+    Record shown() const;
+    struct Cursors {
+        bool on = false;
+        int active = 0;
+        std::int64_t at_ns[2] = {0, 0};  ///< relative to the trigger
+    };
+    const Cursors& cursors() const { return cursors_; }
+
+private:
+    Action letter(char c);
+    void arrow(const Key& key);
+    void next_edge();
+    void move_level(double divisions);
+    void move_cursor(int samples);
+    void change_window(std::int64_t total_ns, std::int64_t pre_ns);
+    void fit_lane(std::size_t channel, double lane_divisions, double above_centre);
+    void select(std::size_t channel);
+
+    std::string status_line(const Record& record, std::uint64_t lost) const;
+    std::string channel_line(const Record& record, std::size_t channel) const;
+    void draw_grid(Raster& raster, const Record& record) const;
+    void draw_trace(Raster& raster, const Record& record, std::size_t channel) const;
+    std::uint8_t colour_of(std::size_t channel) const;
+
+    Acquisition& acquisition_;
+    bool unicode_, colour_;
+    std::vector<Trace> traces_;
+    std::size_t selected_ = 0;
+    Cursors cursors_;
+    bool measures_ = true, help_ = false, fitted_ = false;
+    std::string message_;
+};
+
+/// Returns the next larger (`up`) or smaller value of the series 1, 2, 5, 10 …; `value` > 0.
+double next_step(double value, bool up);
+
+}  // namespace hal::tools

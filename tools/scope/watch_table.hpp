@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <string>
+#include <vector>
+
+#include "scope/samples.hpp"
+
+namespace hal::tools {
+
+/// Values with their extremes and rates, over all samples since the last reset.
+class WatchTable {
+public:
+    explicit WatchTable(std::vector<Channel> channels) : channels_(std::move(channels)), rows_(channels_.size()) {}
+
+    void feed(std::size_t channel, Sample sample);
+    /// Forgets minimum and maximum.
+    void reset();
+    /// Returns a head and a line per channel: name, value, unit, minimum, maximum, change per second over the last second (of a bit: edges).
+    std::vector<std::string> lines() const;
+
+private:
+    struct Row {
+        bool any = false;
+        Sample last;
+        double min = 0, max = 0;
+        std::uint64_t edges = 0;
+        struct Mark {
+            Sample sample;
+            std::uint64_t edges;
+        };
+        std::deque<Mark> marks;  ///< each 100 ms, of the last second
+    };
+    std::vector<Channel> channels_;
+    std::vector<Row> rows_;
+};
+
+}  // namespace hal::tools
