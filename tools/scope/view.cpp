@@ -162,7 +162,7 @@ void ScopeView::move_level(double divisions) {
     if (!trigger || acquisition_.channels()[trigger->source].bit) return;
     const double fine = traces_[trigger->source].per_division * 0.1;
     trigger->level =
-        (std::round(trigger->level / fine) + divisions * 10) * fine;  // on a grid, so that up and down come back to the same level
+        (std::round(trigger->level / fine) + divisions * 10) * fine;  // on a grid, so that up and down return to the same level
     acquisition_.set_trigger(trigger);
 }
 
