@@ -54,7 +54,7 @@ void ScopeView::fit_lane(std::size_t channel, double lane_divisions, double abov
 void ScopeView::fit(std::size_t channel) { fit_lane(channel, divisions_y, 0); }
 
 void ScopeView::fit_all() {
-    const auto count = static_cast<double>(std::count_if(traces_.begin(), traces_.end(), [](const Trace& trace) { return trace.shown; }));
+    const auto count = static_cast<double>(std::count_if(traces_.begin(), traces_.end(), [](const ChannelView& trace) { return trace.shown; }));
     const double lane = divisions_y / std::max(count, 1.0);
     double above = divisions_y / 2.0 - lane / 2;
     for (std::size_t i = 0; i < traces_.size(); ++i)
@@ -91,7 +91,7 @@ ScopeView::Action ScopeView::key(const Key& key) {
 ScopeView::Action ScopeView::letter(char c) {
     const std::int64_t total = acquisition_.pre_ns() + acquisition_.post_ns(), pre = acquisition_.pre_ns();
     const bool running = acquisition_.state() != State::stopped;
-    Trace& trace = traces_[selected_];
+    ChannelView& trace = traces_[selected_];
     switch (c) {
     case 'q': return Action::quit;
     case 'w': return Action::save;

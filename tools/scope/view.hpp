@@ -15,7 +15,7 @@ namespace hal::tools {
 constexpr int divisions_x = 10, divisions_y = 8;
 
 /// How a channel is drawn.
-struct Trace {
+struct ChannelView {
     double per_division = 1;  ///< of the channel's unit
     double centre = 0;        ///< the value in the middle of the picture
     bool shown = true;
@@ -38,7 +38,7 @@ public:
     /// Fits a channel into the whole height.
     void fit(std::size_t channel);
 
-    const std::vector<Trace>& traces() const { return traces_; }
+    const std::vector<ChannelView>& traces() const { return traces_; }
     std::size_t selected() const { return selected_; }
     /// Returns the record that is drawn: of the trigger, or the newest samples while there is none and in roll mode.
     Record shown() const;
@@ -67,7 +67,7 @@ private:
 
     Acquisition& acquisition_;
     bool unicode_, colour_;
-    std::vector<Trace> traces_;
+    std::vector<ChannelView> traces_;
     std::size_t selected_ = 0;
     Cursors cursors_;
     bool measures_ = true, help_ = false, fitted_ = false;

@@ -88,7 +88,7 @@ std::string ScopeView::status_line(const Record& record, std::uint64_t lost) con
 
 std::string ScopeView::channel_line(const Record& record, std::size_t channel) const {
     const Channel& about = acquisition_.channels()[channel];
-    const Trace& trace = traces_[channel];
+    const ChannelView& trace = traces_[channel];
     const Samples& samples = record.samples[channel];
     std::string text = fmt::format("{}{} {:<20} {:>10}/div{}  ", channel == selected_ ? ">" : " ", channel + 1, about.name,
                                    format_measured(trace.per_division, about.unit), trace.shown ? "" : " hidden");
@@ -128,7 +128,7 @@ void ScopeView::draw_grid(Raster& raster, const Record& record) const {
     };
     if (record.triggered) vertical(record.trigger_ns, 2, trigger_colour);
     if (const auto& trigger = acquisition_.trigger(); trigger && trigger->source < traces_.size() && acquisition_.mode() != Mode::roll) {
-        const Trace& trace = traces_[trigger->source];
+        const ChannelView& trace = traces_[trigger->source];
         const double middle = static_cast<double>(height - 1) / 2;
         const double y =
             std::round(middle - (trigger->level - trace.centre) / trace.per_division * static_cast<double>(height) / divisions_y);
@@ -140,7 +140,7 @@ void ScopeView::draw_grid(Raster& raster, const Record& record) const {
 }
 
 void ScopeView::draw_trace(Raster& raster, const Record& record, std::size_t channel) const {
-    const Trace& trace = traces_[channel];
+    const ChannelView& trace = traces_[channel];
     const bool stepped = acquisition_.channels()[channel].stepped;
     const double per_ns =
         static_cast<double>(raster.width() - 1) / static_cast<double>(std::max<std::int64_t>(record.end_ns - record.begin_ns, 1));
