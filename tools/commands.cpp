@@ -63,6 +63,7 @@
 #include "scope/scope.hpp"
 #include "scope/watch.hpp"
 #include "text/diagnostic.hpp"
+#include "trace/trace.hpp"
 
 namespace hal::tools {
 
@@ -181,6 +182,7 @@ constexpr Subcommand table[] = {
     command<TopOptions, run_top>("top", "", "show all instances on this machine and the network, their threads and faults"),
     command<WatchOptions, run_watch>("watch", "NAME… [--for TIME] [--once]", "show values of a running instance live, with minimum, maximum and rate"),
     command<ScopeOptions, run_scope>("scope", "NAME… [--trigger TRIGGER] [--pre TIME] [--post TIME] [--svg FILE] [--csv FILE] [--png FILE]", "show signals of a running instance over time, with trigger and measurements"),
+    command<TraceOptions, run_trace>("trace", "FILE [--for TIME] [--on-overrun|--on-fault [--keep TIME]] [--sched]", "record what the threads of a running instance run, as a Perfetto timeline"),
     command<PanelOptions, ON_PANEL(run_panel)>("panel", "[FILE] [--write] [--listen ADDRESS]", "show a running machine in a web browser: values, graph, scope, user panels"),
     command<DoctorOptions, run_doctor>("doctor", "", "check whether this machine is fit for real time"),
     command<CompletionOptions, run_completion>("completion", "SHELL", "print a completion script: source <(hal completion bash)"),

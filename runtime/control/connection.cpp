@@ -55,6 +55,7 @@ constexpr Verb verbs[] = {
     {"probe", &Connection::State::probe, "every batch_ms buffer_ms "},
     {"unprobe", &Connection::State::unprobe, ""},
     {"journal", &Connection::State::journal, ""},
+    {"trace", &Connection::State::trace, ""},
     {"list", &Connection::State::list, "patterns "},
     {"describe", &Connection::State::describe_kind, "patterns type histograms "},
     {"complete", &Connection::State::complete, "cursor "},
@@ -110,7 +111,7 @@ Connection::~Connection() {
 void Connection::on_event(std::function<void(std::string)> take) { state_->event = std::move(take); }
 
 bool Connection::idle() const {
-    if (state_->engaged || !state_->subscriptions.empty() || !state_->probes.empty()) return false;
+    if (state_->engaged || !state_->subscriptions.empty() || !state_->probes.empty() || state_->traces.on()) return false;
     const auto lock = state_->session.lock();
     return !state_->session.programs().answers(state_->owner);
 }
@@ -175,11 +176,14 @@ bool Connection::cancels(std::string_view line) {
 
 void Connection::cancel(bool on) { state_->shell.cancel(on); }
 
-std::int64_t Connection::next_due_ns() const { return std::min(state_->subscriptions.next_due_ns(), state_->probes.next_due_ns()); }
+std::int64_t Connection::next_due_ns() const {
+    return std::min({state_->subscriptions.next_due_ns(), state_->probes.next_due_ns(), state_->traces.next_due_ns()});
+}
 
 void Connection::publish(std::int64_t now_ns, bool congested, std::string& events) {
     state_->subscriptions.publish(state_->session, now_ns, congested, events);
     state_->probes.publish(now_ns, congested, events);
+    state_->traces.publish(now_ns, congested, events);
 }
 
 std::uint64_t Connection::requests() const { return state_->requests; }

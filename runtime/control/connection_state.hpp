@@ -16,6 +16,7 @@
 #include "control/connection.hpp"
 #include "control/request.hpp"
 #include "control/subscriptions.hpp"
+#include "control/trace_feed.hpp"
 #include "machine/programs.hpp"
 #include "machine/session.hpp"
 
@@ -32,6 +33,7 @@ struct Connection::State {
     const std::uint64_t owner = session.programs().new_owner();  ///< of the components that this client answers for
     Subscriptions subscriptions;
     ProbeFeeds probes{session};
+    TraceFeed traces{session};
     std::atomic<std::uint64_t> requests{0}, rubbish{0};
     std::atomic<bool> engaged{false};  ///< a request is being executed, or `begin` is open since the last one
     // What follows, and the shell's members beside cancel(), belong to the thread in handle().
@@ -50,6 +52,7 @@ struct Connection::State {
     void probe(const Json& body, std::string& reply);
     void unprobe(const Json& body, std::string& reply);
     void journal(const Json& body, std::string& reply);
+    void trace(const Json& body, std::string& reply);
     void list(const Json& body, std::string& reply);
     void describe_kind(const Json& body, std::string& reply);
     void complete(const Json& body, std::string& reply);

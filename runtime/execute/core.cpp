@@ -45,6 +45,7 @@ void Core::cycle(std::int64_t grid_ns, std::int64_t due_ns, std::int64_t woke_ns
     grid_ns_ = grid_ns;
     info_.start_ns = due_ns;
     std::int64_t end_ns = woke_ns;
+    tracing_ = trace_.load(std::memory_order_acquire);
     if (measure_) {
         due_.store(due_ns, std::memory_order_release);
         busy_since_.store(woke_ns, std::memory_order_release);
@@ -60,6 +61,8 @@ void Core::cycle(std::int64_t grid_ns, std::int64_t due_ns, std::int64_t woke_ns
         output();
         if (probes_) sample_probes();
         answer();
+        if (tracing_) [[unlikely]]
+            tracing_->put(woke_ns, monotonic_ns(), info_.number, static_cast<std::uint32_t>(std::clamp<std::int64_t>(woke_ns - due_ns, 0, UINT32_MAX)), TraceEvent::cycle);
     }
     ++info_.number;
     finished_.store(end_ns, std::memory_order_release);
@@ -107,6 +110,10 @@ void Core::warm(std::int64_t until_ns) const noexcept {
 }
 
 void Core::skip(std::uint64_t periods) noexcept {
+    if (TraceRing* const tracing = trace_.load(std::memory_order_acquire)) {
+        const std::int64_t now_ns = monotonic_ns();
+        tracing->put(now_ns, now_ns, info_.number + periods, static_cast<std::uint32_t>(std::min<std::uint64_t>(periods, UINT32_MAX)), TraceEvent::missed);
+    }
     info_.number += periods;
     // first the deadline, then the number: missed_by() never counts a period twice
     due_.store(due_.load(std::memory_order_relaxed) + static_cast<std::int64_t>(periods) * period_ns_, std::memory_order_release);
@@ -119,7 +126,12 @@ void Core::skip(std::uint64_t periods) noexcept {
 void Core::take_over() noexcept {
     plan::Plan* const offered = inbox_.exchange(nullptr, std::memory_order_acq_rel);
     drain_writes();
-    if (offered) take(offered);
+    if (offered) {
+        TraceRing* const tracing = trace_.load(std::memory_order_acquire);
+        const std::int64_t begin_ns = tracing ? monotonic_ns() : 0;
+        take(offered);
+        if (tracing) tracing->put(begin_ns, monotonic_ns(), info_.number, 0, TraceEvent::plan);
+    }
     if (!probe_inbox_.load(std::memory_order_relaxed)) return;
     if (plan::ProbeSet* const probes = probe_inbox_.exchange(nullptr, std::memory_order_acq_rel)) {
         probes_ = probes->probes.empty() ? nullptr : probes;
@@ -200,7 +212,7 @@ void Core::run() noexcept {
             const plan::Row* row = plan_->rows.data();
             if (!measure_) {
                 run_rows(row, steps, steps + functions.back().end);
-            } else if (profile_every.load(std::memory_order_relaxed)) {
+            } else if (profile_every.load(std::memory_order_relaxed) || tracing_) {
                 for (const plan::Function& function : functions) run_timed(function, steps);
             } else {
                 const plan::Function& function = functions[sampled_];
@@ -250,7 +262,9 @@ void Core::run_steps(const plan::Step* first, const plan::Step* last) noexcept {
 void Core::run_timed(const plan::Function& function, const plan::Step* steps) noexcept {
     const std::int64_t begin = monotonic_ns();
     run_steps(steps + function.begin, steps + function.end);
-    const auto took = static_cast<std::int32_t>(std::min<std::int64_t>(monotonic_ns() - begin, INT32_MAX));
+    const std::int64_t end = monotonic_ns();
+    if (tracing_) tracing_->put(begin, end, info_.number, function.id, TraceEvent::function);
+    const auto took = static_cast<std::int32_t>(std::min<std::int64_t>(end - begin, INT32_MAX));
     plan::FunctionTimes& times = *function.times;
     store(times.time, took);
     const bool more = took > times.tmax.slot->s32;

@@ -10,6 +10,7 @@
 #include "execute/faults.hpp"
 #include "execute/histogram.hpp"
 #include "execute/timeline.hpp"
+#include "execute/trace.hpp"
 #include "hal/abi.h"
 #include "hal/clock.hpp"
 #include "hal/queue.hpp"
@@ -113,6 +114,9 @@ public:
     bool withdraw(Observation* observation) {
         return observation_.compare_exchange_strong(observation, nullptr, std::memory_order_acq_rel);
     }
+    /// Begins to record events in the ring, or ends it with nullptr. The ring must outlive the thread: a cycle that runs may still write to it.
+    void trace(TraceRing* ring) { trace_.store(ring, std::memory_order_release); }
+    bool traced() const { return trace_.load(std::memory_order_relaxed) != nullptr; }
     bool next_fault(FaultEvent& event) { return faults_.pop(event); }
     /// Returns true after the first pass of the thread, in which initf functions run.
     bool passed() const { return passed_.load(std::memory_order_acquire); }
@@ -163,6 +167,7 @@ private:
     FaultBoard& board_;
     Timeline& timeline_;
     const std::atomic<bool>& running_;
+    std::atomic<TraceRing*> trace_{nullptr};  // written by the session; nullptr: not traced
     const bool measure_;                  // false under the virtual clock: times are 0, so runs are identical
     std::atomic<plan::Plan*> inbox_{nullptr};         // written by the session, emptied by the thread
     std::atomic<std::uint64_t> taken_{0};             // written by the thread
@@ -192,6 +197,7 @@ private:
     FaultLimiter limiter_;                            // the thread's own
     plan::Plan* plan_ = nullptr;          // the rest is the thread's own
     plan::ProbeSet* probes_ = nullptr;
+    TraceRing* tracing_ = nullptr;        // trace_ during a cycle
     hal_cycle info_{};
     std::int64_t grid_ns_ = 0;            // position of the cycle that runs
     const plan::Step* volatile current_ = nullptr;

@@ -226,6 +226,8 @@ std::int64_t Executor::now_ns() const { return virtual_ ? clock_.now_ns() : mono
 
 Granted Executor::granted(const Core& core) const { return runner(core).granted; }
 
+int Executor::tid(const Core& core) const { return runner(core).tid; }
+
 std::int64_t Executor::spin_ns(const Core& core) const { return runner(core).spin_ns(); }
 
 std::uint64_t Executor::page_faults(const Core& core) const { return virtual_ ? 0 : runner(core).page_faults(); }

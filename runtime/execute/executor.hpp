@@ -61,6 +61,8 @@ public:
     bool is_virtual() const { return virtual_; }
 
     Granted granted(const Core& core) const;
+    /// Returns the number that the system gave the thread; 0 under the virtual clock.
+    int tid(const Core& core) const;
     std::int64_t spin_ns(const Core& core) const;
     /// Returns the number of page faults in the thread's cycles since its 100th.
     std::uint64_t page_faults(const Core& core) const;

@@ -62,6 +62,7 @@ const SessionOptions& Session::options() const { return state_->options; }
 const Model& Session::model() const { return state_->model; }
 Probes& Session::probes() { return state_->probes; }
 Journal& Session::journal() { return state_->journal; }
+Traces& Session::traces() { return state_->traces; }
 Absences& Session::absences() { return state_->absences; }
 
 Transaction Session::begin() {

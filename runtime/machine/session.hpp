@@ -27,6 +27,7 @@
 #include "machine/probes.hpp"
 #include "machine/reports.hpp"
 #include "machine/thread_control.hpp"
+#include "machine/traces.hpp"
 #include "machine/transaction.hpp"
 
 namespace hal {
@@ -77,6 +78,7 @@ public:
     LiveValues& values() { return values_; }
     Probes& probes();
     Journal& journal();
+    Traces& traces();
     Reports& reports() { return reports_; }
     const Reports& reports() const { return reports_; }
     const PluginHost& host() const { return host_; }

@@ -19,6 +19,7 @@
 #include "machine/plugins.hpp"
 #include "machine/probes.hpp"
 #include "machine/session.hpp"
+#include "machine/traces.hpp"
 
 namespace hal {
 
@@ -56,6 +57,7 @@ struct SessionState {
     Probes probes{*this};
     FaultLog faults{*this};
     Journal journal{*this};
+    Traces traces{*this};
     hal_status status{sizeof status, nullptr, nullptr};  ///< for plugins
     std::vector<std::string> refused;        ///< by the system: "memory locking"
     bool shut = false;

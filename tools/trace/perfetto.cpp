@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: MIT
+#include "trace/perfetto.hpp"
+
+#include <algorithm>
+#include <fmt/core.h>
+
+namespace hal::tools {
+
+namespace {
+
+// Numbers of fields, by message.
+namespace trace { constexpr unsigned packet = 1; }
+namespace packet {
+constexpr unsigned ftrace_events = 1, clock_snapshot = 6, timestamp = 8, sequence = 10, track_event = 11, interned_data = 12, sequence_flags = 13, timestamp_clock = 58,
+                   defaults = 59, track_descriptor = 60;
+}
+namespace snapshot { constexpr unsigned clocks = 1, primary = 2, clock_id = 1, clock_timestamp = 2; }
+namespace descriptor {
+constexpr unsigned uuid = 1, name = 2, process = 3, thread = 4, parent = 5, counter = 8;
+constexpr unsigned process_pid = 1, process_name = 6, thread_pid = 1, thread_tid = 2, thread_name = 5, counter_unit = 3, counter_unit_name = 6;
+}
+namespace event { constexpr unsigned annotations = 4, type = 9, name_iid = 10, track = 11, name = 23, counter_value = 30; }
+namespace annotation { constexpr unsigned uint = 3, string = 6, name = 10; }
+namespace bundle {
+constexpr unsigned cpu = 1, event = 2, event_timestamp = 1, event_pid = 2, sched_switch = 4;
+constexpr unsigned prev_comm = 1, prev_pid = 2, prev_prio = 3, prev_state = 4, next_comm = 5, next_pid = 6, next_prio = 7;
+}
+
+constexpr std::uint64_t realtime = 1, monotonic = 3, boottime = 6;                    // clocks
+constexpr std::uint64_t slice_begin = 1, slice_end = 2, instant_event = 3, counter_event = 4;  // types of events
+constexpr std::uint64_t state_cleared = 1, needs_state = 2;                           // sequence flags
+constexpr std::uint64_t process_track = 1, journal_track = 2, own_sequence = 1;
+
+std::string packed(const Message& message) { return Message().message(trace::packet, message).bytes(); }
+
+Message packet_at(std::int64_t time_ns) {
+    Message message;
+    message.number(packet::timestamp, static_cast<std::uint64_t>(time_ns)).number(packet::sequence, own_sequence).number(packet::sequence_flags, needs_state);
+    return message;
+}
+
+Message clock_at(std::uint64_t id, std::int64_t time_ns) {
+    Message clock;
+    clock.number(snapshot::clock_id, id).number(snapshot::clock_timestamp, static_cast<std::uint64_t>(time_ns));
+    return clock;
+}
+
+std::string described(const Message& descriptor) {
+    Message message;
+    message.number(packet::sequence, own_sequence).message(packet::track_descriptor, descriptor);
+    return packed(message);
+}
+
+}  // namespace
+
+std::string PerfettoWriter::begin(const std::string& instance, std::int64_t pid, const ClockReading& clocks) {
+    pid_ = pid;
+    Message snapshot;
+    snapshot.message(snapshot::clocks, clock_at(realtime, clocks.realtime_ns))
+        .message(snapshot::clocks, clock_at(monotonic, clocks.monotonic_ns))
+        .message(snapshot::clocks, clock_at(boottime, clocks.boottime_ns))
+        .number(snapshot::primary, monotonic);
+    Message first;
+    first.message(packet::clock_snapshot, snapshot).number(packet::sequence, own_sequence);
+    Message defaults;
+    defaults.number(packet::timestamp_clock, monotonic);
+    Message second;
+    second.number(packet::sequence, own_sequence).number(packet::sequence_flags, state_cleared).message(packet::defaults, defaults);
+    Message process;
+    process.number(descriptor::process_pid, static_cast<std::uint64_t>(pid)).text(descriptor::process_name, "hal " + instance);
+    Message whole, journal;
+    whole.number(descriptor::uuid, process_track).message(descriptor::process, process);
+    journal.number(descriptor::uuid, journal_track).text(descriptor::name, "faults, edits, commands").number(descriptor::parent, process_track);
+    return packed(first) + packed(second) + described(whole) + described(journal);
+}
+
+std::uint64_t PerfettoWriter::track(const TraceThread& thread, std::string& out) {
+    const auto [at, fresh] = threads_.emplace(thread.tid, next_track_);
+    if (!fresh) return at->second;
+    ++next_track_;
+    Message about, whole;
+    about.number(descriptor::thread_pid, static_cast<std::uint64_t>(pid_)).number(descriptor::thread_tid, static_cast<std::uint64_t>(thread.tid)).text(descriptor::thread_name, thread.name);
+    whole.number(descriptor::uuid, at->second).number(descriptor::parent, process_track).message(descriptor::thread, about);
+    out += described(whole);
+    return at->second;
+}
+
+/// A name that is new goes into the packet that uses it first.
+std::uint64_t PerfettoWriter::interned(const std::string& name, Message& to) {
+    const auto [at, fresh] = names_.emplace(name, names_.size() + 1);
+    if (fresh) {
+        Message entry, data;
+        entry.number(1, at->second).text(2, name);
+        data.message(2, entry);
+        to.message(packet::interned_data, data);
+    }
+    return at->second;
+}
+
+void PerfettoWriter::slice(std::string& out, std::uint64_t track, std::int64_t begin_ns, const std::string& name, const std::vector<Annotation>& annotations) {
+    Message message = packet_at(begin_ns), event;
+    event.number(event::type, slice_begin).number(event::name_iid, interned(name, message)).number(event::track, track);
+    for (const Annotation& one : annotations) {
+        Message annotation;
+        annotation.text(annotation::name, one.name).number(annotation::uint, one.value);
+        event.message(event::annotations, annotation);
+    }
+    out += packed(message.message(packet::track_event, event));
+}
+
+void PerfettoWriter::end(std::string& out, std::uint64_t track, std::int64_t time_ns) {
+    Message message = packet_at(time_ns), event;
+    event.number(event::type, slice_end).number(event::track, track);
+    out += packed(message.message(packet::track_event, event));
+}
+
+void PerfettoWriter::mark(std::string& out, std::uint64_t track, std::int64_t time_ns, const std::string& name, const std::vector<Annotation>& annotations,
+                          const std::string& text) {
+    Message message = packet_at(time_ns), event;
+    event.number(event::type, instant_event).number(event::name_iid, interned(name, message)).number(event::track, track);
+    for (const Annotation& one : annotations) {
+        Message annotation;
+        annotation.text(annotation::name, one.name).number(annotation::uint, one.value);
+        event.message(event::annotations, annotation);
+    }
+    if (!text.empty()) {
+        Message annotation;
+        annotation.text(annotation::name, "text").text(annotation::string, text);
+        event.message(event::annotations, annotation);
+    }
+    out += packed(message.message(packet::track_event, event));
+}
+
+std::string PerfettoWriter::events(const TraceThread& thread, const std::vector<ThreadEvent>& events, std::uint64_t lost) {
+    std::string out;
+    const std::uint64_t to = track(thread, out);
+    std::vector<ThreadEvent>& open = open_[thread.tid];
+    const auto inner = [&](const ThreadEvent& one) {
+        const auto named = functions_.find(one.id);
+        const std::string name = one.kind == ThreadEvent::plan ? "take new plan" : named != functions_.end() ? named->second : fmt::format("function {}", one.id);
+        slice(out, to, one.begin_ns, name, {});
+        end(out, to, one.end_ns);
+    };
+    for (const ThreadEvent& one : events) {
+        if (one.kind == ThreadEvent::missed) {
+            mark(out, to, one.begin_ns, "missed periods", {{"periods", one.id}, {"next_cycle", one.cycle_number}});
+        } else if (one.kind != ThreadEvent::cycle) {
+            open.push_back(one);
+        } else {
+            // What ended before the cycle began (a plan taken between two cycles) stands for itself.
+            const auto within = std::stable_partition(open.begin(), open.end(), [&](const ThreadEvent& other) { return other.begin_ns < one.begin_ns; });
+            std::for_each(open.begin(), within, inner);
+            slice(out, to, one.begin_ns, "cycle", {{"cycle", one.cycle_number}, {"latency_ns", one.id}});
+            std::for_each(within, open.end(), inner);
+            end(out, to, one.end_ns);
+            const std::int64_t took_ns = one.end_ns - one.begin_ns;
+            if (took_ns + one.id > thread.period_ns)
+                mark(out, to, one.end_ns, "overrun", {{"cycle", one.cycle_number}, {"latency_ns", one.id}, {"execution_ns", static_cast<std::uint64_t>(took_ns)}});
+            out += counter(thread, "wake-up latency", one.begin_ns, one.id);
+            out += counter(thread, "execution time", one.begin_ns, took_ns);
+            open.clear();
+        }
+    }
+    if (lost > 0) mark(out, to, events.empty() ? 0 : events.back().end_ns, "lost events", {{"events", lost}});
+    return out;
+}
+
+std::string PerfettoWriter::instant(std::int64_t time_ns, const std::string& kind, const std::string& text) {
+    std::string out;
+    mark(out, journal_track, time_ns, kind, {}, text);
+    return out;
+}
+
+std::string PerfettoWriter::counter(const TraceThread& thread, const std::string& name, std::int64_t time_ns, std::int64_t value, const char* unit) {
+    std::string out;
+    const auto [at, fresh] = counters_.emplace(std::pair(thread.tid, name), next_track_);
+    if (fresh) {
+        ++next_track_;
+        Message about, whole;
+        about.text(descriptor::counter_unit_name, unit);
+        if (std::string_view(unit) == "ns") about.number(descriptor::counter_unit, 1);
+        whole.number(descriptor::uuid, at->second).text(descriptor::name, thread.name + " " + name).number(descriptor::parent, process_track).message(descriptor::counter, about);
+        out += described(whole);
+    }
+    Message message = packet_at(time_ns), event;
+    event.number(event::type, counter_event).number(event::track, at->second).number(event::counter_value, static_cast<std::uint64_t>(value));
+    return out + packed(message.message(packet::track_event, event));
+}
+
+std::string PerfettoWriter::switches(const std::vector<Switch>& all) {
+    std::map<int, Message> bundles;
+    for (const Switch& one : all) {
+        Message change, event;
+        change.text(bundle::prev_comm, one.previous_name)
+            .number(bundle::prev_pid, static_cast<std::uint64_t>(one.previous_tid))
+            .number(bundle::prev_prio, static_cast<std::uint64_t>(one.previous_priority))
+            .number(bundle::prev_state, static_cast<std::uint64_t>(one.previous_state))
+            .text(bundle::next_comm, one.next_name)
+            .number(bundle::next_pid, static_cast<std::uint64_t>(one.next_tid))
+            .number(bundle::next_prio, static_cast<std::uint64_t>(one.next_priority));
+        event.number(bundle::event_timestamp, static_cast<std::uint64_t>(one.time_ns))
+            .number(bundle::event_pid, static_cast<std::uint64_t>(one.previous_tid))
+            .message(bundle::sched_switch, change);
+        Message& bundle = bundles[one.cpu];
+        if (bundle.bytes().empty()) bundle.number(bundle::cpu, static_cast<std::uint64_t>(one.cpu));
+        bundle.message(bundle::event, event);
+    }
+    std::string out;
+    for (const auto& [cpu, bundle] : bundles) {
+        Message message;
+        message.message(packet::ftrace_events, bundle).number(packet::sequence, own_sequence + 1);
+        out += packed(message);
+    }
+    return out;
+}
+
+}  // namespace hal::tools

@@ -1,0 +1,273 @@
+// SPDX-License-Identifier: MIT
+// `hal trace FILE`: a timeline of what the threads of a running instance ran, for ui.perfetto.dev.
+#include "trace/trace.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cstring>
+#include <ctime>
+#include <deque>
+#include <fcntl.h>
+#include <fmt/core.h>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <poll.h>
+#include <unistd.h>
+
+#include "cli/output.hpp"
+#include "cli/signals.hpp"
+#include "control/client.hpp"
+#include "text/numbers.hpp"
+#include "trace/perfetto.hpp"
+#include "trace/sched.hpp"
+
+namespace hal::tools {
+
+namespace {
+
+using nlohmann::json;
+using Clock = std::chrono::steady_clock;
+constexpr std::int64_t default_keep_ns = 5'000'000'000;
+constexpr auto times_period = std::chrono::milliseconds(100);
+
+std::int64_t now_ns(clockid_t clock) {
+    timespec now{};
+    ::clock_gettime(clock, &now);
+    return now.tv_sec * 1'000'000'000 + now.tv_nsec;
+}
+
+/// What one look at the instance brought, before it is encoded: the ring keeps these.
+struct Chunk {
+    struct Part {
+        TraceThread thread;
+        std::vector<ThreadEvent> events;
+        std::uint64_t lost = 0;
+    };
+    struct Entry {
+        std::int64_t time_ns;
+        std::string kind, text;
+    };
+    std::int64_t time_ns = 0;  ///< when it came
+    std::vector<Part> parts;
+    std::vector<Entry> entries;
+    std::vector<Switch> switches;
+    std::vector<std::pair<TraceThread, ThreadTimes>> times;
+};
+
+/// What is printed at the end.
+struct Summary {
+    std::uint64_t cycles = 0, calls = 0, lost = 0, overruns = 0;
+    std::int64_t longest_ns = -1;  ///< from the due time of a cycle to its end
+    std::string thread, function;
+    std::uint64_t cycle = 0;
+    std::int64_t latency_ns = 0, execution_ns = 0, function_ns = 0;
+    std::map<int, ThreadEvent> slowest;  ///< function of the cycle that is not over yet, by tid
+
+    void add(const TraceThread& from, const ThreadEvent& event, const std::map<std::uint32_t, std::string>& names) {
+        if (event.kind == ThreadEvent::function) {
+            ++calls;
+            const auto [at, fresh] = slowest.emplace(from.tid, event);
+            if (!fresh && event.end_ns - event.begin_ns > at->second.end_ns - at->second.begin_ns) at->second = event;
+        }
+        if (event.kind != ThreadEvent::cycle) return;
+        ++cycles;
+        const std::int64_t took_ns = event.end_ns - event.begin_ns, late_ns = took_ns + event.id;
+        overruns += late_ns > from.period_ns;
+        if (late_ns > longest_ns) {
+            longest_ns = late_ns;
+            thread = from.name;
+            cycle = event.cycle_number;
+            latency_ns = event.id;
+            execution_ns = took_ns;
+            function.clear();
+            if (const auto at = slowest.find(from.tid); at != slowest.end()) {
+                function_ns = at->second.end_ns - at->second.begin_ns;
+                if (const auto named = names.find(at->second.id); named != names.end()) function = named->second;
+            }
+        }
+        slowest.erase(from.tid);
+    }
+};
+
+class Tracer {
+public:
+    explicit Tracer(const TraceOptions& options) : options_(options) {}
+    ~Tracer() {
+        if (file_ >= 0) ::close(file_);
+    }
+    Tracer(const Tracer&) = delete;
+    int run();
+
+private:
+    bool ring() const { return options_.on_overrun || options_.on_fault; }
+    bool attach();
+    void receive(int timeout_ms);
+    void take(const json& event, const std::string& payload, Chunk& chunk);
+    void keep(Chunk chunk);
+    bool write(const std::string& bytes) { return good_ = good_ && write_all(file_, bytes); }
+    bool write(const Chunk& chunk);
+    bool open();
+    int finish();
+
+    const TraceOptions& options_;
+    StopRequest stop_;
+    std::unique_ptr<Client> client_;
+    SchedulerEvents scheduler_;
+    PerfettoWriter writer_;
+    std::map<std::uint32_t, std::string> names_;
+    std::map<int, TraceThread> threads_;
+    std::deque<Chunk> kept_;
+    Summary summary_;
+    Clock::time_point next_times_ = Clock::now();
+    std::int64_t fired_ns_ = 0;  ///< when the overrun or fault came; 0: not yet
+    std::string cause_;
+    int file_ = -1;
+    bool good_ = true;
+};
+
+bool Tracer::attach() {
+    std::string problem;
+    client_ = Client::connect(instance_wanted(options_.name), problem);
+    if (!client_) return fail(options_, problem) == 0;
+    const json reply = client_->request({{"trace", true}});
+    if (!reply.value("ok", false)) return fail(options_, reply.value("error", "no answer")) == 0;
+    client_->request({{"journal", true}});
+    if (!options_.sched) return true;
+    if (const std::string why = scheduler_.open(); !why.empty())
+        fail(options_, fmt::format("no scheduler events: {}; the trace has the waiting times of the threads instead", why));
+    return true;
+}
+
+void Tracer::take(const json& event, const std::string& payload, Chunk& chunk) {
+    for (const auto& [id, name] : event.value("names", json::object()).items()) {
+        const auto number = parse_natural(id);
+        if (!number || !name.is_string()) continue;
+        names_[static_cast<std::uint32_t>(*number)] = name.get<std::string>();
+        writer_.name(static_cast<std::uint32_t>(*number), name.get<std::string>());
+    }
+    std::size_t at = 0;
+    for (const json& part : event.value("parts", json::array())) {
+        Chunk::Part one;
+        one.thread = {part.value("thread", ""), part.value("period_ns", std::int64_t{0}), part.value("tid", 0)};
+        one.lost = part.value("lost", std::uint64_t{0});
+        const auto count = part.value("count", std::size_t{0});
+        if (count > (payload.size() - at) / sizeof(ThreadEvent)) return;
+        one.events.resize(count);
+        std::memcpy(one.events.data(), payload.data() + at, count * sizeof(ThreadEvent));
+        at += count * sizeof(ThreadEvent);
+        threads_[one.thread.tid] = one.thread;
+        summary_.lost += one.lost;
+        for (const ThreadEvent& each : one.events) {
+            summary_.add(one.thread, each, names_);
+            const std::int64_t late_ns = each.end_ns - each.begin_ns + each.id;
+            if (options_.on_overrun && fired_ns_ == 0 && each.kind == ThreadEvent::cycle && late_ns > one.thread.period_ns) {
+                fired_ns_ = each.end_ns;
+                cause_ = fmt::format("cycle {} of '{}' ended {} after it was due (period {})", each.cycle_number, one.thread.name,
+                                     format_duration(static_cast<double>(late_ns)), format_duration(static_cast<double>(one.thread.period_ns)));
+            }
+        }
+        chunk.parts.push_back(std::move(one));
+    }
+}
+
+void Tracer::receive(int timeout_ms) {
+    Chunk chunk;
+    json event;
+    std::string payload;
+    while (client_->next_event(event, payload, timeout_ms)) {
+        timeout_ms = 0;
+        const std::string kind = event.value("event", "");
+        if (kind == "trace") take(event, payload, chunk);
+        if (kind != "journal") continue;
+        chunk.entries.push_back({event.value("time_ns", std::int64_t{0}), event.value("kind", ""), event.value("text", "")});
+        if (options_.on_fault && fired_ns_ == 0 && chunk.entries.back().kind == "fault") {
+            fired_ns_ = chunk.entries.back().time_ns;
+            cause_ = chunk.entries.back().text;
+        }
+    }
+    chunk.switches = scheduler_.take();
+    if (Clock::now() >= next_times_) {
+        next_times_ = Clock::now() + times_period;
+        for (const auto& [tid, thread] : threads_)
+            if (const auto times = thread_times(client_->pid(), tid)) chunk.times.emplace_back(thread, *times);
+    }
+    chunk.time_ns = now_ns(CLOCK_MONOTONIC);
+    if (chunk.parts.empty() && chunk.entries.empty() && chunk.switches.empty() && chunk.times.empty()) return;
+    if (ring()) keep(std::move(chunk));
+    else write(chunk);
+}
+
+void Tracer::keep(Chunk chunk) {
+    kept_.push_back(std::move(chunk));
+    const std::int64_t keep_ns = options_.keep_ns >= 0 ? options_.keep_ns : default_keep_ns;
+    if (fired_ns_ == 0)
+        while (kept_.front().time_ns < kept_.back().time_ns - keep_ns) kept_.pop_front();
+}
+
+bool Tracer::write(const Chunk& chunk) {
+    std::string bytes;
+    for (const Chunk::Part& part : chunk.parts) bytes += writer_.events(part.thread, part.events, part.lost);
+    for (const Chunk::Entry& entry : chunk.entries) bytes += writer_.instant(entry.time_ns, entry.kind, entry.text);
+    for (const auto& [thread, times] : chunk.times) {
+        bytes += writer_.counter(thread, "run time", chunk.time_ns, times.ran_ns);
+        bytes += writer_.counter(thread, "waited for a CPU", chunk.time_ns, times.waited_ns);
+    }
+    bytes += PerfettoWriter::switches(chunk.switches);
+    return write(bytes);
+}
+
+bool Tracer::open() {
+    const std::string& path = options_.words.front();
+    file_ = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+    if (file_ < 0) return fail(options_, fmt::format("cannot write '{}': {}", path, std::strerror(errno))) == 0;
+    return write(writer_.begin(client_->instance(), client_->pid(), {now_ns(CLOCK_MONOTONIC), now_ns(CLOCK_REALTIME), now_ns(CLOCK_BOOTTIME)}));
+}
+
+int Tracer::finish() {
+    if (ring() && fired_ns_ == 0) {
+        print(fmt::format("no {} in {} cycles; nothing was written\n", options_.on_overrun ? "overrun" : "fault", summary_.cycles));
+        return 0;
+    }
+    if (ring()) {
+        if (!open()) return 1;
+        for (const Chunk& chunk : kept_) write(chunk);
+    }
+    const std::string& path = options_.words.front();
+    if (!good_) return fail(options_, fmt::format("cannot write '{}': {}", path, std::strerror(errno)));
+    if (!cause_.empty()) print(cause_ + "\n");
+    print(fmt::format("wrote {}: {} cycles, {} function calls, {} overruns, {} events lost; open it in https://ui.perfetto.dev\n", path, summary_.cycles, summary_.calls,
+                      summary_.overruns, summary_.lost));
+    if (summary_.longest_ns < 0) return 0;
+    std::string line = fmt::format("latest end: cycle {} of '{}', {} after it was due: wake-up latency {}, execution {}", summary_.cycle, summary_.thread,
+                                   format_duration(static_cast<double>(summary_.longest_ns)), format_duration(static_cast<double>(summary_.latency_ns)),
+                                   format_duration(static_cast<double>(summary_.execution_ns)));
+    if (!summary_.function.empty()) line += fmt::format(", of it {} in {}", format_duration(static_cast<double>(summary_.function_ns)), summary_.function);
+    print(line + "\n");
+    return 0;
+}
+
+int Tracer::run() {
+    if (options_.words.size() != 1) return fail(options_, fmt::format("unexpected argument '{}'; type: hal trace {}", options_.words[1], options_.words[0]));
+    if (!ring() && options_.keep_ns >= 0) return fail(options_, "--keep needs --on-overrun or --on-fault");
+    if (!attach()) return 1;
+    if (!ring() && !open()) return 1;
+    const auto end = options_.for_ns >= 0 ? Clock::now() + std::chrono::nanoseconds(options_.for_ns) : Clock::time_point::max();
+    while (!stop_.requested() && good_ && Clock::now() < end && client_->connected()) {
+        pollfd waiting[] = {{client_->fd(), POLLIN, 0}, {stop_.fd(), POLLIN, 0}};
+        ::poll(waiting, 2, 20);
+        receive(0);
+        if (fired_ns_ != 0 && now_ns(CLOCK_MONOTONIC) > fired_ns_ + options_.after_ns) break;
+    }
+    if (client_->connected()) {
+        client_->request({{"trace", false}});
+        receive(0);
+    }
+    return finish();
+}
+
+}  // namespace
+
+int run_trace(const TraceOptions& options) { return Tracer(options).run(); }
+
+}  // namespace hal::tools
