@@ -175,7 +175,7 @@ void WireEngine::arrived(std::span<const std::uint8_t> bytes, unsigned number) n
         if (f.merged) ++status_.duplicates;
         else count_foreign(bytes);
         return;
-    case Flight::Kind::expired: ++status_.late; return;
+    case Flight::Kind::expired: return count_late();
     case Flight::Kind::cyclic:
         if (!image_.matches(image_.frames()[f.place], bytes)) break;
         if (accept(f, number)) arrived_cyclic(f, bytes);
@@ -188,7 +188,17 @@ void WireEngine::arrived(std::span<const std::uint8_t> bytes, unsigned number) n
     count_foreign(bytes);
 }
 
+void WireEngine::count_late() noexcept {
+    ++status_.late;
+    missing_ -= missing_ != 0 ? 1 : 0;
+}
+
+/// Counts a frame whose index is free, or that of another frame. As long as own frames are missing, one with the own address is taken for one
+/// of them: it returned after its index was used again.
 void WireEngine::count_foreign(std::span<const std::uint8_t> bytes) noexcept {
+    constexpr std::uint8_t set_by_slaves = 0x02;  // ETG.1000.4: the first one marks the source address as locally administered
+    const auto&            own = primary_->address();
+    if (missing_ != 0 && ((bytes[6] ^ own[0]) & ~set_by_slaves) == 0 && std::equal(own.begin() + 1, own.end(), bytes.begin() + 7)) return count_late();
     ++status_.foreign;
     status_.foreign_control += controls_slaves(bytes) ? 1 : 0;
 }
@@ -282,6 +292,12 @@ void WireEngine::complete_acyclic(Flight& f) noexcept {
     frame.free = true;
 }
 
+void WireEngine::expire(Flight& f) noexcept {
+    f.kind = Flight::Kind::expired;
+    --in_flight_;
+    missing_ += f.copies;
+}
+
 void WireEngine::expire() noexcept {
     const std::int64_t timeout = std::max(acyclic_timeout_ns, 2 * setup_.cycle_ns);
     for (Flight& f : flights_) {
@@ -289,12 +305,12 @@ void WireEngine::expire() noexcept {
             if (f.merged && backup_ != nullptr) {  // the other copy is late or lost: this cycle does without it
                 complete_cyclic(f, halves_[f.place].data());
             } else if (now_ns_ - f.sent_ns >= setup_.frame_timeout_ns) {
-                f.kind = Flight::Kind::expired, --in_flight_;
+                expire(f);
                 ++status_.lost;
             }
         } else if (f.kind == Flight::Kind::complete) {
             if (now_ns_ - f.sent_ns < setup_.frame_timeout_ns + setup_.cycle_ns) continue;
-            f.kind = Flight::Kind::expired, --in_flight_;
+            expire(f);
             ++status_.lost;
         } else if (f.kind == Flight::Kind::acyclic && (f.copies == 0 || now_ns_ - f.sent_ns >= timeout)) {
             if (f.copies != 0) ++status_.lost;
@@ -303,7 +319,7 @@ void WireEngine::expire() noexcept {
                 continue;
             }
             AcyclicFrame& frame = acyclic_[f.place];
-            f.kind = Flight::Kind::expired, --in_flight_;
+            expire(f);
             frame.free = true;
             for (std::size_t n = 0; n < frame.count; ++n) {
                 Channel& c = *frame.items[n].channel;

@@ -85,7 +85,9 @@ private:
     void         complete_cyclic(Flight&, const std::uint8_t* answer) noexcept;
     void         complete_acyclic(Flight&) noexcept;
     void         merge_acyclic(AcyclicFrame&, const std::uint8_t* second) noexcept;
+    void         count_late() noexcept;
     void         expire() noexcept;
+    void         expire(Flight&) noexcept;
     void         wake() noexcept;
     void         send_acyclic(unsigned frames, std::size_t bytes) noexcept;
     bool         pack(AcyclicFrame&, std::uint8_t index, bool& backup, std::size_t most, bool first) noexcept;
@@ -107,6 +109,7 @@ private:
     std::uint64_t                                              cycle_ = 0, resumed_ = 0;
     std::size_t                                                next_channel_ = 0;
     unsigned                                                   in_flight_ = 0;
+    std::uint64_t                                              missing_ = 0;  // copies of expired frames that have not returned
     int                                                        primary_wkc_ = -1;
     std::size_t                                                wire_bytes_ = SIZE_MAX;  // that fit a cycle, with a reserve
     std::uint8_t                                               next_index_ = 0;

@@ -203,6 +203,23 @@ TEST(EthercatMaster, Two_masters_that_begin_together_notice_each_other) {
     EXPECT_EQ(w.log.count(Event::no_slaves), 0U) << "the other master's frames are not answers";
 }
 
+TEST(EthercatMaster, Own_frames_that_return_after_hundreds_of_cycles_are_not_those_of_another_master) {
+    World w;
+    w.add(0x100);
+    w.begin(drives(1));
+    ASSERT_TRUE(w.operational()) << w.log.text();
+    for (const unsigned cycles : {5U, 90U, 300U, 1000U}) {
+        const std::uint64_t late = w.master->status().late;
+        w.primary.stalled = true;
+        for (unsigned n = 0; n < cycles; ++n) w.cycle();
+        w.primary.stalled = false;
+        for (unsigned n = 0; n < 3000; ++n) w.cycle();
+        EXPECT_GE(w.master->status().late, late + 1) << cycles;
+    }
+    EXPECT_EQ(w.log.count(Event::other_master), 0U) << w.log.text();
+    EXPECT_EQ(w.master->status().foreign, 0U);
+}
+
 TEST(EthercatMaster, Writes_only_mappings_that_differ_and_reads_them_back) {
     for (const bool assignment_first : {true, false}) {
         World w;

@@ -83,7 +83,7 @@ struct EndPort final : hal::ethernet::Port {
     esc::End end;
     EndPort* other = nullptr;         ///< at the other end of a ring
     EndPort* other_master = nullptr;  ///< on the same cable
-    bool up = true;
+    bool up = true, stalled = false;  ///< stalled: what arrives is received later
     std::deque<std::vector<std::uint8_t>> arrived;
     std::vector<std::uint8_t> current;
     hal::ethernet::Address mine{2, 0, 0, 0, 0, 1};
@@ -105,7 +105,7 @@ struct EndPort final : hal::ethernet::Port {
         return hal::ethernet::Sent::queued;
     }
     std::optional<hal::ethernet::Arrival> receive(std::int64_t now_ns) noexcept override {
-        if (arrived.empty()) return std::nullopt;
+        if (stalled || arrived.empty()) return std::nullopt;
         current = std::move(arrived.front());
         arrived.pop_front();
         return hal::ethernet::Arrival{current, now_ns};
