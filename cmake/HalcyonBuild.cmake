@@ -32,17 +32,15 @@ endif()
 if(HALCYON_SANITIZE)
     # Omits the checks that double the compile time: a null pointer ends the program anyway, and x86 and ARM load from any address.
     add_compile_options("-fsanitize=${HALCYON_SANITIZE}" -fno-sanitize=null,alignment -fno-sanitize-recover=all -fno-omit-frame-pointer -g1)
-    string(REPLACE "-O2" "-O1" CMAKE_CXX_FLAGS_RELEASE "${CMAKE_CXX_FLAGS_RELEASE}")
+    string(REPLACE "-O2" "-O0" CMAKE_CXX_FLAGS_RELEASE "${CMAKE_CXX_FLAGS_RELEASE}")  # optimising checks takes longer than running them
     add_link_options("-fsanitize=${HALCYON_SANITIZE}")
 endif()
 # The environment of a program that loads plugins. The leak checker takes a plugin's thread-local memory for what it is not, and dies of it,
 # depending on where the heap put it. Fast DDS frees some of its memory by another size than it took.
 set(HALCYON_SANITIZER_OPTIONS "ASAN_OPTIONS=intercept_tls_get_addr=0:new_delete_type_mismatch=0")
 set(HALCYON_TEST_OPTIONS -O0)  # for the tests' own sources: their assertions take longer to optimise than to run
-if(HALCYON_SANITIZE)
-    set(HALCYON_TOOL_OPTIONS -O0)  # for programs and their commands, which are not real time
-else()
-    set(HALCYON_TOOL_OPTIONS "$<$<CONFIG:Release>:-Os>")
+if(NOT HALCYON_SANITIZE)
+    set(HALCYON_TOOL_OPTIONS "$<$<CONFIG:Release>:-Os>")  # for programs and their commands, which are not real time
 endif()
 
 # Optional packages, a file of each, and for the script `hal` the part of the tree that needs it: a build configures again when one of them

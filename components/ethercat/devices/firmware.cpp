@@ -18,7 +18,7 @@ Firmware::Firmware(Design design, std::unique_ptr<Behaviour> behaviour) : design
     outputs_.attach(dictionary, static_cast<std::uint16_t>(coe::assignment + sm_out_), true, design_.most_output_bytes);
     inputs_.attach(dictionary, static_cast<std::uint16_t>(coe::assignment + sm_in_), false, design_.most_input_bytes);
     image_.resize(std::max({design_.most_output_bytes, design_.most_input_bytes, std::size_t{1}}));
-    for (auto* v : {&mail_, &newest_, &previous_}) v->resize(largest_mailbox);
+    for (auto* v : {&mail_, &newest_, &previous_, &taken_}) v->resize(largest_mailbox);
 }
 
 std::uint32_t Firmware::check(const DictionaryObject& o, const DictionaryEntry& e, std::span<const std::uint8_t> value) noexcept {

@@ -121,8 +121,8 @@ private:
     std::uint64_t              pulses_ = 0;
 
     Outbox                    outbox_;
-    std::vector<std::uint8_t> mail_, newest_, previous_;
-    std::size_t               newest_bytes_ = 0, previous_bytes_ = 0, receive_bytes_ = 0;
+    std::vector<std::uint8_t> mail_, newest_, previous_, taken_;  // taken_: the newest request
+    std::size_t               newest_bytes_ = 0, previous_bytes_ = 0, receive_bytes_ = 0, taken_bytes_ = 0;
     std::int64_t              answer_at_ns_ = 0;
     std::uint8_t              counter_ = 0;
     bool                      mailbox_running_ = false, repeat_ = false, resend_newest_ = false;

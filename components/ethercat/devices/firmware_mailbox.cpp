@@ -10,7 +10,7 @@ namespace hal::ethercat::devices {
 void Firmware::start_mailbox(const sii::Mailboxes& m) noexcept {
     outbox_.clear(m.send.size);
     receive_bytes_ = m.receive.size;
-    newest_bytes_ = previous_bytes_ = 0;
+    newest_bytes_ = previous_bytes_ = taken_bytes_ = 0;
     answer_at_ns_ = 0, counter_ = 0;
     repeat_ = resend_newest_ = false;
     mailbox_running_ = true;
@@ -41,6 +41,11 @@ void Firmware::receive_mail(esc::Pdi& pdi) noexcept {
     if (delay > 0) answer_at_ns_ = now_ns_ + delay;
     const auto refuse = [&](MailboxError error) { outbox_.send(MailboxType::error, write_mailbox_error(outbox_.payload(), error)); };
     if (!message) return refuse(MailboxError::invalid_size);
+    if (message->counter != 0 && n == taken_bytes_ && std::memcmp(taken_.data(), mail_.data(), n) == 0) {  // sent again: it is not executed twice
+        resend_newest_ = newest_bytes_ != 0;
+        return;
+    }
+    std::memcpy(taken_.data(), mail_.data(), taken_bytes_ = n);
     if (message->type == MailboxType::error) return;
     if (coe_ && message->type == MailboxType::coe && state_ != State::boot) return coe_->take(*message, state_, outbox_);
     for (auto& s : design_.services)

@@ -9,12 +9,12 @@ namespace {
 
 constexpr std::int64_t busy_pause_ns = 100'000'000;
 
-// Operation, packet. A duplicate of the answer before is not accepted, a wrong number is: it ends the transfer.
+// Operation, packet. Duplicates of earlier answers are not accepted, a number that is too large is: it ends the transfer.
 bool accepts_foe(const Expected& expected, std::span<const std::uint8_t> payload) noexcept {
     const auto message = foe::read(payload);
     if (!message) return false;
     if (message->opcode == foe::Opcode::error || message->opcode == foe::Opcode::busy) return true;
-    return static_cast<std::uint32_t>(message->opcode) == expected.first && message->value + 1 != expected.second;
+    return static_cast<std::uint32_t>(message->opcode) == expected.first && message->value >= expected.second;
 }
 
 std::size_t write_name(std::span<std::uint8_t> body, foe::Opcode opcode, std::uint32_t password, std::string_view name) noexcept {

@@ -13,8 +13,8 @@ constexpr std::int64_t  look_every_ns = 10 * millisecond, empty_retry_ns = 100 *
 constexpr std::int64_t  counters_every_ns = 1'000 * millisecond, clocks_every_ns = 100 * millisecond;
 constexpr std::uint16_t spare_station = 0x0fff;
 constexpr std::uint8_t  counter_high = 0x80;
-constexpr std::uint64_t other_master_frames = 10;  ///< in a second: fewer may be damaged or late ones
-constexpr unsigned      commands_last_s = 10;      ///< commands of `hal ethercat` that only read are not another master
+/// In a second: fewer may be damaged or late ones. Those of `hal ethercat`, which only reads beside a master, are no sign of another one.
+constexpr std::uint64_t other_master_frames = 10;
 
 /// Finds the tree; `changed`: the ports may have changed since the slaves were identified.
 Task<void> find_ports(Channel& c, Bus& bus, bool changed) noexcept {
@@ -301,15 +301,12 @@ std::uint32_t neighbour(const Bus& bus, const Device& d, unsigned port) noexcept
 
 Task<void> watch(Channel& c, Bus& bus) noexcept {
     std::uint64_t foreign = bus.status.foreign, control = bus.status.foreign_control;
-    unsigned      seconds = 0;  // with frames of another program
     bool          other = false;
     while (true) {
         const std::int64_t  began = c.now_ns();
         const std::uint64_t more = bus.status.foreign - std::exchange(foreign, bus.status.foreign);
         const std::uint64_t controls = bus.status.foreign_control - std::exchange(control, bus.status.foreign_control);
-        seconds = more >= other_master_frames ? seconds + 1 : 0;
-        const bool was_other = other;
-        other = controls >= other_master_frames || seconds > commands_last_s || (was_other && seconds != 0);
+        const bool was_other = std::exchange(other, controls >= other_master_frames || (other && more >= other_master_frames));
         if (other && !was_other) bus.report(Event::other_master, static_cast<std::int64_t>(more));
         for (const auto& device : bus.devices) {
             Device& d = *device;

@@ -23,12 +23,15 @@ constexpr bool only_reads(Command c) noexcept {
     return c == Command::aprd || c == Command::fprd || c == Command::brd || c == Command::lrd || c == Command::nop;
 }
 
-/// Returns whether a frame of another program exchanges process data, distributes time or requests states, as a master does; `hal ethercat`
-/// only reads beside a running master.
+/// Returns whether a frame of another program is that of a master: it exchanges process data, distributes time or sets registers. `hal ethercat`
+/// beside a running master only reads, for which it sets those of the EEPROM and latches receive times.
 bool controls_slaves(std::span<const std::uint8_t> bytes) noexcept {
     const auto command = static_cast<Command>(bytes[first_datagram]);
-    return is_logical(command) || command == Command::frmw || command == Command::armw ||
-           (!only_reads(command) && get<std::uint16_t>(&bytes[first_datagram + 4]) == registers::al_control);
+    if (is_logical(command) || command == Command::frmw || command == Command::armw) return true;
+    const auto address = get<std::uint16_t>(&bytes[first_datagram + 4]);
+    const bool of_reading =
+        (address >= registers::eeprom_configuration && address < registers::eeprom_data + 8) || address == registers::dc_receive_time;
+    return !only_reads(command) && !of_reading;
 }
 
 }  // namespace
@@ -198,7 +201,8 @@ void WireEngine::count_late() noexcept {
 void WireEngine::count_foreign(std::span<const std::uint8_t> bytes) noexcept {
     constexpr std::uint8_t set_by_slaves = 0x02;  // ETG.1000.4: the first one marks the source address as locally administered
     const auto&            own = primary_->address();
-    if (missing_ != 0 && ((bytes[6] ^ own[0]) & ~set_by_slaves) == 0 && std::equal(own.begin() + 1, own.end(), bytes.begin() + 7)) return count_late();
+    if (missing_ != 0 && ((bytes[6] ^ own[0]) & ~set_by_slaves) == 0 && std::equal(own.begin() + 1, own.end(), bytes.begin() + 7))
+        return count_late();
     ++status_.foreign;
     status_.foreign_control += controls_slaves(bytes) ? 1 : 0;
 }

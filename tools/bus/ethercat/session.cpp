@@ -93,7 +93,8 @@ bool EthercatSession::until(const std::function<bool()>& done, std::int64_t time
 }
 
 BusSlave* EthercatSession::chosen(const EthercatPositionOptions& options) {
-    if (size() == 0) return fail(options, "no slave answers; check the cable and the supply of the first slave"), nullptr;
+    if (!until([&] { return size() != 0; }, 2 * second))  // a line that paused is scanned again
+        return fail(options, "no slave answers; check the cable and the supply of the first slave"), nullptr;
     if (options.position < 0 && size() != 1)
         return fail(options, fmt::format("{} slaves on the bus; choose one with -p 0 … -p {}", size(), size() - 1)), nullptr;
     const auto position = static_cast<std::size_t>(options.position < 0 ? 0 : options.position);
