@@ -8,6 +8,18 @@ case ${1-} in
 esac
 tests=ON
 failed=
+laps=
+begun_at=$(date +%s)
+lap_at=$begun_at
+
+# lap WHAT: notes for the last lines how long that took.
+lap() {
+    now=$(date +%s)
+    laps="$laps
+    $(duration $((now - lap_at)))  $1"
+    lap_at=$now
+}
+
 changed_before=$build/.changed-before
 sh "$root/tests/checks/clean_tree.sh" "$root" >"$changed_before"
 
@@ -37,6 +49,7 @@ peers() {
     fi
 }
 peers
+lap preparing
 
 # run_tests TREE CTEST-ARGUMENT...: prints the closing lines of ctest and the whole output of what failed. What failed beside other tests
 # runs once more alone: on a shared machine, a test with real processes and real threads may get no CPU for seconds. It is listed when that
@@ -63,20 +76,24 @@ $(sed -n 's/^ *[0-9]*\/[0-9]* Test *#[0-9]*: \([^ ]*\) .*/    \1/p' "$log.again"
             fi
         fi
     fi
+    lap "testing build/$tree"
     reasons=$(python3 "$root/tests/skipped.py" "$log.xml")
     [ -z "$reasons" ] || say "left out, and why (which: build/$tree-tests.log):
 $reasons"
 }
 
 compile_release all bench
+lap "building build/release"
 run_tests release
 
 if [ "${1-}" != quick ]; then
     compile asan "everything under the address and undefined-behaviour sanitizers" all
+    lap "building build/asan"
     # Left out: what runs in user-mode-linux, whose addresses are where this sanitizer has its shadow.
     run_tests asan -LE 'check|docs|uml'
 
     compile tsan "what has threads under the thread sanitizer" unit_tests
+    lap "building build/tsan"
     # g++ 12's thread sanitizer cannot start where the kernel randomises addresses by more than 28 bits.
     if setarch -R true 2>/dev/null; then plain_addresses="setarch -R"; else plain_addresses=; fi
     ctest() { command $plain_addresses ctest "$@"; }
@@ -86,5 +103,6 @@ fi
 # A build and a test leave no file behind that git would see.
 sh "$root/tests/checks/clean_tree.sh" "$root" "$changed_before" || failed="$failed clean-tree"
 
+say "after $(duration $(($(date +%s) - begun_at))):$laps"
 if [ "$failed" ]; then die "failed:$failed"; fi
 say "all tests passed"
