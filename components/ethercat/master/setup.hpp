@@ -146,7 +146,7 @@ struct Setup {
     std::int64_t                 cycle_ns = 1'000'000;
     ClockLead                    lead = ClockLead::reference;
     std::optional<std::uint16_t> reference_slave;  ///< index of its Slave; not set: the first one with a 64-bit clock
-    std::int64_t                 frame_timeout_ns = 0;  ///< 0: until the next cycle
+    std::int64_t                 frame_timeout_ns = 0;  ///< 0: until the next cycle, and 2 ms or two cycles for what is not process data
     bool          accept_other_slaves = false;  ///< slaves on the bus that the setup does not name are left in PRE-OP, without a fault
     std::size_t   frame_bytes = 1514;  ///< longest frame, from the destination address on, without check sequence
     std::uint16_t most_slaves = 0;  ///< capacity of the bus; 0: the slaves named here and 64 more

@@ -13,7 +13,7 @@ constexpr std::int64_t  look_every_ns = 10 * millisecond, empty_retry_ns = 100 *
 constexpr std::int64_t  counters_every_ns = 1'000 * millisecond, clocks_every_ns = 100 * millisecond;
 constexpr std::uint16_t spare_station = 0x0fff;
 constexpr std::uint8_t  counter_high = 0x80;
-/// In a second: fewer may be damaged or late ones. Those of `hal ethercat`, which only reads beside a master, are no sign of another one.
+/// In a second: fewer may be damaged or late ones.
 constexpr std::uint64_t other_master_frames = 10;
 
 /// Finds the tree; `changed`: the ports may have changed since the slaves were identified.

@@ -303,7 +303,7 @@ void WireEngine::expire(Flight& f) noexcept {
 }
 
 void WireEngine::expire() noexcept {
-    const std::int64_t timeout = std::max(acyclic_timeout_ns, 2 * setup_.cycle_ns);
+    const std::int64_t timeout = std::max({acyclic_timeout_ns, 2 * setup_.cycle_ns, setup_.frame_timeout_ns});
     for (Flight& f : flights_) {
         if (f.kind == Flight::Kind::cyclic) {
             if (f.merged && backup_ != nullptr) {  // the other copy is late or lost: this cycle does without it

@@ -46,6 +46,7 @@ bool EthercatSession::open(const EthercatOptions& options, bool objects) {
     ethernet::Port* port = &access_.port();
     master::Setup setup;
     setup.cycle_ns = cycle_ns;
+    setup.frame_timeout_ns = 20'000'000;  // this program and an emulated line share the processor with others
     setup.most_slaves = most_slaves;
     setup.frame_bytes = ethernet::header_bytes + port->statistics().mtu;
     master_ = std::make_unique<master::Master>(setup, port->address(), static_cast<master::Events&>(*this), server_.coe());
