@@ -13,5 +13,3 @@
 #include <string>
 #include <string_view>
 #include <vector>
-
-#include "machine/session.hpp"

@@ -16,7 +16,7 @@ constexpr const char* type_colours[] = {"#b03030", "#2060a0", "#207040", "#50702
 constexpr const char* thread_colours[] = {"#cfe3ff", "#ffe2b8", "#d8f0c8", "#f3d0ee", "#fff3a8", "#d5d5f5", "#c8efe9", "#f7cfc8"};
 constexpr const char* centre_colour = " bgcolor=\"#fff2a8\"";
 
-std::string quoted(std::string_view text) {
+std::string dot_text(std::string_view text) {
     std::string out = "\"";
     for (const char c : text) {
         if (c == '"' || c == '\\') out += '\\';
@@ -39,7 +39,7 @@ public:
             "digraph {} {{\n    graph [rankdir=LR, fontname=\"sans-serif\", ranksep=1.2, nodesep=0.3, newrank=true];\n"
             "    node [shape=plain, fontname=\"sans-serif\", fontsize=10];\n    edge [fontname=\"sans-serif\", fontsize=9, "
             "arrowsize=0.6];\n",
-            quoted(title));
+            dot_text(title));
         for (const auto& thread : model.threads)
             colours_.emplace(thread.get(), thread_colours[colours_.size() % std::size(thread_colours)]);
         legend();
@@ -72,7 +72,7 @@ private:
             text_ += fmt::format(
                 "    subgraph {} {{\n    graph [label={}, labeljust=l, style=\"filled,rounded\", color=\"#b0b0b0\", "
                 "fillcolor=\"#f6f6f6\"];\n    node [style=filled, fillcolor=white];\n",
-                quoted("cluster " + name), quoted(name));
+                dot_text("cluster " + name), dot_text(name));
         for (const Instance* item : instances) instance(*item);
         if (!name.empty()) text_ += "    }\n";
     }
@@ -157,7 +157,7 @@ private:
         if (const auto known = ids_.find(&pin); known != ids_.end()) return known->second;
         const std::string node = fmt::format("t{}", ids_.size());
         ids_.emplace(&pin, node);
-        text_ += fmt::format("    {} [shape=box, height=0.2, margin=0.05, label={}];\n", node, quoted(pin.name));
+        text_ += fmt::format("    {} [shape=box, height=0.2, margin=0.05, label={}];\n", node, dot_text(pin.name));
         return node;
     }
 
@@ -187,8 +187,8 @@ private:
     void edge(const std::string& from, const std::string& to, const Signal& signal, const char* style, bool labelled, bool both) {
         // A value that is one cycle old runs against the order of execution: it does not count for the ranks.
         text_ += fmt::format("    {} -> {} [color=\"{}\", style={}, tooltip={}{}{}{}];\n", from, to,
-                             type_colours[static_cast<std::size_t>(signal.type)], style, quoted(signal.name),
-                             labelled ? ", label=" + quoted(signal.name) : "", both ? ", dir=both" : "",
+                             type_colours[static_cast<std::size_t>(signal.type)], style, dot_text(signal.name),
+                             labelled ? ", label=" + dot_text(signal.name) : "", both ? ", dir=both" : "",
                              std::string_view(style) == "dashed" ? ", headlabel=\"z⁻¹\", constraint=false" : "");
     }
 
@@ -196,7 +196,7 @@ private:
     std::string node_of(const Signal& item) {
         const std::string node = fmt::format("s{}", ids_.size());
         ids_.emplace(&item, node);
-        text_ += fmt::format("    {} [shape=ellipse, style=dashed, height=0.2, margin=0.03, label={}];\n", node, quoted(item.name));
+        text_ += fmt::format("    {} [shape=ellipse, style=dashed, height=0.2, margin=0.03, label={}];\n", node, dot_text(item.name));
         return node;
     }
 
