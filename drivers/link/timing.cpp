@@ -3,6 +3,8 @@
 // FD frames: stuffed up to the end of the data; stuff count and CRC have a fixed stuff bit before every four of their bits.
 #include "link/timing.hpp"
 
+#include <array>
+
 namespace hal::can {
 
 namespace {
@@ -11,32 +13,79 @@ constexpr unsigned classic_tail = 1 + 1 + 1 + 7 + intermission_bits;  // CRC del
 constexpr unsigned fd_tail = classic_tail - 1;                        // the CRC delimiter counts to the data phase
 constexpr unsigned crc_delimiter = 1;
 
-/// Counts the stuff bits of a frame and computes its CRC-15, bit by bit.
+constexpr std::uint32_t next_crc(std::uint32_t crc, unsigned bit) noexcept {
+    return (crc << 1 & 0x7fffU) ^ ((bit ^ (crc >> 14 & 1U)) != 0 ? 0x4599U : 0U);
+}
+
+/// Bits of equal value up to here, run 1..5 of 0 or of 1, as run | value << 3; and the stuff bits inserted on the way here.
+struct Run {
+    std::uint8_t state = 0;
+    std::uint8_t stuffed = 0;
+};
+constexpr Run next_run(Run r, unsigned bit) noexcept {
+    if ((r.state & 7U) == 5) r = {static_cast<std::uint8_t>((r.state & 8U) != 0 ? 1U : 9U), static_cast<std::uint8_t>(r.stuffed + 1U)};
+    const bool continues = r.state != 0 && r.state >> 3 == bit;
+    r.state = static_cast<std::uint8_t>((continues ? (r.state & 7U) + 1U : 1U) | bit << 3);
+    return r;
+}
+
+/// What eight bits at once do.
+struct Tables {
+    std::array<std::uint16_t, 256> crc{};
+    std::array<std::array<Run, 256>, 16> run{};
+};
+constexpr Tables tables = [] {
+    Tables t;
+    for (unsigned byte = 0; byte < 256; ++byte) {
+        std::uint32_t crc = 0;
+        for (unsigned bit = 8; bit-- > 0;) crc = next_crc(crc, byte >> bit & 1U);
+        t.crc[byte] = static_cast<std::uint16_t>(crc);
+        for (unsigned from = 0; from < 16; ++from) {
+            Run r{static_cast<std::uint8_t>(from), 0};
+            for (unsigned bit = 8; bit-- > 0;) r = next_run(r, byte >> bit & 1U);
+            t.run[from][byte] = r;
+        }
+    }
+    return t;
+}();
+
+/// Counts the stuff bits of a frame and computes its CRC-15.
 class Bitstream {
 public:
-    void put(unsigned bit) noexcept {
-        const unsigned next = bit ^ (crc_ >> 14 & 1U);
-        crc_ = (crc_ << 1 & 0x7fffU) ^ (next != 0 ? 0x4599U : 0U);
-        stuff();
-        ++bits_;
-        run_ = bit == last_ ? run_ + 1 : 1;
-        last_ = bit;
+    /// The first bits of a frame, which begin with start of frame, 0: as a byte, filled up by bits that change neither CRC nor run.
+    template <unsigned width>
+    void put_first(std::uint32_t value) noexcept {
+        constexpr unsigned odd = width % 8;
+        static_assert(odd != 0);
+        const std::uint32_t byte = value >> (width - odd) & 0xffU;
+        crc_ = tables.crc[byte];
+        count(tables.run[0][byte | (0x55U << odd & 0xffU)]);
+        bits_ += odd;
+        for (unsigned left = width / 8; left-- > 0;) put_byte(value >> 8 * left & 0xffU);
     }
-    void put(std::uint32_t value, unsigned width) noexcept {
-        while (width-- > 0) put(value >> width & 1U);
+    template <unsigned width>
+    void put(std::uint32_t value) noexcept {
+        for (unsigned left = width; left % 8 != 0; --left) {
+            const unsigned bit = value >> (left - 1) & 1U;
+            crc_ = next_crc(crc_, bit);
+            count(next_run({state_, 0}, bit));
+        }
+        bits_ += width % 8;
+        for (unsigned left = width / 8; left-- > 0;) put_byte(value >> 8 * left & 0xffU);
     }
-    /// Inserts a stuff bit that is due, except before a fixed stuff bit.
-    void stuff() noexcept {
-        if (run_ != 5) return;
-        last_ ^= 1U;
-        run_ = 1;
-        ++bits_;
+    void put_byte(unsigned byte) noexcept {
+        crc_ = (crc_ << 8 & 0x7fffU) ^ tables.crc[(crc_ >> 7 ^ byte) & 0xffU];
+        count(tables.run[state_][byte]);
+        bits_ += 8;
     }
     unsigned bits() const noexcept { return bits_; }
     std::uint32_t crc() const noexcept { return crc_; }
 
 private:
-    unsigned bits_ = 0, run_ = 0, last_ = 2;
+    void count(Run r) noexcept { state_ = r.state, bits_ += r.stuffed; }
+
+    unsigned bits_ = 0;
+    std::uint8_t state_ = 0;
     std::uint32_t crc_ = 0;
 };
 
@@ -45,41 +94,31 @@ unsigned fixed_bits(unsigned length) noexcept {  // stuff count with parity, CRC
     return 4 + crc + (4 + crc + 3) / 4;
 }
 
-void put_identifier(Bitstream& s, const Frame& f) noexcept {
-    s.put(0U);  // start of frame
-    if (!f.extended) {
-        s.put(f.id, 11);
-        s.put(f.remote ? 1U : 0U);
-        s.put(0U);  // IDE
-    } else {
-        s.put(f.id >> 18, 11);
-        s.put(3U, 2);  // SRR, IDE
-        s.put(f.id & 0x3ffffU, 18);
-        s.put(f.remote ? 1U : 0U);
-    }
+/// Puts start of frame, identifier and the flags behind it, and the bits that follow: `width` in a base frame, `extended_width` in an
+/// extended one.
+template <unsigned width, unsigned extended_width>
+void put_head(Bitstream& s, const Frame& f, std::uint32_t next) noexcept {
+    const std::uint32_t request = f.remote ? 1U : 0U;
+    if (!f.extended) return s.put_first<1 + 11 + 2 + width>(((f.id & 0x7ffU) << 2 | request << 1) << width | next);  // RTR, IDE
+    s.put_first<1 + 11 + 2>((f.id >> 18 & 0x7ffU) << 2 | 3U);  // SRR, IDE
+    s.put<18 + 1 + extended_width>(((f.id & 0x3ffffU) << 1 | request) << extended_width | next);
 }
 
 }  // namespace
 
 Bits frame_bits(const Frame& f) noexcept {
     Bitstream s;
-    put_identifier(s, f);
     const auto data = f.bytes();
     if (!f.fd) {
-        s.put(0U, f.extended ? 2 : 1);  // r1, r0
-        s.put(f.length < 8U ? f.length : 8U, 4);
-        for (const auto byte : data.first(data.size() < 8 ? data.size() : 8)) s.put(byte, 8);
-        s.put(s.crc(), 15);
-        s.stuff();
-        return {s.bits() + classic_tail, 0};
+        put_head<1 + 4, 2 + 4>(s, f, f.length < 8U ? f.length : 8U);  // r1, r0, DLC
+        for (const auto byte : data.first(data.size() < 8 ? data.size() : 8)) s.put_byte(byte);
+        s.put<15 + crc_delimiter>(s.crc() << 1 | 1U);  // a stuff bit may be due before the delimiter
+        return {s.bits() + classic_tail - crc_delimiter, 0};
     }
-    s.put(1U);  // FDF
-    s.put(0U);  // res
-    s.put(f.bit_rate_switch ? 1U : 0U);
+    put_head<3, 3>(s, f, f.bit_rate_switch ? 5U : 4U);  // FDF, res, BRS
     const unsigned slow = s.bits();
-    s.put(f.error_state ? 1U : 0U);
-    s.put(code_of_length(f.length), 4);
-    for (const auto byte : data) s.put(byte, 8);
+    s.put<1 + 4>(code_of_length(f.length) | (f.error_state ? 16U : 0U));  // ESI, DLC
+    for (const auto byte : data) s.put_byte(byte);
     const unsigned fast = s.bits() - slow + fixed_bits(f.length) + crc_delimiter;
     return f.bit_rate_switch ? Bits{slow + fd_tail, fast} : Bits{slow + fast + fd_tail, 0};
 }
@@ -103,6 +142,7 @@ std::int64_t duration_ns(Bits bits, std::uint32_t bit_rate, std::uint32_t data_r
     if (bit_rate == 0) return 0;
     const std::uint64_t second = 1'000'000'000;
     const std::uint64_t slow = (bits.nominal * second + bit_rate - 1) / bit_rate;
+    if (bits.data == 0) return static_cast<std::int64_t>(slow);  // a division less
     const std::uint64_t rate = data_rate != 0 ? data_rate : bit_rate;
     return static_cast<std::int64_t>(slow + (bits.data * second + rate - 1) / rate);
 }

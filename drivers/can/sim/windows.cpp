@@ -21,6 +21,7 @@ bool Bus::discard_expired(std::int64_t start) noexcept {
 
 /// Returns true when no frame started in [from, until).
 bool Bus::was_idle(std::int64_t from, std::int64_t until) const noexcept {
+    if (from == until) return true;
     for (std::size_t i = 0; i < std::min(started_, starts_.size()); ++i) {
         const auto start = starts_[(started_ - 1 - i) % starts_.size()];
         if (start < from) return true;

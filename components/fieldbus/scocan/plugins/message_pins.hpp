@@ -12,6 +12,13 @@
 
 namespace hal::scocan {
 
+/// Returns the first 8 bytes of the data, little endian. [realtime]
+inline std::uint64_t data_of(const can::Frame& frame) noexcept {
+    std::uint64_t bits = 0;
+    for (std::size_t i = 0; i < 8; ++i) bits |= std::uint64_t{frame.data[i]} << 8 * i;
+    return bits;
+}
+
 /// The pin of one field, an input of the sender or an output of a receiver.
 template <template <hal::PinType> class Pin>
 class FieldPin {
@@ -39,12 +46,11 @@ public:
         for (std::uint32_t i = 0; i < size_of(field_.type); ++i) frame.data[field_.at + i] = static_cast<std::uint8_t>(bits >> 8 * i);
     }
     /// Writes the value in the data to the pin. [realtime]
-    void decode(const can::Frame& frame) noexcept
+    void decode(std::uint64_t data) noexcept
         requires requires(Pin<double>& p) { p = 1.0; }
     {
-        std::uint64_t bits = 0;
-        for (std::uint32_t i = 0; i < size_of(field_.type); ++i) bits |= std::uint64_t{frame.data[field_.at + i]} << 8 * i;
-        if (u32_) *u32_ = static_cast<std::uint32_t>(bits);
+        const std::uint64_t bits = data >> 8 * field_.at;
+        if (u32_) *u32_ = static_cast<std::uint32_t>(bits) & mask_;
         else if (s32_)
             *s32_ = field_.type == FieldType::s8    ? static_cast<std::int8_t>(bits)
                     : field_.type == FieldType::s16 ? static_cast<std::int16_t>(bits)
@@ -54,6 +60,7 @@ public:
 
 private:
     const Field                         field_;
+    const std::uint32_t                 mask_ = size_of(field_.type) >= 4 ? UINT32_MAX : (1U << 8 * size_of(field_.type)) - 1;
     std::unique_ptr<Pin<std::uint32_t>> u32_;
     std::unique_ptr<Pin<std::int32_t>>  s32_;
     std::unique_ptr<Pin<double>>        real_;
@@ -127,17 +134,13 @@ public:
         if (m.fields.empty() && m.bytes > 0)
             data_ = std::make_unique<hal::Out<std::uint64_t>>(c, f, (m.name + ".data").c_str(), "data, little endian");
     }
-    std::uint32_t id() const noexcept { return message_.id; }
-    void          begin() noexcept { last_ = INT64_MIN, is_fresh_ = false; }
+    void begin() noexcept { last_ = INT64_MIN, is_fresh_ = false; }
 
     void arrived(const can::Frame& frame, Time begin) noexcept {
         if (frame.length < message_.bytes || frame.remote) return;
-        for (auto& field : fields_) field.decode(frame);
-        if (data_) {
-            std::uint64_t bits = 0;
-            for (std::uint32_t i = 0; i < message_.bytes; ++i) bits |= std::uint64_t{frame.data[i]} << 8 * i;
-            *data_ = bits;
-        }
+        const std::uint64_t data = data_of(frame);
+        for (auto& field : fields_) field.decode(data);
+        if (data_) *data_ = message_.bytes >= 8 ? data : data & ((std::uint64_t{1} << 8 * message_.bytes) - 1);
         if (last_ != INT64_MIN) interval_ = static_cast<double>(begin - last_) * 1e-3;
         last_ = begin;
         is_fresh_ = true;

@@ -37,7 +37,7 @@ public:
             const bool is_own = m.node == arguments_.own;
             if (is_own && t.nodes[m.node].role != Role::bridge)
                 sent_.emplace_back(*this, transmit_, receive_, m);  // a bridge sends the participant's
-            else if (!is_own && arguments_.wants(m)) received_.emplace_back(*this, receive_, m);
+            else if (!is_own && arguments_.wants(m)) by_id_[m.id] = &received_.emplace_back(*this, receive_, m);
         }
     }
 
@@ -47,6 +47,7 @@ public:
         const can::Description bus = can::describe(arguments_.link.get());
         can::Options           options{.own_frames = true, .stamps = bus.has_stamps};
         if (bus.in_memory && bus.has_bit_rate) options.bit_rate = arguments_.table.bit_rate;
+        if (bus.in_memory) options.receive_capacity = Station::receive_capacity;
         auto opened = can::open(arguments_.link.get(), options);
         if (!opened) throw std::runtime_error(opened.problem);
         const can::Description& d = opened.link->description();
@@ -116,8 +117,7 @@ protected:
     virtual void passed(const can::Frame&) noexcept {}  ///< a frame of another node. [realtime]
 
     void on_frame(const can::Frame& frame, Time begin) noexcept override {
-        for (auto& m : received_)
-            if (m.id() == frame.id) m.arrived(frame, begin);
+        if (ReceivedMessage* const m = by_id_[frame.id % identifiers]) m->arrived(frame, begin);
         exchange_->each([&](can::SlotUser& user) {
             if (frame.id < request_id || frame.id > answer_id + arguments_.table.nodes.size())
                 if (!user.incoming.push(frame)) user.lost.fetch_add(1, std::memory_order_relaxed);
@@ -161,6 +161,7 @@ protected:
     StationPins   pins_{*this, receive_};
     std::deque<SentMessage>                  sent_;
     std::deque<ReceivedMessage>              received_;
+    std::vector<ReceivedMessage*>            by_id_ = std::vector<ReceivedMessage*>(identifiers, nullptr);
     std::optional<EventWords>                words_;
     std::optional<FaultWords>                faults_text_;
     std::unique_ptr<Station>                 station_;

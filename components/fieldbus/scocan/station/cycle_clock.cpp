@@ -10,6 +10,8 @@ namespace {
 constexpr double        a = 0.3, b = 0.03;
 constexpr double        largest_drift = 1e-3;  // 1000 ppm: no crystal
 constexpr std::uint32_t settling = 8;   // SYNCs until deviations are known
+
+Time rounded(double ns) noexcept { return static_cast<Time>(ns < 0 ? ns - 0.5 : ns + 0.5); }  // llround is a call
 }  // namespace
 
 void CycleClock::clear() noexcept {
@@ -87,7 +89,7 @@ std::uint32_t CycleClock::pass(Time now, Time wait) noexcept {
 
 Time CycleClock::at(std::uint64_t cycle, Time offset) const noexcept {
     const auto ahead = static_cast<double>(static_cast<std::int64_t>(cycle - cycle_));
-    return epoch_ + std::llround(p_ + period_ * (ahead + static_cast<double>(offset) / nominal_));
+    return epoch_ + rounded(p_ + period_ * (ahead + static_cast<double>(offset) * per_nominal_));
 }
 
 double CycleClock::sigma() const noexcept { return std::sqrt(square_); }

@@ -13,7 +13,9 @@ namespace hal::scocan {
 class CycleClock {
 public:
     /// `floor`: deviation, ns, that is never rejected: the resolution of the stamps and some bits.
-    CycleClock(Time nominal, Time floor) noexcept : nominal_(static_cast<double>(nominal)), floor_(static_cast<double>(floor)) { clear(); }
+    CycleClock(Time nominal, Time floor) noexcept : nominal_(static_cast<double>(nominal)), per_nominal_(1 / nominal_), floor_(static_cast<double>(floor)) {
+        clear();
+    }
 
     enum class Taken : std::uint8_t { first, good, rejected, duplicate, jumped };
 
@@ -43,7 +45,7 @@ public:
 private:
     void advance(std::uint32_t cycles) noexcept;
 
-    const double  nominal_, floor_;
+    const double  nominal_, per_nominal_, floor_;
     Time          epoch_ = 0;  // p_ counts from here, so that it keeps fractions of a nanosecond
     double        p_ = 0, period_ = 0, error_ = 0, square_ = 0;
     std::uint32_t taken_ = 0, lost_ = 0, rejected_ = 0;

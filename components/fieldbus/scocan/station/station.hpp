@@ -23,6 +23,9 @@ namespace hal::scocan {
 
 class Station {
 public:
+    /// Frames that a link in memory should hold: twice those that receive() takes at most. 20 nodes with more do not fit into a cache.
+    static constexpr std::size_t receive_capacity = 512;
+
     /// The table and the sink outlive it. [setup]
     Station(const Table&, std::size_t node, const StationOptions&, Sink&);
 
@@ -92,8 +95,8 @@ private:
     // station_transmit.cpp
     bool              may_send(std::uint64_t cycle) const noexcept;
     void              plan_ahead(Time now, Time period) noexcept;
-    void              plan(std::uint64_t cycle, std::uint32_t slot) noexcept;
-    void              plan_shared(std::uint64_t cycle, std::uint32_t slot, const can::Window&) noexcept;
+    void              plan(std::uint64_t cycle, std::uint32_t slot, Time begin) noexcept;
+    void              plan_shared(Time begin, const can::Window&) noexcept;
     void              recycle_announced(Time now) noexcept;
     void              start_now(Time now) noexcept;
     SendQueue::Entry* next_private(const Use&, std::uint32_t slot) noexcept;
@@ -156,6 +159,7 @@ private:
     Time          first_seen_ = INT64_MIN;  ///< first call
     std::uint32_t leader_ = no_node;  ///< sender field of the last SYNC
 
+    std::array<can::Frame, 16>           frames_;       ///< within receive()
     std::array<std::uint8_t, most_slots> last_index_{};  ///< by slot: identifier sent last
     std::array<std::uint32_t, 2048>      foreign_{};
     std::array<bool, most_slots>         seen_{}, told_{};  ///< slots of this cycle with a frame, with an announcement

@@ -45,11 +45,10 @@ void Station::receive(Time now) noexcept {
         first_seen_ = crystal_.epoch = now;
         first_seen_ = crystal_.local(now);
     }
-    std::array<can::Frame, 16> frames;
     for (std::size_t round = 0; round < 16; ++round) {  // bounded: a babbling bus must not stop the thread
-        const auto count = link_->receive(frames, now);
-        for (std::size_t i = 0; i < count; ++i) arrived(frames[i]);
-        if (count < frames.size()) break;
+        const auto count = link_->receive(frames_, now);
+        for (std::size_t i = 0; i < count; ++i) arrived(frames_[i]);
+        if (count < frames_.size()) break;
     }
     const Time local = crystal_.local(now);
     // The SYNC is lost when even that of the last backup would have arrived.
@@ -66,7 +65,7 @@ void Station::receive(Time now) noexcept {
 
 void Station::arrived(const can::Frame& frame) noexcept {
     if (frame.error || frame.extended || frame.fd) return;
-    const Time length = timed_ ? can::duration_ns({can::frame_bits(frame).nominal - can::intermission_bits, 0}, table_.bit_rate) : 0;
+    const Time length = timed_ ? table_.bits(can::frame_bits(frame).nominal - can::intermission_bits) : 0;
     const Time bus_begin = frame.time_ns - length,
                begin = crystal_.stamp(frame.time_ns) - (crystal_.local(frame.time_ns) - crystal_.local(bus_begin));
     last_begin_ = std::max(last_begin_, begin);
@@ -161,12 +160,13 @@ Station::Where Station::where(Time local) const noexcept {
     if (!clock_.known()) return w;
     const Time   slack = table_.guard / 2;
     const double behind = static_cast<double>(local - clock_.start() + slack) / clock_.period();
-    const double cycles = std::floor(behind);
-    if (cycles < -4 || cycles > 1e6) return w;
+    if (!(behind > -4 && behind < 1e6)) return w;
+    auto cycles = static_cast<std::int64_t>(behind);
+    if (behind < static_cast<double>(cycles)) --cycles;
     w.known = true;
-    w.cycle = clock_.cycle() + static_cast<std::uint64_t>(static_cast<std::int64_t>(cycles));
+    w.cycle = clock_.cycle() + static_cast<std::uint64_t>(cycles);
     w.counter = counter_of(w.cycle);
-    const auto slot = static_cast<std::uint32_t>((behind - cycles) * table_.slots);
+    const auto slot = static_cast<std::uint32_t>((behind - static_cast<double>(cycles)) * table_.slots);
     w.slot = std::min(slot, table_.slots - 1);
     w.offset = local - begin_of(w.cycle, w.slot);
     return w;

@@ -36,15 +36,17 @@ void Station::transmit(Time now, Time period) noexcept {
 /// Plans the slots that begin until the next call.
 void Station::plan_ahead(Time now, Time period) noexcept {
     const Time slack = std::min(period / 4, table_.enabled() / 2);
-    const Time next = begin_of(next_cycle_, next_slot_);
+    Time       next = begin_of(next_cycle_, next_slot_);
     if (next < now - slack || next > now + period + 2 * table_.cycle) {  // the first call, a late one, or the clock has jumped
         const Where w = where(now);
         next_cycle_ = w.cycle, next_slot_ = w.slot;
         if (w.offset > slack && ++next_slot_ == table_.slots) next_slot_ = 0, ++next_cycle_;
+        next = begin_of(next_cycle_, next_slot_);
     }
-    while (begin_of(next_cycle_, next_slot_) < now + period - slack) {
-        plan(next_cycle_, next_slot_);
+    while (next < now + period - slack) {
+        plan(next_cycle_, next_slot_, next);
         if (++next_slot_ == table_.slots) next_slot_ = 0, ++next_cycle_;
+        next = begin_of(next_cycle_, next_slot_);
     }
     if (!senses_) recycle_announced(now);
 }
@@ -69,7 +71,7 @@ SendQueue::Entry* Station::next_private(const Use& use, std::uint32_t slot) noex
     return queue_.next(fits);
 }
 
-void Station::plan(std::uint64_t cycle, std::uint32_t slot) noexcept {
+void Station::plan(std::uint64_t cycle, std::uint32_t slot, Time begin) noexcept {
     if (slot == 0) {
         if (is_sync_node()) plan_sync(cycle);
         return;
@@ -77,8 +79,7 @@ void Station::plan(std::uint64_t cycle, std::uint32_t slot) noexcept {
     if (!may_send(cycle)) return;
     const Use* use = table_.use(mode_of(cycle), slot, counter_of(cycle));
     if (!numbered_ && (use == nullptr || use->every > 1)) return;  // the slot may be private
-    const Time begin = begin_of(cycle, slot);
-    if (use == nullptr || use->kind == Kind::shared) return plan_shared(cycle, slot, {.not_before_ns = begin});
+    if (use == nullptr || use->kind == Kind::shared) return plan_shared(begin, {.not_before_ns = begin});
     if (use->node == node_)
         if (SendQueue::Entry* e = next_private(*use, slot)) {
             const Time last = begin + (single_shot_ ? table_.enabled() : table_.last_start(e->frame.length));
@@ -93,15 +94,13 @@ void Station::plan(std::uint64_t cycle, std::uint32_t slot) noexcept {
         return;
     }
     if (senses_)
-        plan_shared(cycle, slot,
-                    {.not_before_ns = begin + table_.idle + table_.guard, .idle_from_ns = idle_from, .idle_until_ns = idle_until});
+        plan_shared(begin, {.not_before_ns = begin + table_.idle + table_.guard, .idle_from_ns = idle_from, .idle_until_ns = idle_until});
 }
 
 /// Hands over the shared frames that may fit into a slot, from the begin of the window on. The controller discards those that do not start
 /// in time; they wait for the next slot.
-void Station::plan_shared(std::uint64_t cycle, std::uint32_t slot, const can::Window& window) noexcept {
-    const Time begin = begin_of(cycle, slot);
-    Time       from = window.not_before_ns;
+void Station::plan_shared(Time begin, const can::Window& window) noexcept {
+    Time from = window.not_before_ns;
     for (;;) {
         SendQueue::Entry* e = queue_.next(
             [&](const SendQueue::Entry& entry) { return !entry.priv && from <= begin + table_.last_start(entry.frame.length); });
@@ -119,7 +118,8 @@ void Station::plan_shared(std::uint64_t cycle, std::uint32_t slot, const can::Wi
 void Station::recycle_announced(Time now) noexcept {
     if (announced_slot_ == no_slot) return;
     const Where w = where(now);
-    if (w.cycle == announced_cycle_ && w.slot == announced_slot_ && may_send(w.cycle)) plan_shared(w.cycle, w.slot, {.not_before_ns = now});
+    if (w.cycle == announced_cycle_ && w.slot == announced_slot_ && may_send(w.cycle))
+        plan_shared(begin_of(w.cycle, w.slot), {.not_before_ns = now});
     announced_slot_ = no_slot;
 }
 

@@ -27,6 +27,7 @@ enum class Topic : std::uint8_t {
 const char* code_of(Topic);  ///< "scocan-line", …: the diagnostic's code
 
 inline constexpr std::uint32_t sync_id = 0, announce_id = 1, request_id = 0x780, answer_id = 0x781;
+inline constexpr std::uint32_t identifiers = 0x800;
 inline constexpr std::size_t   most_nodes = 126, most_slots = 256, most_modes = 16, counter_cycles = 64;
 /// An error flag with its delimiter: bits that the bus is busy after a disturbed frame.
 inline constexpr std::uint32_t error_bits = 20;
@@ -139,6 +140,7 @@ struct Table {
 
 private:
     std::array<int, most_modes> index_{};
+    std::vector<std::uint16_t>  owner_slots_;  ///< by mode and identifier: the first private slot that carries it; no_owner: none
 };
 
 using Report = text::Message<Topic>;
