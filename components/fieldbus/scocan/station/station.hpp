@@ -40,6 +40,8 @@ public:
     void      withdraw(std::uint32_t id) noexcept { queue_.withdraw(id); }  ///< Removes a waiting value. [realtime]
     /// Asks all nodes for a mode change. Only the node that sends the SYNC; returns false on all others. [realtime]
     bool change_mode(std::uint32_t mode) noexcept;
+    /// Asks another node to send nothing, or to send again. Only the monitor; returns false on all others. [realtime]
+    bool tell(std::uint32_t node, bool silent) noexcept;
     void reset() noexcept;  ///< Ends silence after an offence, and standby behind a second SYNC node. [realtime]
 
     const Table&      table() const noexcept { return table_; }
@@ -118,6 +120,7 @@ private:
     void       announce_table() noexcept;
     // station_modes.cpp
     void configuration(const can::Frame&) noexcept;
+    void told(const Request&) noexcept;
     void requested(const Request&) noexcept;
     void answered(const Answer&) noexcept;
     void change_cycle() noexcept;

@@ -27,11 +27,13 @@ void Station::configuration(const can::Frame& frame) noexcept {
 
 /// Handles a message of the node that sends the SYNC.
 void Station::requested(const Request& r) noexcept {
+    if (r.what == Request::What::silence || r.what == Request::What::resume) return told(r);
     if (leading_) return;
     const bool agrees = r.crc == table_.crc;
     if (agrees == listen_only_) {
         listen_only_ = !agrees;
         raise(agrees ? Event::table_agrees : Event::other_table, no_node, 0, r.crc);
+        if (agrees && !is_sync_node()) clock_.clear(), numbered_ = false;  // it followed another SYNC node, in another phase
     }
     if (!agrees || r.what == Request::What::table) return;
     armed_ = {};
@@ -43,6 +45,21 @@ void Station::requested(const Request& r) noexcept {
         answer.reason = Answer::Reason::unknown_mode;
     }
     queue_.push(encode(answer), no_slot, false, true);
+}
+
+bool Station::tell(std::uint32_t node, bool silent) noexcept {
+    if (role_ != Role::monitor || node >= table_.nodes.size() || node == node_) return false;
+    const auto what = silent ? Request::What::silence : Request::What::resume;
+    return queue_.push(encode(Request{what, static_cast<std::uint8_t>(node), table_.crc, 0}), no_slot, false, false);
+}
+
+/// Handles the monitor's request to send nothing, or to send again. Nodes of another table have other numbers.
+void Station::told(const Request& r) noexcept {
+    if (r.mode != node_ || r.crc != table_.crc) return;
+    if (r.what == Request::What::resume) return reset();
+    if (!silenced_) raise(Event::told_silent, static_cast<std::uint32_t>(node_));
+    silenced_ = true;
+    leading_ = false, change_ = {};
 }
 
 void Station::answered(const Answer& a) noexcept {

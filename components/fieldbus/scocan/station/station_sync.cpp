@@ -10,6 +10,8 @@ constexpr std::uint32_t listen_cycles = 3, takeover_every = 8;
 
 /// Decides whether this node begins to send the SYNC.
 void Station::lead(Time now) noexcept {
+    // A primary that does not hear the other one any more, whose table differed, leads with its own.
+    if (role_ == Role::sync && clock_.known() && clock_.lost() >= listen_cycles) listen_only_ = false;
     if (leading_ || listen_only_) return;
     if (!clock_.known()) {
         if (now - first_seen_ < table_.cycle * (listen_cycles + backup_)) return;

@@ -39,7 +39,8 @@ can::Frame encode(const Request& r) noexcept {
 }
 
 bool decode(const can::Frame& f, Request& r) noexcept {
-    if (!is_plain(f, request_id) || f.length != 5 || f.data[0] > 2 || f.data[1] >= most_modes || f.data[4] >= counter_cycles) return false;
+    if (!is_plain(f, request_id) || f.length != 5 || f.data[0] > 4 || f.data[4] >= counter_cycles) return false;
+    if (f.data[1] >= (f.data[0] >= 3 ? most_nodes : most_modes)) return false;
     r = {static_cast<Request::What>(f.data[0]), f.data[1], static_cast<std::uint16_t>(f.data[2] | f.data[3] << 8), f.data[4]};
     return true;
 }

@@ -27,11 +27,11 @@ can::Frame announcement(std::uint32_t slot) noexcept;
 /// Returns false for a frame that is not a valid announcement. [realtime]
 bool decode_announcement(const can::Frame&, std::uint32_t& slot) noexcept;
 
-/// Configuration, identifier 0x780, from the SYNC sender to all nodes.
+/// Configuration, identifier 0x780: from the SYNC sender to all nodes, or from the monitor to one (silence, resume).
 struct Request {
-    enum class What : std::uint8_t { table = 0, prepare = 1, cancel = 2 };
+    enum class What : std::uint8_t { table = 0, prepare = 1, cancel = 2, silence = 3, resume = 4 };
     What          what = What::table;
-    std::uint8_t  mode = 0;
+    std::uint8_t  mode = 0;       ///< silence, resume: the node
     std::uint16_t crc = 0;        ///< of the sender's table
     std::uint8_t  at_counter = 0;  ///< prepare: cycle of the switch
 };
