@@ -42,6 +42,7 @@ class Pictures(Case):
         said = self.make(ROOT / "halfiles/jitter/experiment", self.folder)
         self.assertIn(said, (ROOT / "docs/tutorials/network-and-control.md").read_text(encoding="utf-8"), "the tutorial shows other figures")
         self.assertIn("at every load: passed", said)
+        self.assertRegex(said, r"TDMA and EtherCAT: .* no jitter: passed")
         self.assertIn("No measured delay exceeds the computed bound: passed", said)
         for name in ("jitter.csv", "jitter-overshoot.svg", "jitter-responses.svg"):
             self.same(ROOT / "docs" / name, Path(self.folder, name))
