@@ -51,7 +51,7 @@ public:
             return "own frame " + named(h.id) + " started " + microseconds(h.value) +
                    " behind its transmit window; use a faster thread, or a longer idle time";
         case Event::silenced: return "silenced: 3 own frames outside of their slots in 1 s; correct the cause, then type: " + reset_;
-        case Event::told_silent: return "silenced by the monitor; correct the cause, then type: " + reset_;
+        case Event::silenced_by_monitor: return "silenced by the monitor; correct the cause, then type: " + reset_;
         case Event::bus_off: return "controller off the bus; sends nothing until it has recovered";
         case Event::bus_on: return "controller on the bus again";
         case Event::mode_changed:
@@ -109,7 +109,7 @@ public:
         text_[Event::unknown_mode] = "mode {} of the SYNC is not in the table; receives only";
         text_[Event::babbling] = "a node sends {} frames outside of their slots in one cycle";
         text_[Event::silenced] = "silenced: 3 own frames outside of their slots in 1 s";
-        text_[Event::told_silent] = "silenced by the monitor";
+        text_[Event::silenced_by_monitor] = "silenced by the monitor";
         text_[Event::bus_off] = "controller off the bus";
         text_[Event::mode_refused] = "mode change cancelled: a node did not agree";
         text_[Event::monitor_lost] = "monitor lost: idle slots are not announced any more";

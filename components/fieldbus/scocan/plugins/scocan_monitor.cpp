@@ -35,7 +35,7 @@ private:
 
     void before_slots() noexcept override {
         for (auto& s : silences_)
-            if (s.pin != s.was && station_->state() == State::running && station_->tell(s.node, s.pin)) s.was = s.pin;
+            if (s.pin != s.was && station_->state() == State::running && station_->request_silence(s.node, s.pin)) s.was = s.pin;
     }
     void received() noexcept override {
         idle = station_->count().idle;

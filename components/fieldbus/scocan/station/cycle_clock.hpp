@@ -13,7 +13,8 @@ namespace hal::scocan {
 class CycleClock {
 public:
     /// `floor`: deviation, ns, that is never rejected: the resolution of the stamps and some bits.
-    CycleClock(Time nominal, Time floor) noexcept : nominal_(static_cast<double>(nominal)), per_nominal_(1 / nominal_), floor_(static_cast<double>(floor)) {
+    CycleClock(Time nominal, Time floor) noexcept
+        : nominal_(static_cast<double>(nominal)), per_nominal_(1 / nominal_), floor_(static_cast<double>(floor)) {
         clear();
     }
 

@@ -41,7 +41,7 @@ public:
     /// Asks all nodes for a mode change. Only the node that sends the SYNC; returns false on all others. [realtime]
     bool change_mode(std::uint32_t mode) noexcept;
     /// Asks another node to send nothing, or to send again. Only the monitor; returns false on all others. [realtime]
-    bool tell(std::uint32_t node, bool silent) noexcept;
+    bool request_silence(std::uint32_t node, bool silent) noexcept;
     void reset() noexcept;  ///< Ends silence after an offence, and standby behind a second SYNC node. [realtime]
 
     const Table&      table() const noexcept { return table_; }
@@ -120,7 +120,7 @@ private:
     void       announce_table() noexcept;
     // station_modes.cpp
     void configuration(const can::Frame&) noexcept;
-    void told(const Request&) noexcept;
+    void silence_requested(const Request&) noexcept;
     void requested(const Request&) noexcept;
     void answered(const Answer&) noexcept;
     void change_cycle() noexcept;
@@ -162,7 +162,7 @@ private:
     Time          first_seen_ = INT64_MIN;  ///< first call
     std::uint32_t leader_ = no_node;  ///< sender field of the last SYNC
 
-    std::array<can::Frame, 16>           frames_;       ///< within receive()
+    std::array<can::Frame, 16>           frames_;  ///< within receive()
     std::array<std::uint8_t, most_slots> last_index_{};  ///< by slot: identifier sent last
     std::array<std::uint32_t, 2048>      foreign_{};
     std::array<bool, most_slots>         seen_{}, told_{};  ///< slots of this cycle with a frame, with an announcement

@@ -14,7 +14,7 @@ enum class State : std::uint8_t {
     running,      ///< sends in its slots
     silent,       ///< too many SYNCs lost: receives only
     listen_only,  ///< another table or an unknown mode: receives only
-    silenced,     ///< sent outside of its slots, or told by the monitor: sends nothing until reset
+    silenced,     ///< sent outside of its slots, or was silenced by the monitor: sends nothing until reset
     down,         ///< the controller is off the bus, or the interface is down
 };
 const char* to_string(State) noexcept;
@@ -36,7 +36,7 @@ enum class Event : std::uint8_t {
     babbling,        ///< id, who; value: frames outside of their slots in one cycle
     late_frame,      ///< own frame; value: ns behind the end of its transmit window
     silenced,        ///< this node
-    told_silent,     ///< this node, by the monitor
+    silenced_by_monitor,     ///< this node, by the monitor
     bus_off,
     bus_on,
     mode_changed,    ///< value: mode

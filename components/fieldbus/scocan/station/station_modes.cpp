@@ -27,7 +27,7 @@ void Station::configuration(const can::Frame& frame) noexcept {
 
 /// Handles a message of the node that sends the SYNC.
 void Station::requested(const Request& r) noexcept {
-    if (r.what == Request::What::silence || r.what == Request::What::resume) return told(r);
+    if (r.what == Request::What::silence || r.what == Request::What::resume) return silence_requested(r);
     if (leading_) return;
     const bool agrees = r.crc == table_.crc;
     if (agrees == listen_only_) {
@@ -47,17 +47,17 @@ void Station::requested(const Request& r) noexcept {
     queue_.push(encode(answer), no_slot, false, true);
 }
 
-bool Station::tell(std::uint32_t node, bool silent) noexcept {
+bool Station::request_silence(std::uint32_t node, bool silent) noexcept {
     if (role_ != Role::monitor || node >= table_.nodes.size() || node == node_) return false;
     const auto what = silent ? Request::What::silence : Request::What::resume;
     return queue_.push(encode(Request{what, static_cast<std::uint8_t>(node), table_.crc, 0}), no_slot, false, false);
 }
 
 /// Handles the monitor's request to send nothing, or to send again. Nodes of another table have other numbers.
-void Station::told(const Request& r) noexcept {
+void Station::silence_requested(const Request& r) noexcept {
     if (r.mode != node_ || r.crc != table_.crc) return;
     if (r.what == Request::What::resume) return reset();
-    if (!silenced_) raise(Event::told_silent, static_cast<std::uint32_t>(node_));
+    if (!silenced_) raise(Event::silenced_by_monitor, static_cast<std::uint32_t>(node_));
     silenced_ = true;
     leading_ = false, change_ = {};
 }
