@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "hal/component.hpp"
+#include "mobile/to_target.hpp"
 
 namespace {
 
@@ -14,60 +15,42 @@ constexpr double      pi = std::numbers::pi;
 struct DriveAround : hal::Component {
     using Component::Component;
 
-    hal::In<bool>           enable{*this, "enable", "FALSE commands standstill", {.initial = true}};
-    hal::In<double>         target_x{*this, "target-x", "x of the target", {.unit = "m"}};
-    hal::In<double>         target_y{*this, "target-y", "y of the target", {.unit = "m"}};
-    hal::In<double>         x{*this, "x", "x of the robot", {.unit = "m"}};
-    hal::In<double>         y{*this, "y", "y of the robot", {.unit = "m"}};
-    hal::In<double>         heading{*this, "heading", "heading of the robot", {.unit = "rad"}};
+    hal::mobile::ToTarget go{*this, {0.05, "distance within which the target is reached"}};
+
     hal::Ins<std::uint32_t> reading{*this, "reading-##", sensors, "reading of sensor ## of the infrared ring, 0..4095"};
-    hal::Param<double>      constant{*this, "constant", "reading times the square of distance + offset", {.initial = 40.0}};
-    hal::Param<double>      offset{*this, "offset", "offset of the distance", {.initial = 0.05, .unit = "m"}};
-    hal::Param<double>      apothem{*this, "apothem", "distance of the sensors from the centre", {.initial = 0.22, .unit = "m"}};
+    hal::In<double>         echo_range{
+        *this, "echo-range", "distance from the centre of what the ultrasonic head has found", {.initial = 1000.0, .unit = "m"}};
+    hal::In<double>        echo_bearing{*this, "echo-bearing", "its direction, to the left of the heading", {.unit = "rad"}};
+    hal::In<std::uint32_t> echo_count{*this, "echo-count", "a new value: echo-range and echo-bearing are new"};
+    hal::Param<double>     constant{*this, "constant", "reading times the square of distance + offset", {.initial = 40.0}};
+    hal::Param<double>     offset{*this, "offset", "offset of the distance", {.initial = 0.05, .unit = "m"}};
+    hal::Param<double>     apothem{*this, "apothem", "distance of the sensors from the centre", {.initial = 0.22, .unit = "m"}};
     hal::Param<double> spread{*this, "spread", "distance of the two sensors of a side from its middle", {.initial = 0.045, .unit = "m"}};
     hal::Param<double> body{*this, "body-radius", "radius of the robot with a margin", {.initial = 0.32, .unit = "m"}};
     hal::Param<double> horizon{*this, "horizon", "obstacles farther from the centre do not matter", {.initial = 0.85, .unit = "m"}};
     hal::Param<double> memory{*this, "memory", "time for which an obstacle is remembered", {.initial = 3.0, .unit = "s"}};
-    hal::Param<double> max_speed{*this, "max-speed", "maximum forward speed", {.initial = 0.5, .unit = "m/s"}};
-    hal::Param<double> distance_gain{*this, "distance-gain", "forward speed per remaining distance", {.initial = 1.5, .unit = "1/s"}};
     hal::Param<double> heading_gain{
         *this, "heading-gain", "turning speed per angle to the chosen direction", {.initial = 3.0, .unit = "1/s"}};
     hal::Param<double> max_turn{*this, "max-turn", "maximum turning speed", {.initial = 1.5, .unit = "rad/s"}};
-    hal::Param<double> tolerance{*this, "tolerance", "distance within which the target is reached", {.initial = 0.05, .unit = "m"}};
 
-    hal::Out<double> linear{*this, "linear", "requested forward speed", {.unit = "m/s", .safe = 0.0, .finite = true}};
-    hal::Out<double> angular{
-        *this, "angular", "requested turning speed, positive to the left", {.unit = "rad/s", .safe = 0.0, .finite = true}};
-    hal::Out<double> distance{*this, "distance", "remaining distance", {.unit = "m", .finite = true}};
     hal::Out<double> nearest{
         *this, "nearest", "distance of the nearest obstacle from the centre; 1000: none", {.unit = "m", .finite = true}};
     hal::Out<double> direction{*this, "direction", "chosen direction, relative to the heading", {.unit = "rad", .finite = true}};
-    hal::Out<bool>   reached{*this, "reached", "TRUE at the target"};
     hal::Out<bool>   avoiding{*this, "avoiding", "TRUE: the direct way is not free"};
     hal::Out<bool>   blocked{*this, "blocked", "TRUE: no direction is free; the robot turns on the spot"};
-    hal::Out<bool>   invalid{*this, "invalid", "TRUE: an input is NaN, infinite or beyond 1e6 m; standstill is commanded"};
 
     hal::Function run{*this, "update", &DriveAround::update, "chooses a direction and the speeds"};
 
     void update(hal::Cycle cycle) noexcept {
-        const double dx = target_x - x, dy = target_y - y, left = std::hypot(dx, dy);
-        invalid = !(left < 1e6 && std::fabs(heading) < 1e6);
-        if (invalid) return rest(0.0, false);
+        if (!go.valid()) return rest();
         look(cycle.start_ns());
-        const bool there = left <= std::fabs(tolerance);
-        if (there || !enable) return rest(left, there);
-        const double wanted = std::remainder(std::atan2(dy, dx) - heading, 2 * pi);
-        const double chosen = choose(wanted, left);
-        const double ahead = std::fmax(0.0, std::cos(direction));
+        if (!go.under_way(1.0)) return rest();
+        const double chosen = choose(go.wanted(), go.left());
         // Space in front: no faster than the robot can stop within it.
         const double room = std::clamp((free_ahead() - body) * 2.0, 0.0, 1.0);
-        const double fastest = std::isfinite(max_speed) ? std::fabs(max_speed) : 0.0;
-        linear = blocked ? 0.0
-                         : finite(std::clamp(distance_gain * left, 0.0, fastest) * ahead * ahead *
-                                  (avoiding ? std::fmax(room, 0.15) : std::fmax(room, 0.3)));
-        angular = finite(std::clamp(heading_gain * chosen, -std::fabs(max_turn), std::fabs(max_turn)));
-        distance = left;
-        reached = false;
+        const double slowed = go.speed(direction) * (avoiding ? std::fmax(room, 0.15) : std::fmax(room, 0.3));
+        go.linear = blocked ? 0.0 : go.finite(std::fmax(slowed, 0.0));
+        go.angular = go.finite(std::clamp(heading_gain * chosen, -std::fabs(max_turn), std::fabs(max_turn)));
     }
 
 private:
@@ -81,11 +64,8 @@ private:
         double angle, distance;  // from the centre, relative to the heading
     };
 
-    static double finite(double value) noexcept { return std::isfinite(value) ? value : 0.0; }
-    void          rest(double left, bool there) noexcept {
-        linear = 0.0, angular = 0.0, direction = 0.0;
-        distance = left;
-        reached = there;
+    void rest() noexcept {
+        direction = 0.0;
         avoiding = false, blocked = false;
         last_ = 0.0;
     }
@@ -100,20 +80,24 @@ private:
             const double out = apothem + std::fmax(range, 0.0), at = std::hypot(out, aside);
             least = std::fmin(least, at);
             if (!(at < horizon)) continue;
-            const double direction = heading + facing + std::atan2(aside, out);
-            remember({x + at * std::cos(direction), y + at * std::sin(direction), now});
+            remember(at, facing + std::atan2(aside, out), now);
         }
-        nearest = finite(least);
+        if (echo_count != echoes_) {
+            echoes_ = echo_count;
+            if (echo_range > 0.0 && echo_range < horizon && std::isfinite(echo_bearing)) remember(echo_range, echo_bearing, now);
+        }
+        nearest = go.finite(least);
         count_ = 0;
         for (const Point& p : points_) {
-            const double at = std::hypot(p.x - x, p.y - y);
+            const double at = std::hypot(p.x - go.x, p.y - go.y);
             if (p.at_ns != never && 1e-9 * static_cast<double>(now - p.at_ns) <= memory && at < horizon)
-                seen_[count_++] = {std::atan2(p.y - y, p.x - x) - heading, at};
+                seen_[count_++] = {std::atan2(p.y - go.y, p.x - go.x) - go.heading, at};
         }
     }
     /// A point that is nearly known is renewed; another one replaces the oldest.
-    void remember(const Point& seen) noexcept {
+    void remember(double at, double bearing, std::int64_t now) noexcept {
         constexpr double same_m = 0.05;
+        const Point      seen{go.x + at * std::cos(go.heading + bearing), go.y + at * std::sin(go.heading + bearing), now};
         Point*           oldest = points_.data();
         for (Point& p : points_) {
             if (p.at_ns != never && std::hypot(p.x - seen.x, p.y - seen.y) < same_m) {
@@ -144,12 +128,12 @@ private:
     /// The free direction with the least cost: away from the target, and away from the direction chosen before, in the room (J. Borenstein,
     /// Y. Koren, *The vector field histogram*, IEEE Transactions on Robotics and Automation 7, 1991; the cost is that of I. Ulrich's VFH+, 1998).
     double choose(double wanted, double left) noexcept {
-        const double before = std::remainder(last_ - heading, 2 * pi);
+        const double before = std::remainder(last_ - go.heading, 2 * pi);
         if (is_free(wanted, left)) {
             // Around a convex obstacle: the direct way counts as free when the old direction agrees with it.
             avoiding = false, blocked = false;
             direction = wanted;
-            last_ = heading + wanted;
+            last_ = go.heading + wanted;
             return wanted;
         }
         double best = 0.0, least = 1e9;
@@ -163,7 +147,7 @@ private:
         blocked = least > 1e8;
         avoiding = true;
         direction = blocked ? 0.0 : best;
-        if (!blocked) last_ = heading + best;
+        if (!blocked) last_ = go.heading + best;
         return blocked ? pi / 4 : best;
     }
 
@@ -171,6 +155,7 @@ private:
     std::array<Obstacle, 192> seen_{};
     std::size_t               count_ = 0;
     double                    last_ = 0.0;
+    std::uint32_t             echoes_ = 0;
 };
 
 }  // namespace
@@ -183,7 +168,8 @@ forwards, counted to the left.
 
 Each obstacle closes the directions in which the robot, with `body-radius`, would touch it; of the free ones the robot takes the one nearest to the
 target, and nearest to the one it took before (vector field histogram: J. Borenstein, Y. Koren, IEEE Transactions on Robotics and Automation 7, 1991).
-It drives slower towards what is near. An obstacle is remembered for `memory`, because what is beside
+It drives slower towards what is near. An ultrasonic head (`echo_range`) adds what the ring does not see: each new value of `echo-count` is an echo at `echo-range` and
+`echo-bearing`. An obstacle is remembered for `memory`, because what is beside
 the robot may be between two sensors. There is no map beyond that: a dead end deeper than the range of the sensors can hold it, and `blocked` or a long time without
 `reached` is for the program above.
 
@@ -198,4 +184,12 @@ the robot may be between two sensors. There is no map beyond that: a dead end de
     net front   => pilot.reading-00
     net ahead   pilot.linear  => base.linear
     net turn    pilot.angular => base.angular
+
+With the head of `echo_range`:
+
+    loadrt echo_range names=sonar
+    addf sonar.update servo
+    net echo-range   sonar.range   => pilot.echo-range
+    net echo-bearing sonar.bearing => pilot.echo-bearing
+    net echo-count   sonar.bursts  => pilot.echo-count
 )")
