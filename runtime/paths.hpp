@@ -8,6 +8,7 @@
 namespace hal::paths {
 
 extern const std::string_view version;             ///< of Halcyon, "1.2.3"
+extern const std::string_view commit;              ///< checked out when this was built, abbreviated; "unknown" outside of a checkout
 extern const std::string_view build_components;    ///< folder of the plugins in the build tree
 extern const std::string_view install_components;  ///< folder of the plugins once installed
 extern const std::string_view build_python;        ///< folder of the Python module in the build tree

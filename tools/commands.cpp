@@ -342,7 +342,7 @@ int run_command_line(int argc, char** argv) {
     const std::vector<std::string> all(argv + std::min(argc, 1), argv + argc);
     if (all.empty()) return help({});
     if (all[0] == "help" || all[0] == "--help" || all[0] == "-h") return help({all.begin() + 1, all.end()});
-    if (all[0] == "--version" || all[0] == "version") return print(fmt::format("hal {}\n", paths::version)) ? 0 : 1;
+    if (all[0] == "--version" || all[0] == "version") return print(fmt::format("hal {} (commit {})\n", paths::version, paths::commit)) ? 0 : 1;
     const auto [row, name_words] = find(all);
     if (!row && find_group(all[0]) && (all.size() == 1 || all[1] == "help" || all[1] == "--help" || all[1] == "-h")) return help({all[0]});
     if (!row) return no_such_command(all);

@@ -8,6 +8,7 @@ import sys
 import tempfile
 from pathlib import Path
 
+import abi
 import files
 import includes
 import language
@@ -112,6 +113,53 @@ def check_files(root):
            "tools: missing README.md")
 
 
+ABI = SPDX.replace("//", "/*").replace("\n", " */\n") + """#include <stdint.h>
+#define HAL_ABI_MAJOR 1
+#define HAL_ABI_MINOR 0
+typedef enum hal_dir { HAL_DIR_IN, HAL_DIR_OUT } hal_dir;
+typedef struct hal_host {
+    uint32_t size; /* bytes */
+    uint32_t pad;
+    void (*fail)(const struct hal_host *, const char *reason);
+} hal_host;
+"""
+
+
+def check_abi(root):
+    def changed(*replacements):
+        text = ABI
+        for old, new in replacements:
+            assert old in text
+            text = text.replace(old, new)
+        write(root, {"runtime/abi/hal/abi.h": "#include <stddef.h>\n" + text})
+
+    changed()
+    expect("a first record", run(abi, root, "--record"), 0)
+    expect("a layout as recorded", run(abi, root), 0)
+    changed(("bytes", "in bytes"))
+    expect("another comment", run(abi, root), 0)
+    place, end = "runtime/abi/hal/abi.h: ", ("on purpose? Then follow docs/versioning.md", "HAL_ABI_MAJOR, or")
+    changed(("const char *reason", "int reason"))
+    expect("another parameter", run(abi, root), 1, f"{place}INCOMPATIBLE: struct hal_host: no longer as recorded: 8, size 8: void (*fail)",
+           f"{place}INCOMPATIBLE: struct hal_host: new: 8, size 8: void (*fail)", *end)
+    expect("an incompatible change within a major version", run(abi, root, "--record"), 1, "abi.h: an incompatible change: raise HAL_ABI_MAJOR")
+    changed(("HAL_DIR_IN, ", "HAL_DIR_NONE, HAL_DIR_IN, "))
+    expect("another value", run(abi, root), 1, *[f"{place}INCOMPATIBLE: enum hal_dir: no longer as recorded: HAL_DIR_"] * 2,
+           *[f"{place}added: enum hal_dir: new: HAL_DIR_"] * 3, *end)
+    changed(("uint32_t pad;", "uint32_t pad, more;"))
+    expect("a member in the middle", run(abi, root), 1, f"{place}INCOMPATIBLE: struct hal_host: no longer as recorded: 8, size 8: void (*fail)",
+           f"{place}INCOMPATIBLE: struct hal_host: new: 8, size 4: uint32_t more", f"{place}INCOMPATIBLE: struct hal_host: new: 16, size 8: void (*fail)", *end)
+    growth = ("reason);", "reason);\n    void (*warn)(const struct hal_host *);")
+    changed(growth)
+    expect("a member at the end", run(abi, root), 1, f"{place}added: struct hal_host: new: 16, size 8: void (*warn)", *end)
+    expect("an addition within a minor version", run(abi, root, "--record"), 1, "abi.h: an addition: raise HAL_ABI_MINOR")
+    changed(growth, ("MINOR 0", "MINOR 1"))
+    expect("an addition in a new minor version", run(abi, root, "--record"), 0)
+    expect("the record of an addition", run(abi, root), 0)
+    changed(("uint32_t pad;", "uint32_t flags;"), ("MAJOR 1", "MAJOR 2"))
+    expect("an incompatible change in a new major version", run(abi, root, "--record"), 0)
+
+
 def check_language(root):
     write(root, {"runtime/a.cpp": SPDX + 'int refused = 1;\nconst char* good = "rejected; connection refused";\n', "a.md": "The node is offline.\n"})
     expect("texts in the terms of the field", run(language, root), 0)
@@ -149,7 +197,7 @@ def check_clean_tree(root):
 
 
 def main():
-    for check in (check_includes, check_files, check_language, check_symbols, check_clean_tree):
+    for check in (check_includes, check_files, check_abi, check_language, check_symbols, check_clean_tree):
         with tempfile.TemporaryDirectory() as folder:
             check(Path(folder).resolve())
     print("\n".join(failures) or "every planted violation was found")
