@@ -4,8 +4,10 @@
 function(halcyon_commit target)
     find_program(HALCYON_GIT git)
     set(record)
+    set(git)
     if(HALCYON_GIT AND EXISTS "${PROJECT_SOURCE_DIR}/.git")
-        execute_process(COMMAND "${HALCYON_GIT}" -c safe.directory=* rev-parse --path-format=absolute --git-path logs/HEAD
+        set(git "${HALCYON_GIT}")
+        execute_process(COMMAND "${git}" -c safe.directory=* rev-parse --path-format=absolute --git-path logs/HEAD
                         WORKING_DIRECTORY "${PROJECT_SOURCE_DIR}" OUTPUT_VARIABLE path OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET)
         if(path)
             file(GLOB record CONFIGURE_DEPENDS "${path}")  # configured again when it is removed
@@ -13,7 +15,7 @@ function(halcyon_commit target)
     endif()
     set(source "${PROJECT_BINARY_DIR}/generated/commit.cpp")
     set(script "${CMAKE_CURRENT_FUNCTION_LIST_DIR}/commit.cmake")
-    add_custom_command(OUTPUT "${source}" COMMAND "${CMAKE_COMMAND}" "-DGIT=${HALCYON_GIT}" "-DROOT=${PROJECT_SOURCE_DIR}" "-DOUTPUT=${source}" -P "${script}"
+    add_custom_command(OUTPUT "${source}" COMMAND "${CMAKE_COMMAND}" "-DGIT=${git}" "-DROOT=${PROJECT_SOURCE_DIR}" "-DOUTPUT=${source}" -P "${script}"
                        DEPENDS ${record} "${script}" VERBATIM)
     target_sources(${target} PRIVATE "${source}")
 endfunction()

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 # cmake -DGIT=PROGRAM -DROOT=FOLDER -DOUTPUT=FILE -P commit.cmake
-# Writes a source with the commit that is checked out in ROOT, or with `unknown`: without git, and where ROOT is not the top of a checkout.
+# Writes a source with the commit that is checked out in ROOT; without GIT, with `unknown`.
 set(commit unknown)
-if(GIT AND EXISTS "${ROOT}/.git")
+if(GIT)
     execute_process(COMMAND "${GIT}" -c safe.directory=* -C "${ROOT}" rev-parse --short=10 HEAD
                     OUTPUT_VARIABLE found OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET RESULT_VARIABLE result)
     if(result EQUAL 0)
