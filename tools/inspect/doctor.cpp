@@ -2,6 +2,7 @@
 // `hal doctor`: what on this machine prevents real time, remedies to type, and the measured wake-up jitter.
 #include "inspect/doctor.hpp"
 
+#include <algorithm>
 #include <cctype>
 #include <cerrno>
 #include <cstring>
@@ -25,6 +26,7 @@
 #include "cli/output.hpp"
 #include "hal/privilege.hpp"
 #include "inspect/jitter.hpp"
+#include "inspect/remedies.hpp"
 
 namespace hal::tools {
 
@@ -36,8 +38,11 @@ enum class Verdict { good, fair, poor };
 struct Finding {
     Verdict verdict;
     std::string subject, sentence;
-    std::string remedy = {};  ///< what to type; empty when no action is needed
+    std::string remedy = {};  ///< what to type; empty when no action is needed. A command begins with `sudo`
     std::string other = {};   ///< what to type instead, where there is a choice
+    std::string then = {};    ///< what remains to be done after the remedy
+
+    std::string advice() const { return then.empty() ? remedy : remedy + ", then " + then; }
 };
 
 std::string first_line(const std::string& path) {
@@ -78,7 +83,7 @@ Finding kernel() {
                                                                             : "no preemption";
     return {Verdict::fair, "kernel",
             fmt::format("{} ({}), not PREEMPT_RT: occasional wake-up latencies of milliseconds", about.release, kind),
-            "sudo apt install linux-image-rt-amd64, then reboot into it"};
+            fmt::format("sudo apt-get install -y linux-image-rt-{}", std::string_view(about.machine) == "aarch64" ? "arm64" : "amd64"), {}, "reboot into it"};
 }
 
 Finding machine() {
@@ -202,8 +207,9 @@ Finding idle_states() {
     return {Verdict::fair, "idle states",
             fmt::format("{}, and /dev/cpu_dma_latency is not writable: leaving a deep state takes up to 0.2 ms", states),
             "sudo groupadd -f realtime; sudo usermod -aG realtime $USER; sudo chgrp realtime /dev/cpu_dma_latency; "
-            "sudo chmod 0660 /dev/cpu_dma_latency, then log in again; lost at reboot, unless the line KERNEL==\"cpu_dma_latency\", "
-            "GROUP=\"realtime\", MODE=\"0660\" is in /etc/udev/rules.d/99-cpu-dma-latency.rules"};
+            "sudo chmod 0660 /dev/cpu_dma_latency; "
+            "echo 'KERNEL==\"cpu_dma_latency\", GROUP=\"realtime\", MODE=\"0660\"' | sudo tee /etc/udev/rules.d/99-cpu-dma-latency.rules",
+            {}, "log in again"};
 }
 
 /// System-management interrupts stop all processors unseen; Intel counts them in a register.
@@ -230,7 +236,7 @@ std::string described(const Finding& finding, bool colour) {
     const std::string verdict = colour ? fmt::format("{}{}\033[0m", codes[static_cast<std::size_t>(finding.verdict)], word(finding.verdict))
                                        : word(finding.verdict);
     std::string text = fmt::format("{}  {:15} {}\n", verdict, finding.subject, finding.sentence);
-    if (!finding.remedy.empty()) text += fmt::format("      {:15}   try: {}\n", "", finding.remedy);
+    if (!finding.remedy.empty()) text += fmt::format("      {:15}   try: {}\n", "", finding.advice());
     if (!finding.other.empty()) text += fmt::format("      {:15}   or:  {}\n", "", finding.other);
     return text;
 }
@@ -240,16 +246,20 @@ std::string described(const Finding& finding, bool colour) {
 int run_doctor(const DoctorOptions& options) {
     const bool colour = colours(STDOUT_FILENO);
     nlohmann::ordered_json report;
+    std::vector<Remedy> remedies;
     for (const auto& check : checks) {
         const Finding finding = check();
+        const Remedy remedy{finding.remedy, finding.then};
+        if (finding.remedy.starts_with("sudo ") && std::find(remedies.begin(), remedies.end(), remedy) == remedies.end()) remedies.push_back(remedy);
         if (options.json)
             report["findings"].push_back({{"verdict", word(finding.verdict)},
                                           {"subject", finding.subject},
                                           {"sentence", finding.sentence},
-                                          {"remedy", finding.remedy},
+                                          {"remedy", finding.advice()},
                                           {"other", finding.other}});
         else if (!print(described(finding, colour))) return 1;
     }
+    if (options.fix) return carry_out(options, remedies);
     constexpr std::int64_t period_ns = 1'000'000, spin_ns = 200'000;
     for (const std::int64_t spin : {std::int64_t{0}, spin_ns}) {
         if (options.seconds <= 0.0) break;

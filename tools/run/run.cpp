@@ -15,6 +15,7 @@
 #include "run/hosted_machine.hpp"
 #include "run/picture.hpp"
 #include "run/report.hpp"
+#include "run/service_notifier.hpp"
 
 namespace hal::tools {
 
@@ -35,23 +36,30 @@ std::string end_reason(int signal) {
     return name ? fmt::format("ended by SIG{}\n", name) : "";
 }
 
-/// Opens the device of --watchdog. Returns false after printing the error.
-bool attach_watchdog(HostedMachine& machine, const RunOptions& options) {
-    if (options.watchdog.empty()) return true;
+/// Opens the device of --watchdog, or that of a service manager with a watchdog. Returns false after printing the error.
+bool attach_watchdog(HostedMachine& machine, const RunOptions& options, ServiceNotifier& service) {
+    if (options.watchdog.empty() && !service.watchdog()) return true;
+    const char* const name = service.watchdog() ? "WatchdogSec= of the service" : "--watchdog";
     const auto lock = machine.session.lock();
-    std::string problem;
-    if (machine.session.model().threads.empty()) problem = "--watchdog needs a thread whose progress feeds the device; the netlist has none";
-    if (problem.empty() && machine.session.threads().attach_watchdog(options.watchdog, problem)) return true;
+    std::string problem, device = options.watchdog;
+    if (machine.session.model().threads.empty())
+        problem = fmt::format("{} needs a thread whose progress feeds the {}; the netlist has none", name, service.watchdog() ? "watchdog" : "device");
+    else if (service.watchdog() && !device.empty())
+        problem = "--watchdog and WatchdogSec= of the service exclude each other; leave one out";
+    else if (service.watchdog())
+        device = service.watchdog_device(problem);
+    if (problem.empty() && machine.session.threads().attach_watchdog(device, problem)) return true;
     fail(options, problem);
     return false;
 }
 
-int run_plain(HostedMachine& machine, const RunOptions& options, std::vector<NodeLine> nodes) {
+int run_plain(HostedMachine& machine, const RunOptions& options, std::vector<NodeLine> nodes, ServiceNotifier& service) {
     int status = options.part.empty() ? machine.load() : load_node(machine, options, std::move(nodes));
     if ((status != 0 && !options.keep_going) || machine.stop.requested()) return status;
-    if (!attach_watchdog(machine, options)) return 1;
+    if (!attach_watchdog(machine, options, service)) return 1;
     machine.start_threads();
     const std::string& name = machine.session.options().name;
+    service.ready(fmt::format("machine '{}' runs; to control it: hal shell --name {}", name, name));
     print(loaded_summary(machine.session));
     if (options.interactive) {
         const FaultLines faults(machine.session);
@@ -67,11 +75,12 @@ int run_plain(HostedMachine& machine, const RunOptions& options, std::vector<Nod
         machine.stop.wait_ns(options.for_ns);
     }
     const bool faulted = machine.faulted();
+    service.stopping();
     const std::string report = timing_report(machine.session);  // the threads take their figures with them
     machine.shut_down();
     print("\n" + end_reason(machine.stop.signal()) + report);
-    if (!machine.session.threads().watchdog_disarmed())
-        fail(options, options.watchdog + "was not disarmed, because a thread does not end; it resets this host after its timeout");
+    if (!options.watchdog.empty() && !machine.session.threads().watchdog_disarmed())
+        fail(options, options.watchdog + " was not disarmed, because a thread does not end; it resets this host after its timeout");
     return faulted ? 1 : status;
 }
 
@@ -87,9 +96,10 @@ int run_run(const RunOptions& options) {
     if (options.interactive && options.for_ns >= 0) return fail(options, "-I and --for exclude each other; leave one out");
     const auto nodes = requested_nodes(options);
     if (!nodes) return 1;
+    ServiceNotifier service;  // before there are other threads, because it changes the environment
     HostedMachine machine(options, own_name(options), false);
     if (!machine.serve(true)) return 1;
-    return options.classic ? run_classic(machine, options) : run_plain(machine, options, *nodes);
+    return options.classic ? run_classic(machine, options) : run_plain(machine, options, *nodes, service);
 }
 
 }  // namespace hal::tools
