@@ -28,7 +28,7 @@ class Help(Case):
                 self.assertIn("usage: hal " + line.split()[0], self.good("help", line.split()[0]))
 
     def test_version(self):
-        self.assertRegex(self.good("--version"), r"^hal \d+\.\d+\.\d+\n$")
+        self.assertRegex(self.good("--version"), r"^hal \d+\.\d+\.\d+ \(commit ([0-9a-f]{10}|unknown)\)\n$")
 
 
 class BusProgram(Case):

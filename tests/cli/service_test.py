@@ -39,7 +39,8 @@ class Service(Case):
 
     def test_reports_ready_and_stopping_and_does_not_pass_the_socket_on(self):
         self.listen(str(self.folder / "notify"))
-        netlist = self.write("a.hal", "loadusr -w sh -c 'echo \"socket: $NOTIFY_SOCKET\"'\n" + SERVO)
+        netlist = self.write("a.hal", "loadusr -w sh show.sh\n" + SERVO)
+        self.write("show.sh", 'echo "socket: $NOTIFY_SOCKET"\n')
         machine = self.start("run", netlist)
         self.assertEqual("READY=1\nSTATUS=machine 'default' runs; to control it: hal shell --name default", self.receive())
         self.assertIsNone(self.receive(0.3), "without WatchdogSec= nothing else is sent")

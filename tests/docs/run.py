@@ -7,9 +7,11 @@ In README.md and docs/**/*.md:
   ```cpp file=NAME      written to NAME
   ```text file=NAME     written to NAME
   ```console            lines `$ COMMAND` are run in order, in one folder per document; the lines below a command are
-                        its whole output, stdout and stderr together. A line `...` stands for any lines, `...` inside a
-                        line for any text. No output lines: anything is accepted. The exit status must be 0 unless the
-                        command ends in `# exit 1`.
+                        its whole output, stdout and stderr together. No output lines: anything is accepted. The exit
+                        status must be 0 unless the command ends in `# exit 1`.
+  ```console figures    the same for output that was real when the page was written and contains times, counts or addresses: a
+                        number, with its unit of time, stands for any number, and the width of columns is not compared.
+                        Placeholders (`...`) are not allowed: a command whose output is too long ends in `| head` or the like.
   `./hal` in a command is the program under test and `build/release` its build tree; such commands run in the repository's
 root. Nothing is skipped but `./hal test` and `./hal bench`, which run this, and `./hal build`.
 """
@@ -30,15 +32,15 @@ NOT_RUN = ("./hal test", "./hal bench", "./hal build")
 FENCE = re.compile(r"^```(\w+)([^\n]*)\n(.*?)^```", re.M | re.S)
 
 
-def matches(expected, actual):
-    """True when the lines agree, `...` standing for anything."""
-    pattern = []
-    for line in expected:
-        if line.strip() == "...":
-            pattern.append(r"(?:.*\n)*?")
-        else:
-            pattern.append(".*".join(re.escape(part) for part in line.rstrip().split("...")) + r"[ \t]*\n")
-    return re.fullmatch("".join(pattern), "".join(line + "\n" for line in actual)) is not None
+NUMBER = re.compile(r"(?<=cycle )\d+(?: \d{3})*|\b(?=\w*[a-f])(?=\w*\d)[0-9a-f]{8,}\b|"  # cycle 1 104; a token
+                    r"(?<![A-Za-z_])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?: ?(?:ns|us|ms|s|min)\b)?")
+
+
+def matches(expected, actual, figures=False):
+    """True when the lines agree; with `figures`, any number stands for any number."""
+    def plain(line):
+        return " ".join(NUMBER.sub("#", line).replace("-#", "#").split()) if figures else line.rstrip()
+    return [plain(line) for line in expected] == [plain(line) for line in actual]
 
 
 def run(command, folder, environment):
@@ -59,13 +61,19 @@ def run(command, folder, environment):
     return done.returncode == status, done.returncode, done.stdout.splitlines()
 
 
-def check_console(text, where, folder, environment):
+def placeholders(commands):
+    """The lines of output that show a placeholder in place of what a command prints."""
+    return [line for command, output in commands for line in output if "..." in line and "`...`" not in line]
+
+
+def check_console(text, where, folder, environment, figures):
     problems, commands = [], []
     for line in text.splitlines():
         if line.startswith("$ "):
             commands.append((line[2:], []))
         elif commands:
             commands[-1][1].append(line)
+    problems += [f"{where}: shows a placeholder, not real output: {line}" for line in placeholders(commands)]
     for command, expected in commands:
         if command.startswith(NOT_RUN):
             continue
@@ -74,7 +82,7 @@ def check_console(text, where, folder, environment):
             expected.pop()
         if not good:
             problems.append(f"{where}: `{command}` ended with status {status}:\n" + "\n".join(actual))
-        elif expected and not matches(expected, actual):
+        elif expected and not matches(expected, actual, figures):
             problems.append(f"{where}: `{command}` printed\n" + "\n".join(actual) + "\n  where the document has\n" + "\n".join(expected))
     return len(commands), problems
 
@@ -113,7 +121,7 @@ def check_document(path):
                 if not good:
                     problems.append(f"{where}: hal check prints\n" + "\n".join(actual))
             elif language == "console":
-                count, found = check_console(body, where, folder, environment)
+                count, found = check_console(body, where, folder, environment, "figures" in options.split())
                 ran += count
                 problems += found
         end_what_was_left(home)

@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: MIT
+"""The Debian packages: which files each has, and its control fields."""
+
+OWN = "halcyon (= {version})"
+
+# name: depends besides the libraries, further fields, summary, description
+PACKAGES = {
+    "halcyon": {
+        "depends": "adduser, libcap2-bin, iproute2",
+        "fields": {"Recommends": "libpam-modules", "Suggests": "halcyon-dev, halcyon-doc, can-utils"},
+        "summary": "real-time dataflow runtime in the manner of LinuxCNC's HAL",
+        "text": "Control components are wired together by netlist files and run in real-time\nthreads; a shell inspects and rewires the running machine. CANopen, EtherCAT\n"
+                "and TDMA on Ethernet are components like any other.\n.\nContains the program hal, the core components, the buses and the machines to\nstart from.",
+    },
+    "halcyon-linuxcnc": {
+        "depends": OWN,
+        "fields": {"Conflicts": "linuxcnc-uspace, linuxcnc", "Architecture": "all"},
+        "summary": "LinuxCNC's command names for Halcyon",
+        "text": "halrun, halcmd, halcompile, halsampler, halstreamer and lcec_conf as names of\nthe program hal.",
+    },
+    "halcyon-vision": {"depends": OWN, "summary": "cameras and markers for Halcyon", "text": "The components that use OpenCV."},
+    "halcyon-dds": {"depends": OWN, "summary": "distribution over DDS for Halcyon", "text": "The components that use Fast DDS: signals as topics, also for ROS 2, and\nmachines of several computers."},
+    "halcyon-estimation": {"depends": OWN, "summary": "estimation and state control for Halcyon", "text": "Kalman filters, state feedback, observers, force and torque."},
+    "halcyon-panel": {"depends": OWN, "summary": "web panel of running Halcyon machines", "text": "The command hal panel: values, graph, scope and user panels in a browser."},
+    "python3-halcyon": {
+        "depends": OWN + ", python3 (>= 3.11), python3 (<< 3.12)",
+        "fields": {"Section": "python"},
+        "summary": "components and clients of Halcyon in Python",
+        "text": "The modules hal and halcyon. Where LinuxCNC is installed, its module hal takes\nprecedence outside of Halcyon's own machines.",
+    },
+    "halcyon-dev": {
+        "depends": OWN + ", g++",
+        "fields": {"Recommends": "cmake, ninja-build, libpugixml-dev", "Section": "libdevel", "Conflicts": "linuxcnc-uspace-dev, linuxcnc-dev"},
+        "summary": "headers and CMake package of Halcyon",
+        "text": "What hal compile, hal new component and find_package(Halcyon) need.",
+    },
+    "halcyon-doc": {"depends": "", "fields": {"Section": "doc", "Architecture": "all"}, "summary": "pages and component reference of Halcyon",
+                    "text": "Tutorials, guides and manual pages; as one searchable site in\n/usr/share/doc/halcyon/html."},
+}
+
+DOC = "usr/share/doc/Halcyon/"
+ALIASES = "(halrun|halcmd|halcompile|halsampler|halstreamer|lcec_conf)"
+GROUPS = ("vision", "dds", "estimation")  # components that are packages of their own
+
+# (pattern of a path in the installation, package, new path or None for the same); the first match counts. Package None: left out.
+RULES = (
+    (rf"{DOC}LICENSE", None, None),
+    (rf"{DOC}reference/.*", None, None),  # is in the site
+    (rf"{DOC}halfiles/(.*)", "halcyon", r"usr/share/halcyon/halfiles/\1"),
+    (rf"{DOC}tests/netlists/(.*)", "halcyon-doc", r"usr/share/doc/halcyon/tests/netlists/\1"),
+    (rf"{DOC}(.*)", "halcyon-doc", r"usr/share/doc/halcyon/\1"),
+    (r"usr/share/man/.*", "halcyon-doc", None),
+    (rf"usr/bin/{ALIASES}", "halcyon-linuxcnc", None),
+    (r"usr/share/bash-completion/completions/halcmd", "halcyon-linuxcnc", None),
+    (r"usr/bin/hal-panel", "halcyon-panel", None),
+    (r"usr/include/.*|usr/lib/cmake/.*|usr/lib/[^/]*\.a|usr/lib/lib[^/]*\.so", "halcyon-dev", None),
+    (r"usr/lib/halcyon/python/.*", "python3-halcyon", None),
+    (r"usr/lib/libhalcyon_dds\..*", "halcyon-dds", None),
+    (r"usr/lib/libhalcyon_vision\..*", "halcyon-vision", None),
+    (r"usr/.*|etc/.*|lib/.*", "halcyon", None),
+)
+
+# What only packages have: file in files/, package, path, mode
+EXTRA = (
+    ("halcyon@.service", "halcyon", "lib/systemd/system/halcyon@.service", 0o644),
+    ("halcyon-can@.service", "halcyon", "lib/systemd/system/halcyon-can@.service", 0o644),
+    ("limits.conf", "halcyon", "etc/security/limits.d/halcyon-realtime.conf", 0o644),
+    ("60-halcyon.rules", "halcyon", "lib/udev/rules.d/60-halcyon.rules", 0o644),
+    ("README.etc", "halcyon", "etc/halcyon/README", 0o644),
+    ("halcyon.pth", "python3-halcyon", "usr/lib/python3/dist-packages/halcyon.pth", 0o644),
+)
