@@ -80,6 +80,7 @@ class Packages:
             to.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(HERE / "files" / source, to)
             to.chmod(mode)
+        (self.tree("halcyon") / "etc/halcyon/can").mkdir()
         site = self.build / "site"
         if site.exists():
             shutil.copytree(site, self.tree("halcyon-doc") / "usr/share/doc/halcyon/html")

@@ -1,0 +1,161 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""The Debian packages: lintian, installation in a clean Debian 12, a machine there as an ordinary user, removal. Needs root and a mirror.
+
+HALCYON_PACKAGES: a folder with packages to test, instead of making them. HALCYON_CHROOT: a tar archive of Debian 12 to start from."""
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+BUILD = Path(os.environ.get("HAL_BIN", ROOT / "build/release/bin/hal")).resolve().parents[1]
+PARTS = ("halcyon", "halcyon-linuxcnc", "halcyon-estimation", "halcyon-doc")  # without the large libraries
+SERVICE_KEYS = ("Type=notify", "User=halcyon", "WatchdogSec=5", "Restart=on-failure", "NoNewPrivileges=yes", "ProtectSystem=strict")
+
+
+def run(*words, **how):
+    return subprocess.run([str(word) for word in words], stdin=subprocess.DEVNULL, capture_output=True, text=True, **how)
+
+
+def skip(reason):
+    print(reason)
+    sys.exit(77)
+
+
+class Chroot(unittest.TestCase):
+    maxDiff = None
+
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = Path(tempfile.mkdtemp(prefix="halcyon-chroot-"))
+        cls.addClassCleanup(shutil.rmtree, cls.folder, True)
+        if given := os.environ.get("HALCYON_PACKAGES"):
+            cls.packages = Path(given)
+        else:
+            cls.packages = cls.folder / "packages"
+            made = run(sys.executable, ROOT / "tools/package/build.py", ROOT, BUILD, cls.packages)
+            assert made.returncode == 0, made.stdout + made.stderr
+        cls.root = cls.folder / "root"
+        if archive := os.environ.get("HALCYON_CHROOT"):
+            cls.root.mkdir()
+            made = run("tar", "-C", cls.root, "-xf", archive)
+        else:
+            made = run("mmdebstrap", "--variant=minbase", "bookworm", cls.root)
+        if made.returncode != 0:
+            print(made.stderr)
+            skip("mmdebstrap cannot make a Debian 12 here: no mirror?")
+        (cls.root / "packages").mkdir()
+        for path in cls.packages.glob("*.deb"):
+            shutil.copy(path, cls.root / "packages")
+
+    @classmethod
+    def inside(cls, script):
+        """A shell command as root in the chroot, with /proc, /dev and this system's name servers."""
+        mounts = 'mount -t proc proc "$0/proc"; mount --rbind /dev "$0/dev"; mount --bind /etc/resolv.conf "$0/etc/resolv.conf" 2>/dev/null; exec chroot "$0" /usr/bin/env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin LC_ALL=C.UTF-8 DEBIAN_FRONTEND=noninteractive sh -c "$1"'
+        return run("unshare", "-m", "sh", "-c", mounts, cls.root, script)
+
+    def good(self, script):
+        done = self.inside(script)
+        self.assertEqual(0, done.returncode, f"{script}\n{done.stdout[-3000:]}{done.stderr[-3000:]}")
+        return done.stdout
+
+    def of_user(self, script):
+        return self.good(f"su tester -c '{script}'")
+
+    def files(self):
+        """What is in the chroot, except what apt and the accounts leave."""
+        listed = self.good("find / -xdev \\( -path /proc -o -path /dev -o -path /packages -o -path /var/lib/apt -o -path /var/lib/dpkg -o -path /var/cache "
+                           "-o -path /var/log -o -path /tmp -o -path /run -o -path /home \\) -prune -o -print").splitlines()
+        return set(listed)
+
+    def test_lintian_has_no_errors(self):
+        if not shutil.which("lintian"):
+            self.skipTest("needs lintian")
+        done = run("lintian", "--fail-on", "error", "--tag-display-limit", "0", "--suppress-tags", "bad-distribution-in-changes-file", *self.packages.glob("*.deb"))
+        self.assertEqual([], [line for line in done.stdout.splitlines() if line.startswith("E:")])
+
+    def test_every_package_is_complete_and_no_file_is_in_two(self):
+        seen = {}
+        for path in self.packages.glob("*.deb"):
+            for line in run("dpkg-deb", "-c", path).stdout.splitlines():
+                name = line.split()[5]
+                if not name.endswith("/"):
+                    self.assertNotIn(name, seen, f"in {path.name} and {seen.get(name)}")
+                    seen[name] = path.name
+        for name, package in (("./usr/bin/hal", "halcyon_"), ("./usr/bin/halcmd", "halcyon-linuxcnc_"), ("./usr/lib/halcyon/components/pid.so", "halcyon_"),
+                              ("./usr/lib/halcyon/components/lqr.so", "halcyon-estimation_"), ("./usr/include/hal/component.hpp", "halcyon-dev_"),
+                              ("./usr/share/halcyon/halfiles/furuta/hang.hal", "halcyon_"), ("./usr/share/doc/halcyon/README.md", "halcyon-doc_")):
+            self.assertTrue(seen.get(name, "").startswith(package), (name, seen.get(name)))
+
+    def test_installs_runs_as_an_ordinary_user_and_is_removed(self):
+        self.good("apt-get update")
+        self.good("apt-get install -y --no-install-recommends adduser libcap2-bin iproute2 procps")
+        self.good("apt-get install -y --no-install-recommends $(for p in halcyon-estimation; do apt-get -s install /packages/halcyon_*.deb "
+                  "/packages/halcyon-estimation_*.deb | sed -n 's/^Inst \\([^ ]*\\) .*/\\1/p' | grep -v halcyon; done)")
+        before = self.files()
+        self.good("apt-get install -y --no-install-recommends " + " ".join(f"/packages/{name}_*.deb" for name in PARTS))
+        self.good("useradd -m tester")
+        # Removed again, everything but the accounts, their folders and /etc is as before.
+        self.check_permissions()
+        self.check_machine()
+        self.check_service()
+        self.good("apt-get purge -y " + " ".join(PARTS))
+        left = {path for path in self.files() - before if not path.startswith(("/etc/passwd", "/etc/group", "/etc/shadow", "/etc/gshadow", "/etc/sub", "/etc/ld.so.cache", "/etc/apt"))}
+        self.assertEqual(set(), {path for path in left if "halcyon" in path or "/hal" in path})
+
+    def check_permissions(self):
+        self.assertIn("realtime", self.good("getent group realtime"))
+        self.assertIn("realtime", self.good("id -nG halcyon"))
+        self.assertIn("@realtime - rtprio 98", self.good("cat /etc/security/limits.d/halcyon-realtime.conf"))
+        capabilities = self.good("getcap /usr/bin/hal")
+        if capabilities:
+            self.assertEqual("/usr/bin/hal cap_ipc_lock,cap_net_raw,cap_sys_nice=ep\n", capabilities.replace("cap_net_raw,cap_ipc_lock", "cap_ipc_lock,cap_net_raw"))
+            report = self.of_user("hal doctor --seconds 0")
+            for subject in ("SCHED_FIFO", "memory locking", "capabilities", "raw Ethernet"):
+                self.assertRegex(report, rf"good +{subject}")
+
+    def check_machine(self):
+        self.assertRegex(self.of_user("hal --version"), r"^hal \d+\.\d+\.\d+ ")
+        report = self.of_user("cd; hal run /usr/share/halcyon/halfiles/furuta/hang.hal --for 2s 2>&1")
+        self.assertRegex(report, r"servo-thread +1 ms +\d{4}")
+        if self.good("getcap /usr/bin/hal"):
+            self.assertIn("SCHED_FIFO", report)
+        shown = self.of_user("cd; hal sim /usr/share/halcyon/halfiles/furuta/swing-up.hal --for 5s --show pendulum-upright 2>/dev/null || hal sim /usr/share/halcyon/halfiles/furuta/swing-up.hal --for 5s 2>&1")
+        self.assertNotIn("error", shown)
+        self.assertIn("first-order", self.of_user("hal doc lowpass").lower())
+        self.assertIn("NAME", self.of_user("hal doc lqr"))
+        self.assertEqual("hal-pid.9.gz", Path(self.good("ls /usr/share/man/man9/hal-pid.9.gz").strip()).name)
+        # The command of the service, as its user, with its sandbox left out.
+        self.good("cp -r /usr/share/halcyon/halfiles/furuta /etc/halcyon/pendulum && ln -s hang.hal /etc/halcyon/pendulum/machine.hal")
+        self.good("install -d -o halcyon -g halcyon -m 0700 /run/halcyon/pendulum")
+        report = self.good("cd /etc/halcyon/pendulum && su -s /bin/sh halcyon -c 'XDG_RUNTIME_DIR=/run/halcyon/pendulum; export XDG_RUNTIME_DIR; "
+                           "hal run --no-picture --name pendulum machine.hal --for 3s 2>&1 & until hal shell --name pendulum -Q show timing; do sleep 0.2; done; wait'")
+        self.assertIn("servo-thread", report)
+        self.good("rm -r /etc/halcyon/pendulum /run/halcyon")
+
+    def check_service(self):
+        unit = self.good("cat /lib/systemd/system/halcyon@.service")
+        for key in SERVICE_KEYS:
+            self.assertIn(f"\n{key}\n", unit)
+        command = re.search(r"ExecStart=(.*)", unit)[1]
+        self.assertEqual("/usr/bin/hal run --no-picture --name %i $HAL_OPTIONS machine.hal", command)
+        if shutil.which("systemd-analyze"):
+            units = self.root / "lib/systemd/system"
+            checked = run("systemd-analyze", "security", "--offline=true", "--threshold=60", units / "halcyon@.service")
+            if "Unknown" not in checked.stderr:
+                self.assertEqual(0, checked.returncode, checked.stdout[-500:] + checked.stderr)
+
+
+if __name__ == "__main__":
+    if os.geteuid() != 0:
+        skip("needs root")
+    if not os.environ.get("HALCYON_CHROOT") and not shutil.which("mmdebstrap"):
+        skip("needs mmdebstrap (or HALCYON_CHROOT)")
+    if run("unshare", "-m", "true").returncode != 0:
+        skip("needs namespaces")
+    unittest.main()
