@@ -91,7 +91,7 @@ public:
     Got next(ProbeBatch& batch, int timeout_ms);
     struct Entry {
         std::int64_t time_ns = 0;
-        std::string kind, text;  ///< kind: fault, edit, command
+        std::string kind, text;  ///< kind: fault, edit, command, message
     };
     const Entry& entry() const { return entry_; }
 

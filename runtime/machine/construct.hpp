@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "text/diagnostic.hpp"
+#include "hal/messages.h"
 #include "hal/status.h"
 #include "model/edit.hpp"
 #include "model/model.hpp"
@@ -56,7 +57,7 @@ bool construct(Model& model, Edit& edit, LoadedComponent& component, const LoadR
 void* allocate_for(Instance& instance, std::size_t bytes, std::size_t align) noexcept;
 
 /// Starts one instance: it may acquire hardware. Returns why it failed, or an empty Failure.
-Failure start_instance(Instance& instance, const Model& model, Executor& executor, const hal_status& status);
+Failure start_instance(Instance& instance, const Model& model, Executor& executor, const hal_status& status, const hal_messages& messages);
 /// The instance that disciplines the threads (external clock reference), or nullptr.
 const Instance* clock_leader(const Model& model);
 /// [setup] Not while a thread runs its functions.

@@ -1,11 +1,17 @@
 // SPDX-License-Identifier: MIT
-// What happened to a machine, in order: commands and edits that were executed, and faults. Kept only while a client listens.
+// What happened to a machine, in order: commands and edits that were executed, faults, and messages of its instances. Kept only while a
+// client listens.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <deque>
+#include <mutex>
 #include <string>
+#include <string_view>
 #include <vector>
+
+#include "hal/messages.h"
 
 namespace hal {
 
@@ -13,7 +19,7 @@ struct SessionState;
 
 struct JournalEntry {
     std::int64_t time_ns = 0;  ///< on the machine's clock
-    std::string kind;          ///< fault, edit, command
+    std::string kind;          ///< fault, edit, command, message
     std::string text;
 };
 
@@ -21,6 +27,7 @@ struct JournalEntry {
 class Journal {
 public:
     explicit Journal(SessionState& state) : state_(state) {}
+    Journal(const Journal&) = delete;
 
     /// Where a listener is: it has what was added before.
     struct Position {
@@ -34,13 +41,24 @@ public:
     /// Adds an entry; does nothing while nobody listens.
     void add(const char* kind, std::string text);
     bool wanted() const { return listeners_ > 0; }
+    /// Adds a line of an instance. Needs no lock of the session. [any]
+    void message(std::string_view line) noexcept;
+    /// Returns the same as the extension that plugins use.
+    const hal_messages& for_plugins() const { return for_plugins_; }
 
 private:
+    void append(JournalEntry entry);
+    void collect_messages();
     static constexpr std::size_t kept = 10'000;
     SessionState& state_;
-    std::size_t listeners_ = 0;
+    std::atomic<std::size_t> listeners_{0};  // written under the session's lock
     std::deque<JournalEntry> entries_;
     std::uint64_t count_ = 0;  // of all entries ever
+    std::mutex messages_mutex_;
+    std::vector<JournalEntry> messages_;  // guarded by it: what is not in entries_ yet
+    const hal_messages for_plugins_{sizeof(hal_messages),
+                                    [](const hal_messages* self, const char* line, std::size_t bytes) { static_cast<Journal*>(self->data)->message({line, bytes}); },
+                                    this};
 };
 
 }  // namespace hal

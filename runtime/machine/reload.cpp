@@ -24,7 +24,7 @@ bool SessionState::start_replaced(Diagnostics& diagnostics) {
     const auto start = [&](const LoadedComponent& component) {
         for (const auto& instance : component.instances) {
             if (instance->started) continue;
-            if (const Failure why = start_instance(*instance, model, *executor, status); !why.empty())
+            if (const Failure why = start_instance(*instance, model, *executor, status, journal.for_plugins()); !why.empty())
                 diagnostics.error("start-failed", instance->loaded,
                                   "'" + instance->name + "' (" + component.name + ") cannot start in its new version: " + why.text,
                                   "loaded here", why.help.empty() ? "the old version goes on" : why.help + "; the old version goes on");
@@ -70,7 +70,7 @@ void SessionState::restart_replaced(Diagnostics& diagnostics) {
         for (auto it = one.other->instances.rbegin(); it != one.other->instances.rend(); ++it) stop_instance(**it);
         for (const auto& instance : one.component->instances) {
             if (instance->started || !one.stopped) continue;
-            const Failure why = start_instance(*instance, model, *executor, status);
+            const Failure why = start_instance(*instance, model, *executor, status, journal.for_plugins());
             if (why.empty()) continue;
             for (LoadedFunction* const function : instance->functions) function->halted = true;
             diagnostics.error("start-failed", instance->loaded,

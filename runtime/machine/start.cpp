@@ -15,6 +15,7 @@ struct Starting {
     const Model& model;
     Executor& executor;
     const hal_status& status;
+    const hal_messages& messages;
     Failure failure;
 
     bool fail(const char* reason) noexcept {
@@ -86,8 +87,8 @@ const Instance* clock_leader(const Model& model) {
     return nullptr;
 }
 
-Failure start_instance(Instance& instance, const Model& model, Executor& executor, const hal_status& status) {
-    Starting starting{instance, model, executor, status, {}};
+Failure start_instance(Instance& instance, const Model& model, Executor& executor, const hal_status& status, const hal_messages& messages) {
+    Starting starting{instance, model, executor, status, messages, {}};
     executor.clock().claim = claim_clock;
     const hal_host host{
         sizeof host, &starting,
@@ -106,6 +107,7 @@ Failure start_instance(Instance& instance, const Model& model, Executor& executo
             if (std::strcmp(id, "hal.stream/1") == 0) return &stream_host;
             if (std::strcmp(id, "hal.faults/1") == 0) return &static_cast<Starting*>(h->data)->executor.board().shared;
             if (std::strcmp(id, HAL_STATUS) == 0) return &static_cast<Starting*>(h->data)->status;
+            if (std::strcmp(id, HAL_MESSAGES) == 0) return &static_cast<Starting*>(h->data)->messages;
             if (std::strcmp(id, "hal.clock/1") == 0) return &static_cast<Starting*>(h->data)->executor.clock();
             if (std::strcmp(id, HAL_SUPERVISION) == 0) return &static_cast<Starting*>(h->data)->executor.supervisor().shared;
             if (std::strcmp(id, HAL_PATH_DELAY) == 0) return &path_delay_host;

@@ -132,7 +132,7 @@ bool SessionState::carry_out(Diagnostics& diagnostics) {
     for (Instance* const instance : edit->added_instances()) {
         if (!instance->constructed || instance->started || model.find_instance(instance->name) != instance)
             continue;  // unloaded again in the same edit
-        if (const Failure why = start_instance(*instance, model, *executor, status); !why.empty())
+        if (const Failure why = start_instance(*instance, model, *executor, status, journal.for_plugins()); !why.empty())
             diagnostics.error(Code::named(why.code).value_or(Code("start-failed")), instance->loaded,
                               "'" + instance->name + "' (" + instance->component->name + ") cannot start: " + why.text, "", why.help);
     }

@@ -91,12 +91,22 @@ TEST_F(ProbeProtocol, the_journal_has_edits_and_commands_but_no_queries) {
     ask({{"journal", true}});
     machine.must("getp s.out\nsetp s.in1 4\nstart\n");
     ask({{"set", {{"a.in1", true}}}});
+    const hal_messages& messages = machine.session.journal().for_plugins();
+    constexpr std::string_view line = "canopen.0: node 3: emergency 8110h";
+    messages.add(&messages, line.data(), line.size());  // of an instance
     std::string events;
     connection.publish(connection.next_due_ns(), false, events);
     EXPECT_NE(events.find(R"("kind":"edit","text":"setp s.in1 4"})"), events.npos) << events;
     EXPECT_NE(events.find(R"("kind":"command","text":"start"})"), events.npos) << events;
     EXPECT_NE(events.find(R"("kind":"edit","text":"setp a.in1 TRUE"})"), events.npos) << events;
+    EXPECT_NE(events.find(R"("kind":"message","text":"canopen.0: node 3: emergency 8110h"})"), events.npos) << events;
     EXPECT_EQ(events.find("getp"), events.npos) << events;
+    ask({{"journal", false}});
+    messages.add(&messages, line.data(), line.size());
+    ask({{"journal", true}});
+    events.clear();
+    connection.publish(connection.next_due_ns(), false, events);
+    EXPECT_EQ(events, "") << "nobody listened";
     ask({{"journal", false}});
     EXPECT_EQ(connection.next_due_ns(), INT64_MAX);
 }

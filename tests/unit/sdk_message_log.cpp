@@ -79,6 +79,20 @@ TEST_F(MessageLogTest, Subjects_beyond_the_limit_are_counted) {
     EXPECT_EQ(lines.back(), "it.0: 99744 messages about further subjects not shown\n");
 }
 
+TEST_F(MessageLogTest, Lines_go_to_the_journal_of_the_machine_while_it_is_set) {
+    Lines kept;
+    const hal_messages journal{sizeof journal, [](const hal_messages* self, const char* line, std::size_t bytes) { static_cast<Lines*>(self->data)->emplace_back(line, bytes); }, &kept};
+    log.print("before", 0);
+    log.journal(&journal);
+    log.print("node # is lost", "node 3 is lost", 0);
+    log.print("node # is lost", "node 4 is lost", 100 * ms);
+    log.flush(1200 * ms);
+    log.journal(nullptr);
+    log.print("after", 3000 * ms);
+    EXPECT_EQ(kept, (Lines{"it.0: node 3 is lost", "it.0: node 4 is lost"}));
+    EXPECT_EQ(lines.size(), 4u);
+}
+
 TEST_F(MessageLogTest, Close_prints_what_was_only_counted) {
     for (int i = 0; i < 5; ++i) log.print("a", "x", i * 100 * ms);
     log.close();

@@ -23,7 +23,7 @@ public:
     void layout(std::vector<ProbeGroup> groups);
     void add(ProbeBatch&& batch);
     void add(const ProbeClient::Entry& entry) { entries_.push_back(entry); }
-    /// Writes what there is between the two times. Returns false after a failed write.
+    /// Writes the samples and entries between the two times. Returns false after a failed write.
     bool write(Sink& sink, std::int64_t begin_ns, std::int64_t end_ns, std::uint64_t& rows) const;
     /// Forgets what is older than the time to be kept, reckoned from `now_ns`; nothing after `but_from_ns`.
     void prune(std::int64_t now_ns, std::int64_t but_from_ns);

@@ -110,7 +110,7 @@ private:
         const auto& times = trace.table->times_ns;
         auto row = static_cast<std::size_t>(std::upper_bound(times.begin(), times.end(), begin_) - times.begin());
         if (row > 0) --row;
-        std::string path;
+        std::string path, at;  // at: y of the pen
         bool pen = false;
         for (double last = NAN; row < times.size() && times[row] <= end_;) {
             const double pixel = std::floor(std::max(x_of(times[row]), left));
@@ -125,12 +125,15 @@ private:
                 pen = false;
                 continue;
             }
-            if (pen) path += fmt::format("H{:.1f}V{:.1f}", x, y_of(strip, first));
-            else path += fmt::format("M{:.1f} {:.1f}", x, y_of(strip, first));
-            if (low != first) path += fmt::format("V{:.1f}", y_of(strip, low));
-            if (high != low) path += fmt::format("V{:.1f}", y_of(strip, high));
-            if (std::isfinite(last) && last != high) path += fmt::format("V{:.1f}", y_of(strip, last));
+            const auto text = [&](double value) { return fmt::format("{:.1f}", y_of(strip, value)); };
+            if (pen && low == high && text(low) == at) continue;  // a horizontal line goes on
+            if (pen) path += fmt::format("H{:.1f}V{}", x, text(first));
+            else path += fmt::format("M{:.1f} {}", x, text(first));
+            if (low != first) path += "V" + text(low);
+            if (high != low) path += "V" + text(high);
+            if (std::isfinite(last) && last != high) path += "V" + text(last);
             pen = std::isfinite(last);
+            if (pen) at = text(last);
         }
         if (pen && row >= times.size()) path += fmt::format("H{:.1f}", std::min(x_of(std::max(times.back(), begin_)), left + plot_));
         svg_ += fmt::format("<path d=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.4\" stroke-linejoin=\"round\"/>\n", path, stroke);

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "hal/clock.hpp"
+#include "hal/messages.h"
 
 namespace hal {
 
@@ -29,6 +30,8 @@ public:
     /// Lines are "INSTANCE: MESSAGE", or the message alone without an instance; `sink` gets them, with their newline, instead of standard error. [setup]
     explicit MessageLog(const std::string& instance, Sink sink = {})
         : prefix_(instance.empty() ? instance : instance + ": "), sink_(std::move(sink)) {}
+    /// Lines also go to the journal of the machine until it is called with nullptr. Not while another thread prints. [setup]
+    void journal(const hal_messages* to) noexcept { journal_ = to; }
     MessageLog(const MessageLog&) = delete;
     MessageLog& operator=(const MessageLog&) = delete;
     ~MessageLog() { close(); }
@@ -124,10 +127,12 @@ private:
         const std::string line = prefix_ + message + "\n";
         if (sink_) sink_(line);
         else std::fputs(line.c_str(), stderr);
+        if (journal_) journal_->add(journal_, line.data(), line.size() - 1);
     }
 
     const std::string  prefix_;
     const Sink         sink_;
+    const hal_messages* journal_ = nullptr;
     std::mutex         mutex_;  // of the rest
     std::vector<Entry> entries_;
     std::uint64_t      suppressed_ = 0;

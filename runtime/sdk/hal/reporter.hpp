@@ -27,12 +27,17 @@ public:
         : words_(std::move(words)), subject_(std::move(subject)), events_(room), log_(instance) {}
     ~Reporter() { stop(); }
 
-    void start() { background_.start(); }  // [setup] in the component's start()
+    /// In the component's start(). [setup]
+    void start() {
+        log_.journal(extension<hal_messages>(HAL_MESSAGES));
+        background_.start();
+    }
     /// What was queued by now is still printed. [setup]
     void stop() noexcept {
         background_.stop();
         print(now_ns_);
         log_.close();
+        log_.journal(nullptr);
     }
     /// Queues an event; if the queue is full, only counts it. [realtime]
     void tell(const Event& event) noexcept {
