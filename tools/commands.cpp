@@ -60,6 +60,7 @@
 #include "run/fmt.hpp"
 #include "run/run.hpp"
 #include "run/sim.hpp"
+#include "scope/meter.hpp"
 #include "scope/scope.hpp"
 #include "scope/watch.hpp"
 #include "text/diagnostic.hpp"
@@ -181,6 +182,7 @@ constexpr Subcommand table[] = {
     command<Options, ON_BUS(run_node_faults)>("node faults", "", "list the faults that simulated devices can inject"),
     command<TopOptions, run_top>("top", "", "show all instances on this machine and the network, their threads and faults"),
     command<WatchOptions, run_watch>("watch", "NAME… [--for TIME] [--once]", "show values of a running instance live, with minimum, maximum and rate"),
+    command<MeterOptions, run_meter>("meter", "NAME [--for TIME]", "show one value of a running instance in large digits"),
     command<ScopeOptions, run_scope>("scope", "NAME… [--trigger TRIGGER] [--pre TIME] [--post TIME] [--svg FILE] [--csv FILE] [--png FILE]", "show signals of a running instance over time, with trigger and measurements"),
     command<TraceOptions, run_trace>("trace", "FILE [--for TIME] [--on-overrun|--on-fault [--keep TIME]] [--sched]", "record what the threads of a running instance run, as a Perfetto timeline"),
     command<PanelOptions, ON_PANEL(run_panel)>("panel", "[FILE] [--write] [--listen ADDRESS]", "show a running machine in a web browser: values, graph, scope, user panels"),

@@ -20,11 +20,11 @@ ROWS = {
     "runtime/commands": ["runtime/machine"],
     "runtime/control": ["runtime/commands"],
     "runtime/cells": ["runtime/control", "components/dds/links"],
-    "tools": ["tools/inspect", "tools/scope", "tools/trace", "tools/comp", "tools/bus", "tools/panel"],  # the table of subcommands
+    "tools": ["tools/inspect", "tools/trace", "tools/comp", "tools/bus", "tools/panel"],  # the table of subcommands
     "tools/cli": ["runtime/control"],
     "tools/run": ["tools/record", "runtime/cells"],
     "tools/record": ["tools/cli", "drivers/link", "components/recording/mcap"],
-    "tools/inspect": ["tools/run"],
+    "tools/inspect": ["tools/run", "tools/scope"],
     "tools/scope": ["tools/cli"],
     "tools/trace": ["tools/cli"],
     "tools/doc": ["tools/cli"],

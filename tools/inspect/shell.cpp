@@ -5,7 +5,9 @@
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
-#include <fmt/core.h>
+#include <fmt/format.h>
+#include <optional>
+#include <sstream>
 #include <sys/signalfd.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -14,6 +16,7 @@
 #include "cli/output.hpp"
 #include "cli/prompt_loop.hpp"
 #include "control/client.hpp"
+#include "scope/watch.hpp"
 #include "netlist/netlist.hpp"
 #include "text/diagnostic.hpp"
 
@@ -28,20 +31,45 @@ int show(const Client::Answer& answer) {
     return good ? answer.status : 1;
 }
 
+constexpr std::string_view watch_help = "watch NAME…            show values live, with minimum, maximum and rate; q ends it\n";
+
+/// `watch NAME…` is a command of this program, which reads the values as `hal watch` does. Returns nothing for another command.
+std::optional<int> run_own(const RemoteShellOptions& options, const Client& client, std::string_view line) {
+    std::istringstream words{std::string(line)};
+    std::string first;
+    if (options.classic || !(words >> first) || first != "watch") return std::nullopt;
+    WatchOptions watch;
+    watch.program = options.program;
+    watch.name = client.instance();
+    for (std::string name; words >> name;) watch.words.push_back(name);
+    return watch.words.empty() ? fail(options, "missing name; type: watch NAME") : run_watch(watch);
+}
+
 class RemoteShell final : public LineExecutor {
 public:
-    RemoteShell(Client& client, const char* name) : client_(client), name_(name) {}
+    RemoteShell(Client& client, const RemoteShellOptions& options, const char* name) : client_(client), options_(options), name_(name) {}
     int execute(std::string_view line) override { return execute(line, 1); }
     int execute(std::string_view line, std::uint32_t number) {
+        if (const auto status = run_own(options_, client_, line)) return *status;
         last_ = client_.run(line, name_, number);
-        return show(last_);
+        const int status = show(last_);
+        if (!options_.classic && line == "help") print(watch_help);
+        return status;
     }
-    Completion complete(std::string_view line, std::size_t cursor) override { return client_.complete(line, cursor); }
+    Completion complete(std::string_view line, std::size_t cursor) override {
+        constexpr std::string_view own = "watch ";
+        if (options_.classic || !line.starts_with(own)) return client_.complete(line, cursor);
+        Completion found = client_.complete(std::string("getp  ").append(line.substr(own.size())), cursor);
+        const Completion signals = client_.complete(std::string("gets  ").append(line.substr(own.size())), cursor);
+        found.candidates.insert(found.candidates.end(), signals.candidates.begin(), signals.candidates.end());
+        return found;
+    }
     bool collecting() const override { return last_.collecting; }
     bool over() const override { return last_.quit || !client_.connected(); }
 
 private:
     Client& client_;
+    const RemoteShellOptions& options_;
     const char* name_;
     Client::Answer last_{};
 };
@@ -68,7 +96,7 @@ int follow_input(Client& client, const RemoteShellOptions& options) {
         if (!read_file("-", text)) return fail(options, fmt::format("cannot read standard input: {}", text));
         return show(client.run_text("<stdin>", text));
     }
-    RemoteShell executor(client, "<stdin>");
+    RemoteShell executor(client, options, "<stdin>");
     LineReader input(STDIN_FILENO);
     int status = 0;
     std::uint32_t number = 1, first = 1, begin = 0;  // where the lines begin that are collected; 0: none are
@@ -160,12 +188,16 @@ int run_shell(const RemoteShellOptions& options) {
     if (!options.execute.empty()) {
         int status = 0;
         Client::Answer last{};
-        for (const std::string& command : options.execute)
-            if (status == 0 || options.keep_going) status = std::max(status, show(last = client->run(command, "<commandline>")));
+        for (const std::string& command : options.execute) {
+            if (status != 0 && !options.keep_going) break;
+            const auto own = run_own(options, *client, command);
+            status = std::max(status, own ? *own : show(last = client->run(command, "<commandline>")));
+        }
         return without_commit(options, last, status);
     }
     if (!options.words.empty() && !options.from_file) {
         // A single word with blanks is a line that was typed between quotes.
+        if (const auto own = run_own(options, *client, fmt::format("{}", fmt::join(options.words, " ")))) return *own;
         const bool line = options.words.size() == 1 && options.words[0].find_first_of(" \t") != std::string::npos;
         const Client::Answer answer = line ? client->run(options.words[0], "<commandline>") : client->run(options.words);
         return without_commit(options, answer, show(answer));
@@ -175,7 +207,7 @@ int run_shell(const RemoteShellOptions& options) {
         print(fmt::format("instance '{}', process {}; 'help' lists the commands, Tab completes\n", client->instance(), client->pid()));
     const Interrupts interrupts;
     client->cancel_on(interrupts.descriptor());
-    RemoteShell executor(*client, "<shell>");
+    RemoteShell executor(*client, options, "<shell>");
     const Prompt prompt = options.script    ? Prompt{"%%\n", "%%\n"}
                           : options.classic ? Prompt{"halcmd: ", "halcmd+: "}
                                             : Prompt{"hal> ", "hal+> "};

@@ -10,11 +10,11 @@
 
 namespace hal::tools {
 
-/// Nothing where the precondition of a measurement is not met: no sample, fewer than two edges, no step, not settled within the window.
+/// Results; a measurement whose precondition is not met has no value: no sample, fewer than two edges, no step, not settled within the window.
 struct Measurements {
     std::size_t count = 0;  ///< samples in the window
     std::optional<double> min, max;
-    std::optional<double> mean, rms, ac_rms;      ///< over whole periods where there are any, else over the window
+    std::optional<double> mean, rms, ac_rms;      ///< over whole periods, or over the window when it has less than one
     std::optional<double> frequency_hz, duty;     ///< from rising crossings of the mid level, with hysteresis
     std::optional<double> initial, final;         ///< means before the step, and of the last 10 % of the window
     std::optional<double> rise_s;                 ///< from 10 % to 90 % of the step, interpolated
@@ -25,10 +25,10 @@ struct Measurements {
 /// Measures between begin_ns and end_ns, both included. `step_ns`: the time of the step that a step response is measured from, which is the trigger's.
 Measurements measure(const Samples& samples, std::int64_t begin_ns, std::int64_t end_ns, std::int64_t step_ns);
 
-/// Returns the value that holds at `time_ns`: linear between samples, or of the sample before when `stepped`. Nothing before the first one.
+/// Returns the value that holds at `time_ns`: linear between samples, or of the sample before when `stepped`; no value before the first sample.
 std::optional<double> value_at(const Samples& samples, std::int64_t time_ns, bool stepped);
 
-/// Formats a value with four digits and, for units that take one, an SI prefix: "12.34 mV", "0.5 deg", "-0.5", "?" for nothing.
+/// Formats a value with four digits and, for units that take one, an SI prefix: "12.34 mV", "0.5 deg", "-0.5"; "?" without a value.
 std::string format_measured(const std::optional<double>& value, const std::string& unit = "");
 
 }  // namespace hal::tools

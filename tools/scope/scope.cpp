@@ -96,7 +96,7 @@ int write_files(const ScopeOptions& options, const Acquisition& acquisition) {
     return why.empty() ? 0 : fail(options, why);
 }
 
-/// The reason why there is no record.
+/// Returns the reason for a missing record.
 std::string no_record(const ScopeOptions& options, Source& source) {
     const Acquisition& acquisition = source.acquisition();
     const std::string duration = format_duration(static_cast<double>(options.timeout_ns));

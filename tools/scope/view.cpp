@@ -11,7 +11,7 @@ namespace {
 
 constexpr double least_division_ns = 1e3, most_division_ns = 100e9;
 
-/// Least and most finite value between begin and end; least > most: there is none.
+/// Returns the smallest and the largest finite value; the first is larger than the second when no value is finite.
 std::pair<double, double> range_of(const Samples& samples) {
     double least = 1, most = -1;
     for (const Sample& sample : samples) {

@@ -40,7 +40,7 @@ public:
 
     const std::vector<ChannelView>& traces() const { return traces_; }
     std::size_t selected() const { return selected_; }
-    /// Returns the record that is drawn: of the trigger, or the newest samples while there is none and in roll mode.
+    /// Returns the record that is drawn: the newest one of a trigger, or the newest samples before the first record and in roll mode.
     Record shown() const;
     struct Cursors {
         bool on = false;

@@ -36,23 +36,25 @@ void WatchTable::reset() {
     for (Row& row : rows_) row.min = row.max = row.last.value;
 }
 
+WatchTable::Texts WatchTable::texts(std::size_t channel) const {
+    const Row& row = rows_[channel];
+    const Channel& about = channels_[channel];
+    if (!row.any) return {"-", "-", "-", "-"};
+    const auto seconds = static_cast<double>(row.last.time_ns - row.marks.front().sample.time_ns) * 1e-9;
+    const double change = about.bit ? static_cast<double>(row.edges - row.marks.front().edges) : row.last.value - row.marks.front().sample.value;
+    const std::string rate = seconds > 0 && std::isfinite(change) ? fmt::format("{:.4g} {}/s", change / seconds, about.bit ? "edges" : about.unit) : "-";
+    return {shown(about, row.last.value), shown(about, row.min), shown(about, row.max), rate};
+}
+
 std::vector<std::string> WatchTable::lines() const {
     std::size_t width = 4;
     for (const Channel& channel : channels_) width = std::max(width, columns(channel.name));
     std::vector<std::string> lines{fmt::format("{:<{}} {:>14} {:<8} {:>14} {:>14} {:>14}", "NAME", width, "VALUE", "UNIT", "MIN", "MAX", "RATE")};
     for (std::size_t i = 0; i < rows_.size(); ++i) {
         const Channel& channel = channels_[i];
-        const Row& row = rows_[i];
+        const Texts texts = this->texts(i);
         const std::string name = printable(channel.name) + std::string(width - columns(channel.name), ' ');
-        if (!row.any) {
-            lines.push_back(fmt::format("{} {:>14} {:<8} {:>14} {:>14} {:>14}", name, "-", channel.unit, "-", "-", "-"));
-            continue;
-        }
-        const auto seconds = static_cast<double>(row.last.time_ns - row.marks.front().sample.time_ns) * 1e-9;
-        const double change = channel.bit ? static_cast<double>(row.edges - row.marks.front().edges) : row.last.value - row.marks.front().sample.value;
-        const std::string rate = seconds > 0 && std::isfinite(change) ? fmt::format("{:.4g} {}/s", change / seconds, channel.bit ? "edges" : channel.unit) : "-";
-        lines.push_back(fmt::format("{} {:>14} {:<8} {:>14} {:>14} {:>14}", name, shown(channel, row.last.value), channel.unit, shown(channel, row.min),
-                                    shown(channel, row.max), rate));
+        lines.push_back(fmt::format("{} {:>14} {:<8} {:>14} {:>14} {:>14}", name, texts.value, channel.unit, texts.min, texts.max, texts.rate));
     }
     return lines;
 }

@@ -18,6 +18,12 @@ public:
     void feed(std::size_t channel, Sample sample);
     /// Forgets minimum and maximum.
     void reset();
+    bool has_value(std::size_t channel) const { return rows_[channel].any; }
+    struct Texts {
+        std::string value, min, max, rate;  ///< rate: change per second over the last second, of a bit: edges; with its unit
+    };
+    /// Returns what lines() has of a channel; "-" without a sample.
+    Texts texts(std::size_t channel) const;
     /// Returns a head and a line per channel: name, value, unit, minimum, maximum, change per second over the last second (of a bit: edges).
     std::vector<std::string> lines() const;
 
