@@ -38,7 +38,7 @@ peers() {
     stamp_of_peers=$build/peers/installed
     wanted="$root $(cat "$root/tests/peers/requirements.txt")"
     if [ -f "$stamp_of_peers" ] && [ "$(cat "$stamp_of_peers")" = "$wanted" ]; then return; fi
-    say "installing the Python packages that tests/peers talks to (canopen, python-can, pysoem, kickcat, cyclonedds, rosbags, mcap) into build/peers"
+    say "installing the Python packages that tests/peers talks to (canopen, python-can, pysoem, kickcat, cyclonedds, rosbags, mcap, perfetto) into build/peers"
     rm -rf "${build:?}/peers"
     if { python3 -m venv "$build/peers" && "$build/peers/bin/python" -m pip install --disable-pip-version-check --retries 1 --timeout 30 \
         -r "$root/tests/peers/requirements.txt"; } >"$build/peers.log" 2>&1 </dev/null; then

@@ -6,8 +6,14 @@
 
 #include "link/can.hpp"
 #include "link/timing.hpp"
+#include "link/trace_frame.hpp"
 
 namespace hal::can {
+
+/// Reports a frame to the timeline; an extended identifier has bit 31. [realtime]
+inline void trace(link::FrameKind kind, const Frame& f) noexcept {
+    link::trace_frame(kind, f.extended ? f.id | 0x80000000U : f.id, f.bytes().size());
+}
 
 /// Counters of one link. The sending thread writes `sent`, `sent_bytes`, `dropped`; the receiving one the rest; both add to the load.
 /// [realtime]
@@ -24,12 +30,14 @@ public:
 
     /// Counts a sent frame. Sending thread.
     void count_sent(const Frame& f) noexcept {
+        trace(link::can_sent, f);
         add(sent);
         add(sent_bytes, f.bytes().size());
         occupy(f);
     }
     /// Counts a received frame. Receiving thread.
     void count_received(const Frame& f) noexcept {
+        trace(link::can_received, f);
         add(received);
         add(received_bytes, f.bytes().size());
         if (!f.own) occupy(f);

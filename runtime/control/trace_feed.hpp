@@ -28,7 +28,7 @@ public:
 private:
     Session& session_;
     mutable std::mutex mutex_;
-    bool on_ = false;         ///< guarded by mutex_, as is all below
+    bool on_ = false;  ///< guarded by mutex_, as is all below
     std::int64_t due_ns_ = 0;
 };
 

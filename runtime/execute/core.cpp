@@ -62,7 +62,7 @@ void Core::cycle(std::int64_t grid_ns, std::int64_t due_ns, std::int64_t woke_ns
         if (probes_) sample_probes();
         answer();
         if (tracing_) [[unlikely]]
-            tracing_->put(woke_ns, monotonic_ns(), info_.number, static_cast<std::uint32_t>(std::clamp<std::int64_t>(woke_ns - due_ns, 0, UINT32_MAX)), TraceEvent::cycle);
+            tracing_->put(TraceEvent::cycle, woke_ns, monotonic_ns(), info_.number, static_cast<std::uint64_t>(std::max<std::int64_t>(woke_ns - due_ns, 0)));
     }
     ++info_.number;
     finished_.store(end_ns, std::memory_order_release);
@@ -112,7 +112,7 @@ void Core::warm(std::int64_t until_ns) const noexcept {
 void Core::skip(std::uint64_t periods) noexcept {
     if (TraceRing* const tracing = trace_.load(std::memory_order_acquire)) {
         const std::int64_t now_ns = monotonic_ns();
-        tracing->put(now_ns, now_ns, info_.number + periods, static_cast<std::uint32_t>(std::min<std::uint64_t>(periods, UINT32_MAX)), TraceEvent::missed);
+        tracing->put(TraceEvent::missed, now_ns, now_ns, info_.number + periods, periods);
     }
     info_.number += periods;
     // first the deadline, then the number: missed_by() never counts a period twice
@@ -130,7 +130,7 @@ void Core::take_over() noexcept {
         TraceRing* const tracing = trace_.load(std::memory_order_acquire);
         const std::int64_t begin_ns = tracing ? monotonic_ns() : 0;
         take(offered);
-        if (tracing) tracing->put(begin_ns, monotonic_ns(), info_.number, 0, TraceEvent::plan);
+        if (tracing) tracing->put(TraceEvent::plan, begin_ns, monotonic_ns(), info_.number, 0);
     }
     if (!probe_inbox_.load(std::memory_order_relaxed)) return;
     if (plan::ProbeSet* const probes = probe_inbox_.exchange(nullptr, std::memory_order_acq_rel)) {
@@ -263,7 +263,7 @@ void Core::run_timed(const plan::Function& function, const plan::Step* steps) no
     const std::int64_t begin = monotonic_ns();
     run_steps(steps + function.begin, steps + function.end);
     const std::int64_t end = monotonic_ns();
-    if (tracing_) tracing_->put(begin, end, info_.number, function.id, TraceEvent::function);
+    if (tracing_) tracing_->put(TraceEvent::function, begin, end, info_.number, function.id);
     const auto took = static_cast<std::int32_t>(std::min<std::int64_t>(end - begin, INT32_MAX));
     plan::FunctionTimes& times = *function.times;
     store(times.time, took);
@@ -384,6 +384,12 @@ void Core::raise(FaultEvent event) noexcept {
     limiter_.raise(event, [this](const FaultEvent& e) noexcept { faults_.push(e); });  // when full the newest is lost but counted
 }
 
+void Core::trace_frame(TraceEvent::Kind kind, std::uint32_t id, std::size_t bytes) noexcept {
+    if (!tracing_ || !in_function()) return;
+    const std::int64_t now_ns = monotonic_ns();
+    tracing_->put(kind, now_ns, now_ns, info_.number, id, bytes);
+}
+
 void Core::step_clock(std::int64_t ns) noexcept {
     if (in_function()) timeline_.step(grid_ns_, ns);
 }
@@ -435,3 +441,7 @@ void check_finite(void* self, const hal_cycle* cycle) {
 }
 
 }  // namespace hal
+
+void hal_trace_frame(unsigned kind, std::uint32_t id, std::size_t bytes) noexcept {
+    if (hal::Core* const core = hal::Core::current()) core->trace_frame(static_cast<hal::TraceEvent::Kind>(kind), id, bytes);
+}

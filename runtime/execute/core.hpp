@@ -63,6 +63,8 @@ public:
     /// Does the same at the end of the thread; waits while the supervisor does it. Not in a cycle
     void make_safe_at_end() noexcept;
     void raise(FaultEvent event) noexcept;
+    /// Records a frame that the running function sends or receives. [realtime]
+    void trace_frame(TraceEvent::Kind kind, std::uint32_t id, std::size_t bytes) noexcept;
     /// Shifts the grid for all positions after that of this cycle; does nothing outside a function. [realtime]
     void step_clock(std::int64_t ns) noexcept;
 

@@ -6,8 +6,9 @@
 namespace hal {
 
 std::string Traces::begin() {
-    if (on_) return "another client traces this instance; end it first";
-    if (state_.executor->is_virtual()) return "the cycles of a virtual clock take no time; trace an instance of: hal run";
+    if (on_) return "another client traces this instance; wait for its end";
+    if (state_.executor->is_virtual())
+        return "this instance runs on a virtual clock, whose cycles take no time; trace an instance of: hal run";
     on_ = true;
     named_.clear();
     for (const auto& [thread, core] : state_.cores) start(*core);
@@ -20,7 +21,7 @@ void Traces::end() {
     for (const auto& [thread, core] : state_.cores) core->trace(nullptr);
 }
 
-// Of a thread that is removed and another one made at its address: the ring is theirs in turn.
+// A core that was made at the address of a removed one uses its ring: the old thread has ended.
 void Traces::start(Core& core) {
     Ring*& ring = of_[&core];
     if (!ring) ring = rings_.emplace_back(std::make_unique<Ring>()).get();
@@ -41,7 +42,8 @@ TraceBatch Traces::take(std::size_t most) {
         for (TraceEvent event; part.events.size() < most && ring.ring.take(event);) {
             part.events.push_back(event);
             if (event.kind != TraceEvent::function || !named_.insert(event.id).second) continue;
-            if (const LoadedFunction* const function = function_with_id(state_.model, event.id)) batch.names.emplace(event.id, function->name);
+            if (const LoadedFunction* const function = function_with_id(state_.model, event.id))
+                batch.names.emplace(event.id, function->name);
         }
         const std::uint64_t lost = ring.ring.lost();
         part.lost = lost - ring.lost;

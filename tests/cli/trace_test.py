@@ -21,7 +21,7 @@ start
 
 def decoded(path):
     """The fields of a protobuf file as nested dictionaries: number -> list of values."""
-    text = subprocess.run(["protoc", "--decode_raw"], stdin=open(path, "rb"), stdout=subprocess.PIPE, check=True).stdout.decode()
+    text = subprocess.run(["protoc", "--decode_raw"], input=path.read_bytes(), stdout=subprocess.PIPE, check=True).stdout.decode()
     root = {}
     stack = [root]
     for line in text.splitlines():

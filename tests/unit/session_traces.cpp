@@ -15,7 +15,9 @@ struct Traced : testing::Test {
     }
     /// Takes events until there are `cycles` more cycles.
     void collect(std::size_t cycles) {
-        const auto count = [&] { return std::count_if(events.begin(), events.end(), [](const TraceEvent& event) { return event.kind == TraceEvent::cycle; }); };
+        const auto count = [&] {
+            return std::count_if(events.begin(), events.end(), [](const TraceEvent& event) { return event.kind == TraceEvent::cycle; });
+        };
         const auto until = count() + static_cast<std::ptrdiff_t>(cycles);
         EXPECT_TRUE(eventually([&] {
             TraceBatch batch = machine.session.traces().take();
@@ -65,7 +67,8 @@ TEST_F(Traced, An_edit_is_recorded_and_a_thread_that_is_added_too) {
     machine.must("newthread second 2000000\naddf b second");
     EXPECT_TRUE(eventually([&] {
         const TraceBatch batch = machine.session.traces().take();
-        return std::any_of(batch.parts.begin(), batch.parts.end(), [](const TraceBatch::Part& part) { return part.thread.name == "second"; });
+        return std::any_of(batch.parts.begin(), batch.parts.end(),
+                           [](const TraceBatch::Part& part) { return part.thread.name == "second"; });
     }));
 }
 
@@ -73,7 +76,7 @@ TEST_F(Traced, Nothing_is_recorded_after_the_end_and_names_come_again) {
     Traces& traces = machine.session.traces();
     EXPECT_TRUE(traces.take().parts.empty());
     ASSERT_EQ(traces.begin(), "");
-    EXPECT_EQ(traces.begin(), "another client traces this instance; end it first");
+    EXPECT_EQ(traces.begin(), "another client traces this instance; wait for its end");
     collect(3);
     traces.end();
     EXPECT_TRUE(traces.take().parts.empty());
@@ -86,17 +89,18 @@ TEST_F(Traced, Nothing_is_recorded_after_the_end_and_names_come_again) {
 
 TEST(Traces, are_rejected_on_the_virtual_clock) {
     Machine machine;
-    EXPECT_EQ(machine.session.traces().begin(), "the cycles of a virtual clock take no time; trace an instance of: hal run");
+    EXPECT_EQ(machine.session.traces().begin(),
+              "this instance runs on a virtual clock, whose cycles take no time; trace an instance of: hal run");
 }
 
 TEST(TraceRing, counts_what_does_not_fit) {
     TraceRing ring;
-    for (std::size_t i = 0; i < TraceRing::capacity + 3; ++i) ring.put(1, 2, i, 7, TraceEvent::function);
+    for (std::size_t i = 0; i < TraceRing::capacity + 3; ++i) ring.put(TraceEvent::function, 1, 2, i, 7);
     EXPECT_EQ(ring.lost(), 3u);
     TraceEvent event;
     ASSERT_TRUE(ring.take(event));
     EXPECT_EQ(event.cycle_number, 0u);
-    ring.put(1, 2, 99, 7, TraceEvent::function);
+    ring.put(TraceEvent::function, 1, 2, 99, 7);
     EXPECT_EQ(ring.lost(), 3u);
 }
 

@@ -47,8 +47,9 @@ TEST(PerfettoWriter, functions_wait_for_the_cycle_they_belong_to) {
 }
 
 TEST(Switch, a_line_of_trace_pipe_is_read_with_names_that_have_blanks) {
-    const auto one = read_switch("          <idle>-0       [001] d..2.  1234.567890: sched_switch: prev_comm=swapper/1 prev_pid=0 prev_prio=120 prev_state=R ==> "
-                                 "next_comm=my servo next_pid=77 next_prio=1");
+    const auto one = read_switch(
+        "          <idle>-0       [001] d..2.  1234.567890: sched_switch: prev_comm=swapper/1 prev_pid=0 prev_prio=120 prev_state=R ==> "
+        "next_comm=my servo next_pid=77 next_prio=1");
     ASSERT_TRUE(one);
     EXPECT_EQ(one->cpu, 1);
     EXPECT_EQ(one->time_ns, 1234567890000);

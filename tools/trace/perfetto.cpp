@@ -9,22 +9,31 @@ namespace hal::tools {
 namespace {
 
 // Numbers of fields, by message.
-namespace trace { constexpr unsigned packet = 1; }
-namespace packet {
-constexpr unsigned ftrace_events = 1, clock_snapshot = 6, timestamp = 8, sequence = 10, track_event = 11, interned_data = 12, sequence_flags = 13, timestamp_clock = 58,
-                   defaults = 59, track_descriptor = 60;
+namespace trace {
+constexpr unsigned packet = 1;
 }
-namespace snapshot { constexpr unsigned clocks = 1, primary = 2, clock_id = 1, clock_timestamp = 2; }
+namespace packet {
+constexpr unsigned ftrace_events = 1, clock_snapshot = 6, timestamp = 8, sequence = 10, track_event = 11, interned_data = 12,
+                   sequence_flags = 13, timestamp_clock = 58, defaults = 59, track_descriptor = 60;
+}
+namespace snapshot {
+constexpr unsigned clocks = 1, primary = 2, clock_id = 1, clock_timestamp = 2;
+}
 namespace descriptor {
 constexpr unsigned uuid = 1, name = 2, process = 3, thread = 4, parent = 5, counter = 8;
-constexpr unsigned process_pid = 1, process_name = 6, thread_pid = 1, thread_tid = 2, thread_name = 5, counter_unit = 3, counter_unit_name = 6;
+constexpr unsigned process_pid = 1, process_name = 6, thread_pid = 1, thread_tid = 2, thread_name = 5, counter_unit = 3,
+                   counter_unit_name = 6;
+}  // namespace descriptor
+namespace event {
+constexpr unsigned annotations = 4, type = 9, name_iid = 10, track = 11, name = 23, counter_value = 30;
 }
-namespace event { constexpr unsigned annotations = 4, type = 9, name_iid = 10, track = 11, name = 23, counter_value = 30; }
-namespace annotation { constexpr unsigned uint = 3, string = 6, name = 10; }
+namespace annotation {
+constexpr unsigned uint = 3, string = 6, name = 10;
+}
 namespace bundle {
 constexpr unsigned cpu = 1, event = 2, event_timestamp = 1, event_pid = 2, sched_switch = 4;
 constexpr unsigned prev_comm = 1, prev_pid = 2, prev_prio = 3, prev_state = 4, next_comm = 5, next_pid = 6, next_prio = 7;
-}
+}  // namespace bundle
 
 constexpr std::uint64_t realtime = 1, monotonic = 3, boottime = 6;                    // clocks
 constexpr std::uint64_t slice_begin = 1, slice_end = 2, instant_event = 3, counter_event = 4;  // types of events
@@ -35,7 +44,9 @@ std::string packed(const Message& message) { return Message().message(trace::pac
 
 Message packet_at(std::int64_t time_ns) {
     Message message;
-    message.number(packet::timestamp, static_cast<std::uint64_t>(time_ns)).number(packet::sequence, own_sequence).number(packet::sequence_flags, needs_state);
+    message.number(packet::timestamp, static_cast<std::uint64_t>(time_ns))
+        .number(packet::sequence, own_sequence)
+        .number(packet::sequence_flags, needs_state);
     return message;
 }
 
@@ -49,6 +60,14 @@ std::string described(const Message& descriptor) {
     Message message;
     message.number(packet::sequence, own_sequence).message(packet::track_descriptor, descriptor);
     return packed(message);
+}
+
+std::string frame_name(const ThreadEvent& frame) {
+    const bool sent = frame.kind == ThreadEvent::can_sent || frame.kind == ThreadEvent::ethernet_sent;
+    const std::string what = sent ? "send " : "receive ";
+    if (frame.kind >= ThreadEvent::ethernet_sent) return what + fmt::format("Ethernet {:04X}h", frame.id);
+    constexpr std::uint32_t extended = 0x80000000U;
+    return what + (frame.id & extended ? fmt::format("CAN {:08X}h", frame.id & ~extended) : fmt::format("CAN {:03X}h", frame.id));
 }
 
 }  // namespace
@@ -70,7 +89,9 @@ std::string PerfettoWriter::begin(const std::string& instance, std::int64_t pid,
     process.number(descriptor::process_pid, static_cast<std::uint64_t>(pid)).text(descriptor::process_name, "hal " + instance);
     Message whole, journal;
     whole.number(descriptor::uuid, process_track).message(descriptor::process, process);
-    journal.number(descriptor::uuid, journal_track).text(descriptor::name, "faults, edits, commands").number(descriptor::parent, process_track);
+    journal.number(descriptor::uuid, journal_track)
+        .text(descriptor::name, "faults, edits, messages")
+        .number(descriptor::parent, process_track);
     return packed(first) + packed(second) + described(whole) + described(journal);
 }
 
@@ -79,7 +100,9 @@ std::uint64_t PerfettoWriter::track(const TraceThread& thread, std::string& out)
     if (!fresh) return at->second;
     ++next_track_;
     Message about, whole;
-    about.number(descriptor::thread_pid, static_cast<std::uint64_t>(pid_)).number(descriptor::thread_tid, static_cast<std::uint64_t>(thread.tid)).text(descriptor::thread_name, thread.name);
+    about.number(descriptor::thread_pid, static_cast<std::uint64_t>(pid_))
+        .number(descriptor::thread_tid, static_cast<std::uint64_t>(thread.tid))
+        .text(descriptor::thread_name, thread.name);
     whole.number(descriptor::uuid, at->second).number(descriptor::parent, process_track).message(descriptor::thread, about);
     out += described(whole);
     return at->second;
@@ -97,7 +120,8 @@ std::uint64_t PerfettoWriter::interned(const std::string& name, Message& to) {
     return at->second;
 }
 
-void PerfettoWriter::slice(std::string& out, std::uint64_t track, std::int64_t begin_ns, const std::string& name, const std::vector<Annotation>& annotations) {
+void PerfettoWriter::slice(std::string& out, std::uint64_t track, std::int64_t begin_ns, const std::string& name,
+                           const std::vector<Annotation>& annotations) {
     Message message = packet_at(begin_ns), event;
     event.number(event::type, slice_begin).number(event::name_iid, interned(name, message)).number(event::track, track);
     for (const Annotation& one : annotations) {
@@ -114,8 +138,8 @@ void PerfettoWriter::end(std::string& out, std::uint64_t track, std::int64_t tim
     out += packed(message.message(packet::track_event, event));
 }
 
-void PerfettoWriter::mark(std::string& out, std::uint64_t track, std::int64_t time_ns, const std::string& name, const std::vector<Annotation>& annotations,
-                          const std::string& text) {
+void PerfettoWriter::mark(std::string& out, std::uint64_t track, std::int64_t time_ns, const std::string& name,
+                          const std::vector<Annotation>& annotations, const std::string& text) {
     Message message = packet_at(time_ns), event;
     event.number(event::type, instant_event).number(event::name_iid, interned(name, message)).number(event::track, track);
     for (const Annotation& one : annotations) {
@@ -136,8 +160,11 @@ std::string PerfettoWriter::events(const TraceThread& thread, const std::vector<
     const std::uint64_t to = track(thread, out);
     std::vector<ThreadEvent>& open = open_[thread.tid];
     const auto inner = [&](const ThreadEvent& one) {
+        if (one.kind >= ThreadEvent::can_sent) return mark(out, to, one.begin_ns, frame_name(one), {{"bytes", one.bytes}});
         const auto named = functions_.find(one.id);
-        const std::string name = one.kind == ThreadEvent::plan ? "take new plan" : named != functions_.end() ? named->second : fmt::format("function {}", one.id);
+        const std::string name = one.kind == ThreadEvent::plan ? "take new plan"
+                                 : named != functions_.end()   ? named->second
+                                                               : fmt::format("function {}", one.id);
         slice(out, to, one.begin_ns, name, {});
         end(out, to, one.end_ns);
     };
@@ -148,20 +175,22 @@ std::string PerfettoWriter::events(const TraceThread& thread, const std::vector<
             open.push_back(one);
         } else {
             // What ended before the cycle began (a plan taken between two cycles) stands for itself.
-            const auto within = std::stable_partition(open.begin(), open.end(), [&](const ThreadEvent& other) { return other.begin_ns < one.begin_ns; });
+            const auto within =
+                std::stable_partition(open.begin(), open.end(), [&](const ThreadEvent& other) { return other.begin_ns < one.begin_ns; });
             std::for_each(open.begin(), within, inner);
             slice(out, to, one.begin_ns, "cycle", {{"cycle", one.cycle_number}, {"latency_ns", one.id}});
             std::for_each(within, open.end(), inner);
             end(out, to, one.end_ns);
             const std::int64_t took_ns = one.end_ns - one.begin_ns;
             if (took_ns + one.id > thread.period_ns)
-                mark(out, to, one.end_ns, "overrun", {{"cycle", one.cycle_number}, {"latency_ns", one.id}, {"execution_ns", static_cast<std::uint64_t>(took_ns)}});
+                mark(out, to, one.end_ns, "overrun",
+                     {{"cycle", one.cycle_number}, {"latency_ns", one.id}, {"execution_ns", static_cast<std::uint64_t>(took_ns)}});
             out += counter(thread, "wake-up latency", one.begin_ns, one.id);
             out += counter(thread, "execution time", one.begin_ns, took_ns);
             open.clear();
         }
     }
-    if (lost > 0) mark(out, to, events.empty() ? 0 : events.back().end_ns, "lost events", {{"events", lost}});
+    if (lost > 0 && !events.empty()) mark(out, to, events.back().end_ns, "lost events", {{"events", lost}});
     return out;
 }
 
@@ -171,7 +200,8 @@ std::string PerfettoWriter::instant(std::int64_t time_ns, const std::string& kin
     return out;
 }
 
-std::string PerfettoWriter::counter(const TraceThread& thread, const std::string& name, std::int64_t time_ns, std::int64_t value, const char* unit) {
+std::string PerfettoWriter::counter(const TraceThread& thread, const std::string& name, std::int64_t time_ns, std::int64_t value,
+                                    const char* unit) {
     std::string out;
     const auto [at, fresh] = counters_.emplace(std::pair(thread.tid, name), next_track_);
     if (fresh) {
@@ -179,11 +209,16 @@ std::string PerfettoWriter::counter(const TraceThread& thread, const std::string
         Message about, whole;
         about.text(descriptor::counter_unit_name, unit);
         if (std::string_view(unit) == "ns") about.number(descriptor::counter_unit, 1);
-        whole.number(descriptor::uuid, at->second).text(descriptor::name, thread.name + " " + name).number(descriptor::parent, process_track).message(descriptor::counter, about);
+        whole.number(descriptor::uuid, at->second)
+            .text(descriptor::name, thread.name + " " + name)
+            .number(descriptor::parent, process_track)
+            .message(descriptor::counter, about);
         out += described(whole);
     }
     Message message = packet_at(time_ns), event;
-    event.number(event::type, counter_event).number(event::track, at->second).number(event::counter_value, static_cast<std::uint64_t>(value));
+    event.number(event::type, counter_event)
+        .number(event::track, at->second)
+        .number(event::counter_value, static_cast<std::uint64_t>(value));
     return out + packed(message.message(packet::track_event, event));
 }
 

@@ -14,10 +14,20 @@ namespace hal::tools {
 
 /// One event of a thread, as the instance sends it (docs/protocol.md, "trace").
 struct ThreadEvent {
-    enum Kind : std::uint32_t { function = 1, cycle = 2, plan = 3, missed = 4 };
+    enum Kind : std::uint16_t {
+        function = 1,
+        cycle = 2,
+        plan = 3,
+        missed = 4,
+        can_sent = 5,
+        can_received = 6,
+        ethernet_sent = 7,
+        ethernet_received = 8
+    };
     std::int64_t begin_ns, end_ns;
     std::uint64_t cycle_number;
-    std::uint32_t id, kind;
+    std::uint32_t id;
+    std::uint16_t kind, bytes = 0;
 };
 
 struct TraceThread {
@@ -43,7 +53,7 @@ struct ClockReading {
 /// Turns events into packets. All packets belong to one sequence, which begins with begin().
 class PerfettoWriter {
 public:
-    /// Returns the first packets: clocks, the process and a track for faults and edits.
+    /// Returns the first packets: clocks, the process and a track for what is in the journal: faults, edits, commands, messages.
     std::string begin(const std::string& instance, std::int64_t pid, const ClockReading& clocks);
     /// Names a function of later events.
     void name(std::uint32_t function, const std::string& name) { functions_[function] = name; }
@@ -52,7 +62,8 @@ public:
     /// Returns an instant: a fault, an edit or a command.
     std::string instant(std::int64_t time_ns, const std::string& kind, const std::string& text);
     /// Returns a value of a counter below the thread.
-    std::string counter(const TraceThread& thread, const std::string& name, std::int64_t time_ns, std::int64_t value, const char* unit = "ns");
+    std::string counter(const TraceThread& thread, const std::string& name, std::int64_t time_ns, std::int64_t value,
+                        const char* unit = "ns");
     static std::string switches(const std::vector<Switch>& all);
 
 private:
@@ -62,16 +73,18 @@ private:
     };
     std::uint64_t track(const TraceThread& thread, std::string& out);
     std::uint64_t interned(const std::string& name, Message& packet);
-    void slice(std::string& out, std::uint64_t track, std::int64_t begin_ns, const std::string& name, const std::vector<Annotation>& annotations);
+    void slice(std::string& out, std::uint64_t track, std::int64_t begin_ns, const std::string& name,
+               const std::vector<Annotation>& annotations);
     static void end(std::string& out, std::uint64_t track, std::int64_t time_ns);
-    void mark(std::string& out, std::uint64_t track, std::int64_t time_ns, const std::string& name, const std::vector<Annotation>& annotations, const std::string& text = "");
+    void mark(std::string& out, std::uint64_t track, std::int64_t time_ns, const std::string& name,
+              const std::vector<Annotation>& annotations, const std::string& text = "");
 
     std::int64_t pid_ = 0;
     std::map<std::uint32_t, std::string> functions_;
-    std::map<std::string, std::uint64_t> names_;                  ///< interned
-    std::map<int, std::uint64_t> threads_;                        ///< tracks by tid
+    std::map<std::string, std::uint64_t> names_;  ///< interned
+    std::map<int, std::uint64_t> threads_;  ///< tracks by tid
     std::map<std::pair<int, std::string>, std::uint64_t> counters_;
-    std::map<int, std::vector<ThreadEvent>> open_;                ///< functions by tid whose cycle has not ended yet
+    std::map<int, std::vector<ThreadEvent>> open_;  ///< functions by tid whose cycle has not ended yet
     std::uint64_t next_track_ = 16;
 };
 

@@ -62,13 +62,15 @@ std::optional<Switch> read_switch(std::string_view line) {
     const std::string_view before = what.substr(0, arrow), after = what.substr(arrow);
     const auto comm = [](std::string_view part, std::string_view key, std::string_view next) {  // a name may have blanks
         const auto begin = part.find(key), end = part.find(next);
-        return begin == part.npos || end == part.npos ? std::string{} : std::string(part.substr(begin + key.size(), end - begin - key.size()));
+        return begin == part.npos || end == part.npos ? std::string{}
+                                                      : std::string(part.substr(begin + key.size(), end - begin - key.size()));
     };
     one.previous_name = comm(before, "prev_comm=", " prev_pid=");
     one.next_name = comm(after, "next_comm=", " next_pid=");
     one.previous_state = state_of(value_of(before, "prev_state="));
-    if (!read_number(value_of(before, "prev_pid="), one.previous_tid) || !read_number(value_of(before, "prev_prio="), one.previous_priority) ||
-        !read_number(value_of(after, "next_pid="), one.next_tid) || !read_number(value_of(after, "next_prio="), one.next_priority))
+    if (!read_number(value_of(before, "prev_pid="), one.previous_tid) ||
+        !read_number(value_of(before, "prev_prio="), one.previous_priority) || !read_number(value_of(after, "next_pid="), one.next_tid) ||
+        !read_number(value_of(after, "next_prio="), one.next_priority))
         return std::nullopt;
     return one;
 }

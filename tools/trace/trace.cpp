@@ -3,11 +3,13 @@
 #include "trace/trace.hpp"
 
 #include <algorithm>
+#include <cerrno>
 #include <chrono>
 #include <cstring>
 #include <ctime>
 #include <deque>
 #include <fcntl.h>
+#include <filesystem>
 #include <fmt/core.h>
 #include <map>
 #include <memory>
@@ -18,6 +20,7 @@
 #include "cli/output.hpp"
 #include "cli/signals.hpp"
 #include "control/client.hpp"
+#include "machine/address.hpp"
 #include "text/numbers.hpp"
 #include "trace/perfetto.hpp"
 #include "trace/sched.hpp"
@@ -30,6 +33,7 @@ using nlohmann::json;
 using Clock = std::chrono::steady_clock;
 constexpr std::int64_t default_keep_ns = 5'000'000'000;
 constexpr auto times_period = std::chrono::milliseconds(100);
+constexpr std::size_t most_kept_bytes = std::size_t{512} << 20;
 
 std::int64_t now_ns(clockid_t clock) {
     timespec now{};
@@ -53,6 +57,12 @@ struct Chunk {
     std::vector<Entry> entries;
     std::vector<Switch> switches;
     std::vector<std::pair<TraceThread, ThreadTimes>> times;
+
+    std::size_t bytes() const {
+        std::size_t bytes = sizeof(Chunk) + switches.size() * sizeof(Switch);
+        for (const Part& part : parts) bytes += part.events.size() * sizeof(ThreadEvent);
+        return bytes;
+    }
 };
 
 /// What is printed at the end.
@@ -105,7 +115,10 @@ private:
     void receive(int timeout_ms);
     void take(const json& event, const std::string& payload, Chunk& chunk);
     void keep(Chunk chunk);
-    bool write(const std::string& bytes) { return good_ = good_ && write_all(file_, bytes); }
+    bool write(const std::string& bytes) {
+        if (error_ == 0 && !write_all(file_, bytes)) error_ = errno;
+        return error_ == 0;
+    }
     bool write(const Chunk& chunk);
     bool open();
     int finish();
@@ -123,7 +136,8 @@ private:
     std::int64_t fired_ns_ = 0;  ///< when the overrun or fault came; 0: not yet
     std::string cause_;
     int file_ = -1;
-    bool good_ = true;
+    int error_ = 0;              ///< of the first write that failed
+    std::size_t kept_bytes_ = 0;
 };
 
 bool Tracer::attach() {
@@ -140,7 +154,8 @@ bool Tracer::attach() {
 }
 
 void Tracer::take(const json& event, const std::string& payload, Chunk& chunk) {
-    for (const auto& [id, name] : event.value("names", json::object()).items()) {
+    const json names = event.value("names", json::object());
+    for (const auto& [id, name] : names.items()) {
         const auto number = parse_natural(id);
         if (!number || !name.is_string()) continue;
         names_[static_cast<std::uint32_t>(*number)] = name.get<std::string>();
@@ -163,8 +178,9 @@ void Tracer::take(const json& event, const std::string& payload, Chunk& chunk) {
             const std::int64_t late_ns = each.end_ns - each.begin_ns + each.id;
             if (options_.on_overrun && fired_ns_ == 0 && each.kind == ThreadEvent::cycle && late_ns > one.thread.period_ns) {
                 fired_ns_ = each.end_ns;
-                cause_ = fmt::format("cycle {} of '{}' ended {} after it was due (period {})", each.cycle_number, one.thread.name,
-                                     format_duration(static_cast<double>(late_ns)), format_duration(static_cast<double>(one.thread.period_ns)));
+                cause_ =
+                    fmt::format("cycle {} of '{}' ended {} after it was due (period {})", each.cycle_number, one.thread.name,
+                                format_duration(static_cast<double>(late_ns)), format_duration(static_cast<double>(one.thread.period_ns)));
             }
         }
         chunk.parts.push_back(std::move(one));
@@ -199,10 +215,13 @@ void Tracer::receive(int timeout_ms) {
 }
 
 void Tracer::keep(Chunk chunk) {
+    kept_bytes_ += chunk.bytes();
     kept_.push_back(std::move(chunk));
     const std::int64_t keep_ns = options_.keep_ns >= 0 ? options_.keep_ns : default_keep_ns;
-    if (fired_ns_ == 0)
-        while (kept_.front().time_ns < kept_.back().time_ns - keep_ns) kept_.pop_front();
+    while ((fired_ns_ == 0 && kept_.front().time_ns < kept_.back().time_ns - keep_ns) || kept_bytes_ > most_kept_bytes) {
+        kept_bytes_ -= kept_.front().bytes();
+        kept_.pop_front();
+    }
 }
 
 bool Tracer::write(const Chunk& chunk) {
@@ -221,39 +240,58 @@ bool Tracer::open() {
     const std::string& path = options_.words.front();
     file_ = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
     if (file_ < 0) return fail(options_, fmt::format("cannot write '{}': {}", path, std::strerror(errno))) == 0;
-    return write(writer_.begin(client_->instance(), client_->pid(), {now_ns(CLOCK_MONOTONIC), now_ns(CLOCK_REALTIME), now_ns(CLOCK_BOOTTIME)}));
+    return write(
+        writer_.begin(client_->instance(), client_->pid(), {now_ns(CLOCK_MONOTONIC), now_ns(CLOCK_REALTIME), now_ns(CLOCK_BOOTTIME)}));
 }
 
 int Tracer::finish() {
+    int status = 0;
+    if (!client_->connected()) {
+        const std::string& why = client_->closed_because();
+        const std::string ended = why.empty() ? fmt::format("instance '{}' has ended", client_->instance())
+                                              : fmt::format("instance '{}' closed the connection: {}", client_->instance(), why);
+        // One that ends in order removes its socket.
+        if (ring() && fired_ns_ == 0 && std::filesystem::exists(socket_path(client_->instance()))) {
+            fired_ns_ = now_ns(CLOCK_MONOTONIC);
+            cause_ = ended + " without being stopped";
+        } else if (options_.for_ns >= 0) {
+            status = fail(options_, ended + " before the time was over");
+        }
+    }
     if (ring() && fired_ns_ == 0) {
-        print(fmt::format("no {} in {} cycles; nothing was written\n", options_.on_overrun ? "overrun" : "fault", summary_.cycles));
-        return 0;
+        print(fmt::format("no {} in {} cycles; nothing was written\n",
+                          options_.on_overrun ? options_.on_fault ? "overrun or fault" : "overrun" : "fault", summary_.cycles));
+        return status;
     }
     if (ring()) {
         if (!open()) return 1;
         for (const Chunk& chunk : kept_) write(chunk);
     }
     const std::string& path = options_.words.front();
-    if (!good_) return fail(options_, fmt::format("cannot write '{}': {}", path, std::strerror(errno)));
+    if (error_ != 0)
+        return fail(options_, fmt::format("cannot write '{}': {}; the file is complete up to there", path, std::strerror(error_)));
     if (!cause_.empty()) print(cause_ + "\n");
-    print(fmt::format("wrote {}: {} cycles, {} function calls, {} overruns, {} events lost; open it in https://ui.perfetto.dev\n", path, summary_.cycles, summary_.calls,
-                      summary_.overruns, summary_.lost));
-    if (summary_.longest_ns < 0) return 0;
-    std::string line = fmt::format("latest end: cycle {} of '{}', {} after it was due: wake-up latency {}, execution {}", summary_.cycle, summary_.thread,
-                                   format_duration(static_cast<double>(summary_.longest_ns)), format_duration(static_cast<double>(summary_.latency_ns)),
-                                   format_duration(static_cast<double>(summary_.execution_ns)));
-    if (!summary_.function.empty()) line += fmt::format(", of it {} in {}", format_duration(static_cast<double>(summary_.function_ns)), summary_.function);
+    print(fmt::format("wrote {}: {} cycles, {} function calls, {} overruns, {} events lost; open it in https://ui.perfetto.dev\n", path,
+                      summary_.cycles, summary_.calls, summary_.overruns, summary_.lost));
+    if (summary_.longest_ns < 0) return status;
+    std::string line =
+        fmt::format("latest end: cycle {} of '{}', {} after it was due: wake-up latency {}, execution {}", summary_.cycle, summary_.thread,
+                    format_duration(static_cast<double>(summary_.longest_ns)), format_duration(static_cast<double>(summary_.latency_ns)),
+                    format_duration(static_cast<double>(summary_.execution_ns)));
+    if (!summary_.function.empty())
+        line += fmt::format(", of it {} in {}", format_duration(static_cast<double>(summary_.function_ns)), summary_.function);
     print(line + "\n");
-    return 0;
+    return status;
 }
 
 int Tracer::run() {
-    if (options_.words.size() != 1) return fail(options_, fmt::format("unexpected argument '{}'; type: hal trace {}", options_.words[1], options_.words[0]));
+    if (options_.words.size() != 1)
+        return fail(options_, fmt::format("unexpected argument '{}'; type: hal trace {}", options_.words[1], options_.words[0]));
     if (!ring() && options_.keep_ns >= 0) return fail(options_, "--keep needs --on-overrun or --on-fault");
     if (!attach()) return 1;
     if (!ring() && !open()) return 1;
     const auto end = options_.for_ns >= 0 ? Clock::now() + std::chrono::nanoseconds(options_.for_ns) : Clock::time_point::max();
-    while (!stop_.requested() && good_ && Clock::now() < end && client_->connected()) {
+    while (!stop_.requested() && error_ == 0 && Clock::now() < end && client_->connected()) {
         pollfd waiting[] = {{client_->fd(), POLLIN, 0}, {stop_.fd(), POLLIN, 0}};
         ::poll(waiting, 2, 20);
         receive(0);

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "can_bus.hpp"
+#include "link/counting.hpp"
 
 namespace hal::can::simbus {
 
@@ -57,6 +58,7 @@ public:
         while (count < room.size()) {
             const Frame* next = node_.incoming.front();
             if (next == nullptr || next->time_ns > now) break;
+            trace(link::can_received, *next);
             room[count++] = *next;
             node_.incoming.drop();
         }
@@ -153,6 +155,7 @@ private:
     Sent queue(Outgoing frame, std::int64_t time_ns, std::int64_t now_ns) noexcept {
         frame.time_ns = time_ns;
         frame.own = false;
+        trace(link::can_sent, frame);
         if (node_.outgoing.push(frame)) return Sent::queued;
         flush(now_ns);
         if (node_.outgoing.push(frame)) return Sent::queued;

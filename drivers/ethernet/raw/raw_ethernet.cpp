@@ -8,6 +8,7 @@
 
 #include "ethernet_interface.hpp"
 #include "ethernet_monitor.hpp"
+#include "link/trace_frame.hpp"
 #include "pacer.hpp"
 #include "raw_clock.hpp"
 #include "receiver.hpp"
@@ -43,6 +44,7 @@ public:
         const auto longest = header_bytes + sender_.mtu.load(std::memory_order_relaxed);
         if (!launch.fits(frame.size()) || frame.size() > longest) return sender_.drop(Sent::rejected);
         if (!sender_.up.load(std::memory_order_relaxed)) return sender_.drop(Sent::down);
+        link::trace_frame(link::ethernet_sent, frame);
         if (launch.at_ns == 0) return sender_.leave(frame, launch);
         // The caller's now is the start of its cycle; the remaining time counts from here.
         const auto now = link::monotonic_ns();
@@ -53,7 +55,11 @@ public:
         return sender_.leave(frame, launch);
     }
 
-    std::optional<Arrival> receive(std::int64_t) noexcept override { return receiver_.next(clock_); }
+    std::optional<Arrival> receive(std::int64_t) noexcept override {
+        const auto next = receiver_.next(clock_);
+        if (next) link::trace_frame(link::ethernet_received, next->bytes);
+        return next;
+    }
 
     bool wait(std::int64_t until_ns) noexcept override {
         if (receiver_.ready()) return true;

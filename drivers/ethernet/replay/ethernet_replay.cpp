@@ -8,6 +8,7 @@
 #include "capture/packets.hpp"
 #include "link/ethernet_capture.hpp"
 #include "link/system.hpp"
+#include "link/trace_frame.hpp"
 
 namespace hal::ethernet {
 
@@ -38,6 +39,7 @@ public:
     Sent send(std::span<const std::uint8_t> frame, const Launch& launch, std::int64_t now_ns) noexcept override {
         if (!launch.fits(frame.size()) || frame.size() > largest_frame) return add(dropped_), add(errors_), Sent::rejected;
         if (launch.is_late(time(now_ns))) return add(late_), Sent::late;
+        link::trace_frame(link::ethernet_sent, frame);
         add(sent_);
         sent_bytes_.fetch_add(std::max(frame.size(), smallest_frame), std::memory_order_relaxed);
         return Sent::queued;
@@ -51,6 +53,7 @@ public:
             if (!is_wanted(f.bytes)) continue;
             add(received_);
             received_bytes_.fetch_add(f.bytes.size(), std::memory_order_relaxed);
+            link::trace_frame(link::ethernet_received, f.bytes);
             return Arrival{f.bytes, f.time_ns + shift_};
         }
         return std::nullopt;

@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "ethernet_switch.hpp"
+#include "link/trace_frame.hpp"
 
 namespace hal::ethernet::simbus {
 
@@ -42,6 +43,7 @@ public:
         std::memset(f.bytes.data() + frame.size(), 0, f.length - frame.size());
         f.launch = launch;
         f.at_ns = std::max(launch.at_ns != 0 ? launch.at_ns : unclocked, now);
+        link::trace_frame(link::ethernet_sent, frame);
         user_.outgoing.push(place);  // the queue is as large as the pool
         return Sent::queued;
     }
@@ -52,6 +54,7 @@ public:
         const Incoming* next = user_.incoming.front();
         if (next == nullptr || next->time_ns > switch_->time(now_ns)) return std::nullopt;
         held_ = true;
+        link::trace_frame(link::ethernet_received, {next->bytes.data(), next->length});
         return Arrival{{next->bytes.data(), next->length}, next->stamp_ns};
     }
 

@@ -12,6 +12,7 @@
 #include <cstring>
 
 #include "link/system.hpp"
+#include "link/trace_frame.hpp"
 
 namespace hal::ethernet {
 
@@ -91,6 +92,7 @@ public:
             if (launch.finisher != nullptr) launch.finisher->stayed({own.data(), frame.size()});
             return add(dropped_), Sent::full;
         }
+        link::trace_frame(link::ethernet_sent, frame);
         add(sent_);
         sent_bytes_.fetch_add(frame.size(), std::memory_order_relaxed);
         return Sent::queued;
@@ -122,6 +124,7 @@ public:
             }
             auto length = header_bytes + static_cast<std::size_t>(got);
             for (; length < smallest_frame; ++length) frame_[length] = 0;
+            link::trace_frame(link::ethernet_received, {frame_.data(), length});
             add(received_);
             received_bytes_.fetch_add(length, std::memory_order_relaxed);
             return Arrival{{frame_.data(), length}, std::min(time_of(header, now), now)};
