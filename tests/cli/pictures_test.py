@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: MIT
 """Pictures and tables that are computed from a simulation: made again, they are the same to the byte."""
 import os
+import re
 import subprocess
 import sys
 import unittest
@@ -46,6 +47,14 @@ class Pictures(Case):
         self.assertIn("No measured delay exceeds the computed bound: passed", said)
         for name in ("jitter.csv", "jitter-overshoot.svg", "jitter-responses.svg"):
             self.same(ROOT / "docs" / name, Path(self.folder, name))
+
+    def test_wrong_and_right_gain_of_the_tutorial(self):
+        page = (ROOT / "docs/tutorials/look-inside.md").read_text(encoding="utf-8")
+        self.write("loop.hal", re.search(r"```hal file=loop\.hal\n(.*?)^```", page, re.S | re.M)[1])
+        for command in re.findall(r"^\$ ((?:hal sim|hal plot|sed) .*)$", page, re.M):
+            self.assertEqual(0, subprocess.run(["bash", "-c", command], cwd=self.folder, env={**self.environment, "PATH": f"{HAL.parent}:{os.environ['PATH']}"}).returncode, command)
+        for name in ("look-inside-wrong.svg", "look-inside-right.svg"):
+            self.same(ROOT / "docs" / name, self.folder / name)
 
 
 if __name__ == "__main__":

@@ -135,7 +135,7 @@ private:
             pen = std::isfinite(last);
             if (pen) at = text(last);
         }
-        if (pen && row >= times.size()) path += fmt::format("H{:.1f}", std::min(x_of(std::max(times.back(), begin_)), left + plot_));
+        if (pen) path += fmt::format("H{:.1f}", row < times.size() ? left + plot_ : std::min(x_of(std::max(times.back(), begin_)), left + plot_));
         svg_ += fmt::format("<path d=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.4\" stroke-linejoin=\"round\"/>\n", path, stroke);
     }
 

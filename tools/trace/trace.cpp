@@ -22,6 +22,7 @@
 #include "control/client.hpp"
 #include "machine/address.hpp"
 #include "text/numbers.hpp"
+#include "text/quoting.hpp"
 #include "trace/perfetto.hpp"
 #include "trace/sched.hpp"
 
@@ -259,8 +260,8 @@ int Tracer::finish() {
         }
     }
     if (ring() && fired_ns_ == 0) {
-        print(fmt::format("no {} in {} cycles; nothing was written\n",
-                          options_.on_overrun ? options_.on_fault ? "overrun or fault" : "overrun" : "fault", summary_.cycles));
+        print(fmt::format("no {} in {}; nothing was written\n",
+                          options_.on_overrun ? options_.on_fault ? "overrun or fault" : "overrun" : "fault", counted(summary_.cycles, "cycle")));
         return status;
     }
     if (ring()) {
@@ -271,8 +272,8 @@ int Tracer::finish() {
     if (error_ != 0)
         return fail(options_, fmt::format("cannot write '{}': {}; the file is complete up to there", path, std::strerror(error_)));
     if (!cause_.empty()) print(cause_ + "\n");
-    print(fmt::format("wrote {}: {} cycles, {} function calls, {} overruns, {} events lost; open it in https://ui.perfetto.dev\n", path,
-                      summary_.cycles, summary_.calls, summary_.overruns, summary_.lost));
+    print(fmt::format("wrote {}: {}, {}, {}, {} lost; open it in https://ui.perfetto.dev\n", path, counted(summary_.cycles, "cycle"),
+                      counted(summary_.calls, "function call"), counted(summary_.overruns, "overrun"), counted(summary_.lost, "event")));
     if (summary_.longest_ns < 0) return status;
     std::string line =
         fmt::format("latest end: cycle {} of '{}', {} after it was due: wake-up latency {}, execution {}", summary_.cycle, summary_.thread,
