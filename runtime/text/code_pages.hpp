@@ -278,6 +278,14 @@ inline constexpr CodePage code_pages[] = {
     {"output-set",
      "Only its component writes an output, and would overwrite the value of setp in the next cycle.\n\n"
      "To force a value downstream, unlink the output and set the signal: `unlinkp OUT`, `sets SIGNAL VALUE`."},
+    {"panel-element",
+     "A PyVCP file is invalid at this place: the XML is malformed, an element in a container is unknown, or the value of an option is not a "
+     "literal of Python (options are never evaluated).\n\n"
+     "docs/panel.md describes the differences from LinuxCNC's pyvcp."},
+    {"panel-line",
+     "A line of a .panel file is invalid: an unknown widget or option, a value of the wrong type, a duplicate pin, a container without "
+     "`end`.\n\n"
+     "docs/panel.md lists the widgets with their options."},
     {"parameter-link",
      "Parameters cannot be linked: use setp instead of net."},
     {"period-multiple",

@@ -1,39 +1,11 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""The page of `hal panel` in headless Chromium, driven over the DevTools protocol."""
-import sys
-import unittest
-
-from harness import SERVO, Case, wait_until
-from web import PANEL, Browser, have_browser, start_panel
-
-WAVE = SERVO + """loadrt siggen names=wave
-addf wave.update servo
-setp wave.frequency 5
-net sine wave.sine
-"""
+"""The page of `hal panel` in headless Chromium, driven over the DevTools protocol: its views."""
+from harness import SERVO
+from panel_page import WAVE, Page, main
 
 
-class Page(Case):
-    def begin(self, *words, netlist=WAVE, view="overview", token=True):
-        self.machine = self.start("run", self.write("m.hal", netlist))
-        self.process, self.port, self.token = start_panel(self, *words)
-        self.browser = Browser(self)
-        self.open(view, token)
-
-    def open(self, view, token=True):
-        if token and self.token:
-            self.browser.open(f"http://localhost:{self.port}/#t={self.token}")
-            self.browser.wait("window.halcyon?.machine && location.hash.startsWith('#/')")
-            self.browser.evaluate(f"location.hash = '#/{view}'")
-        else:
-            self.browser.open(f"http://localhost:{self.port}/#/{view}")
-        self.browser.wait("window.halcyon?.machine && document.getElementById('main').children.length > 0")
-
-    def tearDown(self):
-        if hasattr(self, "browser"):
-            self.assertEqual([], self.browser.errors)
-
+class Views(Page):
     def test_overview_shows_the_threads_and_a_killed_machine(self):
         self.begin()
         self.browser.wait("Number(document.querySelector('[data-thread=servo] .figures dd:nth-of-type(2)')?.textContent) > 10")
@@ -93,7 +65,7 @@ class Page(Case):
             return [g.value(c, row - 1), g.value(c, row)]; })()""")
         self.assertLess(before, 0.5 + 1e-9)
         self.assertGreaterEqual(after, 0.5 - 1e-9)
-        frequency = self.browser.wait("parseFloat(document.querySelector('[data-channel=sine]').children[5].textContent)")
+        frequency = self.browser.wait("parseFloat(document.querySelector('[data-channel=sine]').children[6].textContent)")
         self.assertAlmostEqual(5, frequency, delta=1)
 
     def test_a_batch_of_a_probe_is_read_to_the_last_bit(self):
@@ -107,7 +79,7 @@ class Page(Case):
                 view.setFloat64(32 * i + 16, Math.sin(2 * Math.PI * 50 * i * 1e-4), true);
                 view.setBigInt64(32 * i + 24, BigInt(-i), true);
             }
-            store.samples({parts: [{group: 0, rows, lost: 3}], until_ns: 1000000000000 + rows * 100000}, view, {columns: [{type: 'float'}, {type: 's32'}]});
+            store.samples({parts: [{group: 0, rows, lost: 3}], until_ns: 1000000000000 + rows * 100000}, view.buffer, {columns: [{type: 'float'}, {type: 's32'}]});
             const edges = new Trigger('x', 'rising', 0).scan(store), seen = measure(store, 'x', 0, 1);
             return {rows: store.rows, lost: store.lost, gaps: store.gaps, least: measure(store, 'n', 0, 1).min, edges: edges.map(t => Math.round(t * 1e6)), rms: seen.rms, frequency: seen.frequency};
         })()""")
@@ -116,32 +88,48 @@ class Page(Case):
         self.assertAlmostEqual(0.5 ** 0.5, result["rms"], places=4)
         self.assertAlmostEqual(50, result["frequency"], places=4)
 
-    def test_a_button_of_a_user_panel_is_true_while_it_is_pressed(self):
-        self.write("jog.panel", "component jog\nbutton go\nslider speed min=-1 max=1 safe=0\ngauge total of=total max=10\n")
-        self.begin("jog.panel", "--write", view="panel")
-        self.browser.wait("document.querySelector('[data-pin=go]') && !document.querySelector('[data-pin=go]').disabled")
-        self.browser.wait("document.querySelector('[data-widget=meter]').dataset.value === '5'")
-        x, y = self.browser.evaluate("(r => [r.x + 5, r.y + 5])(document.querySelector('[data-pin=go]').getBoundingClientRect())")
-        self.browser.call("Input.dispatchMouseEvent", type="mousePressed", x=x, y=y, button="left", clickCount=1)
-        wait_until(lambda: self.value("jog.go") == "TRUE", "pressed")
-        self.browser.call("Input.dispatchMouseEvent", type="mouseReleased", x=x, y=y, button="left", clickCount=1)
-        wait_until(lambda: self.value("jog.go") == "FALSE", "released")
-        self.browser.evaluate("const s = document.querySelector('input[type=range]'); s.value = 0.5; s.dispatchEvent(new Event('input'))")
-        wait_until(lambda: self.value("jog.speed") == "0.5", "moved")
-        self.browser.open("about:blank")
-        wait_until(lambda: self.value("jog.speed") == "0", "the page is lost")
-
     def test_names_of_the_machine_are_text(self):
         self.begin(netlist=SERVO + "newsig <img/src=x> float\n", view="watch?filter=img")
         self.browser.wait("document.querySelector('.tree').textContent.includes('<img/src=x>')")
         self.assertEqual(0, self.browser.evaluate("document.querySelectorAll('main img').length"))
 
+    def test_networks_show_stations_and_emergencies_in_words(self):
+        self.write("bus.canopen", "[bus]\nlink = sim:panel\nbitrate = 1M\nsync = cycle\n[node 3 io]\ndevice = cia401\nheartbeat = 20ms\n[node 80 force]\ndevice = jr3\nheartbeat = 20ms\n")
+        self.begin(netlist="""loadrt threads name1=servo period1=1000000
+loadrt canopen config=bus.canopen
+loadrt canopen_io link=sim:panel id=3 inputs=8 outputs=8
+loadrt canopen_jr3 link=sim:panel id=0x50
+addf canopen.0.receive servo
+addf canopen.0.transmit servo
+addf canopen-io.0.update servo
+addf canopen-jr3.0.update servo
+start
+""", view="networks", token=False)
+        cell = "[...document.querySelectorAll('[data-node={}] td')][[...document.querySelectorAll('#bus-canopen\\\\.0 thead th')].findIndex(th => th.dataset.what === '{}')]?.textContent"
+        self.browser.wait(cell.format("io", "operational") + " === 'yes'")
+        self.browser.wait("document.querySelectorAll('.station.operational').length === 2")
+        self.assertEqual("–", self.browser.evaluate(cell.format("force", "emcy")))
+        self.good("shell", "setp", "canopen-jr3.0.fz", "-220")
+        self.browser.wait(cell.format("force", "emcy") + " === 'FF01h device specific'")
+        self.browser.wait("document.querySelectorAll('.station.faulty').length === 1")
+        self.good("shell", "setp", "canopen-io.0.power", "FALSE")
+        self.browser.wait(cell.format("io", "online") + " === 'no' && document.querySelectorAll('.station:not(.online):not(.master)').length === 1")
+
+    def test_the_log_has_writes_edits_and_faults_and_filters_them(self):
+        self.begin("--write", view="watch?names=adder.in0")
+        self.browser.wait("!document.querySelector('button.set').disabled")
+        self.browser.evaluate("document.querySelector('input.set').value = '40'; document.querySelector('button.set').click()")
+        self.browser.wait("halcyon.log.some(entry => /adder\\.in0: 2 -> 40/.test(entry.text))")
+        self.browser.evaluate("location.hash = '#/log'")
+        self.browser.wait("/write\\s+client \\d+: adder\\.in0: 2 -> 40/.test(document.getElementById('log').innerText)")
+        self.good("shell", "loadrt", "sum2", "names=later")
+        self.browser.wait("/loadrt sum2 names=later/.test(document.getElementById('log').innerText)")
+        self.browser.evaluate("[...document.querySelectorAll('button')].find(b => b.textContent === 'write').click()")
+        self.browser.wait("!/write\\s+client/.test(document.getElementById('log').innerText)")
+        self.assertIn("hide=write", self.browser.evaluate("location.hash"))
+        self.browser.evaluate("const f = document.querySelector('input[type=search]'); f.value = 'later'; f.dispatchEvent(new Event('input'))")
+        self.browser.wait("document.querySelectorAll('#log li').length === 1")
+
 
 if __name__ == "__main__":
-    if not PANEL.exists():
-        print("hal-panel is not built: install libwebsockets-dev and libpugixml-dev")
-        sys.exit(77)
-    if not have_browser():
-        print("no browser: install the Debian package chromium")
-        sys.exit(77)
-    unittest.main()
+    main()

@@ -2,12 +2,13 @@
 # SPDX-License-Identifier: MIT
 """The server of `hal panel` without a browser: HTTP and WebSockets by hand, what it must reject, what it serves."""
 import re
+import socket
 import sys
 import time
 import unittest
 from pathlib import Path
 
-from harness import SERVO, Case, wait_until
+from harness import SERVO, TIMEOUT, Case, wait_until
 from web import PANEL, WebSocket, request, start_panel
 
 
@@ -152,6 +153,47 @@ class Panel(Case):
             pass  # closed meanwhile
         self.assertEqual([5.0], self.ask(good, read=["total"])["values"])
 
+    def test_a_hundred_connections_keep_nobody_out(self):
+        self.begin("--write", machine=False)
+        half = [socket.create_connection(("127.0.0.1", self.port), timeout=TIMEOUT) for _ in range(100)]
+        for one in half:  # headers that never end
+            self.addCleanup(one.close)
+            one.sendall(b"GET / HTTP/1.1\r\nHost: localhost\r\nX: ")
+        self.assertEqual("HTTP/1.1 200 OK", request(self.port)[0])
+        silent = [WebSocket(self.port, origin=f"http://localhost:{self.port}") for _ in range(100)]  # without a hello
+        for one in silent:
+            self.addCleanup(one.close)
+        self.assertEqual("HTTP/1.1 200 OK", request(self.port)[0])
+        page = self.page(self.token)
+        self.assertEqual("welcome", page.read()["event"])
+        viewers = [self.page() for _ in range(60)]
+        self.assertTrue(any(one.read() is None and one.closed[0] == 1013 for one in viewers))  # more than are served
+        page.send({"id": 5, "read": ["x"]})
+        self.assertFalse(page.expect(lambda m: m.get("id") == 5)["ok"])
+        descriptors = len(list(Path(f"/proc/{self.process.pid}/fd").iterdir()))
+        self.assertLess(descriptors, 400)
+
+    def test_a_frame_that_announces_gigabytes_ends_its_connection(self):
+        self.begin(machine=False)
+        page = self.page()
+        page.expect(lambda m: m.get("event") == "welcome")
+        page.socket.sendall(b"\x81\xff" + (1 << 40).to_bytes(8, "big") + b"\0\0\0\0" + b"x" * 100_000)
+        while page.read() is not None:
+            pass
+        self.assertIn(page.closed[0], (1006, 1009))
+        memory = int(re.search(r"VmRSS:\s+(\d+)", Path(f"/proc/{self.process.pid}/status").read_text())[1])
+        self.assertLess(memory, 100_000)
+        self.assertEqual("HTTP/1.1 200 OK", request(self.port)[0])
+
+    def test_listen_states_what_it_exposes(self):
+        self.begin(machine=False)
+        done = self.run_program("panel", "--listen", "127.0.0.2", "--port", "0", "--write", "--for", "50ms")
+        self.assertRegex(done.stdout, r"""(?s)^warning: listening on 127\.0\.0\.2, port \d+: every computer that reaches it and has the token can read all values of instance 'default' and set them\.
+The connection is not encrypted: .*
+http://127\.0\.0\.2:\d+/#t=[0-9a-f]{32}
+programs and Foxglove: ws://127\.0\.0\.2:\d+/\?t=[0-9a-f]{32}
+$""")
+
     def test_a_client_that_does_not_read_delays_no_other(self):
         self.begin()
         lazy, good = self.connected(), self.connected()
@@ -249,22 +291,21 @@ class Panel(Case):
             ("timer.0.reset", "bit", "IN", False), ("timer.0.run", "bit", "IN", False), ("w", "float", "OUT", 0.0), ("w.reset", "bit", "IN", False),
             ("w.scale", "float", "IN", 1.0)]), pins)
 
-    def test_errors_in_panels_have_their_place(self):
-        self.write("bad.panel", "gauge x min=5 max=1\nled x\nslider s step=0 sfae=1\nrow\nfrobnicate\ntimeout 1ms\n")
-        self.assertEqual("""bad.panel:1:1: error: min must be less than max
-bad.panel:2:5: error: duplicate pin 'x'; each pin of a panel needs a name of its own
-bad.panel:3:17: error: 'sfae' is not an option of 'slider'; the options are: label doc unit min max step initial safe
-bad.panel:3:1: error: step must be positive
-bad.panel:5:1: error: unknown word 'frobnicate'; the words are: component, timeout, title, row, column, frame, end, gauge, bar, number, integer, led, chart, button, … (5 more)
-bad.panel:6:1: error: the timeout must be 100ms to 60s; write: timeout 500ms
-bad.panel:4:1: error: this container has no end; add a line: end
+    def test_errors_in_panels_have_their_place(self):  # all of them: tests/errors/panel-line, panel-element
+        self.write("bad.panel", "row\n  slider speed min=5 max=1\n")
+        self.assertEqual("""bad.panel:1:1: error: this container has no end [panel-line]
+    1 | row
+      | ^^^
+      = help: add a line: end
+
+bad.panel:2:16: error: min must be less than max [panel-line]
+    2 |   slider speed min=5 max=1
+      |                ^^^^^
 hal panel: 'bad.panel' has errors
 """, self.bad("panel", "bad.panel"))
-        self.write("bad.xml", "<pyvcp>\n<vbox>\n <ledd><led/></ledd>\n <led><size>__import__('os')</size></led>\n</vbox></pyvcp>")
-        self.assertEqual("""bad.xml:3:3: error: unknown element <ledd> in <vbox>; did you mean 'led'?
-bad.xml:4:8: error: invalid value of option 'size': '__import__('os')'; use a string in quotation marks, a number, a list or a constant of Tk
-hal panel: 'bad.xml' has errors
-""", self.bad("panel", "bad.xml"))
+        self.write("outer.xml", '<pyvcp><include src="inner.xml"/></pyvcp>')
+        self.write("inner.xml", "<pyvcp>\n<vbox><led></vbox></pyvcp>\n")
+        self.assertIn("inner.xml:2:14: error: invalid XML: Start-end tags mismatch [panel-element]", self.bad("panel", "outer.xml"))
 
     def test_foxglove_clients_get_channels_values_and_parameters(self):
         self.begin("--write")

@@ -5,6 +5,7 @@ import json
 import os
 import re
 import shutil
+import signal
 import socket
 import struct
 import subprocess
@@ -126,12 +127,12 @@ class WebSocket:
 class Browser:
     """Headless Chromium with one page."""
 
-    def __init__(self, case, width=1280, height=800):
-        folder = case.folder / "browser"
+    def __init__(self, case, width=1280, height=800, folder="browser"):
+        folder = case.folder / folder
         self.process = subprocess.Popen(
             ["chromium", "--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--remote-debugging-port=0", f"--window-size={width},{height}",
              "--hide-scrollbars", "--force-prefers-reduced-motion", f"--user-data-dir={folder}", "about:blank"],
-            stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env={**os.environ, "HOME": str(case.folder)})
+            stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True, env={**os.environ, "HOME": str(case.folder)})
         case.addCleanup(self.end)
         port_file = folder / "DevToolsActivePort"
         port = int(wait_until(lambda: port_file.exists() and port_file.read_text().split("\n")[0], "the browser starts"))
@@ -176,7 +177,11 @@ class Browser:
         self.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}])
 
     def end(self):
-        self.process.kill()
+        """Ends the browser with the processes it has started."""
+        try:
+            os.killpg(self.process.pid, signal.SIGKILL)
+        except ProcessLookupError:
+            pass
         self.process.wait()
 
 

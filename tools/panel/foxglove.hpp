@@ -22,6 +22,7 @@ public:
 
     void tick(std::int64_t now_ms) override;
     bool by_token() const override { return by_token_; }
+    bool admitted() const override { return admitted_; }
 
 protected:
     void message(std::string_view text, bool binary) override;

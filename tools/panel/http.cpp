@@ -22,6 +22,7 @@ constexpr std::pair<const char*, std::string_view> security[] = {
     {"referrer-policy:", "no-referrer"},
     {"cross-origin-resource-policy:", "same-origin"},
     {"cross-origin-opener-policy:", "same-origin"},
+    {"cross-origin-embedder-policy:", "require-corp"},
     {"cache-control:", "no-store"},
 };
 

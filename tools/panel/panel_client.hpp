@@ -23,7 +23,7 @@ public:
 
     void tick(std::int64_t now_ms) override;
     bool by_token() const override { return by_token_; }
-    bool welcome() const { return welcome_; }
+    bool admitted() const override { return welcome_; }
     std::uint64_t number() const { return number_; }
     /// Reports who controls the machine.
     void send_control();

@@ -26,7 +26,7 @@ struct PanelLayout {
 };
 
 /// Reads a `.panel` text or, when it begins with `<`, a PyVCP file; files that it includes are relative to its folder.
-/// `component`: the name of the component; empty: by the file. Appends errors as lines "file:line:column: error: …" to `errors`.
+/// `component`: the name of the component; empty: by the file. Appends errors as they are printed to `errors`.
 PanelLayout read_panel_file(const std::string& path, const std::string& component, std::string& errors);
 /// The same for a text. `name` is the file in messages.
 PanelLayout read_panel_text(const std::string& text, const std::string& name, std::string& errors);

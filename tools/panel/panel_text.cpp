@@ -8,10 +8,12 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <unistd.h>
 
 #include "base/types.hpp"
 #include "cli/output.hpp"
 #include "machine/address.hpp"
+#include "panel/panel_errors.hpp"
 #include "panel/panel_layout.hpp"
 #include "text/config_text.hpp"
 #include "text/suggest.hpp"
@@ -24,7 +26,7 @@ using text::Word;
 namespace {
 
 constexpr int deepest = 30;
-constexpr std::size_t most_widgets = 2000, most_errors = 50;
+constexpr std::size_t most_widgets = 2000;
 
 /// A widget of the language.
 struct Kind {
@@ -84,9 +86,9 @@ std::optional<double> number_of(std::string_view text) {
 
 class Reader {
 public:
-    Reader(const std::string& name, std::string& errors) : name_(name), errors_(errors) {}
-
-    PanelLayout read(const std::string& whole) {
+    /// Errors are appended to `printed` as they are printed.
+    PanelLayout read(const std::string& whole, const std::string& name, std::string& printed) {
+        source_ = errors_.add_file(name, whole);
         layout_.root = {{"widget", "vbox"}, {"children", Json::array()}};
         open_.push_back(&layout_.root);
         for (text::Lines lines(whole, "#"); auto line = lines.next();) {
@@ -94,12 +96,13 @@ public:
             if (!words.empty()) this->line(words);
         }
         if (open_.size() > 1) error(opened_.back(), "this container has no end", "add a line: end");
+        printed += errors_.text(colours(STDERR_FILENO));
         return std::move(layout_);
     }
 
 private:
     void error(const text::Span& at, const std::string& sentence, const std::string& help = "") {
-        if (++count_ <= most_errors) errors_ += text::message_text(name_, Severity::error, at, sentence, help) + "\n";
+        errors_.add({source_, at.offset, at.offset + at.length}, sentence, help);
     }
 
     void line(const std::vector<Word>& words) {
@@ -137,7 +140,7 @@ private:
     void timeout(const std::vector<Word>& words) {
         const auto ns = words.size() == 2 ? parse_duration_ns(words[1].text) : std::nullopt;
         if (!ns || *ns < 100'000'000 || *ns > 60'000'000'000)
-            return error(words[0].at, "the timeout must be 100ms to 60s", "write: timeout 500ms");
+            return error(words.back().at, "the timeout must be 100ms to 60s", "write: timeout 500ms");
         layout_.timeout_ms = *ns / 1'000'000;
     }
 
@@ -179,13 +182,13 @@ public:
     }
 
 private:
-    std::string name_;
-    std::string& errors_;
+    PanelErrors errors_{"panel-line"};
+    std::uint32_t source_ = 0;
     PanelLayout layout_;
     std::vector<Json*> open_;
     std::vector<text::Span> opened_;
     std::vector<std::unique_ptr<Json>> containers_;
-    std::size_t count_ = 0, widgets_ = 0;
+    std::size_t widgets_ = 0;
 };
 
 std::optional<Json> Reader::value_of(const Kind& kind, const Word& word) {
@@ -253,8 +256,8 @@ void Reader::widget(const Kind& kind, const std::vector<Word>& words) {
         }
     }
     if (options.contains("min") && options.contains("max") && options["min"].get<double>() >= options["max"].get<double>())
-        error(words[0].at, "min must be less than max");
-    if (options.contains("step") && options["step"].get<double>() <= 0) error(words[0].at, "step must be positive");
+        error(given["min"].at, "min must be less than max");
+    if (options.contains("step") && options["step"].get<double>() <= 0) error(given["step"].at, "step must be positive");
     if (given.contains("label")) options["text"] = given["label"].text;
     if (!kind.type) {
         options["text"] = words[1].text;
@@ -271,8 +274,8 @@ void Reader::widget(const Kind& kind, const std::vector<Word>& words) {
 }  // namespace
 
 PanelLayout read_panel_text(const std::string& text, const std::string& name, std::string& errors) {
-    Reader reader(name, errors);
-    PanelLayout layout = reader.read(text);
+    Reader reader;
+    PanelLayout layout = reader.read(text, name, errors);
     reader.assemble(layout.root);
     return layout;
 }

@@ -10,8 +10,10 @@
 #include <fstream>
 #include <map>
 #include <pugixml.hpp>
+#include <unistd.h>
 
 #include "cli/output.hpp"
+#include "panel/panel_errors.hpp"
 #include "panel/python_literal.hpp"
 #include "text/config_text.hpp"
 #include "text/suggest.hpp"
@@ -24,11 +26,11 @@ namespace {
 
 constexpr std::array<std::string_view, 4> containers{"vbox", "hbox", "labelframe", "tabs"};
 constexpr std::array<std::string_view, 3> invisible{"title", "option", "axisoptions"};
-constexpr std::array<std::string_view, 14> colours{
+constexpr std::array<std::string_view, 14> colour_options{
     "fg",        "bg",      "foreground", "background", "activebackground", "activeforeground", "on_color", "off_color", "disabled_color",
     "fillcolor", "bgcolor", "dialcolor",  "edgecolor",  "dotcolor"};
 constexpr int deepest = 60;
-constexpr std::size_t most_widgets = 5000, most_errors = 50;
+constexpr std::size_t most_widgets = 5000;
 
 template <class Names>
 bool one_of(std::string_view name, const Names& names) {
@@ -67,7 +69,7 @@ std::string base64(std::string_view bytes) {
 
 void to_css(Json& options) {
     for (auto& [key, value] : options.items()) {
-        if (value.is_string() && one_of(key, colours)) value = css_colour(value.get<std::string>());
+        if (value.is_string() && one_of(key, colour_options)) value = css_colour(value.get<std::string>());
         const bool range = key.starts_with("range") || key.starts_with("region");
         if (range && value.is_array() && value.size() == 3 && value[2].is_string()) value[2] = css_colour(value[2].get<std::string>());
     }
@@ -75,32 +77,35 @@ void to_css(Json& options) {
 
 class Reader {
 public:
-    Reader(PanelLayout& layout, std::string& errors) : layout_(layout), errors_(errors), pins_(layout) {}
+    explicit Reader(PanelLayout& layout) : layout_(layout), pins_(layout) {}
+
+    std::string errors() const { return errors_.text(colours(STDERR_FILENO)); }
 
     Json file(const std::string& text, const std::string& name) {
-        const std::string outer_text = std::move(text_), outer_name = std::move(name_);
-        text_ = text;
-        name_ = name;
+        const std::string outer_name = std::exchange(name_, name);
+        const std::uint32_t outer_source = std::exchange(source_, errors_.add_file(name, text));
+        const std::size_t outer_size = std::exchange(size_, text.size());
         Json root{{"widget", "vbox"}, {"children", Json::array()}};
         pugi::xml_document document;
         const pugi::xml_parse_result result = document.load_buffer(text.data(), text.size());
-        if (!result) error(result.offset, fmt::format("invalid XML: {}", result.description()), "check the tags and quotation marks here");
+        if (!result)
+            error(result.offset, 1, fmt::format("invalid XML: {}", result.description()), "check the tags and quotation marks here");
         else if (const pugi::xml_node top = document.child("pyvcp")) children(top, root, true);
-        else error(0, "missing element <pyvcp>", "a PyVCP file begins with <pyvcp>");
-        text_ = outer_text;
+        else error(0, 1, "missing element <pyvcp>", "a PyVCP file begins with <pyvcp>");
         name_ = outer_name;
+        source_ = outer_source;
+        size_ = outer_size;
         return root;
     }
 
 private:
-    void error(std::ptrdiff_t offset, const std::string& sentence, const std::string& help = "") {
-        if (++count_ > most_errors) return;
-        const std::size_t at = std::min(static_cast<std::size_t>(std::max<std::ptrdiff_t>(offset, 0)), text_.size());
-        text::Span span;
-        span.line = 1 + static_cast<std::uint32_t>(std::count(text_.begin(), text_.begin() + static_cast<std::ptrdiff_t>(at), '\n'));
-        const std::size_t line = at == 0 ? std::string::npos : text_.rfind('\n', at - 1);
-        span.column = static_cast<std::uint32_t>(at - (line == std::string::npos ? 0 : line + 1)) + 1;
-        errors_ += text::message_text(name_, Severity::error, span, sentence, help) + "\n";
+    /// `length`: of what is marked from that byte on.
+    void error(std::ptrdiff_t offset, std::size_t length, const std::string& sentence, const std::string& help = "") {
+        const std::size_t at = std::min(static_cast<std::size_t>(std::max<std::ptrdiff_t>(offset, 0)), size_);
+        errors_.add({source_, static_cast<std::uint32_t>(at), static_cast<std::uint32_t>(std::min(at + length, size_))}, sentence, help);
+    }
+    void error(pugi::xml_node element, const std::string& sentence, const std::string& help = "") {
+        error(element.offset_debug(), std::string_view(element.name()).size(), sentence, help);
     }
 
     void attributes(pugi::xml_node element, Json& options) {
@@ -110,13 +115,11 @@ private:
     /// Children that are neither widgets nor containers are options, whose text is Python.
     void option(pugi::xml_node child, std::string_view owner, Json& options) {
         const bool nested = child.find_child([](pugi::xml_node node) { return node.type() == pugi::node_element; });
-        if (nested)
-            return error(child.offset_debug(), fmt::format("unknown element <{}> in <{}>", child.name(), owner), suggestion(child.name()));
+        if (nested) return error(child, fmt::format("unknown element <{}> in <{}>", child.name(), owner), suggestion(child.name()));
         const auto value = python_literal(child.text().get());
         if (!value)
             return error(
-                child.offset_debug(),
-                fmt::format("invalid value of option '{}': '{}'", child.name(), std::string_view(child.text().get()).substr(0, 60)),
+                child, fmt::format("invalid value of option '{}': '{}'", child.name(), std::string_view(child.text().get()).substr(0, 60)),
                 "use a string in quotation marks, a number, a list or a constant of Tk");
         options[child.name()] = *value;
     }
@@ -133,7 +136,7 @@ private:
     void children(pugi::xml_node element, Json& node, bool top) {
         if (++depth_ > deepest) {
             --depth_;
-            return error(element.offset_debug(), "elements are nested more than 60 deep");
+            return error(element, "elements are nested more than 60 deep");
         }
         const std::string_view owner = element.name();
         const bool horizontal = owner == "hbox";
@@ -174,7 +177,7 @@ private:
 
     Json widget(pugi::xml_node element) {
         if (++widgets_ > most_widgets) {
-            if (widgets_ == most_widgets + 1) error(element.offset_debug(), "more than 5000 widgets");
+            if (widgets_ == most_widgets + 1) error(element, "more than 5000 widgets");
             return {};
         }
         const std::string name = element.name();
@@ -189,7 +192,7 @@ private:
         for (const pugi::xml_node child : element.children())
             if (child.type() == pugi::node_element) option(child, name, options);
         if (const std::string problem = pins_.declare(name, options, node); !problem.empty())
-            error(element.offset_debug(), problem, "each pin of a panel needs a name of its own");
+            error(element, problem, "each pin of a panel needs a name of its own");
         if (name.starts_with("image_")) pictures(options, node);
         to_css(options);
         node["options"] = std::move(options);
@@ -202,9 +205,9 @@ private:
         const std::string file = element.attribute("file").as_string(), name = element.attribute("name").as_string();
         std::string bytes;
         if (!read_bytes((std::filesystem::path(name_).parent_path() / file).string(), largest, bytes) || images_.size() >= 100)
-            return error(element.offset_debug(), fmt::format("cannot read the image '{}' (at most 100 images of 200 kB)", file));
+            return error(element, fmt::format("cannot read the image '{}' (at most 100 images of 200 kB)", file));
         const std::string kind = bytes.starts_with("GIF8") ? "gif" : bytes.starts_with("\x89PNG") ? "png" : "";
-        if (kind.empty()) return error(element.offset_debug(), fmt::format("the image '{}' is neither GIF nor PNG", file));
+        if (kind.empty()) return error(element, fmt::format("the image '{}' is neither GIF nor PNG", file));
         images_[name] = "data:image/" + kind + ";base64," + base64(bytes);
     }
 
@@ -227,11 +230,11 @@ private:
         const std::string path = (std::filesystem::path(name_).parent_path() / source).string();
         std::string text;
         if (++includes_ > 20) {
-            error(element.offset_debug(), "more than 20 included files");
+            error(element, "more than 20 included files");
             return {};
         }
         if (source.empty() || !read_file(path, text)) {
-            error(element.offset_debug(), fmt::format("cannot read the included file '{}'{}{}", source, text.empty() ? "" : ": ", text));
+            error(element, fmt::format("cannot read the included file '{}'{}{}", source, text.empty() ? "" : ": ", text));
             return {};
         }
         const std::string outer = pins_.prefix;
@@ -242,11 +245,13 @@ private:
     }
 
     PanelLayout& layout_;
-    std::string& errors_;
+    PanelErrors errors_{"panel-element"};
     PyvcpPins pins_;
-    std::string text_, name_;
+    std::string name_;
+    std::uint32_t source_ = 0;
+    std::size_t size_ = 0;
     int depth_ = 0;
-    std::size_t widgets_ = 0, includes_ = 0, count_ = 0;
+    std::size_t widgets_ = 0, includes_ = 0;
     std::map<std::string, std::string> images_;
 };
 
@@ -254,7 +259,9 @@ private:
 
 PanelLayout read_pyvcp(const std::string& text, const std::string& name, std::string& errors) {
     PanelLayout layout;
-    layout.root = Reader(layout, errors).file(text, name);
+    Reader reader(layout);
+    layout.root = reader.file(text, name);
+    errors += reader.errors();
     layout.root["pyvcp"] = true;
     return layout;
 }

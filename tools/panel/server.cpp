@@ -56,7 +56,7 @@ int on_web_socket(lws* wsi, lws_callback_reasons reason, void* user, void* in, s
         const bool listed = foreign && std::find(origins.begin(), origins.end(), origin) != origins.end();
         const bool absent = lws_hdr_total_length(wsi, WSI_TOKEN_ORIGIN) == 0;  // not a browser
         const bool good = host_allowed(server.access(), host) && (absent || own_origin(origin, host) || listed);
-        return good && server.connections() < PanelServer::most_connections ? 0 : -1;
+        return good && server.make_space() ? 0 : -1;
     }
     case LWS_CALLBACK_ESTABLISHED: {
         auto made = make(server_of(wsi), wsi, lws_hdr_total_length(wsi, WSI_TOKEN_ORIGIN) > 0);
@@ -137,7 +137,7 @@ PanelServer::PanelServer(Access access, std::string instance)
     : access_(std::move(access)), instance_(std::move(instance)), loop_(std::make_unique<EventLoop>()) {
     log_.on_entry = [this](const std::string& entry) {
         for (const auto& client : clients_)
-            if (auto* const page = dynamic_cast<PanelClient*>(client.get()); page && page->welcome()) page->send(entry, false, true);
+            if (auto* const page = dynamic_cast<PanelClient*>(client.get()); page && page->admitted()) page->send(entry, false, true);
     };
 }
 
@@ -181,7 +181,7 @@ void PanelServer::load(PanelLayout layout) {
     panel_ = std::make_unique<UserPanel>(host_, instance_, std::move(layout), log_);
     panel_->on_values = [this](const std::string& event) {
         for (const auto& client : clients_)
-            if (auto* const page = dynamic_cast<PanelClient*>(client.get()); page && page->welcome()) page->send(event, false, true);
+            if (auto* const page = dynamic_cast<PanelClient*>(client.get()); page && page->admitted()) page->send(event, false, true);
     };
 }
 
@@ -203,7 +203,7 @@ void PanelServer::tick() {
 
 void PanelServer::tell_control() {
     for (const auto& client : clients_)
-        if (auto* const page = dynamic_cast<PanelClient*>(client.get()); page && page->welcome()) page->send_control();
+        if (auto* const page = dynamic_cast<PanelClient*>(client.get()); page && page->admitted()) page->send_control();
 }
 
 void PanelServer::take_control(PanelClient& client) {
@@ -233,6 +233,16 @@ bool PanelServer::admit(WebClient& client) {
     if (viewer == clients_.end()) return false;
     (*viewer)->close(1013, "displaced by a client with the token");
     return true;
+}
+
+bool PanelServer::make_space() {
+    if (clients_.size() < most_connections) return true;
+    const auto silent = [](const auto& one) { return !one->by_token() && !one->admitted(); };
+    auto oldest = std::find_if(clients_.begin(), clients_.end(), silent);
+    if (oldest == clients_.end()) oldest = std::find_if(clients_.begin(), clients_.end(), [](const auto& one) { return !one->by_token(); });
+    if (oldest == clients_.end()) return false;
+    (*oldest)->drop();
+    return clients_.size() < 2 * most_connections;  // a dropped one is removed when the library has closed it
 }
 
 void PanelServer::remove(WebClient* client) {

@@ -52,12 +52,13 @@ public:
     void release(PanelClient& client);
     /// Returns false when too many clients are connected. One with the token displaces the oldest one without it.
     bool admit(WebClient& client);
+    /// Makes space for one more connection: drops the oldest one that is not admitted yet, else the oldest without the token.
+    bool make_space();
 
     // Called by the event loop.
     void add(std::unique_ptr<WebClient> client) { clients_.push_back(std::move(client)); }
     void remove(WebClient* client);
     std::uint64_t next_number() { return ++numbers_; }
-    std::size_t connections() const { return clients_.size(); }
     void tick();
 
     static constexpr std::size_t most_clients = 32, most_connections = 48;

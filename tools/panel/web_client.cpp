@@ -29,6 +29,8 @@ void WebClient::close(int code, std::string_view reason) {
     lws_callback_on_writable(wsi_);
 }
 
+void WebClient::drop() { lws_set_timeout(wsi_, PENDING_TIMEOUT_KILLED_BY_PARENT, LWS_TO_KILL_ASYNC); }
+
 bool WebClient::closing() {
     lws_close_reason(wsi_, static_cast<lws_close_status>(close_code_), reinterpret_cast<unsigned char*>(close_reason_.data()),
                      close_reason_.size());

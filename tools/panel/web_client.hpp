@@ -23,10 +23,14 @@ public:
     std::size_t waiting() const { return waiting_; }
     /// Closes the connection after what is queued, with a code of RFC 6455 section 7.4 and a reason.
     void close(int code, std::string_view reason);
+    /// Ends the connection without waiting for the client.
+    void drop();
 
     /// Called every 50 ms.
     virtual void tick(std::int64_t) {}
     virtual bool by_token() const { return false; }
+    /// The client may read: it has greeted, with the token where that is needed.
+    virtual bool admitted() const { return false; }
 
     // Called by the event loop. False: the connection is closed.
     bool received(std::string_view part, bool last, bool binary, std::int64_t now_ms);

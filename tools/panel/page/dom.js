@@ -38,8 +38,11 @@ export function duration(ns) {
 export const colour = name => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 export const typeColour = type => colour(type === 'bit' ? '--t-bit' : type === 'float' ? '--t-float' : type === 'port' ? '--t-port' : '--t-int');
 
+export const dark = matchMedia('(prefers-color-scheme: dark)');
+
 /// Prepares a canvas for drawing in CSS pixels at the screen's resolution; draw() is called once per frame after request(). Redraws at a change of size.
-export function surface(canvas, draw) {
+/// `opaque`: draw() paints every pixel.
+export function surface(canvas, draw, opaque = false) {
   let asked = false;
   const paint = () => {
     asked = false;
@@ -50,10 +53,10 @@ export function surface(canvas, draw) {
       canvas.width = Math.round(width * ratio);
       canvas.height = Math.round(height * ratio);
     }
-    const context = canvas.getContext('2d');
+    const context = canvas.getContext('2d', {alpha: !opaque});
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
-    context.clearRect(0, 0, width, height);
-    draw(context, width, height);
+    if (!opaque) context.clearRect(0, 0, width, height);
+    draw(context, width, height, ratio);
   };
   const request = () => {
     if (!asked) requestAnimationFrame(paint);
@@ -61,8 +64,9 @@ export function surface(canvas, draw) {
   };
   const watch = new ResizeObserver(request);
   watch.observe(canvas);
+  dark.addEventListener('change', request);
   request();
-  return {request, end: () => watch.disconnect()};
+  return {request, end: () => { watch.disconnect(); dark.removeEventListener('change', request); }};
 }
 
 export function announce(message) { document.getElementById('announce').textContent = message; }

@@ -62,7 +62,7 @@ function neighbourhood({boxes, edges}, around, depth) {
 }
 
 export function show(main, query) {
-  const view = {x: 0, y: 0, scale: 1, fitted: false};
+  const view = {x: 0, y: 0, scale: 1, fitted: false, moved: false, size: ''};
   let all = new Map(), graph = {boxes: [], edges: []}, size = {width: 1, height: 1}, values = new Map(), end = null, selected = query.get('pin') ?? '';
   const collapsed = new Set((query.get('collapsed') ?? '').split(',').filter(name => name));
   const search = h('input', {type: 'search', class: 'grow', list: 'graph-names', placeholder: 'Search pins, signals, instances', 'aria-label': 'Search', value: query.get('around') ?? ''});
@@ -75,18 +75,19 @@ export function show(main, query) {
   main.append(h('div', {class: 'column'}, h('div', {class: 'bar'}, search, names, depth, grouped, h('button', {onclick: () => fit()}, 'Show all'), note), h('div', {class: 'fill'}, canvas, details)));
 
   const drawing = surface(canvas, (context, width, height) => {
-    if (!view.fitted && graph.boxes.length > 0) fit(width, height);
+    if ((!view.fitted || (!view.moved && view.size !== `${width} ${height}`)) && graph.boxes.length > 0) fit(width, height);
     context.translate(view.x, view.y);
     context.scale(view.scale, view.scale);
     draw(context, {left: -view.x / view.scale, top: -view.y / view.scale, right: (width - view.x) / view.scale, bottom: (height - view.y) / view.scale});
   });
 
-  function curve(context, path) {
+  /// `back`: the path leaves to the right, turns and runs to the left.
+  function curve(context, path, back) {
     context.moveTo(...path[0]);
     for (let i = 1; i < path.length; i++) {
-      const [x0, y0] = path[i - 1], [x1, y1] = path[i], bend = Math.max(Math.abs(x1 - x0) * .45, 8);
-      if (x1 >= x0) context.bezierCurveTo(x0 + bend, y0, x1 - bend, y1, x1, y1);
-      else context.bezierCurveTo(x0 - bend, y0, x1 + bend, y1, x1, y1);
+      const [x0, y0] = path[i - 1], [x1, y1] = path[i], bend = Math.max(Math.abs(x1 - x0) * .45, 14);
+      const begin = back && i > 1 ? -bend : bend, end = back && i < path.length - 1 ? -bend : bend;
+      context.bezierCurveTo(x0 + begin, y0, x1 - end, y1, x1, y1);
     }
   }
   function draw(context, seen) {
@@ -100,7 +101,7 @@ export function show(main, query) {
       context.globalAlpha = signal && !marked ? .35 : 1;
       context.setLineDash(edge.back || edge.loop ? [5, 4] : []);
       context.beginPath();
-      curve(context, edge.path);
+      curve(context, edge.path, edge.back || edge.loop);
       context.stroke();
     }
     context.globalAlpha = 1;
@@ -142,7 +143,7 @@ export function show(main, query) {
     view.scale = Math.min(1.2, (width - 40) / (size.width + 60), (height - 40) / size.height);
     view.x = (width - size.width * view.scale) / 2;
     view.y = (height - size.height * view.scale) / 2;
-    view.fitted = true;
+    Object.assign(view, {fitted: true, moved: false, size: `${width} ${height}`});
     drawing.request();
   }
   function zoom(factor, x, y) {
@@ -150,6 +151,7 @@ export function show(main, query) {
     view.x = x - (x - view.x) * scale / view.scale;
     view.y = y - (y - view.y) * scale / view.scale;
     view.scale = scale;
+    view.moved = true;
     drawing.request();
   }
   function toggle(button, key) {
@@ -171,7 +173,7 @@ export function show(main, query) {
   }
   function follow() {
     if (end) end();
-    const shown = [...new Set(graph.edges.map(edge => edge.signal.name))].slice(0, 1000);
+    const shown = [...new Set(graph.boxes.flatMap(box => box.outputs.map(pin => pin.signal)))].slice(0, 1000);
     end = shown.length === 0 ? null : subscribe(shown, 200, got => {
       shown.forEach((name, i) => values.set(name, got[i]));
       canvas.dataset.values = values.size;
@@ -222,7 +224,7 @@ export function show(main, query) {
     view.scale = Math.max(view.scale, .8);
     view.x = canvas.clientWidth / 2 - (box.x + box.width / 2) * view.scale;
     view.y = canvas.clientHeight / 2 - (box.y + box.height / 2) * view.scale;
-    view.fitted = true;
+    view.fitted = view.moved = true;
     drawing.request();
   }
   function hit(x, y) {
@@ -250,6 +252,7 @@ export function show(main, query) {
     } else {
       view.x += now[0] - before[0];
       view.y += now[1] - before[1];
+      view.moved = true;
     }
     pointers.set(event.pointerId, now);
     drawing.request();
@@ -265,7 +268,7 @@ export function show(main, query) {
   canvas.addEventListener('wheel', event => { event.preventDefault(); zoom(Math.exp(-event.deltaY / 400), event.offsetX, event.offsetY); }, {passive: false});
   canvas.addEventListener('keydown', event => {
     const step = {ArrowLeft: [60, 0], ArrowRight: [-60, 0], ArrowUp: [0, 60], ArrowDown: [0, -60]}[event.key];
-    if (step) { view.x += step[0]; view.y += step[1]; drawing.request(); }
+    if (step) { view.x += step[0]; view.y += step[1]; view.moved = true; drawing.request(); }
     else if (event.key === '+' || event.key === '-') zoom(event.key === '+' ? 1.25 : .8, canvas.clientWidth / 2, canvas.clientHeight / 2);
     else if (event.key === '0') fit();
     else if (event.key === 'Escape') select('');

@@ -58,7 +58,7 @@ async function start(one) {
   }
 }
 
-/// Probes names: act(event, DataView of the rows, layout). Calls failed(reply) when the machine has no probes. Returns a function that ends it.
+/// Probes names: act(event, ArrayBuffer of the rows, layout). Calls failed(reply) when the machine has no probes. Returns a function that ends it.
 export function probe(names, options, act, failed) {
   const one = {names, options, act, failed, number: null, layout: null};
   probes.add(one);
@@ -135,7 +135,7 @@ function receiveBytes(bytes) {
   const event = samples;
   samples = null;
   if (!event) return;
-  for (const one of probes) if (one.number === event.probe) one.act(event, new DataView(bytes), one.layout);
+  for (const one of probes) if (one.number === event.probe) one.act(event, bytes, one.layout);
 }
 
 export function connect() {

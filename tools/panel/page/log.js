@@ -15,13 +15,13 @@ export function show(main, query) {
     remember({hide: [...hidden].join(',')});
     draw();
   }}, kind));
-  main.append(h('div', {class: 'bar'}, filter, buttons), h('div', {class: 'card'}, list));
+  main.append(h('div', {class: 'bar'}, filter, h('span', {class: 'bar tight', role: 'group', 'aria-label': 'Kinds to show'}, buttons)), h('div', {class: 'card'}, list));
   let faults = [];
   function draw() {
     const word = filter.value.toLowerCase();
     const all = [...state.log.filter(one => one.kind !== 'fault' || faults.length === 0), ...faults].filter(one => !hidden.has(one.kind) && one.text.toLowerCase().includes(word)).sort((a, b) => b.unix_ms - a.unix_ms).slice(0, 500);
     list.replaceChildren(...(all.length === 0 ? [h('li', {class: 'dim'}, 'Nothing happened since this page was opened.')] : all.map(one => h('li', {class: one.kind === 'fault' ? 'bad' : ''},
-      h('time', {}, new Date(one.unix_ms).toLocaleTimeString([], {hour12: false})), h('span', {class: 'dim'}, `${one.kind} `), one.text))));
+      h('time', {}, new Date(one.unix_ms).toLocaleTimeString([], {hour12: false})), h('span', {class: 'dim kind'}, `${one.kind} `), h('span', {}, one.text)))));
   }
   async function readFaults() {
     const reply = await request({run: ['show', 'fault']});

@@ -26,6 +26,10 @@ export function emergency(code) {
   return `${code.toString(16).toUpperCase().padStart(4, '0')}h ${exact ? exact[1] : 'unknown'}`;
 }
 
+// Bits of the error register, CiA 301 object 1001h.
+const registers = ['generic', 'current', 'voltage', 'temperature', 'communication', 'device profile', 'reserved', 'manufacturer'];
+const register = value => value ? registers.filter((_, bit) => value >> bit & 1).join(', ') : '–';
+
 const shown = ['state', 'online', 'operational', 'emcy', 'emcy-count', 'error-register', 'fault', 'heartbeat-age-ms', 'retries', 'boot-result', 'frames', 'late', 'drift', 'losses', 'lost-links', 'crc-errors', 'dc-sync-diff', 'al-status-code'];
 
 export function show(main, query) {
@@ -57,7 +61,7 @@ export function show(main, query) {
       const name = pin.name.split('.').pop(), names = /(state|step|result)$/.test(name) ? meanings(pin.doc) : new Map();
       watched.push(pin.name);
       act.push(value => {
-        const words = name === 'emcy' || name === 'error-code' ? emergency(value) : names.size > 1 && typeof value === 'number' ? names.get(value) ?? String(value) : typeof value === 'boolean' ? value ? 'yes' : 'no' : `${number(typeof value === 'number' ? Number(value.toPrecision(5)) : value)}${pin.unit ? ` ${pin.unit}` : ''}`;
+        const words = name === 'emcy' || name === 'error-code' ? emergency(value) : name === 'error-register' ? register(value) : names.size > 1 && typeof value === 'number' ? names.get(value) ?? String(value) : typeof value === 'boolean' ? value ? 'yes' : 'no' : `${number(typeof value === 'number' ? Number(value.toPrecision(5)) : value)}${pin.unit ? ` ${pin.unit}` : ''}`;
         text(element, words);
         paint?.(value, element);
       });
@@ -67,19 +71,23 @@ export function show(main, query) {
       const columns = shown.filter(what => [...bus.nodes.values()].some(pins => pins.has(what)));
       const line = h('div', {class: 'bus', role: 'img', 'aria-label': `stations of ${instance}; the table has their states`}, h('span', {class: 'station master'}, instance));
       const rows = [...bus.nodes].map(([node, pins]) => {
-        const chip = h('span', {class: 'station'}, node);
+        const chip = h('span', {class: 'station'}, node), causes = new Set();
         line.append(chip);
         const paint = what => (value, element) => {
           if (what === 'online') { chip.classList.toggle('online', Boolean(value)); if (!pins.has('operational')) chip.classList.toggle('operational', Boolean(value)); }
           if (what === 'operational') chip.classList.toggle('operational', Boolean(value));
-          if (what === 'fault' || what === 'emcy') { chip.classList.toggle('faulty', Boolean(value)); element.classList.toggle('bad', Boolean(value)); }
+          if (what === 'fault' || what === 'emcy') {
+            causes[value ? 'add' : 'delete'](what);
+            chip.classList.toggle('faulty', causes.size > 0);
+            element.classList.toggle('bad', Boolean(value));
+          }
           if (what === 'online') element.className = value ? 'n good' : 'n bad';
         };
         return h('tr', {'data-node': node}, h('td', {class: 'mono'}, node), columns.map(what => cell(pins.get(what), paint(what))));
       });
       const own = [...bus.own].filter(([, pin]) => pin.dir === 'OUT' && !/(^|[.-])(time|tmax)$/.test(pin.name)).map(([name, pin]) => h('tr', {title: pin.doc ?? ''}, h('td', {}, name), cell(pin)));
       return h('section', {class: 'card wide', id: `bus-${instance}`}, h('h2', {}, `${bus.kind} ${instance}`), line,
-        rows.length > 0 ? h('div', {class: 'scroll'}, h('table', {}, h('thead', {}, h('tr', {}, h('th', {}, 'Station'), columns.map(what => h('th', {class: 'n'}, what)))), h('tbody', {}, rows))) : h('p', {class: 'dim'}, 'no stations'),
+        rows.length > 0 ? h('div', {class: 'scroll'}, h('table', {}, h('thead', {}, h('tr', {}, h('th', {}, 'Station'), columns.map(what => h('th', {class: 'n', 'data-what': what}, what.replace(/-ms$/, '').replaceAll('-', ' '))))), h('tbody', {}, rows))) : h('p', {class: 'dim'}, 'no stations'),
         h('details', {open: wanted === instance, ontoggle: event => remember({bus: event.target.open ? instance : ''})}, h('summary', {}, 'The bus itself'), h('table', {class: 'narrow'}, h('tbody', {}, own))));
     })));
     if (end) end();

@@ -4,9 +4,8 @@ import {on, request, state} from './link.js';
 import {colour, duration, h, number, surface, text} from './dom.js';
 
 const figures = [['period', t => duration(t.period_ns)], ['cycles', t => number(t.cycles)], ['missed', t => number(t.missed)], ['overruns', t => number(t.overruns)],
-  ['wake-up p50', t => duration(t.wakeup_p50_ns)], ['p99', t => duration(t.wakeup_p99_ns)], ['max', t => duration(t.wakeup_max_ns)], ['page faults', t => number(t.page_faults)],
-  ['execution p50', t => duration(t.busy_p50_ns)], ['p99', t => duration(t.busy_p99_ns)], ['max', t => duration(t.busy_max_ns)],
-  ['load', t => `${(100 * t.busy_p50_ns / t.period_ns).toPrecision(2)} %`]];
+  ['load', t => `${(100 * t.busy_p50_ns / t.period_ns).toPrecision(2)} %`], ['page faults', t => number(t.page_faults)]];
+const times = [['wake-up latency', 'wakeup'], ['execution time', 'busy']], quantiles = ['p50', 'p99', 'max'];
 
 /// Draws two distributions over a logarithmic axis, one above the other.
 function drawHistograms(context, width, height, histograms, period) {
@@ -36,17 +35,22 @@ function drawHistograms(context, width, height, histograms, period) {
   });
   context.fillStyle = colour('--bad');
   context.fillRect(x(period), 0, 1.5, height - 14);
+  context.textAlign = x(period) > width - 60 ? 'right' : 'left';
+  context.fillText('period', x(period) + (x(period) > width - 60 ? -4 : 5), 11);
+  context.textAlign = 'left';
 }
 
 function threadCard(thread) {
   const card = {thread, histograms: null};
   card.values = figures.map(() => h('dd'));
+  card.times = times.map(() => quantiles.map(() => h('td', {class: 'n'})));
   card.state = h('p');
   card.policy = h('p', {class: 'dim'});
-  const canvas = h('canvas', {role: 'img', 'aria-label': `Histograms of thread ${thread.name}; the figures are in the list above`});
+  const canvas = h('canvas', {role: 'img', 'aria-label': `Histograms of thread ${thread.name}; the figures are in the table above`});
   canvas.style.height = '150px';
   card.element = h('section', {class: 'card', 'data-thread': thread.name}, h('h2', {}, `Thread ${thread.name}`), card.state,
-    h('dl', {class: 'figures'}, figures.map(([name], i) => [h('dt', {}, name), card.values[i]])), canvas, card.policy);
+    h('dl', {class: 'figures'}, figures.map(([name], i) => [h('dt', {}, name), card.values[i]])),
+    h('table', {class: 'times'}, h('thead', {}, h('tr', {}, h('th'), quantiles.map(name => h('th', {class: 'n'}, name)))), h('tbody', {}, times.map(([name], i) => h('tr', {}, h('td', {}, name), card.times[i])))), canvas, card.policy);
   card.surface = surface(canvas, (context, width, height) => drawHistograms(context, width, height, card.histograms, card.thread.period_ns));
   return card;
 }
@@ -62,6 +66,7 @@ function update(card, thread, histograms) {
   card.thread = thread;
   card.histograms = histograms;
   figures.forEach(([, of], i) => text(card.values[i], of(thread)));
+  times.forEach(([, of], i) => quantiles.forEach((name, k) => text(card.times[i][k], duration(thread[`${of}_${name}_ns`]))));
   const [words, kind] = stateOf(thread);
   text(card.state, words);
   card.state.className = kind;
@@ -75,7 +80,7 @@ export function show(main) {
   const cards = h('div', {class: 'cards'}), faults = h('ul', {class: 'plain'}), summary = h('p', {class: 'dim'});
   const clear = h('button', {onclick: () => request({run: ['fault', 'clear']}).then(faultsNow)}, 'Acknowledge faults');
   const faultCard = h('section', {class: 'card wide'}, h('h2', {}, 'Faults'), faults, clear);
-  main.append(summary, h('div', {class: 'cards'}, faultCard), h('p'), cards);
+  main.append(summary, h('div', {class: 'cards first'}, faultCard), cards);
   const known = new Map();
   let busy = false, open = true;
 

@@ -129,13 +129,14 @@ export function show(main) {
   enable();
   // The server sets the safe values when these messages stop.
   const beat = setInterval(() => { if (state.held) tell({panel: {}}); }, Math.max(50, panel.timeout_ms / 4));
-  const release = () => { if (document.hidden) pins.release?.forEach(act => act()); };
+  const release = event => { if (event.type === 'blur' || document.hidden) pins.release?.forEach(act => act()); };
   document.addEventListener('visibilitychange', release);
-  addEventListener('blur', () => pins.release?.forEach(act => act()));
+  addEventListener('blur', release);
   return () => {
     pins.release?.forEach(act => act());
     clearInterval(beat);
     document.removeEventListener('visibilitychange', release);
+    removeEventListener('blur', release);
     ends.forEach(end => end());
     pins.ends?.forEach(end => end());
   };

@@ -2,16 +2,15 @@
 // The scope: up to 16 channels, time base, trigger, cursors, measurements. Samples come from a probe, every cycle of their threads; from a machine
 // without probes, by subscription.
 import {on, probe, subscribe} from './link.js';
-import {colour, h, number, surface, text} from './dom.js';
+import {colour, dark, h, number, surface, text} from './dom.js';
 import {objects} from './objects.js';
 import {Store, Trigger, measure, valueAt} from './scope_data.js';
+import {Picture} from './scope_picture.js';
 import {remember} from './app.js';
 
 const most = 16, divisions = 10, rows = 8, before = .2;
 const hues = [210, 30, 130, 350, 270, 175, 60, 310];
-const dark = matchMedia('(prefers-color-scheme: dark)');
 const paint = i => `hsl(${hues[i % 8]} ${dark.matches ? '85% 68%' : '80% 36%'})`;
-const dash = i => i < 8 ? [] : [6, 3];
 const steps = [1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, .01, .02, .05, .1, .2, .5, 1, 2];
 const seconds = s => s < 1e-3 ? `${Number((s * 1e6).toPrecision(4))} µs` : s < 1 ? `${Number((s * 1e3).toPrecision(4))} ms` : `${Number(s.toPrecision(4))} s`;
 const nice = size => { const e = 10 ** Math.floor(Math.log10(size)); return e * (size / e <= 1 ? 1 : size / e <= 2 ? 2 : size / e <= 5 ? 5 : 10); };
@@ -25,7 +24,7 @@ export function show(main, query) {
   let base = Number(query.get('base')) || .1, mode = query.get('mode') || 'roll', run = true, end = null, source = '', shownAt = null, single = false, lastTrigger = 0;
   let [trigger, edge, level] = [query.get('trigger') ?? '', query.get('edge') ?? 'rising', Number(query.get('level')) || 0];
   const store = new Store(), cursors = [.3, .7];
-  let watcher = null, pending = null, useCursors = query.get('cursors') === '1', selected = 0, frames = 0, since = performance.now();
+  let watcher = null, pending = null, useCursors = query.get('cursors') === '1', selected = 0, frames = 0, drawn = 0, since = performance.now(), looks = {};
 
   const add = h('input', {type: 'search', list: 'scope-names', placeholder: 'Add a channel', 'aria-label': 'Add a channel'}), names = h('datalist', {id: 'scope-names'});
   const choose = (label, values, value, act) => {
@@ -39,11 +38,14 @@ export function show(main, query) {
   const edges = choose('Edge', [['rising', 'rising'], ['falling', 'falling'], ['either', 'either edge']], edge, value => { edge = value; save(); arm(); });
   const levelInput = h('input', {size: 7, inputmode: 'decimal', 'aria-label': 'Trigger level', value: String(level), onchange: () => { level = Number(levelInput.value) || 0; save(); arm(); }});
   const stop = h('button', {class: 'main', onclick: () => { run = !run; single = false; draw(); }}, 'Stop');
-  const cursorButton = h('button', {'aria-pressed': String(useCursors), onclick: () => { useCursors = !useCursors; cursorButton.setAttribute('aria-pressed', useCursors); save(); }}, 'Cursors');
-  const status = h('span', {class: 'dim', id: 'scope-status'}), legend = h('div', {class: 'legend'}), table = h('tbody');
+  const cursorButton = h('button', {'aria-pressed': String(useCursors), onclick: () => { useCursors = !useCursors; cursorButton.setAttribute('aria-pressed', useCursors); showCursors(); save(); }}, 'Cursors');
+  const status = h('span', {class: 'dim', id: 'scope-status'}), table = h('tbody');
   const canvas = h('canvas', {tabindex: 0, role: 'img', 'aria-label': 'Traces; the measurements are in the table below. Space runs and stops, left and right change the time base, up and down move the channel, plus and minus scale it, a scales all.'});
-  main.append(h('div', {class: 'column'}, h('div', {class: 'bar'}, add, names, timeBase, modes, triggerSource, edges, levelInput, stop, h('button', {onclick: autoscale}, 'Auto scale'), cursorButton, status),
-    h('div', {class: 'fill'}, canvas), legend, h('table', {}, h('thead', {}, h('tr', {}, ['Channel', 'min', 'max', 'mean', 'rms', 'frequency', 'cursor 1', 'cursor 2', 'Δ'].map((t, i) => h('th', {class: i ? 'n' : ''}, t)))), table)));
+  const titles = ['Channel', 'units/div', 'min', 'max', 'mean', 'rms', 'frequency', 'cursor 1', 'cursor 2', 'Δ'];
+  const whole = h('table', {class: 'channels'}, h('thead', {}, h('tr', {}, titles.map((t, i) => h('th', {class: i < 2 ? '' : i < 7 ? 'n' : 'n cursor'}, t)), h('th', {}, h('span', {class: 'unseen'}, 'Remove')))), table);
+  const showCursors = () => whole.classList.toggle('no-cursors', !useCursors);
+  main.append(h('div', {class: 'column'}, h('div', {class: 'bar'}, add, names, timeBase, modes, triggerSource, edges, h('label', {class: 'tied'}, 'at', levelInput), stop, h('button', {onclick: autoscale}, 'Auto scale'), cursorButton, status),
+    h('div', {class: 'fill high'}, canvas), h('div', {class: 'scroll'}, whole)));
 
   function save() {
     remember({ch: channels.map(c => `${c.name}:${c.scale}:${c.position}`).join(','), base, mode, trigger, edge, level, cursors: useCursors ? '1' : ''});
@@ -57,10 +59,10 @@ export function show(main, query) {
     const list = channels.map(channel => channel.name);
     if (list.length === 0) return;
     let known = 0;
-    end = probe(list, {batch_ms: 20}, (event, view, layout) => {
+    end = probe(list, {batch_ms: 15}, (event, bytes, layout) => {
       if (layout.layout !== known) { known = layout.layout; store.layout(layout.groups, list); arm(); }
       source = 'every cycle';
-      store.samples(event, view, layout);
+      store.samples(event, bytes, layout);
       take();
     }, () => {  // a machine without probes
       source = 'sampled every 10 ms';
@@ -97,99 +99,68 @@ export function show(main, query) {
   }
   const range = () => { const to = shownAt ?? store.newest; return [to - base * divisions, to]; };
 
-  const drawing = surface(canvas, (context, width, height) => {
+  const picture = new Picture();
+  const drawing = surface(canvas, (context, cssWidth, cssHeight, ratio) => {
     frames++;
-    const [from, to] = range(), x = time => width * (time - from) / (to - from), dy = height / rows;
-    context.strokeStyle = colour('--grid');
-    context.lineWidth = 1;
-    context.beginPath();
-    for (let i = 1; i < divisions; i++) { context.moveTo(Math.round(width * i / divisions) + .5, 0); context.lineTo(Math.round(width * i / divisions) + .5, height); }
-    for (let i = 1; i < rows; i++) { context.moveTo(0, Math.round(dy * i) + .5); context.lineTo(width, Math.round(dy * i) + .5); }
-    context.stroke();
+    const [from, to] = range(), {width, height} = canvas, dy = height / rows, thick = Math.max(1, Math.round(ratio));
+    if (looks.dark !== dark.matches) looks = {dark: dark.matches, back: colour('--card'), grid: colour('--grid'), text: colour('--text')};
+    picture.begin(width, height, thick, looks.back);
+    for (let i = 1; i < divisions; i++) picture.vertical(width * i / divisions, looks.grid);
+    for (let i = 1; i < rows; i++) picture.horizontal(dy * i, looks.grid);
     channels.forEach((channel, i) => {
       if (channel.scale === 0 && store.rows > 20) { const seen = measure(store, channel.name, from, to); if (seen) { channel.scale = nice(Math.max(seen.max - seen.min, Math.abs(seen.max), 1e-9) / (rows * .4)); } }
-      if (channel.scale === 0 || !store.place.has(channel.name)) return;
-      const y = value => height / 2 - dy * (value / channel.scale + channel.position);
-      context.strokeStyle = paint(i);
-      context.setLineDash(dash(i));
-      context.lineWidth = i === selected ? 2.2 : 1.4;
-      trace(context, ...store.place.get(channel.name), from, to, x, y, width);
-      if (channel.name === trigger && mode !== 'roll') {
-        context.setLineDash([2, 4]);
-        context.beginPath();
-        context.moveTo(0, y(level)); context.lineTo(width, y(level));
-        context.moveTo(width * before, 0); context.lineTo(width * before, height);
-        context.stroke();
-      }
+      if (channel.scale === 0 || i === selected) return;
+      drawChannel(channel, i, from, to, height, dy, thick);
     });
-    context.setLineDash([]);
+    if (channels[selected]?.scale) drawChannel(channels[selected], selected, from, to, height, dy, 2 * thick);  // the selected one is on top
+    if (useCursors) for (const at of cursors) picture.vertical(width * at, looks.text);
+    context.putImageData(picture.image, 0, 0);
     if (useCursors) {
-      context.fillStyle = colour('--text');
-      cursors.forEach((at, i) => { context.fillRect(width * at, 0, 1, height); context.fillText(String(i + 1), width * at + 4, 12); });
+      context.fillStyle = looks.text;
+      context.font = '12px system-ui, sans-serif';
+      cursors.forEach((at, i) => context.fillText(String(i + 1), Math.min(cssWidth * at + 4, cssWidth - 10), 12));
     }
-  });
-  /// A column of pixels with many samples is a line from their minimum to their maximum; with few samples the trace is stairs.
-  function trace(context, group, column, from, to, x, y, width) {
-    const begin = Math.max(group.row(from) - 1, group.first), finish = Math.min(group.row(to) + 1, group.count);
-    context.beginPath();
-    if (finish - begin < 2 * width) {
-      let last = null;
-      for (let row = begin; row < finish; row++) {
-        const px = x(group.time(row)), py = y(group.value(column, row));
-        if (last === null) context.moveTo(px, py);
-        else { context.lineTo(px, last); context.lineTo(px, py); }
-        last = py;
-      }
-      if (last !== null) context.lineTo(Math.min(x(to), width), last);
-    } else {
-      let pixel = -1, low = 0, high = 0, last = 0;
-      for (let row = begin; row < finish; row++) {
-        const px = Math.floor(x(group.time(row))), value = group.value(column, row);
-        if (px !== pixel) {
-          if (pixel >= 0) { context.moveTo(pixel + .5, y(low) + .5); context.lineTo(pixel + .5, y(high) - .5); }
-          pixel = px;
-          low = Math.min(value, last);
-          high = Math.max(value, last);
-          if (row === begin) low = high = value;
-        } else if (value < low) low = value;
-        else if (value > high) high = value;
-        last = value;
-      }
-    }
-    context.stroke();
+  }, true);
+  function drawChannel(channel, i, from, to, height, dy, thick) {
+    const y = value => height / 2 - dy * (value / channel.scale + channel.position);
+    picture.trace(store, channel.name, from, to, y, {name: paint(i), thick, dashed: i >= 8});
+    if (channel.name !== trigger || mode === 'roll') return;
+    picture.horizontal(y(level), paint(i), true);
+    picture.vertical(canvas.width * before, paint(i), true);
   }
   function draw() {
     text(stop, run ? 'Stop' : 'Run');
     drawing.request();
   }
-  function drawLegend() {
+  function drawChannels() {
     triggerSource.replaceChildren(...[['', 'no trigger'], ...channels.map(c => [c.name, c.name])].map(([v, t]) => h('option', {value: v}, t)));
     triggerSource.value = channels.some(c => c.name === trigger) ? trigger : '';
-    legend.replaceChildren(...channels.map((channel, i) => {
+    whole.hidden = channels.length === 0;
+    table.replaceChildren(...channels.map((channel, i) => {
       const swatch = h('span', {class: 'swatch'});
-      swatch.style.background = paint(i);
-      const scale = h('input', {size: 6, value: channel.scale ? String(channel.scale) : 'auto', 'aria-label': `${channel.name}: units per division`, onchange: () => { channel.scale = Number(scale.value) || 0; save(); }});
-      channel.input = scale;
-      return h('span', {class: 'chip'}, h('button', {'aria-pressed': String(i === selected), onclick: () => { selected = i; drawLegend(); draw(); }}, swatch, ` ${channel.name}`), scale,
-        h('button', {'aria-label': `remove ${channel.name}`, onclick: () => { channels = channels.filter(c => c !== channel); selected = 0; save(); drawLegend(); follow(); }}, '×'));
+      swatch.style.background = i < 8 ? paint(i) : `repeating-linear-gradient(90deg, ${paint(i)} 0 5px, transparent 5px 8px)`;
+      channel.input = h('input', {class: 'short', value: channel.scale ? String(channel.scale) : 'auto', 'aria-label': `${channel.name}: units per division`, onchange: () => { channel.scale = Number(channel.input.value) || 0; save(); }});
+      channel.cells = Array.from({length: 8}, (_, k) => h('td', {class: k < 5 ? 'n mono' : 'n mono cursor'}, '–'));
+      return h('tr', {'data-channel': channel.name}, h('td', {}, h('button', {class: 'plain mono', 'aria-pressed': String(i === selected), onclick: () => { selected = i; drawChannels(); draw(); }}, swatch, channel.name)), h('td', {}, channel.input), channel.cells,
+        h('td', {}, h('button', {class: 'plain', 'aria-label': `remove ${channel.name}`, onclick: () => { channels = channels.filter(c => c !== channel); selected = 0; save(); drawChannels(); follow(); }}, '×')));
     }));
-    table.replaceChildren(...channels.map(channel => h('tr', {'data-channel': channel.name}, h('td', {class: 'mono'}, channel.name), Array.from({length: 8}, () => h('td', {class: 'n mono'}, '–')))));
   }
   const measuring = setInterval(() => {
     const [from, to] = range(), cut = useCursors ? cursors.map(at => from + (to - from) * at).sort((a, b) => a - b) : [from, to];
-    channels.forEach((channel, i) => {
-      const seen = measure(store, channel.name, ...cut), cells = table.children[i]?.children;
-      if (!cells) return;
+    channels.forEach(channel => {
+      const seen = measure(store, channel.name, ...cut);
+      if (!channel.cells) return;
       const at = useCursors ? cursors.map(c => valueAt(store, channel.name, from + (to - from) * c)) : [null, null];
       const all = [seen?.min, seen?.max, seen?.mean, seen?.rms, seen?.frequency === null || !seen ? '?' : `${number(Number(seen.frequency.toPrecision(5)))} Hz`, ...at, at[0] === null || at[1] === null ? null : at[1] - at[0]];
-      all.forEach((value, k) => text(cells[k + 1], typeof value === 'number' ? number(Number(value.toPrecision(5))) : value ?? '–'));
+      all.forEach((value, k) => text(channel.cells[k], typeof value === 'number' ? number(Number(value.toPrecision(5))) : value ?? '–'));
       if (document.activeElement !== channel.input && channel.scale) channel.input.value = String(Number(channel.scale.toPrecision(3)));
     });
     const now = performance.now(), fps = frames * 1000 / (now - since);
+    drawn += frames;
     frames = 0;
     since = now;
     text(status, channels.length === 0 ? 'Add a channel: a pin, signal or parameter' : `${source}, ${store.rows} rows, ${store.lost} lost${run ? '' : single ? ', single record' : ', stopped'}${mode !== 'roll' && trigger && run && performance.now() - lastTrigger > 1000 ? ', waiting for trigger' : ''}${useCursors ? `, Δt ${seconds(Math.abs(cursors[1] - cursors[0]) * base * divisions)}` : ''}`);
-    window.halcyonScope = {rows: store.rows, lost: store.lost, gaps: store.gaps, fps, shownAt, lastTrigger, pre: base * divisions * before, store, range: range()};
+    window.halcyonScope = {rows: store.rows, lost: store.lost, gaps: store.gaps, fps, frames: drawn, shownAt, lastTrigger, pre: base * divisions * before, store, range: range()};
   }, 500);
 
   let dragging = null;
@@ -216,7 +187,7 @@ export function show(main, query) {
     } else if ((key === 'ArrowUp' || key === 'ArrowDown') && channel) channel.position += (key === 'ArrowUp' ? 1 : -1) * (event.shiftKey ? 1 : .1);
     else if ((key === '+' || key === '-') && channel) channel.scale = nice(channel.scale * (key === '+' ? .45 : 1.9));
     else if (key === 'a') autoscale();
-    else if (key >= '1' && key <= '9' && channels[key - 1]) { selected = key - 1; drawLegend(); }
+    else if (key >= '1' && key <= '9' && channels[key - 1]) { selected = key - 1; drawChannels(); }
     else return;
     event.preventDefault();
     save();
@@ -227,7 +198,7 @@ export function show(main, query) {
     channels.push({name, scale: 0, position: 0});
     add.value = '';
     save();
-    drawLegend();
+    drawChannels();
     follow();
   });
   const load = async () => {
@@ -235,12 +206,15 @@ export function show(main, query) {
     names.replaceChildren(...[...all.values()].slice(0, 3000).map(o => h('option', {value: o.name})));
   };
   load();
-  drawLegend();
+  showCursors();
+  drawChannels();
+  dark.addEventListener('change', drawChannels);
   arm();
   follow();
   const ends = [on('machine', () => { shownAt = null; load(); })];
   return () => {
     clearInterval(measuring);
+    dark.removeEventListener('change', drawChannels);
     ends.forEach(one => one());
     if (end) end();
     drawing.end();

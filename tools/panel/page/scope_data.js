@@ -14,11 +14,11 @@ class Group {
   get first() { return Math.max(0, this.count - capacity + 1); }
   time(row) { return this.times[row & (capacity - 1)]; }
   value(column, row) { return this.values[column][row & (capacity - 1)]; }
-  add(time, value) {
-    const at = this.count & (capacity - 1);
+  /// Begins a row; returns its place in the columns.
+  add(time) {
+    const at = this.count++ & (capacity - 1);
     this.times[at] = time;
-    for (let column = 0; column < this.values.length; column++) this.values[column][at] = value(column);
-    this.count++;
+    return at;
   }
   /// The first row at or after a time.
   row(time) {
@@ -32,6 +32,38 @@ class Group {
   }
 }
 
+/// Minimum and maximum of a channel in each interval of `width` seconds, kept up to date as rows arrive: what a column of pixels shows.
+class Columns {
+  static size = 1 << 13;
+  constructor(group, column, width) {
+    Object.assign(this, {group, column, width, row: group.first, newest: -1, last: NaN});
+    this.index = new Float64Array(Columns.size).fill(-1);
+    this.low = new Float64Array(Columns.size);
+    this.high = new Float64Array(Columns.size);
+  }
+  update() {
+    const {group, index, low, high, width} = this, {times} = group, values = group.values[this.column], mask = capacity - 1;
+    for (let row = Math.max(this.row, group.first); row < group.count; row++) {
+      const value = values[row & mask], interval = Math.floor(times[row & mask] / width), at = interval & (Columns.size - 1);
+      if (Number.isNaN(value)) continue;
+      if (index[at] !== interval) {  // from the last value on, so that the trace has no holes
+        index[at] = interval;
+        low[at] = this.last < value ? this.last : value;
+        high[at] = this.last > value ? this.last : value;
+      } else if (value < low[at]) low[at] = value;
+      else if (value > high[at]) high[at] = value;
+      this.newest = interval;
+      this.last = value;
+    }
+    this.row = group.count;
+  }
+  /// Where an interval is in low and high; -1: it has no row.
+  find(interval) {
+    const at = interval & (Columns.size - 1);
+    return this.index[at] === interval ? at : -1;
+  }
+}
+
 export class Store {
   constructor() { this.clear(); }
   clear() {
@@ -42,6 +74,14 @@ export class Store {
     this.rows = 0;
     this.gaps = 0;
     this.origin = null;
+    this.cut = new Map();  // channel -> Columns
+  }
+  /// The Columns of a channel, up to date.
+  columns(name, width) {
+    let columns = this.cut.get(name);
+    if (!columns || columns.width !== width) this.cut.set(name, columns = new Columns(...this.place.get(name), width));
+    columns.update();
+    return columns;
   }
   layout(groups, names) {
     this.clear();
@@ -53,31 +93,32 @@ export class Store {
     this.origin ??= ns;
     return (ns - this.origin) / 1e9;
   }
-  /// Takes a batch of a probe: rows of 8-byte words, cycle, time, values.
-  samples(event, view, layout) {
-    let at = 0;
+  /// Takes a batch of a probe: rows of 8-byte words, cycle, time, values; little-endian, as all browsers are.
+  samples(event, bytes, layout) {
+    const reals = new Float64Array(bytes), lows = new Uint32Array(bytes), highs = new Int32Array(bytes), every = layout.every ?? 1;
+    let word = 0;
     for (const part of event.parts) {
-      const group = this.groups[part.group], types = group.columns.map(channel => layout.columns[channel].type), step = 16 + 8 * types.length;
+      const group = this.groups[part.group], types = group.columns.map(channel => layout.columns[channel].type);
       this.lost += part.lost;
-      for (let row = 0; row < part.rows; row++, at += step) {
-        const cycle = view.getUint32(at, true) + view.getUint32(at + 4, true) * 4294967296, every = layout.every ?? 1;
+      for (let row = 0; row < part.rows; row++) {
+        const cycle = lows[2 * word] + lows[2 * word + 1] * 4294967296;
         if (cycle > 0 && this.cycles[part.group] >= 0 && cycle !== this.cycles[part.group] + every) this.gaps++;
         this.cycles[part.group] = cycle;
-        const time = this.seconds(view.getUint32(at + 8, true) + view.getInt32(at + 12, true) * 4294967296);
-        group.add(time, column => {
-          const place = at + 16 + 8 * column, type = types[column];
-          if (type === 'float') return view.getFloat64(place, true);
-          return view.getUint32(place, true) + (type === 's32' || type === 's64' ? view.getInt32(place + 4, true) : view.getUint32(place + 4, true)) * 4294967296;
-        });
-        this.rows++;
+        const at = group.add(this.seconds(lows[2 * word + 2] + highs[2 * word + 3] * 4294967296));
+        word += 2;
+        for (let column = 0; column < types.length; column++, word++) {
+          const type = types[column];
+          group.values[column][at] = type === 'float' ? reals[word] : lows[2 * word] + (type === 's32' || type === 's64' ? highs[2 * word + 1] : lows[2 * word + 1]) * 4294967296;
+        }
       }
+      this.rows += part.rows;
     }
     this.newest = Math.max(this.newest, this.seconds(event.until_ns));
   }
   /// Takes the values of a subscription.
   values(event) {
-    const time = this.seconds(event.time_ns);
-    this.groups[0].add(time, column => Number(event.values[this.groups[0].columns[column]] ?? NaN));
+    const time = this.seconds(event.time_ns), [group] = this.groups, at = group.add(time);
+    group.columns.forEach((channel, column) => { group.values[column][at] = Number(event.values[channel] ?? NaN); });
     this.rows++;
     this.lost += event.skipped ?? 0;
     this.newest = time;

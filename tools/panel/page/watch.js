@@ -37,8 +37,8 @@ async function set(name, value) {
 }
 
 function setter(name, object) {
-  if (!settable(object)) return object.kind === 'sig' ? h('span', {class: 'dim'}, `set by ${object.writer}`) : object.signal ? h('span', {class: 'dim'}, `linked to ${object.signal}`) : h('span', {class: 'dim'}, 'output');
-  if (object.type === 'bit') return h('span', {}, ['TRUE', 'FALSE'].map(word => h('button', {class: 'set', 'aria-label': `set ${name} ${word}`, onclick: () => set(name, word === 'TRUE')}, word)));
+  if (!settable(object)) return object.kind === 'sig' ? h('span', {class: 'dim hide-narrow'}, `set by ${object.writer}`) : object.signal ? h('span', {class: 'dim hide-narrow'}, `linked to ${object.signal}`) : h('span', {class: 'dim hide-narrow'}, 'output');
+  if (object.type === 'bit') return h('span', {class: 'setter'}, ['TRUE', 'FALSE'].map(word => h('button', {class: 'set', 'aria-label': `set ${name} ${word}`, onclick: () => set(name, word === 'TRUE')}, word)));
   const input = h('input', {class: 'set', size: 9, inputmode: 'decimal', 'aria-label': `new value of ${name}`});
   const send = () => {
     const value = typed(object.type, input.value);
@@ -46,7 +46,7 @@ function setter(name, object) {
     else { input.removeAttribute('aria-invalid'); set(name, value); }
   };
   input.addEventListener('keydown', event => { if (event.key === 'Enter') send(); });
-  return h('span', {}, input, h('button', {class: 'set', onclick: send}, 'Set'));
+  return h('span', {class: 'setter'}, input, h('button', {class: 'set', onclick: send}, 'Set'));
 }
 
 export function show(main, query) {
@@ -56,7 +56,7 @@ export function show(main, query) {
   const table = h('table', {}, h('thead', {}, h('tr', {}, h('th', {}, 'Name'), h('th', {class: 'n'}, 'Value'), h('th', {}, 'Unit'),
     h('th', {class: 'hide-narrow'}, 'Last 15 s'), h('th', {}, 'Set'), h('th', {}, h('span', {class: 'unseen'}, 'Remove')))), body);
   main.append(h('div', {class: 'split'}, h('div', {class: 'column'}, h('div', {class: 'bar'}, filter), tree),
-    h('div', {class: 'card'}, h('h2', {}, 'Watch list'), note, h('p', {id: 'watch-problem', class: 'bad', role: 'status'}), table)));
+    h('div', {class: 'card'}, h('h2', {}, 'Watch list'), note, h('p', {id: 'watch-problem', class: 'bad', role: 'status'}), h('div', {class: 'scroll'}, table))));
 
   function leaf(name, label = name) {
     const object = all.get(name);
@@ -101,9 +101,9 @@ export function show(main, query) {
       const row = {name, value, values: [], canvas};
       row.surface = surface(canvas, (context, width, height) => sparkline(context, width, height, row.values));
       rows.set(name, row);
-      return h('tr', {}, h('td', {class: 'mono', title: object?.doc ?? ''}, name, object ? h('span', {class: 'dim'}, ` ${object.type}`) : ''), value, h('td', {class: 'dim'}, object?.unit ?? ''),
+      return h('tr', {}, h('td', {class: 'mono', title: object?.doc ?? ''}, name, object ? h('span', {class: 'dim hide-narrow'}, ` ${object.type}`) : ''), value, h('td', {class: 'dim'}, object?.unit ?? ''),
         h('td', {class: 'hide-narrow'}, canvas), h('td', {}, object ? setter(name, object) : h('span', {class: 'dim'}, 'unknown name')),
-        h('td', {}, h('button', {'aria-label': `remove ${name}`, onclick: () => change(names.filter(other => other !== name))}, '×')));
+        h('td', {}, h('button', {class: 'plain', 'aria-label': `remove ${name}`, onclick: () => change(names.filter(other => other !== name))}, '×')));
     }));
     text(note, names.length === 0 ? 'Choose names in the tree. The list is part of the address of this page.' : '');
     enable();

@@ -166,7 +166,7 @@ function scale(node, pins) {
     input.setAttribute('aria-valuetext', number(now));
   });
   parameter(node, pins, set);
-  return node.kind ? h('label', {class: 'w-line'}, h('span', {}, options.text), input, shown) : h('div', {class: vertical ? 'w-box w-vbox' : 'w-box w-hbox'}, shown, input);
+  return node.kind ? h('label', {class: 'w-line'}, h('span', {}, options.text), input, shown) : h('div', {class: vertical ? 'w-box w-vbox w-centre' : 'w-box w-hbox'}, shown, input);
 }
 
 function dial(node, pins) {

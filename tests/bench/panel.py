@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: MIT
+"""Measures the page of `hal panel` in headless Chromium: panel.py HAL [SECONDS]. Prints a figure per line for `hal bench panel`:
+what|unit|figure|goal, where the goal is `<= N`, `>= N` or empty.
+
+The browser draws without a GPU, so that its CPU time contains what a GPU would do. CPU times are those of all processes of the browser
+and of hal-panel; the machine is not part of them. The page waits for a first picture: the values of a thread, drawn.
+"""
+import os
+import re
+import statistics
+import sys
+import time
+from pathlib import Path
+
+os.environ["HAL_BIN"] = sys.argv[1]
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "cli"))
+import harness  # noqa: E402
+from web import Browser, have_browser, request, start_panel  # noqa: E402
+
+SECONDS = float(sys.argv[2]) if len(sys.argv) > 2 else 10
+NAMES = [f"wave{i}" for i in range(16)]
+NETLIST = f"loadrt threads name1=servo period1=100000\nloadrt siggen names={','.join(NAMES)}\n" + "".join(
+    f"setp {name}.frequency {3 + i}\naddf {name}.update servo\nnet {name}-sine {name}.sine\n" for i, name in enumerate(NAMES)) + "start\n"
+FILE = r"""(?:href|src)="([\w.]+)"|(?:from |import\()'\./([\w.]+)'"""
+FIRST_PICTURE = """(() => {
+    const look = () => {
+        const cycles = document.querySelector('[data-thread] .figures dd:nth-of-type(2)')?.textContent;
+        if (cycles > 0) requestAnimationFrame(() => { window.firstPicture = performance.now(); });
+        else requestAnimationFrame(look);
+    };
+    requestAnimationFrame(look);
+})()"""
+
+
+class Bench(harness.Case):
+    def runTest(self):
+        pass
+
+
+def ticks(group):
+    """CPU seconds of the processes of a process group."""
+    sum_ = 0
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            fields = stat.read_text().rpartition(")")[2].split()
+        except OSError:
+            continue
+        if int(fields[2]) == group:
+            sum_ += int(fields[11]) + int(fields[12])
+    return sum_ / os.sysconf("SC_CLK_TCK")
+
+
+def process_s(pid):
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def row(what, unit, figure, goal=""):
+    print(f"{what}|{unit}|{figure:.6g}|{goal}", flush=True)
+
+
+def first_picture(browser, port):
+    browser.call("Page.addScriptToEvaluateOnNewDocument", source=FIRST_PICTURE)
+    times = []
+    for _ in range(7):
+        browser.open("about:blank")
+        browser.wait("location.href === 'about:blank'")
+        browser.open(f"http://localhost:{port}/#/overview")
+        times.append(browser.wait("window.firstPicture"))
+    row("page to first picture, median of 7", "ms", statistics.median(times), "<= 500")
+    row("the slowest of them", "ms", max(times))
+
+
+def page_size(port):
+    """KB of all files that the page can load."""
+    waiting, seen = ["/"], {}
+    while waiting:
+        path = waiting.pop()
+        if path not in seen:
+            body = request(port, path)[2]
+            seen[path] = len(body)
+            waiting += ["/" + name for found in re.findall(FILE, body.decode()) for name in found if name]
+    row(f"page, {len(seen)} files", "kB", sum(seen.values()) / 1000, "<= 200")
+
+
+def scope(browser, port, panel):
+    channels = ",".join(f"{name}-sine:1:{3.5 - 7 * i / 15:.3g}" for i, name in enumerate(NAMES))
+    for mode, query in (("roll", "mode=roll"), ("triggered", f"mode=normal&trigger={NAMES[0]}-sine&edge=rising&level=0")):
+        browser.open("about:blank")
+        browser.wait("location.href === 'about:blank'")
+        browser.open(f"http://localhost:{port}/#/scope?ch={channels}&base=0.1&{query}")
+        browser.wait("window.halcyonScope?.rows > 20000")
+        before = browser.evaluate("({...halcyonScope, store: null, at: performance.now(), bytes: halcyon.stats.bytes})")
+        cpu, server = ticks(browser.process.pid), process_s(panel.pid)
+        time.sleep(SECONDS)
+        after = browser.evaluate("({...halcyonScope, store: null, at: performance.now(), bytes: halcyon.stats.bytes})")
+        cpu, server = ticks(browser.process.pid) - cpu, process_s(panel.pid) - server
+        passed = (after["at"] - before["at"]) / 1000
+        row(f"scope, 16 channels at 10 kHz, {mode}: frames per second", "", (after["frames"] - before["frames"]) / passed, ">= 60" if mode == "roll" else "")
+        row(f"rows per second in the page, {mode}", "", (after["rows"] - before["rows"]) / passed)
+        row(f"lost rows, {mode}", "", after["lost"] + after["gaps"], "<= 0")
+        row(f"CPU of the browser and hal-panel, {mode}", "%", 100 * (cpu + server) / passed, "<= 30")
+        row(f"of which hal-panel, {mode}", "%", 100 * server / passed)
+
+
+def main():
+    if not have_browser():
+        print("no browser: install the Debian package chromium")
+        sys.exit(77)
+    case = Bench()
+    case.setUp()
+    try:
+        case.start("run", case.write("bench.hal", NETLIST))
+        panel, port, _ = start_panel(case)
+        browser = Browser(case)
+        page_size(port)
+        first_picture(browser, port)
+        scope(browser, port, panel)
+    finally:
+        case.doCleanups()
+
+
+main()

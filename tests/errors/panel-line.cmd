@@ -1,0 +1,1 @@
+hal panel panel-line.panel
