@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Measures the page of `hal panel` in headless Chromium: panel.py HAL [SECONDS]. Prints a figure per line for `hal bench panel`:
-what|unit|figure|goal, where the goal is `<= N`, `>= N` or empty.
+"""Measures the page of `hal panel` in headless Chromium: panel.py HAL [SECONDS]. Prints a figure per line, with its target.
 
 The browser draws without a GPU, so that its CPU time contains what a GPU would do. CPU times are those of all processes of the browser
-and of hal-panel; the machine is not part of them. The page waits for a first picture: the values of a thread, drawn.
+and of hal-panel; the machine is not part of them. The first picture has the values of a thread.
 """
 import os
 import re
@@ -56,7 +55,7 @@ def process_s(pid):
 
 
 def row(what, unit, figure, goal=""):
-    print(f"{what}|{unit}|{figure:.6g}|{goal}", flush=True)
+    print(f"{what:62} {figure:9.4g} {unit:3} {f'target {goal}' if goal else ''}".rstrip(), flush=True)
 
 
 def first_picture(browser, port):

@@ -21,7 +21,7 @@ class Soak(Page):
                 self.browser.evaluate(f"location.hash = '#/{view}'")
                 self.browser.wait(f"document.getElementById('main').children.length > 0 && location.hash.startsWith('#/{view.partition('?')[0]}')")
                 rows = self.browser.evaluate("halcyon.stats.bytes")
-                self.browser.wait(f"halcyon.stats.bytes > {rows} + 2000")
+                self.browser.wait(f"halcyon.stats.bytes > {rows} + 100")
             self.browser.wait("halcyonScope.rows > 5000")
             self.browser.call("HeapProfiler.collectGarbage")
             seen = {one["name"]: one["value"] for one in self.browser.call("Performance.getMetrics")["metrics"]}
@@ -33,7 +33,7 @@ class Soak(Page):
         deadline = time.monotonic() + 20
         while time.monotonic() < deadline:
             last = round_of_views()
-        for what, before, after, most in zip(("KB of the page", "KB of the server", "nodes", "listeners"), first, last, (1500, 3000, 300, 60)):
+        for what, before, after, most in zip(("KB of the page", "KB of the server", "nodes", "listeners"), first, last, (1500, 3000, 400, 60)):
             self.assertLess(after - before, most, f"{what}: from {before} to {after}")
 
 

@@ -1,12 +1,14 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """The server of `hal panel` without a browser: HTTP and WebSockets by hand, what it must reject, what it serves."""
+import json
 import re
 import socket
 import sys
 import time
 import unittest
 from pathlib import Path
+from random import Random
 
 from harness import SERVO, TIMEOUT, Case, wait_until
 from web import PANEL, WebSocket, request, start_panel
@@ -183,6 +185,37 @@ class Panel(Case):
         self.assertIn(page.closed[0], (1006, 1009))
         memory = int(re.search(r"VmRSS:\s+(\d+)", Path(f"/proc/{self.process.pid}/status").read_text())[1])
         self.assertLess(memory, 100_000)
+        self.assertEqual("HTTP/1.1 200 OK", request(self.port)[0])
+
+    def test_random_messages_harm_only_their_connection(self):
+        self.begin("--write")
+        good = self.connected()
+        random = Random(16)
+        valid = [json.dumps(one) for one in (
+            {"hello": {"token": self.token}}, {"id": 1, "read": ["total"]}, {"id": 2, "set": {"adder.in0": 3}}, {"id": 3, "subscribe": ["total"], "every_ms": 20}, {"take": True},
+            {"id": 4, "probe": ["total"], "batch_ms": 20}, {"id": 5, "run": ["show", "pin"]}, {"panel": {"write": {"x": 1}}}, {"release": True},
+            {"op": "subscribe", "subscriptions": [{"id": 1, "channelId": 1}]}, {"op": "getParameters", "parameterNames": [], "id": "a"},
+            {"op": "setParameters", "parameters": [{"name": "servo.tmax", "value": 1}], "id": "b"}, {"op": "subscribeConnectionGraph"})]
+        for n in range(150):
+            foxglove = n % 2
+            client = WebSocket(self.port, origin=None if foxglove else f"http://localhost:{self.port}", **({"subprotocol": "foxglove.sdk.v1", "path": f"/?t={self.token}"} if foxglove else {}))
+            self.addCleanup(client.close)
+            try:
+                client.send(valid[0])
+                for _ in range(20):
+                    text = bytearray(random.choice(valid).encode())
+                    for _ in range(random.randrange(4)):
+                        at = random.randrange(len(text))
+                        text[at:at + random.randrange(3)] = random.choice((b"", b"[]", b"-1", b"null", b'"', b"{", b"1e999", bytes([random.randrange(256)])))
+                    client.send(bytes(text), random.choice((0x81, 0x81, 0x81, 0x82)))
+            except OSError:
+                pass  # closed meanwhile
+            client.close()
+        for line in (b"GET  HTTP/1.1", b"GET / HTTP/9.9", b"\0" * 100, b"GET /" + b"a" * 20000, b"POST / HTTP/1.1\r\nContent-Length: -5", b"GET / HTTP/1.1\r\nHost: " + b"h" * 9000, b"OPTIONS * HTTP/1.1\r\nHost: localhost"):
+            with socket.create_connection(("127.0.0.1", self.port), timeout=TIMEOUT) as one:
+                one.sendall(line + b"\r\n\r\n")
+        self.assertIsNone(self.process.poll())
+        self.assertIn("values", self.ask(good, read=["total"]))
         self.assertEqual("HTTP/1.1 200 OK", request(self.port)[0])
 
     def test_listen_states_what_it_exposes(self):

@@ -39,6 +39,7 @@ export const colour = name => getComputedStyle(document.documentElement).getProp
 export const typeColour = type => colour(type === 'bit' ? '--t-bit' : type === 'float' ? '--t-float' : type === 'port' ? '--t-port' : '--t-int');
 
 export const dark = matchMedia('(prefers-color-scheme: dark)');
+dark.addEventListener('change', () => { for (const canvas of document.querySelectorAll('canvas')) canvas.dispatchEvent(new Event('redraw')); });
 
 /// Prepares a canvas for drawing in CSS pixels at the screen's resolution; draw() is called once per frame after request(). Redraws at a change of size.
 /// `opaque`: draw() paints every pixel.
@@ -64,9 +65,9 @@ export function surface(canvas, draw, opaque = false) {
   };
   const watch = new ResizeObserver(request);
   watch.observe(canvas);
-  dark.addEventListener('change', request);
+  canvas.addEventListener('redraw', request);
   request();
-  return {request, end: () => { watch.disconnect(); dark.removeEventListener('change', request); }};
+  return {request, end: () => watch.disconnect()};
 }
 
 export function announce(message) { document.getElementById('announce').textContent = message; }

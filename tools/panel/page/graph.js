@@ -63,7 +63,7 @@ function neighbourhood({boxes, edges}, around, depth) {
 
 export function show(main, query) {
   const view = {x: 0, y: 0, scale: 1, fitted: false, moved: false, size: ''};
-  let all = new Map(), graph = {boxes: [], edges: []}, size = {width: 1, height: 1}, values = new Map(), end = null, selected = query.get('pin') ?? '';
+  let all = new Map(), graph = {boxes: [], edges: []}, size = {width: 1, height: 1}, values = new Map(), end = null, open = true, selected = query.get('pin') ?? '';
   const collapsed = new Set((query.get('collapsed') ?? '').split(',').filter(name => name));
   const search = h('input', {type: 'search', class: 'grow', list: 'graph-names', placeholder: 'Search pins, signals, instances', 'aria-label': 'Search', value: query.get('around') ?? ''});
   const names = h('datalist', {id: 'graph-names'});
@@ -289,6 +289,7 @@ export function show(main, query) {
 
   async function load() {
     all = await objects(true);
+    if (!open) return;
     arrange();
     names.replaceChildren(...[...new Set([...graph.boxes.map(one => one.id), ...[...all.values()].filter(o => o.kind === 'sig' || o.signal).map(o => o.name)])].slice(0, 2000).map(value => h('option', {value})));
     if (selected !== '') select(selected, !view.fitted);
@@ -296,6 +297,7 @@ export function show(main, query) {
   load();
   const ends = [on('machine', load)];
   return () => {
+    open = false;
     ends.forEach(one => one());
     if (end) end();
     drawing.end();

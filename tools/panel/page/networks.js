@@ -35,7 +35,7 @@ const shown = ['state', 'online', 'operational', 'emcy', 'emcy-count', 'error-re
 export function show(main, query) {
   const content = h('div', {class: 'cards'}), wanted = query.get('bus') ?? '';
   main.append(content);
-  let end = null;
+  let end = null, open = true;
   async function load() {
     const all = await objects(true), found = new Map();
     for (const pin of all.values()) {
@@ -51,7 +51,7 @@ export function show(main, query) {
         for (const what of shown) { const pin = all.get(`${instance}.${node}.${what}`); if (pin) pins.set(what, pin); }
         bus.nodes.set(node, pins);
       }
-    draw(found);
+    if (open) draw(found);
   }
   function draw(found) {
     const watched = [], act = [];
@@ -96,6 +96,7 @@ export function show(main, query) {
   load();
   const ends = [on('machine', load)];
   return () => {
+    open = false;
     ends.forEach(one => one());
     if (end) end();
   };

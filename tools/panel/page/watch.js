@@ -50,7 +50,7 @@ function setter(name, object) {
 }
 
 export function show(main, query) {
-  let names = (query.get('names') ?? '').split(',').filter(name => name), all = new Map(), rows = new Map(), end = null;
+  let names = (query.get('names') ?? '').split(',').filter(name => name), all = new Map(), rows = new Map(), end = null, open = true;
   const filter = h('input', {type: 'search', class: 'grow', placeholder: 'Filter names', 'aria-label': 'Filter names', value: query.get('filter') ?? ''});
   const tree = h('div', {class: 'card tree'}), body = h('tbody'), note = h('p', {class: 'dim'});
   const table = h('table', {}, h('thead', {}, h('tr', {}, h('th', {}, 'Name'), h('th', {class: 'n'}, 'Value'), h('th', {}, 'Unit'),
@@ -134,6 +134,7 @@ export function show(main, query) {
   filter.addEventListener('input', () => { drawTree(); remember({filter: filter.value}); });
   const load = async () => {
     all = await objects(true);
+    if (!open) return;
     drawTree();
     drawRows();
   };
@@ -141,6 +142,7 @@ export function show(main, query) {
   follow();
   const ends = [on('machine', load), on('state', enable)];
   return () => {
+    open = false;
     ends.forEach(one => one());
     if (end) end();
     rows.forEach(row => row.surface.end());
