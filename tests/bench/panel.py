@@ -89,6 +89,7 @@ def scope(browser, port, panel):
         browser.wait("location.href === 'about:blank'")
         browser.open(f"http://localhost:{port}/#/scope?ch={channels}&base=0.1&{query}")
         browser.wait("window.halcyonScope?.rows > 20000")
+        time.sleep(5)  # a browser that has just started is busy with its own pages
         before = browser.evaluate("({...halcyonScope, store: null, at: performance.now(), bytes: halcyon.stats.bytes})")
         cpu, server = ticks(browser.process.pid), process_s(panel.pid)
         time.sleep(SECONDS)

@@ -122,10 +122,10 @@ export function show(main, query) {
     }
   }, true);
   function drawChannel(channel, i, from, to, height, dy, thick) {
-    const y = value => height / 2 - dy * (value / channel.scale + channel.position);
-    picture.trace(store, channel.name, from, to, y, {name: paint(i), thick, dashed: i >= 8});
+    const zero = height / 2 - dy * channel.position, perUnit = dy / channel.scale;
+    picture.trace(store, channel.name, from, to, zero, perUnit, {name: paint(i), thick, dashed: i >= 8});
     if (channel.name !== trigger || mode === 'roll') return;
-    picture.horizontal(y(level), paint(i), true);
+    picture.horizontal(zero - level * perUnit, paint(i), true);
     picture.vertical(canvas.width * before, paint(i), true);
   }
   function draw() {

@@ -36,8 +36,8 @@ class Group {
 class Columns {
   static size = 1 << 13;
   constructor(group, column, width) {
-    Object.assign(this, {group, column, width, row: group.first, newest: -1, last: NaN});
-    this.index = new Float64Array(Columns.size).fill(-1);
+    Object.assign(this, {group, column, width, row: group.first, newest: -1, last: NaN, mask: Columns.size - 1});  // interval i is at i & mask, if index has i there
+    this.index = new Float64Array(Columns.size).fill(NaN);
     this.low = new Float64Array(Columns.size);
     this.high = new Float64Array(Columns.size);
   }
@@ -56,11 +56,6 @@ class Columns {
       this.last = value;
     }
     this.row = group.count;
-  }
-  /// Where an interval is in low and high; -1: it has no row.
-  find(interval) {
-    const at = interval & (Columns.size - 1);
-    return this.index[at] === interval ? at : -1;
   }
 }
 

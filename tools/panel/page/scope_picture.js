@@ -39,32 +39,34 @@ export class Picture {
   }
 
   /// A channel. With many samples per column of pixels, a column is a line from their minimum to their maximum; with few, the trace is stairs.
-  /// `line`: {name, thick, dashed}; x and y give places of times and values.
-  trace(store, channel, from, to, y, line) {
+  /// `line`: {name, thick, dashed}. A value is at the row zero - value * perUnit.
+  trace(store, channel, from, to, zero, perUnit, line) {
     const place = store.place.get(channel), each = (to - from) / this.width;
     if (!place) return;
     const [group, column] = place, begin = Math.max(group.row(from) - 1, group.first), end = Math.min(group.row(to) + 1, group.count), paint = this.colour(line.name);
-    const shown = line.dashed ? x => x % 12 < 8 : () => true, limit = value => Math.max(-9, Math.min(this.height + 9, Math.round(value)));
+    const pixelRow = row => Math.max(-9, Math.min(this.height + 9, Math.round(zero - group.value(column, row) * perUnit)));
     if (end - begin < 2 * this.width) {
       for (let row = begin; row < end; row++) {
         const at = Math.floor((group.time(row) - from) / each), next = row + 1 < end ? Math.floor((group.time(row + 1) - from) / each) : this.width;
-        const here = limit(y(group.value(column, row))), before = row > begin ? limit(y(group.value(column, row - 1))) : here;
-        if (line.dashed) { for (let x = Math.max(at, 0); x < Math.min(next, this.width); x++) if (shown(x)) this.fill(x, 1, here, here + line.thick - 1, paint); }
+        const here = pixelRow(row), before = row > begin ? pixelRow(row - 1) : here;
+        if (line.dashed) { for (let x = Math.max(at, 0); x < Math.min(next, this.width); x++) if (x % 12 < 8) this.fill(x, 1, here, here + line.thick - 1, paint); }
         else this.fill(at, next - at, here, here + line.thick - 1, paint);
         if (here !== before) this.fill(at, line.thick, Math.min(here, before), Math.max(here, before) + line.thick - 1, paint);
       }
       return;
     }
-    const columns = store.columns(channel, each), first = Math.floor(from / each);
-    let low = NaN, high = NaN;
-    for (let x = 0; x < this.width; x++) {
-      const at = columns.find(first + x);
-      if (at >= 0) {
-        low = limit(y(columns.high[at]));
-        high = limit(y(columns.low[at]));
-      } else if (first + x > columns.newest || Number.isNaN(low)) continue;
-      else low = high;  // no sample in this column: the last value holds
-      if (shown(x)) this.fill(x, 1, Math.min(low, high), Math.max(low, high) + line.thick - 1, paint);
+    const columns = store.columns(channel, each), first = Math.floor(from / each), {width, height, pixels} = this, {dashed, thick} = line;
+    let top = NaN, bottom = NaN;
+    for (let x = 0; x < width; x++) {  // the hot loop: no calls
+      const interval = first + x, at = interval & columns.mask;
+      if (columns.index[at] === interval) {
+        top = Math.round(zero - columns.high[at] * perUnit);
+        bottom = Math.round(zero - columns.low[at] * perUnit);
+      } else if (interval > columns.newest || top !== top) continue;
+      else top = bottom;  // no sample in this column: the last value holds
+      if (dashed && x % 12 >= 8) continue;
+      const end = (bottom + thick < height ? bottom + thick : height) * width;
+      for (let cell = (top > 0 ? top : 0) * width + x; cell < end; cell += width) pixels[cell] = paint;
     }
   }
 }
