@@ -1,68 +1,31 @@
 // SPDX-License-Identifier: MIT
-#include <algorithm>
 #include <memory>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "fault_list.hpp"
 #include "hal/component.hpp"
 #include "link/can.hpp"
 #include "link/simulation.hpp"
-#include "text/numbers.hpp"
 
 namespace {
 
 using namespace hal::can;
 
-struct Row {
-    const char* name;
-    Fault       fault;
-};
-constexpr Row rows[] = {{"error", Fault::error}, {"loss", Fault::loss}, {"duplicate", Fault::duplicate}, {"delay", Fault::delay}};
-
-[[noreturn]] void reject(const std::string& part, const std::string& help) {
-    throw hal::ArgumentError("faults", "invalid fault '" + part + "': " + help);
-}
+constexpr hal::faults::Named<Fault> can_fault_names[] = {
+    {"error", Fault::error}, {"loss", Fault::loss}, {"duplicate", Fault::duplicate}, {"delay", Fault::delay}};
 
 /// "error:id=0x10A:from=1s:until=2s".
-Disturbance parse(const std::string& part) {
-    const char* help =
-        "write error, loss, duplicate or delay, with options :id=0x10A:every=50:probability=0.02:count=3:from=1s:until=2s:time=20us";
-    std::string_view rest(part);
-    const auto       word = rest.substr(0, rest.find(':'));
-    rest.remove_prefix(std::min(word.size() + 1, rest.size()));
-    const auto* row = std::find_if(std::begin(rows), std::end(rows), [&](const Row& r) { return word == r.name; });
-    if (row == std::end(rows)) reject(part, help);
-    Disturbance d{.fault = row->fault, .every = 1, .delay_ns = 20'000};
-    while (!rest.empty()) {
-        const auto item = rest.substr(0, rest.find(':'));
-        rest.remove_prefix(std::min(item.size() + 1, rest.size()));
-        const auto equals = std::min(item.find('='), item.size());
-        const auto key = item.substr(0, equals), value = item.substr(std::min(equals + 1, item.size()));
-        const auto natural = hal::parse_natural(value);
-        const auto time = hal::parse_duration_ns(value, 0.0);
-        const auto real = hal::parse_real(value);
-        if (key == "id" && natural && *natural <= 0x1fffffff) d.id = static_cast<std::uint32_t>(*natural), d.mask = 0x1fffffff;
-        else if (key == "every" && natural && *natural >= 1 && *natural <= 1'000'000'000) d.every = static_cast<std::uint32_t>(*natural);
-        else if (key == "count" && natural) d.count = *natural;
-        else if (key == "probability" && real && *real > 0.0 && *real <= 1.0) d.probability = *real, d.every = 0;
-        else if (key == "from" && time) d.from_ns = *time;
-        else if (key == "until" && time) d.until_ns = *time;
-        else if (key == "time" && time) d.delay_ns = *time;
-        else reject(part, "'" + std::string(item) + "' is not an option; " + help);
-    }
-    return d;
-}
-
-std::vector<Disturbance> parse_all(std::string_view text) {
-    std::vector<Disturbance> all;
-    while (!text.empty()) {
-        const auto part = text.substr(0, text.find(','));
-        text.remove_prefix(std::min(part.size() + 1, text.size()));
-        all.push_back(parse(std::string(part)));
-    }
-    if (all.size() > 32) throw hal::ArgumentError("faults", std::to_string(all.size()) + " faults (limit 32)");
-    return all;
+Disturbance parse_can_fault(std::string_view part) {
+    return hal::faults::parse(
+        part, can_fault_names, Disturbance{.delay_ns = 20'000},
+        "write error, loss, duplicate or delay, with options :id=0x10A:every=50:probability=0.02:count=3:from=1s:until=2s:time=20us",
+        [&](Disturbance& d, std::string_view key, std::string_view value) {
+        if (key != "id") return false;
+        d.id = static_cast<std::uint32_t>(hal::faults::count(part, value, 0x1fffffff)), d.mask = 0x1fffffff;
+        return true;
+    });
 }
 
 struct CanFaults final : hal::Component {
@@ -70,7 +33,7 @@ struct CanFaults final : hal::Component {
 
     hal::TextArgument              link{*this, "link", "sim:can0", "bus in memory, sim:NAME"};
     hal::TextArgument              faults{*this, "faults", "", "faults, comma-separated: error:id=0x10A:from=1s:until=2s,loss:every=50"};
-    const std::vector<Disturbance> list = parse_all(faults.get());
+    const std::vector<Disturbance> list = hal::faults::parse_list(faults.get(), parse_can_fault);
     hal::Argument                  seed{*this, "seed", 1, "seed of random faults", {.min = 0, .max = 1'000'000'000}};
     hal::Argument                  victim{*this,
                          "victim",

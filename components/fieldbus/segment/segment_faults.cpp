@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: MIT
-#include <charconv>
-#include <cmath>
 #include <memory>
 #include <stdexcept>
 
+#include "fault_list.hpp"
 #include "hal/component.hpp"
 #include "link/segment.hpp"
 
@@ -11,11 +10,7 @@ namespace {
 
 using namespace hal::ethernet;
 
-struct Row {
-    const char* name;
-    Fault       fault;
-};
-constexpr Row rows[] = {
+constexpr hal::faults::Named<Fault> segment_fault_names[] = {
     {"loss", Fault::loss}, {"duplicate", Fault::duplicate}, {"delay", Fault::delay}, {"cut", Fault::cut}, {"garble", Fault::garble},
 };
 
@@ -32,90 +27,29 @@ const Kind*             kind_of(std::string_view name) {
     return nullptr;
 }
 
-[[noreturn]] void reject(const std::string& part, const std::string& help) {
-    throw std::invalid_argument("invalid fault '" + part + "': " + help);
-}
-
-double number(const std::string& part, std::string_view text, const char*& unit) {
-    double value = 0;
-    const auto [end, wrong] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (wrong != std::errc{} || !(value >= 0.0 && value < 1e9)) reject(part, "'" + std::string(text) + "' is not a number");
-    unit = end;
-    return value;
-}
-
-double number(const std::string& part, std::string_view text) {
-    const char*  end = nullptr;
-    const double value = number(part, text, end);
-    if (end != text.data() + text.size()) reject(part, "'" + std::string(text) + "' is not a number");
-    return value;
-}
-
-/// 1s, 20ms, 500us.
-std::int64_t duration(const std::string& part, std::string_view text) {
-    const char*            end = nullptr;
-    const double           value = number(part, text, end);
-    const std::string_view unit(end, static_cast<std::size_t>(text.data() + text.size() - end));
-    const double           scale = unit == "s" ? 1e9 : unit == "ms" ? 1e6 : unit == "us" ? 1e3 : unit == "ns" ? 1.0 : 0.0;
-    if (scale == 0.0) reject(part, "'" + std::string(text) + "' is not a time; write one with a unit, for example 20ms");
-    return std::llround(value * scale);
-}
-
 /// "loss:every=50:from=1s:until=2s".
-Disturbance parse(const std::string& part) {
-    const char* help =
-        "write loss, duplicate, delay, cut or garble, with options "
-        ":every=50:probability=0.02:count=3:from=1s:until=2s:type=0x9023:frame=reply:time=2ms:length=30";
-    std::string_view rest(part);
-    const auto       word = rest.substr(0, rest.find(':'));
-    rest.remove_prefix(std::min(word.size() + 1, rest.size()));
-    Disturbance d;
-    bool        known = false;
-    for (const auto& row : rows)
-        if (word == row.name) d.fault = row.fault, known = true;
-    if (!known) reject(part, help);
-    d.every = 1, d.delay_ns = 1'000'000, d.length = 30;
-    while (!rest.empty()) {
-        const auto item = rest.substr(0, rest.find(':'));
-        rest.remove_prefix(std::min(item.size() + 1, rest.size()));
-        const auto equals = std::min(item.find('='), item.size());
-        const auto key = item.substr(0, equals), value = item.substr(std::min(equals + 1, item.size()));
-        if (key == "from") d.from_ns = duration(part, value);
-        else if (key == "until") d.until_ns = duration(part, value);
-        else if (key == "time") d.delay_ns = duration(part, value);
-        else if (key == "every") d.every = static_cast<std::uint32_t>(number(part, value));
-        else if (key == "probability") d.probability = number(part, value), d.every = 0;
-        else if (key == "count") d.count = static_cast<std::uint64_t>(number(part, value));
-        else if (key == "length") d.length = static_cast<std::size_t>(number(part, value));
+Disturbance parse_segment_fault(std::string_view part) {
+    return hal::faults::parse(part, segment_fault_names, Disturbance{.delay_ns = 1'000'000, .length = 30},
+                              "write loss, duplicate, delay, cut or garble, with options "
+                              ":every=50:probability=0.02:count=3:from=1s:until=2s:type=0x9023:frame=reply:time=2ms:length=30",
+                              [&](Disturbance& d, std::string_view key, std::string_view value) {
+        if (key == "length") d.length = static_cast<std::size_t>(hal::faults::count(part, value, 1'000'000));
         else if (key == "type" && value == "0x9021") d.type = 0x9021;
         else if (key == "type" && value == "0x9022") d.type = 0x9022;
         else if (key == "type" && value == "0x9023") d.type = 0x9023;
         else if (const auto* kind = kind_of(key == "frame" ? value : ""); kind != nullptr) d.type = 0x9021, d.at = kind_at, d.is = kind->id;
-        else reject(part, help);
-    }
-    if (d.every == 0 && d.probability == 0.0) reject(part, "every must be at least 1, or probability above 0");
-    if (d.probability > 1.0) reject(part, "probability exceeds 1");
-    return d;
-}
-
-std::vector<Disturbance> parse_all(std::string_view text) {
-    std::vector<Disturbance> all;
-    while (!text.empty()) {
-        const auto part = text.substr(0, text.find(','));
-        text.remove_prefix(std::min(part.size() + 1, text.size()));
-        all.push_back(parse(std::string(part)));
-    }
-    if (all.size() > 32) throw std::invalid_argument(std::to_string(all.size()) + " faults (limit 32)");
-    return all;
+        else return false;
+        return true;
+    });
 }
 
 struct SegmentFaults final : hal::Component {
     using Component::Component;
 
-    hal::TextArgument link{*this, "link", "sim:net0/tester",
+    hal::TextArgument              link{*this, "link", "sim:net0/tester",
                            "segment, with a station of its own, or the station whose cable is cut, for example sim:cnc/x"};
-    hal::TextArgument faults{*this, "faults", "", "faults, comma-separated: loss:every=50:from=1s:until=2s,duplicate:every=7"};
-    const std::vector<Disturbance> list = parse_all(faults.get());
+    hal::TextArgument              faults{*this, "faults", "", "faults, comma-separated: loss:every=50:from=1s:until=2s,duplicate:every=7"};
+    const std::vector<Disturbance> list = hal::faults::parse_list(faults.get(), parse_segment_fault);
     hal::Argument                  seed{*this, "seed", 1, "seed of random faults", {.min = 0, .max = 1'000'000'000}};
 
     hal::Function run{*this, "update", &SegmentFaults::update, "cuts and reconnects the cable, babbles, counts faults"};
