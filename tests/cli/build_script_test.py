@@ -15,10 +15,12 @@ from harness import HAL, PLUGINS, ROOT, Case
 
 CMAKE = """#!/bin/sh
 echo "cmake $*" >>"$TOOLS/log"
+source=$(pwd)
+case "$*" in *" -B "*) cd "$4/../.." ;; esac
 mkdir -p build/release/components build/release/bin
-echo "CMAKE_HOME_DIRECTORY:INTERNAL=$(pwd)" >build/release/CMakeCache.txt
+echo "CMAKE_HOME_DIRECTORY:INTERNAL=$source" >build/release/CMakeCache.txt
 touch build/release/build.ninja
-for file in components/*/*.cpp; do name=${file##*/}; echo "${name%.cpp} math A component"; done >build/release/components/groups
+for file in "$source"/components/*/*.cpp; do name=${file##*/}; echo "${name%.cpp} math A component"; done >build/release/components/groups
 echo "seeing libseeing-dev" >build/release/components/absent
 """
 NINJA = """#!/bin/sh
@@ -89,6 +91,28 @@ class Script(unittest.TestCase):
         self.assertEqual(["cmake --preset release -DHALCYON_TESTS=OFF -DHALCYON_QUICK=ON", self.BUILD + "hal component_sum2 component_pid"], self.hal("run", "a.hal", "--for", "1s"))
         self.assertEqual("hal: building the program and 2 components in build/release\n", self.said)
         self.assertIn("started: run a.hal --for 1s\n", self.printed)
+
+    @unittest.skipUnless(os.geteuid() == 0, "needs root to mount the tree read-only")
+    def test_a_read_only_tree_is_built_in_the_cache_of_the_user_also_with_unusual_names(self):
+        tree = self.folder / "ein Projekt mit Ümläuten"
+        self.tree.rename(tree)
+        script = 'mount --bind "$0" "$0" && mount -o remount,ro,bind "$0" && cd "$1" && exec "$0/hal" run a.hal'
+
+        def start():
+            (self.tools / "log").write_text("")
+            done = subprocess.run(["unshare", "-m", "sh", "-c", script, tree, self.folder], env=self.environment, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=60)
+            self.assertEqual(0, done.returncode, done.stderr)
+            return done, (self.tools / "log").read_text().splitlines()
+        done, calls = start()
+        builds = list((self.folder / ".cache/halcyon").glob("*/build"))
+        self.assertEqual(1, len(builds))
+        self.assertEqual([f"cmake --preset release -B {builds[0]}/release -DHALCYON_TESTS=OFF -DHALCYON_QUICK=ON",
+                          f"ninja -C {builds[0]}/release hal component_sum2 component_pid"], calls)
+        self.assertIn(f"hal: {tree} is read-only: building in {builds[0]}\n", done.stderr)
+        self.assertIn("started: run a.hal\n", done.stdout)
+        done, calls = start()
+        self.assertEqual(([], ""), (calls, done.stderr))
+        self.assertFalse((tree / "build").exists())
 
     def test_the_second_start_builds_nothing(self):
         self.hal("run", "a.hal")

@@ -1,10 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """`hal run` as a service: readiness, the watchdog and the end, as systemd receives them; and what hal doctor --fix carries out."""
+import contextlib
 import os
-import select
+import queue
 import signal
 import socket
+import threading
 import time
 import unittest
 
@@ -20,15 +22,28 @@ class Service(Case):
     def setUp(self):
         super().setUp()
         self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        self.socket.settimeout(0.1)
         self.addCleanup(self.socket.close)
+        self.messages, self.ending = queue.Queue(), False
 
     def listen(self, address):
         self.socket.bind(address)
+        reader = threading.Thread(target=self.read)  # as systemd, it reads at once: a socket holds few messages
+        reader.start()
+        self.addCleanup(reader.join)
+        self.addCleanup(setattr, self, "ending", True)
         self.environment["NOTIFY_SOCKET"] = address.replace("\0", "@")
+
+    def read(self):
+        while not self.ending:
+            with contextlib.suppress(TimeoutError):
+                self.messages.put(self.socket.recv(4096).decode())
+        self.socket.close()
 
     def receive(self, timeout=TIMEOUT):
         """The next message, or None."""
-        return self.socket.recv(4096).decode() if select.select([self.socket], [], [], timeout)[0] else None
+        with contextlib.suppress(queue.Empty):
+            return self.messages.get(timeout=timeout)
 
     def until(self, text):
         deadline = time.monotonic() + TIMEOUT
@@ -77,6 +92,18 @@ class Service(Case):
         self.assertEqual("hal run: WatchdogSec= of the service needs a thread whose progress feeds the watchdog; the netlist has none\n", said)
         said = self.bad("run", self.write("b.hal", SERVO), "--watchdog", "/dev/null", environment={"WATCHDOG_USEC": "400000"})
         self.assertEqual("hal run: --watchdog and WatchdogSec= of the service exclude each other; leave one out\n", said)
+
+    def test_a_service_manager_that_does_not_read_does_not_stop_the_end(self):
+        address = str(self.folder / "deaf")
+        self.socket.bind(address)
+        self.environment.update(NOTIFY_SOCKET=address, WATCHDOG_USEC="4000")
+        machine = self.start("run", self.write("a.hal", SERVO))
+        self.socket.setblocking(False)
+        with self.assertRaises(BlockingIOError), socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as other:
+            other.setblocking(False)
+            while True:  # until it holds no more
+                other.sendto(b"full", address)
+        self.end(machine)
 
     def test_a_missing_service_manager_changes_nothing(self):
         self.environment["NOTIFY_SOCKET"] = str(self.folder / "nobody")
