@@ -30,7 +30,7 @@ public:
     double cycle_ns(double seconds, bool trace) {
         Session& session = runtime_.session;
         std::string problem = trace ? session.traces().begin() : "";
-        const auto probe = session.probes().attach({{"t.time"}}, problem);
+        const auto probe = session.probes().attach({std::vector<std::string>{"t.time"}}, problem);
         if (!probe || !problem.empty()) throw std::runtime_error(problem);
         std::vector<double> samples;
         for (const Stopwatch watch; watch.ms() < seconds * 1000;) {
