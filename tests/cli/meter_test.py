@@ -41,6 +41,7 @@ class Meter(Case):
 
     def test_one_value_at_a_time(self):
         self.assertRegex(self.bad("meter", "adder.*"), r"^hal meter: one value at a time, not \d+; several: hal watch adder\.\*\n$")
+        self.assertEqual("hal meter: no pin, parameter or signal matches 'zz*'; to list them: hal shell show pin\n", self.bad("meter", "zz*"))
         self.assertIn("did you mean 'total'?", self.bad("meter", "totla"))
         self.assertEqual("hal meter: one value at a time, not 2; several: hal watch total gate.out\n", self.bad("meter", "total", "gate.out"))
 

@@ -209,6 +209,10 @@ class Live(Case):
         self.assertIn("matches 'zz*'", self.bad("record", "run.mcap", "zz*"))
         self.assertIn("missing names", self.bad("record", "run.mcap"))
         self.assertIn("--trigger needs --last", self.bad("record", "run.mcap", "sine", "--trigger", "high"))
+        self.assertIn("--after needs --last TIME", self.bad("record", "run.mcap", "sine", "--after", "1s"))
+        self.assertIn("--keep needs --rotate TIME or --last TIME", self.bad("record", "run.mcap", "sine", "--keep", "2"))
+        self.assertIn("unknown format of 'run.txt'; name the file .mcap or .csv", self.bad("record", "run.txt", "sine"))
+        self.assertIn("--limit: -1 is negative; use 0 or more", self.bad("record", "run.mcap", "sine", "--limit", "-1"))
         self.assertIn("for a sampler", self.bad("record", "run.mcap", "sine", "--tag"))
         self.assertIn("No such file or directory", self.bad("record", "nowhere/run.mcap", "sine"))
 

@@ -162,6 +162,7 @@ class Trace(Case):
 
     def test_errors(self):
         self.assertEqual("hal trace: --keep needs --on-overrun or --on-fault\n", self.bad("trace", "a.pftrace", "--keep", "1s"))
+        self.assertEqual("hal trace: --after needs --on-overrun or --on-fault\n", self.bad("trace", "a.pftrace", "--after", "1s"))
         self.assertRegex(self.bad("trace", "/nowhere/a.pftrace"), r"^hal trace: cannot write '/nowhere/a.pftrace': No such file or directory\n$")
         self.assertEqual("hal trace: unexpected argument 'b'; type: hal trace a\n", self.bad("trace", "a", "b"))
 

@@ -12,7 +12,9 @@ namespace hal::tools {
 void DeclaredOption::in(int least, int most) { option_->check(CLI::Range(least, most)); }
 void DeclaredOption::in(double least, double most) { option_->check(CLI::Range(least, most)); }
 void DeclaredOption::quietly_in(int least, int most) { option_->check(CLI::Range(least, most).description("")); }
-void DeclaredOption::not_negative() { option_->check(CLI::NonNegativeNumber); }
+void DeclaredOption::not_negative() {
+    option_->check([](const std::string& text) { return text.starts_with('-') ? fmt::format("{} is negative; use 0 or more", text) : std::string(); });
+}
 
 OptionSet::OptionSet(Options& options, const char* name, const char* summary)
     : options_(options), app_(std::make_unique<CLI::App>(summary, fmt::format("hal {}", name))) {

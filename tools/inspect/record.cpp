@@ -13,6 +13,7 @@
 #include "cli/signals.hpp"
 #include "inspect/stream.hpp"
 #include "link/record_file.hpp"
+#include "text/numbers.hpp"
 
 namespace hal::tools {
 
@@ -125,7 +126,8 @@ int follow(Stream& stream, const RecordOptions& options, RecordFile& file) {
 
 int run_record(const RecordOptions& options) {
     const std::vector<std::string>& words = options.words;
-    const bool named = !words.empty() && (words[0].ends_with(".mcap") || (words.size() > 1 && words[0].ends_with(".csv")));
+    const bool channel = !words.empty() && parse_natural(words[0]);
+    const bool named = !words.empty() && !channel && (words[0].ends_with(".mcap") || words.size() > 1);
     if (!options.classic && (named || options.values.asked())) {
         if (words.empty()) return fail(options, "missing file: hal record FILE.mcap NAMES");
         if (options.csv || options.tag || options.count != 0 || !options.channel.empty())

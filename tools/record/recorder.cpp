@@ -191,6 +191,10 @@ int record_values(const Options& options, const std::string& instance, Recording
         return fail(options, fmt::format("unknown format of '{}'; name the file .mcap or .csv", what.file));
     if (what.names.empty() && !what.all) return fail(options, "missing names of values; or --all");
     if (what.last_ns >= 0 && what.rotate_ns >= 0) return fail(options, "--last and --rotate exclude each other; leave one out");
+    if (what.last_ns < 0 && what.after_ns >= 0) return fail(options, "--after needs --last TIME");
+    if (what.last_ns < 0 && what.rotate_ns < 0 && what.keep != 0) return fail(options, "--keep needs --rotate TIME or --last TIME");
+    constexpr std::int64_t default_after_ns = 5'000'000'000;
+    if (what.after_ns < 0) what.after_ns = default_after_ns;
     if (what.last_ns < 0 && !what.trigger.empty()) return fail(options, "--trigger needs --last TIME: what is kept until it comes");
     std::string problem;
     const auto client = Client::connect(instance, problem);

@@ -20,7 +20,7 @@ struct Recording {
     double most_mb = 0;                        ///< 0: no limit
     unsigned keep = 0;                         ///< files of a rotation, or of triggers; 0: all
     std::int64_t last_ns = -1;                 ///< flight recorder: how much it keeps
-    std::int64_t after_ns = 5'000'000'000;
+    std::int64_t after_ns = -1;                ///< -1: not given
     std::string trigger;
 
     void declare(OptionSet& set) {
@@ -39,7 +39,7 @@ struct Recording {
     }
     /// Something of it was given: the words are FILE NAMES.
     bool asked() const {
-        return all || every != 1 || for_ns >= 0 || most_mb > 0 || rotate_ns >= 0 || last_ns >= 0 || keep != 0 || !trigger.empty();
+        return all || every != 1 || for_ns >= 0 || most_mb > 0 || rotate_ns >= 0 || last_ns >= 0 || keep != 0 || !trigger.empty() || after_ns >= 0;
     }
 };
 

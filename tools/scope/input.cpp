@@ -12,14 +12,16 @@ bool Input::connect(const std::string& instance, std::string& problem) {
     return client_ != nullptr;
 }
 
-std::vector<std::string> Input::expand(const std::vector<std::string>& words) {
+std::vector<std::string> Input::expand(const std::vector<std::string>& words, std::string& problem) {
     std::vector<std::string> names;
     for (const std::string& word : words) {
         std::vector<std::string> found;
-        if (word.find_first_of("*?[") != word.npos)
+        const bool pattern = word.find_first_of("*?[") != word.npos;
+        if (pattern)
             for (const char* kind : {"pin", "param", "sig"})
                 for (const nlohmann::json& name : client_->request({{"list", kind}, {"patterns", {word}}}).value("names", nlohmann::json::array()))
                     if (name.is_string()) found.push_back(name.get<std::string>());
+        if (found.empty() && pattern) problem = fmt::format("no pin, parameter or signal matches '{}'; to list them: hal shell show pin", word);
         if (found.empty()) found.push_back(word);
         names.insert(names.end(), found.begin(), found.end());
     }

@@ -18,8 +18,8 @@ class Input {
 public:
     /// Connects to an instance ("": the one that is wanted). Returns false and sets `problem`.
     bool connect(const std::string& instance, std::string& problem);
-    /// Returns the words with patterns replaced by the names of pins, parameters and signals that match; a pattern that matches none stays.
-    std::vector<std::string> expand(const std::vector<std::string>& words);
+    /// Returns the words with patterns replaced by the names of pins, parameters and signals that match. Sets `problem` when one matches nothing.
+    std::vector<std::string> expand(const std::vector<std::string>& words, std::string& problem);
     /// Attaches a probe to the names, each once. Returns false and sets `problem`.
     bool attach(const std::vector<std::string>& names, int every, std::string& problem);
 

@@ -81,7 +81,8 @@ int run_meter(const MeterOptions& options) {
     Input input;
     std::string problem;
     if (!input.connect(options.name, problem)) return fail(options, problem);
-    const std::vector<std::string> names = input.expand(options.words);
+    const std::vector<std::string> names = input.expand(options.words, problem);
+    if (!problem.empty()) return fail(options, problem);
     if (names.size() != 1)
         return fail(options,
                     fmt::format("one value at a time, not {}; several: hal watch {}", names.size(), fmt::join(options.words, " ")));

@@ -39,7 +39,8 @@ public:
             if (!text.problem.empty()) return fail(options, text.problem) == 0;
         }
         if (!input_.connect(options.name, problem)) return fail(options, problem) == 0;
-        std::vector<std::string> names = input_.expand(options.words);
+        std::vector<std::string> names = input_.expand(options.words, problem);
+        if (!problem.empty()) return fail(options, problem) == 0;
         if (!options.trigger.empty()) names.push_back(text.name);
         if (!input_.attach(names, options.every, problem)) return fail(options, problem) == 0;
         acquisition_.emplace(input_.channels(), options.pre_ns, options.post_ns);

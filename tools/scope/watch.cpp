@@ -33,7 +33,9 @@ std::string joined(const std::vector<std::string>& lines) {
 int run_watch(const WatchOptions& options) {
     Input input;
     std::string problem;
-    if (!input.connect(options.name, problem) || !input.attach(input.expand(options.words), 1, problem)) return fail(options, problem);
+    if (!input.connect(options.name, problem)) return fail(options, problem);
+    const std::vector<std::string> names = input.expand(options.words, problem);
+    if (!problem.empty() || !input.attach(names, 1, problem)) return fail(options, problem);
     WatchTable table(input.channels());
     const Input::Take take = [&](std::size_t channel, Sample sample) { table.feed(channel, sample); };
     StopRequest stop;

@@ -32,7 +32,7 @@ namespace {
 
 using nlohmann::json;
 using Clock = std::chrono::steady_clock;
-constexpr std::int64_t default_keep_ns = 5'000'000'000;
+constexpr std::int64_t default_keep_ns = 5'000'000'000, default_after_ns = 200'000'000;
 constexpr auto times_period = std::chrono::milliseconds(100);
 constexpr std::size_t most_kept_bytes = std::size_t{512} << 20;
 
@@ -288,7 +288,8 @@ int Tracer::finish() {
 int Tracer::run() {
     if (options_.words.size() != 1)
         return fail(options_, fmt::format("unexpected argument '{}'; type: hal trace {}", options_.words[1], options_.words[0]));
-    if (!ring() && options_.keep_ns >= 0) return fail(options_, "--keep needs --on-overrun or --on-fault");
+    if (!ring() && (options_.keep_ns >= 0 || options_.after_ns >= 0))
+        return fail(options_, fmt::format("{} needs --on-overrun or --on-fault", options_.keep_ns >= 0 ? "--keep" : "--after"));
     if (!attach()) return 1;
     if (!ring() && !open()) return 1;
     const auto end = options_.for_ns >= 0 ? Clock::now() + std::chrono::nanoseconds(options_.for_ns) : Clock::time_point::max();
@@ -296,7 +297,7 @@ int Tracer::run() {
         pollfd waiting[] = {{client_->fd(), POLLIN, 0}, {stop_.fd(), POLLIN, 0}};
         ::poll(waiting, 2, 20);
         receive(0);
-        if (fired_ns_ != 0 && now_ns(CLOCK_MONOTONIC) > fired_ns_ + options_.after_ns) break;
+        if (fired_ns_ != 0 && now_ns(CLOCK_MONOTONIC) > fired_ns_ + (options_.after_ns >= 0 ? options_.after_ns : default_after_ns)) break;
     }
     if (client_->connected()) {
         client_->request({{"trace", false}});

@@ -10,7 +10,7 @@ namespace hal::tools {
 
 struct TraceOptions : Options {
     std::string name;  ///< of the instance; empty: not given
-    std::int64_t for_ns = -1, keep_ns = -1, after_ns = 200'000'000;
+    std::int64_t for_ns = -1, keep_ns = -1, after_ns = -1;
     bool on_overrun = false, on_fault = false, sched = false;
 
     void declare(OptionSet& set) override {
