@@ -16,7 +16,7 @@ install(FILES ${HALCYON_PACKAGE_FILES} "${PROJECT_BINARY_DIR}/HalcyonConfigVersi
 add_dependencies(installed halcyon_text halcyon_link halcyon_cia402 halcyon_can_timing halcyon_canopen halcyon_tdma halcyon_scocan)
 
 # Pages, and the machines to start from, in the order of the tree, so that links between them are right.
-install(FILES LICENSE README.md DESTINATION "${CMAKE_INSTALL_DOCDIR}")
+install(FILES LICENSE README.md CHANGELOG.md CONTRIBUTING.md SECURITY.md DESTINATION "${CMAKE_INSTALL_DOCDIR}")
 install(DIRECTORY docs halfiles DESTINATION "${CMAKE_INSTALL_DOCDIR}" USE_SOURCE_PERMISSIONS)
 install(DIRECTORY components drivers runtime tests tools DESTINATION "${CMAKE_INSTALL_DOCDIR}" FILES_MATCHING PATTERN "*.md")
 install(DIRECTORY tests/netlists/semantics DESTINATION "${CMAKE_INSTALL_DOCDIR}/tests/netlists")

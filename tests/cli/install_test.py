@@ -20,8 +20,9 @@ MACHINES = "share/doc/Halcyon/halfiles"
 # Parts of machines, those that need the network namespaces which bring-up makes, and those with settings in an INI file.
 NOT_ALONE = {"ethercat-cnc/control.hal", "ethernet-cnc/clock.hal", "ethernet-cnc/control.hal", "ethernet-cnc/wire.hal", "ethernet-furuta/control.hal",
              "ethernet-furuta/rig.hal", "ethernet-furuta/swing-up-wire.hal", "ethernet-furuta/upright.hal", "ethernet-furuta/wire.hal",
-             # with an INI file
-             "jitter/plain.hal", "jitter/random.hal", "jitter/scocan.hal", "yair/pc.hal", "yair/pc-alone.hal", "yair/robot.hal", "yair/robot-alone.hal", "yair/yair.hal"}
+             # with an INI file, or part of another file
+             "jitter/plain.hal", "jitter/random.hal", "jitter/scocan.hal", "jitter/tdma.hal", "jitter/wiring.hal",
+             "yair/pc.hal", "yair/pc-alone.hal", "yair/robot.hal", "yair/robot-alone.hal", "yair/yair.hal"}
 HIDDEN = f'for folder in "$1" "$2"; do mount -t tmpfs none "$folder" || exit 99; done; user=$3; shift 3; exec {RUNUSER} -u "$user" -- env "HOME=$HOME" "$@"'
 OVERLAY = 'mount -t overlay -o "lowerdir=$1,upperdir=$2/upper,workdir=$2/work" overlay "$1" || exit 99; cd "$1"; shift 2; eval "$@"'
 OWN_ETC = 'mount --bind "$1/etc" /etc && mount --bind "$1/latency" /dev/cpu_dma_latency; shift; sudo() { "$@"; }; eval "$@"'

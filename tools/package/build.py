@@ -163,6 +163,10 @@ class Packages:
 
     def pack(self, package, about):
         tree = self.tree(package)
+        if accepted := about.get("lintian"):
+            overrides = tree / f"usr/share/lintian/overrides/{package}"
+            overrides.parent.mkdir(parents=True)
+            overrides.write_text("".join(f"{package}: {line}\n" for line in accepted))
         self.finish(package)
         control = tree / "DEBIAN"
         control.mkdir()

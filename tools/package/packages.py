@@ -3,11 +3,15 @@
 
 OWN = "halcyon (= {version})"
 
-# name: depends besides the libraries, further fields, summary, description
+# What lintian reports and is meant so: a component takes what it needs from the program that loads it.
+PLUGINS = "library-not-linked-against-libc [usr/lib/halcyon/components/*]"
+
+# name: depends besides the libraries, further fields, summary, description, accepted reports of lintian
 PACKAGES = {
     "halcyon": {
         "depends": "adduser, libcap2-bin, iproute2",
-        "fields": {"Recommends": "libpam-modules", "Suggests": "halcyon-dev, halcyon-doc, can-utils"},
+        "lintian": [PLUGINS, "python3-script-but-no-python3-dep * [usr/share/halcyon/halfiles/*]"],  # pictures of examples
+        "fields": {"Recommends": "libpam-modules, python3", "Suggests": "halcyon-dev, halcyon-doc, can-utils"},
         "summary": "real-time dataflow runtime in the manner of LinuxCNC's HAL",
         "text": "Control components are wired together by netlist files and run in real-time\nthreads; a shell inspects and rewires the running machine. CANopen, EtherCAT\n"
                 "and TDMA on Ethernet are components like any other.\n.\nContains the program hal, the core components, the buses and the machines to\nstart from.",
@@ -18,9 +22,9 @@ PACKAGES = {
         "summary": "LinuxCNC's command names for Halcyon",
         "text": "halrun, halcmd, halcompile, halsampler, halstreamer and lcec_conf as names of\nthe program hal.",
     },
-    "halcyon-vision": {"depends": OWN, "summary": "cameras and markers for Halcyon", "text": "The components that use OpenCV."},
-    "halcyon-dds": {"depends": OWN, "summary": "distribution over DDS for Halcyon", "text": "The components that use Fast DDS: signals as topics, also for ROS 2, and\nmachines of several computers."},
-    "halcyon-estimation": {"depends": OWN, "summary": "estimation and state control for Halcyon", "text": "Kalman filters, state feedback, observers, force and torque."},
+    "halcyon-vision": {"depends": OWN, "lintian": [PLUGINS], "summary": "cameras and markers for Halcyon", "text": "The components that use OpenCV."},
+    "halcyon-dds": {"depends": OWN, "lintian": [PLUGINS], "summary": "distribution over DDS for Halcyon", "text": "The components that use Fast DDS: signals as topics, also for ROS 2, and\nmachines of several computers."},
+    "halcyon-estimation": {"depends": OWN, "lintian": [PLUGINS], "summary": "estimation and state control for Halcyon", "text": "Kalman filters, state feedback, observers, force and torque."},
     "halcyon-panel": {"depends": OWN, "summary": "web panel of running Halcyon machines", "text": "The command hal panel: values, graph, scope and user panels in a browser."},
     "python3-halcyon": {
         "depends": OWN + ", python3 (>= 3.11), python3 (<< 3.12)",

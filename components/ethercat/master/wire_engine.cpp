@@ -34,6 +34,19 @@ bool controls_slaves(std::span<const std::uint8_t> bytes) noexcept {
     return !only_reads(command) && !of_reading;
 }
 
+/// Returns whether a slave counted in the frame.
+bool passed_a_slave(std::span<const std::uint8_t> bytes) noexcept {
+    for (std::size_t at = first_datagram; at + datagram_overhead <= bytes.size();) {
+        const auto        length = get<std::uint16_t>(&bytes[at + 6]);
+        const std::size_t counter = at + datagram_header_bytes + (length & 0x7ff);
+        if (counter + 2 > bytes.size()) return false;
+        if (get<std::uint16_t>(&bytes[counter]) != 0) return true;
+        if ((length & 0x8000) == 0) return false;
+        at = counter + 2;
+    }
+    return false;
+}
+
 }  // namespace
 
 void WireEngine::attach(ethernet::Port& primary, ethernet::Port* backup) {
@@ -201,7 +214,8 @@ void WireEngine::count_late() noexcept {
 void WireEngine::count_foreign(std::span<const std::uint8_t> bytes) noexcept {
     constexpr std::uint8_t set_by_slaves = 0x02;  // ETG.1000.4: the first one marks the source address as locally administered
     const auto&            own = primary_->address();
-    if (missing_ != 0 && ((bytes[6] ^ own[0]) & ~set_by_slaves) == 0 && std::equal(own.begin() + 1, own.end(), bytes.begin() + 7))
+    if (missing_ != 0 && passed_a_slave(bytes) && ((bytes[6] ^ own[0]) & ~set_by_slaves) == 0 &&
+        std::equal(own.begin() + 1, own.end(), bytes.begin() + 7))
         return count_late();
     ++status_.foreign;
     status_.foreign_control += controls_slaves(bytes) ? 1 : 0;
