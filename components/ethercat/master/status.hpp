@@ -42,7 +42,7 @@ struct BusStatus {
     std::uint64_t late = 0;           ///< frames that returned after their cycle
     std::uint64_t duplicates = 0;     ///< frames that returned twice
     std::uint64_t foreign = 0;        ///< EtherCAT frames of other programs, or damaged ones
-    std::uint64_t foreign_control = 0;  ///< of these, frames with process data or state requests: of another master
+    std::uint64_t foreign_control = 0;  ///< of these, those of another master: process data, settings, or from the far end of the line
     std::uint64_t send_failures = 0;  ///< frames that the port did not take
 
     bool          dc_active = false;           ///< a reference clock is distributed

@@ -210,15 +210,16 @@ void WireEngine::count_late() noexcept {
 }
 
 /// Counts a frame whose index is free, or that of another frame. As long as own frames are missing, one with the own address is taken for one
-/// of them: it returned after its index was used again.
+/// of them: it returned after its index was used again. One with another address that passed no slave comes from a master at the far end.
 void WireEngine::count_foreign(std::span<const std::uint8_t> bytes) noexcept {
     constexpr std::uint8_t set_by_slaves = 0x02;  // ETG.1000.4: the first one marks the source address as locally administered
-    const auto&            own = primary_->address();
-    if (missing_ != 0 && passed_a_slave(bytes) && ((bytes[6] ^ own[0]) & ~set_by_slaves) == 0 &&
-        std::equal(own.begin() + 1, own.end(), bytes.begin() + 7))
-        return count_late();
+    const auto&            address = primary_->address();
+    const bool             own =
+        ((bytes[6] ^ address[0]) & ~set_by_slaves) == 0 && std::equal(address.begin() + 1, address.end(), bytes.begin() + 7);
+    const bool passed = passed_a_slave(bytes);
+    if (missing_ != 0 && passed && own) return count_late();
     ++status_.foreign;
-    status_.foreign_control += controls_slaves(bytes) ? 1 : 0;
+    status_.foreign_control += controls_slaves(bytes) || (!own && !passed) ? 1 : 0;
 }
 
 /// Counts a copy of a frame in flight; the second one at the same port is a duplicate.
