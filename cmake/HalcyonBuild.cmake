@@ -92,11 +92,9 @@ function(halcyon_unity_tool)
     endif()
 endfunction()
 
-# ccache, without its base directory: a precompiled header holds the paths of its tree, and another tree that took it from the cache would read the
-# headers of the first one beside its own.
 find_program(HALCYON_CCACHE ccache)
 if(HALCYON_CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
-    set(HALCYON_LAUNCHER env CCACHE_BASEDIR= CCACHE_SLOPPINESS=pch_defines,time_macros "${HALCYON_CCACHE}")
+    set(HALCYON_LAUNCHER "${CMAKE_CURRENT_LIST_DIR}/cached_compile.sh" "${HALCYON_CCACHE}")
     set(CMAKE_C_COMPILER_LAUNCHER ${HALCYON_LAUNCHER})
     set(CMAKE_CXX_COMPILER_LAUNCHER ${HALCYON_LAUNCHER})
     if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")

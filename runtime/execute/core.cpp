@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <ctime>
-#include <functional>
 
 #include <sched.h>
 
@@ -301,70 +300,6 @@ std::int64_t Core::account(std::int64_t woke_ns) noexcept {
     return now_ns;
 }
 
-void Core::begin(std::int64_t now_ns) noexcept {
-    due_.store(now_ns, std::memory_order_release);
-    finished_.store(now_ns, std::memory_order_release);
-}
-
-void Core::woke_late(std::int64_t due_ns, std::int64_t now_ns) noexcept {
-    const std::int64_t limit = supervise_ns.load(std::memory_order_relaxed);
-    const std::int64_t silent_ns = now_ns - std::max({due_ns, finished_ns(), excused_.load(std::memory_order_acquire)});
-    if (limit == 0 || silent_ns <= limit || !declare_hung()) return;
-    raise({HAL_FAULT_SILENT_THREAD, 0, info_.number, info_.start_ns, static_cast<double>(silent_ns), nullptr, nullptr});
-}
-
-bool Core::declare_hung() noexcept {
-    const std::uint64_t next = cycles.load(std::memory_order_acquire) + 1;
-    if (hung_at_.exchange(next, std::memory_order_acq_rel) == next) return false;
-    hangs.fetch_add(1, std::memory_order_relaxed);
-    stopped_.store(true, std::memory_order_release);
-    return true;
-}
-
-// A function writes current_ as an ordinary variable, millions of times a second; here one look at it is enough.
-__attribute__((no_sanitize("thread"))) const plan::Step* Core::where() const noexcept { return current_; }
-
-std::int64_t Core::overdue_since_ns() const noexcept {
-    const std::int64_t busy_since = busy_since_ns();
-    const std::int64_t since = busy_since != 0 ? busy_since : std::max(finished_ns(), due_.load(std::memory_order_acquire) + period_ns_);
-    return std::max(since, excused_.load(std::memory_order_acquire));
-}
-
-void Core::sample() noexcept {
-    const std::int64_t since = busy_since_.load(std::memory_order_acquire);
-    if (since == 0 || !in_function()) return;
-    const plan::Step* const step = where();
-    if (busy_since_.load(std::memory_order_acquire) != since) return;
-    seen_step_.store(step, std::memory_order_relaxed);
-    seen_since_.store(since, std::memory_order_release);
-}
-
-void Core::stand_in(std::int64_t now_ns, bool emergency) noexcept {
-    int free = nobody;
-    const bool mine = turn_.compare_exchange_strong(free, supervisor, std::memory_order_acq_rel);
-    if (plan::Plan* const plan = shown_.load(std::memory_order_acquire)) {
-        for (const plan::Safe& safe : plan->safe) __atomic_store_n(&safe.pin->slot->raw, safe.value.raw, __ATOMIC_RELAXED);
-        store(*pins_.missed, static_cast<std::uint32_t>(missed_by(now_ns)));
-        if (emergency) {
-            hal_cycle info{};
-            info.size = sizeof info;
-            info.period_ns = period_ns_;
-            info.period_s = static_cast<double>(period_ns_) * 1e-9;
-            info.start_ns = now_ns;
-            info.number = cycles.load(std::memory_order_relaxed);
-            for (const plan::Step& step : plan->emergency) step.step(step.self, &info);
-        }
-        if (mine) publish(*plan);
-    }
-    if (mine) turn_.store(nobody, std::memory_order_release);
-}
-
-std::uint64_t Core::missed_by(std::int64_t now_ns) const noexcept {
-    const std::uint64_t counted = missed.load(std::memory_order_acquire);
-    const std::int64_t due = due_.load(std::memory_order_acquire), late = due == 0 ? 0 : (now_ns - due) / period_ns_ - 1;
-    return counted + (late > 0 ? static_cast<std::uint64_t>(late) : 0);
-}
-
 void Core::make_safe() noexcept {
     safe_ = true;
     if (!plan_) return;
@@ -392,39 +327,6 @@ void Core::trace_frame(TraceEvent::Kind kind, std::uint32_t id, std::size_t byte
 
 void Core::step_clock(std::int64_t ns) noexcept {
     if (in_function()) timeline_.step(grid_ns_, ns);
-}
-
-namespace {
-
-// The function that a step of the plan belongs to; 0: none.
-std::uint32_t function_of(const plan::Plan* plan, const plan::Step* step) noexcept {
-    if (!plan || !step) return 0;
-    const auto among = [step](const std::vector<plan::Step>& steps, const std::vector<plan::Function>& functions) -> std::uint32_t {
-        const std::less<> before;
-        if (before(step, steps.data()) || !before(step, steps.data() + steps.size())) return 0;
-        const auto at = static_cast<std::uint32_t>(step - steps.data());
-        for (const plan::Function& function : functions)
-            if (at >= function.begin && at < function.end) return function.id;
-        return 0;
-    };
-    const std::uint32_t cyclic = among(plan->steps, plan->functions);
-    return cyclic != 0 ? cyclic : among(plan->init_steps, plan->init);
-}
-
-}  // namespace
-
-std::uint32_t Core::current_function() const noexcept { return function_of(plan_, current_); }
-
-std::uint32_t Core::interrupted_function() const noexcept {
-    return in_function() ? function_of(shown_.load(std::memory_order_acquire), where()) : 0;
-}
-
-std::uint32_t Core::hung_function() const noexcept { return busy_since_ns() != 0 ? interrupted_function() : 0; }
-
-// Where the newest sample of the cycle that woke at `woke_ns` found it; 0: there is none.
-std::uint32_t Core::slow_function(std::int64_t woke_ns) const noexcept {
-    if (seen_since_.load(std::memory_order_acquire) != woke_ns) return 0;
-    return function_of(plan_, seen_step_.load(std::memory_order_relaxed));
 }
 
 void check_finite(void* self, const hal_cycle* cycle) {

@@ -3,11 +3,18 @@
 
 #include <algorithm>
 #include <new>
+#include <string>
 #include <utility>
 
 #include "machine/state.hpp"
+#include "text/quoting.hpp"
 
 namespace hal {
+namespace {
+
+std::string missing(std::uint64_t lines) { return "missing here: " + counted(lines, "line") + ", because the reader was too slow"; }
+
+}  // namespace
 
 Journal::Position Journal::begin() {
     ++listeners_;
@@ -40,16 +47,20 @@ void Journal::message(std::string_view line) noexcept {
         JournalEntry entry{state_.executor->now_ns(), "message", std::string(line)};
         const std::scoped_lock own(messages_mutex_);
         if (messages_.size() < kept) messages_.push_back(std::move(entry));
+        else ++messages_lost_;
     } catch (const std::bad_alloc&) {}  // it was printed
 }
 
 void Journal::collect_messages() {
     std::vector<JournalEntry> messages;
+    std::uint64_t lost = 0;
     {
         const std::scoped_lock own(messages_mutex_);
         messages.swap(messages_);
+        lost = std::exchange(messages_lost_, 0);
     }
     for (JournalEntry& one : messages) append(std::move(one));
+    if (lost != 0) append({state_.executor->now_ns(), "message", missing(lost)});
 }
 
 std::vector<JournalEntry> Journal::after(Position& position) {
@@ -57,6 +68,7 @@ std::vector<JournalEntry> Journal::after(Position& position) {
     collect_messages();
     std::vector<JournalEntry> all;
     const std::uint64_t first = count_ - entries_.size();
+    if (first > position.entry) all.push_back({entries_.front().time_ns, "message", missing(first - position.entry)});
     for (std::uint64_t i = std::max(first, position.entry); i < count_; ++i) all.push_back(entries_[i - first]);
     position.entry = count_;
     for (const FaultRecord& record : state_.faults.records(0)) {

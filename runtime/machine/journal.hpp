@@ -56,6 +56,7 @@ private:
     std::uint64_t count_ = 0;  // of all entries ever
     std::mutex messages_mutex_;
     std::vector<JournalEntry> messages_;  // guarded by it: what is not in entries_ yet
+    std::uint64_t messages_lost_ = 0;     // guarded by it: what did not fit there
     const hal_messages for_plugins_{sizeof(hal_messages),
                                     [](const hal_messages* self, const char* line, std::size_t bytes) { static_cast<Journal*>(self->data)->message({line, bytes}); },
                                     this};

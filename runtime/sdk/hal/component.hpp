@@ -13,7 +13,6 @@
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
-#include <exception>
 #include <new>
 #include <optional>
 #include <stdexcept>
@@ -22,6 +21,8 @@
 #include <utility>
 
 #include "hal/abi.h"
+#include "hal/plugin_entry.hpp"
+#include "hal/port.hpp"
 #include "hal/rejection.hpp"
 
 namespace hal {
@@ -39,42 +40,6 @@ private:
     const hal_cycle* cycle_;
 };
 static_assert(sizeof(Cycle) == sizeof(void*) && std::is_trivially_copyable_v<Cycle>, "passed in a register, like the pointer");
-
-/// A byte stream (LinuxCNC `port`): one writer, one reader, never blocks. Reads and writes are atomic: all bytes or none.
-class Port {
-public:
-    explicit Port(hal_port* port = nullptr) noexcept : port_(port) {}
-    std::size_t capacity() const noexcept { return port_ ? port_->capacity : 0; }
-    /// Bytes waiting. [any]
-    std::size_t readable() const noexcept { return port_ ? static_cast<std::size_t>(load(port_->head) - load(port_->tail)) : 0; }
-    /// Free bytes. [any]
-    std::size_t writable() const noexcept { return capacity() - readable(); }
-    /// Copies `bytes` without consuming them; false when fewer are available. [realtime] reader
-    bool peek(void* to, std::size_t bytes) const noexcept {
-        if (readable() < bytes) return false;
-        for (std::size_t i = 0; i < bytes; ++i) static_cast<std::uint8_t*>(to)[i] = port_->data[(port_->tail + i) % port_->capacity];
-        return true;
-    }
-    /// Consumes `bytes`; false, without consuming any, when fewer are available. [realtime] reader
-    bool read(void* to, std::size_t bytes) const noexcept { return peek(to, bytes) && discard(bytes); }
-    bool discard(std::size_t bytes) const noexcept {
-        if (readable() < bytes) return false;
-        store(port_->tail, port_->tail + bytes);
-        return true;
-    }
-    /// Appends `bytes`; false, without writing any, when there is not enough space. [realtime] writer
-    bool write(const void* from, std::size_t bytes) const noexcept {
-        if (writable() < bytes) return false;
-        for (std::size_t i = 0; i < bytes; ++i) port_->data[(port_->head + i) % port_->capacity] = static_cast<const std::uint8_t*>(from)[i];
-        store(port_->head, port_->head + bytes);
-        return true;
-    }
-
-private:
-    static std::uint64_t load(const std::uint64_t& v) noexcept { return __atomic_load_n(&v, __ATOMIC_ACQUIRE); }
-    static void store(std::uint64_t& v, std::uint64_t x) noexcept { __atomic_store_n(&v, x, __ATOMIC_RELEASE); }
-    hal_port* port_;
-};
 
 template <class T>
 concept PinType = std::same_as<T, bool> || std::same_as<T, double> || std::same_as<T, std::int32_t> || std::same_as<T, std::uint32_t> ||
@@ -101,8 +66,6 @@ struct ArgumentOptions {
 };
 
 namespace detail {
-inline thread_local const hal_host* creating = nullptr;  // set while a constructor of this plugin runs
-
 template <class T>
 constexpr hal_type type_of() {
     if constexpr (std::same_as<T, bool>) return HAL_TYPE_BIT;
@@ -218,8 +181,8 @@ protected:
         static_assert(sizeof step == 2 * sizeof(void*));
         std::uintptr_t words[2];
         std::memcpy(words, &step, sizeof step);
-#if defined(__aarch64__)
-        const bool plain = words[1] == 0;
+#if defined(__aarch64__) || defined(__arm__)
+        const bool plain = words[1] == 0;  // ABI for ARM, 3.2.1: the mark of a virtual one is there; bit 0 of the address is Thumb's
 #else
         const bool plain = (words[0] & 1) == 0 && words[1] == 0;
 #endif
@@ -401,72 +364,6 @@ template <PinType T> using Ins = Pins<In<T>, T>;
 template <PinType T> using Outs = Pins<Out<T>, T>;
 template <PinType T> using Ios = Pins<Io<T>, T>;
 template <PinType T> using Params = Pins<Param<T>, T>;
-
-/// Properties of a component as a whole: `static constexpr hal::Traits traits{.singleton = true};`
-struct Traits {
-    bool singleton = false;           ///< one instance, named like the component without a number
-    std::uint32_t default_count = 1;  ///< instances of a bare `loadrt`
-};
-
-namespace detail {
-template <class C>
-constexpr Traits traits_of() {
-    if constexpr (requires { C::traits; }) return C::traits;
-    else return {};
-}
-
-template <class C>
-constexpr bool starts() {
-    return requires(C& c, const hal_host& host) { c.start(host); } || requires(C& c) { c.start(); } || requires(C& c) { c.stop(); };
-}
-
-template <class Action>
-bool guarded(const hal_host* host, Action action) noexcept {
-    try {
-        action();
-        return true;
-    } catch (const Rejection& rejection) {
-        rejection.report(host);
-    } catch (const std::exception& e) {
-        if (*e.what() != '\0') host->fail(host, e.what());
-    } catch (...) {
-        host->fail(host, "an exception that is not a std::exception");
-    }
-    return false;
-}
-
-template <class C>
-void construct(const hal_host* host, void* memory) {
-    new (memory) C(host);  // "no matching function": missing line in the component: using Component::Component;
-}
-
-template <std::derived_from<Component> C>
-constexpr hal_component component(const char* name, const char* summary, const char* doc = "") {
-    // An error in the declaration of a member also makes C unconstructible; C is then not an aggregate, because the constructor is inherited.
-    static_assert(std::is_constructible_v<C, const hal_host*> || !std::is_aggregate_v<C>,
-                  "missing line in the component: using Component::Component;");
-    constexpr Traits traits = traits_of<C>();
-    return {
-        sizeof(hal_component), HAL_ABI_MAJOR, HAL_ABI_MINOR, name, summary, doc,
-        (traits.singleton ? unsigned{HAL_COMPONENT_SINGLETON} : 0u) | (starts<C>() ? unsigned{HAL_COMPONENT_STARTS} : 0u), traits.default_count, sizeof(C), alignof(C),
-        [](const hal_host* host, void* memory) { return guarded(host, [&] { construct<C>(host, memory); }); },
-        [](void* self, const hal_host* host) {
-            return guarded(host, [&] {
-                detail::creating = host;
-                if constexpr (requires(C& c) { c.start(*host); }) static_cast<C*>(self)->start(*host);
-                else if constexpr (requires(C& c) { c.start(); }) static_cast<C*>(self)->start();
-            });
-        },
-        [](void* self) {
-            if constexpr (requires(C& c) { c.stop(); }) {
-                static_assert(noexcept(std::declval<C&>().stop()), "stop() must be noexcept");
-                static_cast<C*>(self)->stop();
-            }
-        },
-        [](void* self) { static_cast<C*>(self)->~C(); },
-    };
-}
-}  // namespace detail
 
 /// Returns an extension of the host interface, or nullptr. In constructor and start() only. [setup]
 template <class Extension>
