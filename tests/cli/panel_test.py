@@ -303,6 +303,20 @@ $""")
         page.close()
         wait_until(lambda: self.value("jog.speed") == "0", "the safe value")
 
+    def test_outputs_are_safe_until_a_page_has_control(self):
+        self.write("jog.panel", "component jog\nslider speed min=-1 max=1 initial=0.5 safe=0.25\nslider from-five min=5 max=9\ntoggle pump safe=TRUE\ntoggle lamp initial=TRUE\n")
+        self.begin("jog.panel", "--write")
+        wait_until(lambda: self.value("jog.speed") == "0.25", "the panel is there")
+        self.assertEqual(["5", "TRUE", "TRUE"], [self.value("jog." + pin) for pin in ("from-five", "pump", "lamp")])
+        page = self.page(self.token)
+        page.expect(lambda m: m.get("event") == "panel" and m["ready"])
+        page.send({"panel": {}})
+        wait_until(lambda: self.value("jog.speed") == "0.5", "the page has control")
+        page.send({"panel": {"write": {"speed": 7}}})
+        page.send({"panel": {"write": {"from-five": 6}}})
+        wait_until(lambda: self.value("jog.from-five") == "6", "the next value arrives")
+        self.assertEqual("0.5", self.value("jog.speed"))
+
     def test_pyvcp_pins_have_their_names_types_and_directions(self):
         self.write("p.xml", """<pyvcp><vbox><led/><rectled halpin="lamp" disable_pin="True"/><led/><number/><s32 halpin="count"/><u32/>
             <checkbutton/><checkbutton halpin="c"><initval>1</initval></checkbutton><radiobutton><choices>["one","two"]</choices></radiobutton>
@@ -371,7 +385,15 @@ hal panel: 'bad.panel' has errors
     def test_errors_of_the_command_line(self):
         self.assertEqual("hal panel: --listen: 'here' is not an IPv4 address; use the address of a network interface, or 0.0.0.0 for all\n", self.bad("panel", "--listen", "here"))
         self.begin(machine=False)
-        self.assertIn(f"cannot listen on 127.0.0.1 port {self.port}", self.bad("panel", "--port", str(self.port)))
+        self.assertEqual(f"hal panel: cannot listen on 127.0.0.1 port {self.port}: another program uses it; choose another with --port\n",
+                         self.bad("panel", "--port", str(self.port)))
+        self.assertEqual("hal panel: cannot listen on 192.0.2.1 port 8123: this host does not have the address; to list them: ip address\n",
+                         self.bad("panel", "--port", "8123", "--listen", "192.0.2.1"))
+        self.assertIn("--port: '99999' is out of range", self.bad("panel", "--port", "99999"))
+
+    def test_an_instance_that_does_not_run_is_said_to_be_awaited(self):
+        self.begin(machine=False)
+        self.assertEqual("hal panel: no instance 'default' is running yet; the page shows it as soon as it runs\n", (self.folder / "panel.err").read_text())
 
 
 if __name__ == "__main__":

@@ -166,6 +166,22 @@ class Trace(Case):
         self.assertRegex(self.bad("trace", "/nowhere/a.pftrace"), r"^hal trace: cannot write '/nowhere/a.pftrace': No such file or directory\n$")
         self.assertEqual("hal trace: unexpected argument 'b'; type: hal trace a\n", self.bad("trace", "a", "b"))
 
+    def test_what_cannot_be_written_is_known_at_the_start(self):
+        self.start("run", self.write("m.hal", MACHINE))
+        self.assertEqual("hal trace: cannot write '/nowhere/t.pftrace': No such file or directory\n",
+                         self.bad("trace", "/nowhere/t.pftrace", "--on-fault"))
+        self.assertEqual("hal trace: --for 0 traces nothing; use a time like 10s\n", self.bad("trace", "t.pftrace", "--for", "0s"))
+        self.assertEqual("hal trace: cannot write '/dev/full': No space left on device; the file is empty\n",
+                         self.bad("trace", "/dev/full", "--for", "10s"))
+
+    def test_a_ring_that_kept_nothing_leaves_no_file_and_replaces_none(self):
+        self.start("run", self.write("m.hal", MACHINE))
+        self.write("old.pftrace", "kept")
+        for name in ("new.pftrace", "old.pftrace"):
+            self.assertIn("nothing was written", self.good("trace", name, "--on-fault", "--for", "100ms"))
+        self.assertFalse((self.folder / "new.pftrace").exists())
+        self.assertEqual("kept", (self.folder / "old.pftrace").read_text())
+
 
 if __name__ == "__main__":
     unittest.main()

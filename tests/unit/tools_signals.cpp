@@ -28,7 +28,6 @@ TEST_F(StopRequestTest, waits_until_requested_or_for_the_time) {
 TEST_F(StopRequestTest, every_ending_signal_requests_it) {
     for (const int number : {SIGINT, SIGTERM, SIGHUP}) {
         StopRequest stop;
-        stop.listen();
         ::kill(::getpid(), number);
         EXPECT_TRUE(stop.wait_ns(-1)) << number;
     }
@@ -37,8 +36,7 @@ TEST_F(StopRequestTest, every_ending_signal_requests_it) {
 TEST_F(StopRequestTest, spared_an_interrupt_is_only_told) {
     StopRequest stop;
     int told = 0;  // called under the lock that spare() takes
-    stop.on_signal = [&] { ++told; };
-    stop.listen();
+    stop.when_signalled([&] { ++told; });
     stop.spare(true);
     ::kill(::getpid(), SIGINT);
     stop.spare(false);  // takes the pending one with the old meaning, if the thread has not yet
@@ -53,8 +51,7 @@ TEST_F(StopRequestTest, spared_an_interrupt_is_only_told) {
 TEST_F(StopRequestTest, after_release_nobody_is_told) {
     StopRequest stop;
     bool told = false;
-    stop.on_signal = [&] { told = true; };
-    stop.listen();
+    stop.when_signalled([&] { told = true; });
     stop.release();
     ::kill(::getpid(), SIGTERM);
     EXPECT_FALSE(stop.wait_ns(1'000'000));

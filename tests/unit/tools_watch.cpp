@@ -2,6 +2,7 @@
 #include <cmath>
 #include <gtest/gtest.h>
 
+#include "text/glyphs.hpp"
 #include "tools/scope/watch_table.hpp"
 
 namespace hal::tools {
@@ -32,6 +33,30 @@ TEST(WatchTable, reset_forgets_the_extremes_and_not_a_number_does_not_stay) {
     EXPECT_EQ(table.lines()[1], "x                 3                       3              5              -");
     table.reset();
     EXPECT_EQ(table.lines()[1], "x                 3                       3              3              -");
+}
+
+TEST(WatchTable, shows_all_digits_of_64_bits) {
+    WatchTable table({{"s", "", true, false, Channel::Wide::s64}, {"u", "", true, false, Channel::Wide::u64}});
+    for (const std::uint64_t word : {std::uint64_t{1} << 53 | 1, std::uint64_t{INT64_MAX}, std::uint64_t{UINT64_MAX}}) {
+        table.feed(0, {0, static_cast<double>(static_cast<std::int64_t>(word)), word});
+        table.feed(1, {0, static_cast<double>(word), word});
+    }
+    EXPECT_EQ(table.texts(0).value, "-1");
+    EXPECT_EQ(table.texts(0).max, "9223372036854775807");
+    EXPECT_EQ(table.texts(1).value, "18446744073709551615");
+    EXPECT_EQ(table.texts(1).min, "9007199254740993");
+}
+
+TEST(WatchTable, a_narrow_terminal_loses_columns_and_never_a_value) {
+    WatchTable table({{"axis.0.position-command", "mm", false, false}, {"axis.1.position-command", "mm", false, false}});
+    for (std::size_t i = 0; i < 2; ++i) table.feed(i, {0, 1.5 + static_cast<double>(i)});
+    EXPECT_EQ(table.lines(80)[1], "axis.0.position-command            1.5 mm                  1.5            1.5");
+    EXPECT_EQ(table.lines(60)[1], "axis.0.position-command            1.5 mm      ");
+    EXPECT_EQ(table.lines(40)[2], "axis.1.position-command            2.5");
+    EXPECT_EQ(table.lines(32)[2], "…position-command            2.5");
+    EXPECT_EQ(table.lines(1)[0], "NAME          VALUE");
+    for (const std::size_t columns : {32, 40, 60, 80, 100, 200})
+        for (const std::string& line : table.lines(columns)) EXPECT_LE(hal::columns(line), columns) << line;
 }
 
 }  // namespace

@@ -9,7 +9,7 @@
 
 namespace hal::tools {
 
-void DeclaredOption::in(int least, int most) { option_->check(CLI::Range(least, most)); }
+void DeclaredOption::in(int least, int most) { option_->check(CLI::Range(least, most).description(fmt::format("{}..{}", least, most))); }
 void DeclaredOption::in(double least, double most) { option_->check(CLI::Range(least, most)); }
 void DeclaredOption::quietly_in(int least, int most) { option_->check(CLI::Range(least, most).description("")); }
 void DeclaredOption::not_negative() {
@@ -78,7 +78,8 @@ OptionSet::Reading OptionSet::read(std::vector<std::string> arguments) {
         std::string& what = reading.problem = error.what();
         constexpr std::string_view unread = "Could not convert: ";  // --speed = fast
         if (const auto equals = what.find(" = "); what.starts_with(unread) && equals != std::string::npos)
-            what = fmt::format("{}: '{}' is not a number", what.substr(unread.size(), equals - unread.size()), what.substr(equals + 3));
+            what = fmt::format("{}: '{}' is {}", what.substr(unread.size(), equals - unread.size()), what.substr(equals + 3),
+                               what.find_first_not_of("0123456789", equals + 4) == what.npos ? "out of range" : "not a number");
         std::replace(what.begin(), what.end(), '\n', ' ');
     }
     return reading;

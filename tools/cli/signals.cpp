@@ -11,6 +11,7 @@
 #include <sys/signalfd.h>
 #include <system_error>
 #include <unistd.h>
+#include <utility>
 
 namespace hal::tools {
 
@@ -39,10 +40,13 @@ StopRequest::StopRequest() {
     done_ = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
     signals_ = ::signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK);
     if (event_ < 0 || done_ < 0 || signals_ < 0) throw std::system_error(errno, std::generic_category(), "cannot wait for signals");
+    thread_ = std::thread([this] { serve(); });
 }
 
-void StopRequest::listen() {
-    thread_ = std::thread([this] { serve(); });
+void StopRequest::when_signalled(std::function<void()> told) {
+    const std::lock_guard lock(mutex_);
+    told_ = std::move(told);
+    if (signal() != 0 && told_) told_();
 }
 
 void StopRequest::release() {
@@ -78,7 +82,7 @@ void StopRequest::take_signals() {
             signal_.compare_exchange_strong(none, static_cast<int>(info.ssi_signo));
             request();
         }
-        if (on_signal) on_signal();
+        if (told_) told_();
     }
 }
 

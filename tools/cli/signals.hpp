@@ -18,9 +18,9 @@ public:
     ~StopRequest();
     StopRequest(const StopRequest&) = delete;
 
-    /// Called in a helper thread when a signal arrives, to end a wait of the main thread.
-    std::function<void()> on_signal;
-    /// While on, SIGINT only calls on_signal: it cancels the running command, not the machine. Switching handles pending
+    /// Has `told` called in a helper thread when a signal arrives, to end a wait of the main thread; at once when one has arrived already.
+    void when_signalled(std::function<void()> told);
+    /// While on, SIGINT only calls what when_signalled() was given: it cancels the running command, not the machine. Switching handles pending
     /// signals first: a Ctrl-C that ended the command's program belongs to that command.
     void spare(bool on);
 
@@ -32,9 +32,7 @@ public:
     int fd() const { return event_; }
     /// Waits for a request, at most `ns` (negative: forever). Returns true when requested.
     bool wait_ns(std::int64_t ns) const;
-    /// Enables on_signal.
-    void listen();
-    /// Disables on_signal. A further Ctrl-C ends the process at once: for the clean-up after outputs have been made safe.
+    /// Ends that: later signals request nothing. A further Ctrl-C ends the process at once: for the clean-up after outputs have been made safe.
     void release();
 
 private:
@@ -45,6 +43,7 @@ private:
     std::atomic<int> signal_{0};
     std::mutex mutex_;    // of taking signals and what they mean
     bool spare_ = false;
+    std::function<void()> told_;
     std::thread thread_;
 };
 

@@ -78,7 +78,6 @@ bool feed(Stream& stream, const PlayOptions& options, json records, const StopRe
 
 int follow(Stream& stream, const PlayOptions& options, int descriptor) {
     StopRequest stop;
-    stop.listen();
     constexpr std::size_t at_once = 1000;
     LineReader input(descriptor, stop.fd());
     std::string line;

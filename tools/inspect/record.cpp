@@ -97,7 +97,6 @@ private:
 /// Takes records until the count is reached or the command is ended. Returns the exit code.
 int follow(Stream& stream, const RecordOptions& options, RecordFile& file) {
     StopRequest stop;
-    stop.listen();
     const std::size_t headers = options.csv ? 1 : 0;
     const auto lost = [&] {
         if (file.error() == EPIPE) return 1;

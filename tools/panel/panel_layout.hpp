@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -14,7 +15,8 @@ struct PanelPin {
     std::string type;          ///< bit, float, s32, u32
     bool output = false;       ///< set by the page
     nlohmann::json initial;    ///< null: 0
-    nlohmann::json safe;       ///< value of an output without a page; null: keeps its value
+    nlohmann::json safe;       ///< value of an output without a page, and before the first one; null: keeps its value
+    double least = -std::numeric_limits<double>::infinity(), most = std::numeric_limits<double>::infinity();  ///< what a page may set
     std::string unit, doc;
 };
 

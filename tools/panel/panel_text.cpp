@@ -54,8 +54,8 @@ constexpr Kind kinds[] = {
 
 constexpr const char* number_keys[] = {"min", "max", "step", "warn", "alarm", "seconds", "digits"};
 
-/// Splits a line at blanks; "…" keeps blanks together, also behind `key=`. An open quotation mark goes to the end of the line.
-std::vector<Word> words_of_line(const Word& line) {
+/// Splits a line at blanks; "…" keeps blanks together, also behind `key=`. `open`: a quotation mark without its second.
+std::vector<Word> words_of_line(const Word& line, bool& open) {
     std::vector<Word> words;
     const std::string& text = line.text;
     for (std::size_t i = 0; i < text.size();) {
@@ -71,6 +71,7 @@ std::vector<Word> words_of_line(const Word& line) {
             if (text[i] == '"') quoted = !quoted;
             else word.text += text[i];
         }
+        open = quoted;
         word.at.length = static_cast<std::uint32_t>(i - begin);
         words.push_back(std::move(word));
     }
@@ -92,8 +93,10 @@ public:
         layout_.root = {{"widget", "vbox"}, {"children", Json::array()}};
         open_.push_back(&layout_.root);
         for (text::Lines lines(whole, "#"); auto line = lines.next();) {
-            const auto words = words_of_line(*line);
-            if (!words.empty()) this->line(words);
+            bool open = false;
+            const auto words = words_of_line(*line, open);
+            if (open) error(words.back().at, "this quotation mark has no second one in its line");
+            else if (!words.empty()) this->line(words);
         }
         if (open_.size() > 1) error(opened_.back(), "this container has no end", "add a line: end");
         printed += errors_.text(colours(STDERR_FILENO));
@@ -110,9 +113,8 @@ private:
         if (first == "component") return setting(words, layout_.component);
         if (first == "timeout") return timeout(words);
         if (first == "title") {
-            std::string title;
-            setting(words, title);
-            layout_.root["title"] = title;
+            setting(words, title_);
+            layout_.root["title"] = title_;
             return;
         }
         if (first == "end") {
@@ -132,6 +134,7 @@ private:
     void setting(const std::vector<Word>& words, std::string& to) {
         if (words.size() != 2)
             return error(words[0].at, fmt::format("'{}' takes one word", words[0].text), "write names with blanks in quotation marks");
+        if (!to.empty()) error(words[0].at, fmt::format("a second '{}'", words[0].text), "a panel has one");
         to = words[1].text;
         if (words[0].text == "component" && !good_instance_name(to))
             error(words[1].at, fmt::format("'{}' is not a valid name of a component", to.substr(0, 60)));
@@ -185,6 +188,7 @@ private:
     PanelErrors errors_{"panel-line"};
     std::uint32_t source_ = 0;
     PanelLayout layout_;
+    std::string title_;
     std::vector<Json*> open_;
     std::vector<text::Span> opened_;
     std::vector<std::unique_ptr<Json>> containers_;
@@ -217,10 +221,17 @@ void Reader::pin(const Kind& kind, const std::vector<Word>& words, const std::ma
     if (std::any_of(layout_.pins.begin(), layout_.pins.end(), [&](const PanelPin& other) { return other.name == pin.name; }))
         return error(words[1].at, fmt::format("duplicate pin '{}'", pin.name), "each pin of a panel needs a name of its own");
     if (kind.output && std::string_view(kind.name) == "button") pin.safe = false;
+    if (kind.output) pin.least = options.value("min", pin.least), pin.most = options.value("max", pin.most);
     for (const auto& [key, word] : given) {
         if (key != "initial" && key != "safe") continue;
-        if (const auto value = value_of(kind, word)) (key == "initial" ? pin.initial : pin.safe) = *value;
+        const auto value = value_of(kind, word);
+        if (!value) continue;
+        if (value->is_number() && (value->get<double>() < pin.least || value->get<double>() > pin.most))
+            error(word.at, fmt::format("{}={} is outside {:g}..{:g}", key, word.text.substr(0, 60), pin.least, pin.most));
+        (key == "initial" ? pin.initial : pin.safe) = *value;
     }
+    if (kind.output && pin.initial.is_null() && pin.safe.is_null() && (pin.least > 0 || pin.most < 0))
+        pin.initial = pin.least > 0 ? pin.least : pin.most;
     if (given.contains("unit")) pin.unit = given.at("unit").text;
     if (given.contains("doc")) pin.doc = given.at("doc").text;
     if (!pin.initial.is_null()) node["initial"] = pin.initial;
@@ -257,6 +268,9 @@ void Reader::widget(const Kind& kind, const std::vector<Word>& words) {
     }
     if (options.contains("min") && options.contains("max") && options["min"].get<double>() >= options["max"].get<double>())
         error(given["min"].at, "min must be less than max");
+    if (options.contains("seconds") && options["seconds"].get<double>() <= 0) error(given["seconds"].at, "seconds must be positive");
+    if (options.contains("digits") && !(options["digits"].get<double>() >= 0 && options["digits"].get<double>() <= 15))
+        error(given["digits"].at, "digits must be 0 to 15");
     if (options.contains("step") && options["step"].get<double>() <= 0) error(given["step"].at, "step must be positive");
     if (given.contains("label")) options["text"] = given["label"].text;
     if (!kind.type) {

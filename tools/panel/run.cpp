@@ -2,6 +2,7 @@
 // `hal panel`: from the command line to a running server.
 #include <arpa/inet.h>
 #include <array>
+#include <filesystem>
 #include <fmt/core.h>
 #include <thread>
 #include <unistd.h>
@@ -82,6 +83,9 @@ int run_panel(const PanelOptions& options) {
     if (const std::string problem = server.open(options.listen.empty() ? loopback : options.listen, options.port); !problem.empty())
         return fail(options, problem);
     if (!options.words.empty()) server.load(std::move(layout));
+    if (!std::filesystem::exists(socket_path(instance)))
+        write_all(STDERR_FILENO,
+                  fmt::format("hal panel: no instance '{}' is running yet; the page shows it as soon as it runs\n", instance));
     if (!print(announcement(options, access, instance, server.port()))) return 1;
     std::thread ending([&] {
         stop.wait_ns(options.for_ns);

@@ -2,9 +2,14 @@
 #include "panel/server.hpp"
 
 #include <algorithm>
+#include <arpa/inet.h>
 #include <array>
+#include <cerrno>
+#include <cstring>
 #include <libwebsockets.h>
 #include <new>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include "panel/clock.hpp"
 #include "panel/control_link.hpp"
@@ -118,6 +123,25 @@ const std::array<lws_protocols, 6> protocols{{
 }};
 const lws_retry_bo_t pings{nullptr, 0, 0, 10, 25, 0};  // pings an idle client after 10 s, closes it after 25 s
 
+/// Returns why nothing can listen there, "" if it can. The library does not tell.
+std::string obstacle(const std::string& address, int port) {
+    const int socket = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    const int yes = 1;
+    sockaddr_in at{};
+    at.sin_family = AF_INET;
+    at.sin_port = htons(static_cast<std::uint16_t>(port));
+    ::inet_pton(AF_INET, address.c_str(), &at.sin_addr);
+    ::setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
+    const bool good = ::bind(socket, reinterpret_cast<const sockaddr*>(&at), sizeof at) == 0 && ::listen(socket, 1) == 0;
+    const int error = errno;
+    ::close(socket);
+    if (good) return "";
+    if (error == EADDRINUSE) return "another program uses it; choose another with --port";
+    if (error == EADDRNOTAVAIL) return "this host does not have the address; to list them: ip address";
+    if (error == EACCES) return "ports below 1024 need the capability CAP_NET_BIND_SERVICE; choose another with --port";
+    return std::strerror(error);
+}
+
 }  // namespace
 
 /// The timer of the event loop.
@@ -163,10 +187,10 @@ std::string PanelServer::open(const std::string& address, int port) {
     info.timeout_secs = 10;
     info.retry_and_idle_policy = &pings;
     info.options = LWS_SERVER_OPTION_DISABLE_IPV6 | LWS_SERVER_OPTION_FAIL_UPON_UNABLE_TO_BIND;
+    if (const std::string why = obstacle(address, port); !why.empty())
+        return "cannot listen on " + address + " port " + std::to_string(port) + ": " + why;
     context_ = lws_create_context(&info);
-    if (!context_)
-        return "cannot listen on " + address + " port " + std::to_string(port) +
-               ": it is in use or not an address of this host; choose another with --port";
+    if (!context_) return "cannot listen on " + address + " port " + std::to_string(port) + "; choose another with --port";
     host_ = lws_get_vhost_by_name(context_, "default");
     metrics_ = std::make_unique<Metrics>(host_, instance_);
     loop_->server = this;

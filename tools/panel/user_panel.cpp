@@ -5,7 +5,10 @@
 #include <cmath>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
+#include <unistd.h>
+#include <utility>
 
+#include "cli/output.hpp"
 #include "panel/event_log.hpp"
 
 namespace hal::tools {
@@ -43,7 +46,7 @@ UserPanel::UserPanel(lws_vhost* host, const std::string& instance, PanelLayout l
     Json pins = Json::object();
     for (std::size_t i = 0; i < layout_.pins.size(); ++i) {
         const PanelPin& pin = layout_.pins[i];
-        shown_.push_back(text_of(pin.initial.is_null() ? zero_of(pin) : pin.initial));
+        shown_.push_back(text_of(pin.output && !pin.safe.is_null() ? pin.safe : pin.initial.is_null() ? zero_of(pin) : pin.initial));
         if (!pin.output) inputs_.push_back(i);
         pins[pin.name] = {
             {"type", pin.type}, {"output", pin.output}, {"unit", pin.unit}, {"doc", pin.doc}, {"value", Json::parse(shown_.back())}};
@@ -64,13 +67,21 @@ std::string UserPanel::write(std::string_view name, const Json& value) {
     Json converted;
     if (at == layout_.pins.end() || !at->output) return fmt::format("'{}' is not an output pin of the panel", name.substr(0, 60));
     if (!convert(*at, value, converted)) return fmt::format("the value of '{}' is not a {}", name, at->type);
+    if (converted.is_number() && !(converted.get<double>() >= at->least && converted.get<double>() <= at->most))
+        return fmt::format("the value of '{}' is outside {:g}..{:g}", name, at->least, at->most);
     const auto i = static_cast<std::size_t>(at - layout_.pins.begin());
     shown_[i] = text_of(converted);
     if (std::find(changed_.begin(), changed_.end(), i) == changed_.end()) changed_.push_back(i);
     return "";
 }
 
-void UserPanel::page_active() { active_ = true; }
+void UserPanel::page_active() {
+    active_ = true;
+    if (std::exchange(begun_, true)) return;
+    for (const PanelPin& pin : layout_.pins)  // until now they had their safe values
+        if (pin.output && !pin.safe.is_null() && !pin.initial.is_null()) write(pin.name, pin.initial);
+    if (on_values) on_values(values());
+}
 
 void UserPanel::page_lost() {
     if (!active_) return;
@@ -132,7 +143,12 @@ void UserPanel::machine_line(std::string_view line, std::string_view) {
     const Json reply = Json::parse(line, nullptr, false);
     if (!reply.is_object() || !reply.contains("id")) return;
     const bool good = reply.value("ok", false);
-    if (!good) log_.add("panel", "the machine rejects the panel's component: " + reply.value("error", ""));
+    if (!good) {
+        log_.add("panel", "the machine rejects the panel's component: " + reply.value("error", ""));
+        if (reply["id"] == 1)
+            write_all(STDERR_FILENO, "hal panel: the machine rejects the panel's component, so its widgets have no pins: " +
+                                         reply.value("error", "") + "\n");
+    }
     if (reply["id"] == 1 && good) {
         registered_ = true;
         changed_.clear();

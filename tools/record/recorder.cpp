@@ -27,7 +27,6 @@ public:
           client_(client),
           probe_(probe),
           origin_{client.instance(), client.version(), client.run("save").out, "", probe.unix_ns(0)} {
-        stop_.listen();
         client.cancel_on(-1);
     }
 

@@ -106,7 +106,7 @@ int sim_cell(const SimOptions& options, std::vector<NodeLine> nodes) {
     StopRequest stop;
     CycleGuard guard;
     guard.begin(options.cycle_limit_ns);
-    stop.on_signal = [&guard] { guard.end_soon(); };
+    stop.when_signalled([&guard] { guard.end_soon(); });
     SessionOptions session;
     session.name = fmt::format("sim-{}", ::getpid());
     session.virtual_clock = true;
@@ -114,7 +114,6 @@ int sim_cell(const SimOptions& options, std::vector<NodeLine> nodes) {
     TrackedOutput output;
     const auto begun = std::chrono::steady_clock::now();
     Cell cell(cell_name(options.words), std::move(nodes), session, shell_options(options));
-    stop.listen();
     int status = cell.load(options.words, options.ini, output) && cell.start(output) ? 0 : 1;
     constexpr std::int64_t slice_ns = 100'000'000;
     if (!options.part.empty()) cell.isolate(cell.find(options.part));

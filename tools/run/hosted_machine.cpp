@@ -88,15 +88,14 @@ std::string own_name(const NetlistOptions& options) {
 HostedMachine::HostedMachine(const NetlistOptions& options, const std::string& name, bool virtual_clock)
     : session(session_options(name, virtual_clock)), shell(session, shell_options(options)), options_(options) {
     export_variables(options, name);
-    stop.on_signal = [this, virtual_clock] {
-        shell.cancel();
-        if (virtual_clock) cycle_guard_.end_soon();
-        if (stop.requested()) setup_guard_.end_soon();
-    };
     if (!virtual_clock)  // a machine that is stopped from the terminal would leave its outputs as they are
         for (const int number : {SIGTSTP, SIGTTIN, SIGTTOU}) std::signal(number, SIG_IGN);
     if (virtual_clock) cycle_guard_.begin(options.cycle_limit_ns);
-    stop.listen();
+    stop.when_signalled([this, virtual_clock] {
+        shell.cancel();
+        if (virtual_clock) cycle_guard_.end_soon();
+        if (stop.requested()) setup_guard_.end_soon();
+    });
 }
 
 HostedMachine::~HostedMachine() {

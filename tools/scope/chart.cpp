@@ -201,7 +201,10 @@ std::string chart_csv(const std::vector<Channel>& channels, const Record& record
             if (next[i] < record.samples[i].size() && record.samples[i][next[i]].time_ns == now) held[i] = &record.samples[i][next[i]++];
         if (now < record.begin_ns) continue;
         text += fmt::format("{:.9f}", static_cast<double>(now - record.trigger_ns) * 1e-9);
-        for (const Sample* sample : held) text += sample ? fmt::format(",{}", sample->value) : ",";
+        for (std::size_t i = 0; i < channels.size(); ++i) {
+            text += ',';
+            if (held[i] != nullptr) text += channels[i].wide == Channel::Wide::no ? fmt::format("{}", held[i]->value) : digits(channels[i], *held[i]);
+        }
         text += '\n';
     }
 }

@@ -156,7 +156,6 @@ std::string save(const Acquisition& acquisition, const Record& record) {
 
 int run_interactive(const ScopeOptions& options, Source& source) {
     StopRequest stop;
-    stop.listen();
     Acquisition& acquisition = source.acquisition();
     ScopeView view(acquisition, unicode_terminal(), colours(STDOUT_FILENO));
     std::string ended;

@@ -69,7 +69,7 @@ int run_watch(const WatchOptions& options) {
             screen.measure();
             if (Clock::now() < next_picture) continue;
             next_picture = Clock::now() + picture_time;
-            std::vector<std::string> lines = table.lines();
+            std::vector<std::string> lines = table.lines(screen.columns());
             const std::size_t rows = lines.size() - 1, visible = screen.rows() > 2 ? screen.rows() - 2 : 1;
             first = std::min(first, rows > visible ? rows - visible : 0);
             lines.erase(lines.begin() + 1, lines.begin() + 1 + static_cast<std::ptrdiff_t>(first));

@@ -24,14 +24,15 @@ public:
     };
     /// Returns what lines() has of a channel; "-" without a sample.
     Texts texts(std::size_t channel) const;
-    /// Returns a head and a line per channel: name, value, unit, minimum, maximum, change per second over the last second (of a bit: edges).
-    std::vector<std::string> lines() const;
+    /// Returns a head and a line per channel: name, value, unit, minimum, maximum, change per second over the last second (of a bit: edges). What
+    /// does not fit into `columns` is left out from the right; a long name loses its beginning.
+    std::vector<std::string> lines(std::size_t columns = SIZE_MAX) const;
 
 private:
     struct Row {
         bool any = false;
         Sample last;
-        double min = 0, max = 0;
+        Sample min, max;
         std::uint64_t edges = 0;
         struct Mark {
             Sample sample;

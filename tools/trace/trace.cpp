@@ -116,13 +116,17 @@ private:
     void receive(int timeout_ms);
     void take(const json& event, const std::string& payload, Chunk& chunk);
     void keep(Chunk chunk);
-    bool write(const std::string& bytes) {
-        if (error_ == 0 && !write_all(file_, bytes)) error_ = errno;
-        return error_ == 0;
+    void write(const std::string& bytes) {
+        if (error_ != 0) return;
+        if (write_all(file_, bytes)) written_ += bytes.size();
+        else error_ = errno;
     }
-    bool write(const Chunk& chunk);
+    void write(const Chunk& chunk);
     bool open();
+    void begin_file();
     int finish();
+    int fail_to_write();
+    bool remove_if_empty();
 
     const TraceOptions& options_;
     StopRequest stop_;
@@ -137,6 +141,8 @@ private:
     std::int64_t fired_ns_ = 0;  ///< when the overrun or fault came; 0: not yet
     std::string cause_;
     int file_ = -1;
+    bool fresh_ = false;         ///< there was no file of this name
+    std::size_t written_ = 0;    ///< bytes of whole packets in the file
     int error_ = 0;              ///< of the first write that failed
     std::size_t kept_bytes_ = 0;
 };
@@ -225,7 +231,7 @@ void Tracer::keep(Chunk chunk) {
     }
 }
 
-bool Tracer::write(const Chunk& chunk) {
+void Tracer::write(const Chunk& chunk) {
     std::string bytes;
     for (const Chunk::Part& part : chunk.parts) bytes += writer_.events(part.thread, part.events, part.lost);
     for (const Chunk::Entry& entry : chunk.entries) bytes += writer_.instant(entry.time_ns, entry.kind, entry.text);
@@ -234,15 +240,32 @@ bool Tracer::write(const Chunk& chunk) {
         bytes += writer_.counter(thread, "waited for a CPU", chunk.time_ns, times.waited_ns);
     }
     bytes += PerfettoWriter::switches(chunk.switches);
-    return write(bytes);
+    write(bytes);
 }
 
+/// Opens the file before anything is traced: what cannot be written is known then, not after the fault. An old one is replaced later.
 bool Tracer::open() {
     const std::string& path = options_.words.front();
-    file_ = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
-    if (file_ < 0) return fail(options_, fmt::format("cannot write '{}': {}", path, std::strerror(errno))) == 0;
-    return write(
-        writer_.begin(client_->instance(), client_->pid(), {now_ns(CLOCK_MONOTONIC), now_ns(CLOCK_REALTIME), now_ns(CLOCK_BOOTTIME)}));
+    fresh_ = ::access(path.c_str(), F_OK) != 0;
+    file_ = ::open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0644);
+    return file_ >= 0 || fail(options_, fmt::format("cannot write '{}': {}", path, std::strerror(errno))) == 0;
+}
+
+void Tracer::begin_file() {
+    if (::ftruncate(file_, 0) != 0 && errno != EINVAL) error_ = errno;  // EINVAL: a pipe
+    write(writer_.begin(client_->instance(), client_->pid(), {now_ns(CLOCK_MONOTONIC), now_ns(CLOCK_REALTIME), now_ns(CLOCK_BOOTTIME)}));
+}
+
+bool Tracer::remove_if_empty() { return written_ == 0 && fresh_ && ::unlink(options_.words.front().c_str()) == 0; }
+
+/// What is in the file ends with a whole packet then.
+int Tracer::fail_to_write() {
+    const bool cut = ::ftruncate(file_, static_cast<off_t>(written_)) == 0;
+    return fail(options_, fmt::format("cannot write '{}': {}; {}", options_.words.front(), std::strerror(error_),
+                                      remove_if_empty() ? "nothing was written"
+                                      : written_ == 0   ? "the file is empty"
+                                      : cut             ? "the file is complete up to there"
+                                                        : "its last packet is damaged"));
 }
 
 int Tracer::finish() {
@@ -257,20 +280,23 @@ int Tracer::finish() {
             cause_ = ended + " without being stopped";
         } else if (options_.for_ns >= 0) {
             status = fail(options_, ended + " before the time was over");
+        } else {
+            status = fail(options_, ended);
         }
     }
     if (ring() && fired_ns_ == 0) {
+        remove_if_empty();
         print(fmt::format("no {} in {}; nothing was written\n",
-                          options_.on_overrun ? options_.on_fault ? "overrun or fault" : "overrun" : "fault", counted(summary_.cycles, "cycle")));
+                          options_.on_overrun ? options_.on_fault ? "overrun or fault" : "overrun" : "fault",
+                          counted(summary_.cycles, "cycle")));
         return status;
     }
     if (ring()) {
-        if (!open()) return 1;
+        begin_file();
         for (const Chunk& chunk : kept_) write(chunk);
     }
     const std::string& path = options_.words.front();
-    if (error_ != 0)
-        return fail(options_, fmt::format("cannot write '{}': {}; the file is complete up to there", path, std::strerror(error_)));
+    if (error_ != 0) return fail_to_write();
     if (!cause_.empty()) print(cause_ + "\n");
     print(fmt::format("wrote {}: {}, {}, {}, {} lost; open it in https://ui.perfetto.dev\n", path, counted(summary_.cycles, "cycle"),
                       counted(summary_.calls, "function call"), counted(summary_.overruns, "overrun"), counted(summary_.lost, "event")));
@@ -290,8 +316,10 @@ int Tracer::run() {
         return fail(options_, fmt::format("unexpected argument '{}'; type: hal trace {}", options_.words[1], options_.words[0]));
     if (!ring() && (options_.keep_ns >= 0 || options_.after_ns >= 0))
         return fail(options_, fmt::format("{} needs --on-overrun or --on-fault", options_.keep_ns >= 0 ? "--keep" : "--after"));
+    if (options_.for_ns == 0) return fail(options_, "--for 0 traces nothing; use a time like 10s");
     if (!attach()) return 1;
-    if (!ring() && !open()) return 1;
+    if (!open()) return 1;
+    if (!ring()) begin_file();
     const auto end = options_.for_ns >= 0 ? Clock::now() + std::chrono::nanoseconds(options_.for_ns) : Clock::time_point::max();
     while (!stop_.requested() && error_ == 0 && Clock::now() < end && client_->connected()) {
         pollfd waiting[] = {{client_->fd(), POLLIN, 0}, {stop_.fd(), POLLIN, 0}};

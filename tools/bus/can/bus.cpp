@@ -48,7 +48,6 @@ std::unique_ptr<can::Link> open_link(const Options& options, const std::string& 
 }  // namespace
 
 bool Bus::open(const Options& options, const std::string& address, bool fd, std::span<const std::string> filters) {
-    stop.listen();
     return (link = open_link(options, address, fd, filters)) != nullptr;
 }
 

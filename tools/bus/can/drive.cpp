@@ -318,7 +318,7 @@ int run_can_drive(const DriveOptions& given) {
                       .ends_at_failure = !terminal && !options.keep_going,
                       .prompt = !one_shot && terminal,
                       .within_ns = within});
-    station.bus.stop.on_signal = [&shell] { shell.press(); };
+    station.bus.stop.when_signalled([&shell] { shell.press(); });
     station.bus.stop.spare(terminal && !one_shot);  // at a prompt Ctrl-C ends a command, not the session
     station.outlasts_stop = true;                   // axes are stopped before the session ends
     if (!station.open(options.words[0])) return 1;

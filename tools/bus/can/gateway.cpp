@@ -242,7 +242,6 @@ int run_can_gateway(const GatewayOptions& options) {
     }
     Listener listener;
     if (!(options.listen.empty() ? listen_locally(options, listener) : listen_on_port(options, listener))) return 1;
-    stop.listen();
     std::string nets;
     for (std::size_t n = 0; n < links.size(); ++n)
         nets += fmt::format("{}net {} is {}", n == 0 ? "" : ", ", n + 1, links[n]->description().address);

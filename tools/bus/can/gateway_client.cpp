@@ -247,7 +247,6 @@ int run_can_gateway_client(const GatewayOptions& options) {
     const int fd = connect_to_gateway(options);
     if (fd < 0) return 1;
     GatewaySession session(options, fd, stop, options.words.empty());
-    stop.listen();
     if (options.words.empty()) {
         const bool terminal = ::isatty(STDIN_FILENO) == 1;
         if (terminal) print(fmt::format("connected to {}; type 'help' for the commands, Tab completes\n", options.connect));

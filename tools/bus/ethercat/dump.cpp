@@ -110,7 +110,6 @@ int run_ethercat_dump(const EthercatDumpOptions& options) {
     how.promiscuous = true;
     how.policy = ethernet::Policy::block;
     StopRequest stop;
-    stop.listen();
     auto opened = ethernet::open(what, how);
     if (!opened) return fail(options, opened.problem);
     Dump dump(options);

@@ -198,7 +198,6 @@ int run_node_ethercat(const EthercatLineOptions& options) {
     for (std::size_t n = 0; n < faults.size(); ++n)
         if (const std::string problem = read_fault(options.faults[n], devices.size(), faults[n]); !problem.empty()) return fail(options, problem);
     StopRequest stop;
-    stop.listen();
     const auto primary = open_interface(options, options.link);
     if (!primary) return 1;
     std::unique_ptr<ethernet::Port> secondary;

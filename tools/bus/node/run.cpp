@@ -160,7 +160,6 @@ private:
 int turn_until_ended(const NodeOptions& options, const NodeKind& kind, canopen::Program& program, std::vector<Setting> settings,
                      std::uint8_t id, const std::vector<std::pair<canopen::Fault, canopen::FaultSetting>>& faults) {
     StopRequest stop;
-    stop.listen();
     can::Options how;
     how.receive_capacity = 16384;
     std::string link = options.link;
