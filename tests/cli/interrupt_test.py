@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Every command that runs until it is told to end does end: by Ctrl-C, and as a service manager or a closed terminal says it."""
+"""Every command that runs until its end is requested does end: by Ctrl-C, and as a service manager or a closed terminal requests it."""
 import os
 import signal
 import subprocess

@@ -275,7 +275,7 @@ $""")
     def test_a_user_panel_is_a_component_whose_outputs_need_control(self):
         self.write("jog.panel", "component jog\ntimeout 300ms\nslider speed min=-1 max=1 safe=0 initial=0.25\nbutton go\nnumber load unit=%\ntoggle keep\n")
         self.begin("jog.panel", "--write")
-        wait_until(lambda: self.value("jog.speed") == "0.25", "the pins exist")
+        wait_until(lambda: self.value("jog.speed") == "0", "the pins exist")
         self.assertIn("jog.go", self.good("shell", "list", "pin"))
         viewer, page = self.connected(), self.page(self.token)
         welcome = page.expect(lambda m: m.get("event") == "welcome")
@@ -306,14 +306,13 @@ $""")
     def test_outputs_are_safe_until_a_page_has_control(self):
         self.write("jog.panel", "component jog\nslider speed min=-1 max=1 initial=0.5 safe=0.25\nslider from-five min=5 max=9\ntoggle pump safe=TRUE\ntoggle lamp initial=TRUE\n")
         self.begin("jog.panel", "--write")
-        wait_until(lambda: self.value("jog.speed") == "0.25", "the panel is there")
-        self.assertEqual(["5", "TRUE", "TRUE"], [self.value("jog." + pin) for pin in ("from-five", "pump", "lamp")])
+        wait_until(lambda: [self.value("jog." + pin) for pin in ("speed", "from-five", "pump", "lamp")] == ["0.25", "5", "TRUE", "TRUE"], "safe")
         page = self.page(self.token)
         page.expect(lambda m: m.get("event") == "panel" and m["ready"])
         page.send({"panel": {}})
         wait_until(lambda: self.value("jog.speed") == "0.5", "the page has control")
-        page.send({"panel": {"write": {"speed": 7}}})
-        page.send({"panel": {"write": {"from-five": 6}}})
+        for pin, value in (("speed", 7), ("from-five", 6)):
+            page.send({"panel": {"write": {pin: value}}})
         wait_until(lambda: self.value("jog.from-five") == "6", "the next value arrives")
         self.assertEqual("0.5", self.value("jog.speed"))
 
@@ -385,8 +384,7 @@ hal panel: 'bad.panel' has errors
     def test_errors_of_the_command_line(self):
         self.assertEqual("hal panel: --listen: 'here' is not an IPv4 address; use the address of a network interface, or 0.0.0.0 for all\n", self.bad("panel", "--listen", "here"))
         self.begin(machine=False)
-        self.assertEqual(f"hal panel: cannot listen on 127.0.0.1 port {self.port}: another program uses it; choose another with --port\n",
-                         self.bad("panel", "--port", str(self.port)))
+        self.assertIn(f"cannot listen on 127.0.0.1 port {self.port}: another program uses it;", self.bad("panel", "--port", str(self.port)))
         self.assertEqual("hal panel: cannot listen on 192.0.2.1 port 8123: this host does not have the address; to list them: ip address\n",
                          self.bad("panel", "--port", "8123", "--listen", "192.0.2.1"))
         self.assertIn("--port: '99999' is out of range", self.bad("panel", "--port", "99999"))

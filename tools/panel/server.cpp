@@ -123,7 +123,7 @@ const std::array<lws_protocols, 6> protocols{{
 }};
 const lws_retry_bo_t pings{nullptr, 0, 0, 10, 25, 0};  // pings an idle client after 10 s, closes it after 25 s
 
-/// Returns why nothing can listen there, "" if it can. The library does not tell.
+/// Returns why nothing can listen there, "" if it can. The library does not report it.
 std::string obstacle(const std::string& address, int port) {
     const int socket = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
     const int yes = 1;
