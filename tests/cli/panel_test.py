@@ -385,8 +385,7 @@ hal panel: 'bad.panel' has errors
         self.assertEqual("hal panel: --listen: 'here' is not an IPv4 address; use the address of a network interface, or 0.0.0.0 for all\n", self.bad("panel", "--listen", "here"))
         self.begin(machine=False)
         self.assertIn(f"cannot listen on 127.0.0.1 port {self.port}: another program uses it;", self.bad("panel", "--port", str(self.port)))
-        self.assertEqual("hal panel: cannot listen on 192.0.2.1 port 8123: this host does not have the address; to list them: ip address\n",
-                         self.bad("panel", "--port", "8123", "--listen", "192.0.2.1"))
+        self.assertIn("this host does not have the address; to list them: ip address", self.bad("panel", "--port", "8123", "--listen", "192.0.2.1"))
         self.assertIn("--port: '99999' is out of range", self.bad("panel", "--port", "99999"))
 
     def test_an_instance_that_does_not_run_is_said_to_be_awaited(self):
