@@ -26,6 +26,10 @@ if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_L
     # g++ 12 warns about its own std::string and std::optional (GCC bugs 105651, 105329, 80635).
     add_compile_options(-Wno-restrict -Wno-array-bounds -Wno-maybe-uninitialized)
 endif()
+if(CMAKE_SIZEOF_VOID_P EQUAL 4)
+    add_compile_options(-Wno-psabi)  # notes that g++ 7 changed how ARM passes some structs
+    add_compile_definitions(_TIME_BITS=64 _FILE_OFFSET_BITS=64)  # glibc's default time_t of 32 bits ends in 2038
+endif()
 if(HALCYON_WERROR)
     add_compile_options(-Werror)
 endif()
@@ -38,8 +42,11 @@ endif()
 # The environment of a program that loads plugins. The leak checker takes a plugin's thread-local memory for what it is not, and dies of it,
 # depending on where the heap put it. Fast DDS frees some of its memory by another size than it took.
 set(HALCYON_SANITIZER_OPTIONS "ASAN_OPTIONS=intercept_tls_get_addr=0:new_delete_type_mismatch=0")
+if(HALCYON_UNOPTIMISED AND NOT HALCYON_SANITIZE)
+    string(REPLACE "-O2" "-O0" CMAKE_CXX_FLAGS_RELEASE "${CMAKE_CXX_FLAGS_RELEASE}")
+endif()
 set(HALCYON_TEST_OPTIONS -O0)  # for the tests' own sources: their assertions take longer to optimise than to run
-if(NOT HALCYON_SANITIZE)
+if(NOT HALCYON_SANITIZE AND NOT HALCYON_UNOPTIMISED)
     set(HALCYON_TOOL_OPTIONS "$<$<CONFIG:Release>:-Os>")  # for programs and their commands, which are not real time
 endif()
 
@@ -102,7 +109,7 @@ if(HALCYON_CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
     endif()
 endif()
 find_program(HALCYON_MOLD mold)
-if(HALCYON_MOLD)
+if(HALCYON_MOLD AND NOT CMAKE_CROSSCOMPILING)  # a cross compiler looks for one of its own name
     add_link_options(-fuse-ld=mold)
 endif()
 

@@ -45,10 +45,18 @@ inline std::int64_t monotonic_ns() noexcept { return clock_ns(CLOCK_MONOTONIC); 
 /// Returns the offset to add to a time of CLOCK_REALTIME.
 inline std::int64_t real_to_monotonic_ns() noexcept { return monotonic_ns() - clock_ns(CLOCK_REALTIME); }
 
+/// Converts a time in ns for calls of the operating system. `long` has 32 bits on 32-bit machines, which the ns of a second fit into.
+constexpr timespec to_timespec(std::int64_t ns) noexcept {
+    timespec time{};
+    time.tv_sec = static_cast<time_t>(ns / 1'000'000'000);
+    time.tv_nsec = static_cast<long>(ns % 1'000'000'000);
+    return time;
+}
+
 /// Waits until the descriptor is readable, or its peer is gone. Returns false on timeout. [setup]
 inline bool readable_within(int fd, std::int64_t at_most_ns) noexcept {
     pollfd p{fd, POLLIN, 0};
-    const timespec limit{at_most_ns > 0 ? at_most_ns / 1'000'000'000 : 0, at_most_ns > 0 ? at_most_ns % 1'000'000'000 : 0};
+    const timespec limit = to_timespec(at_most_ns > 0 ? at_most_ns : 0);
     return ppoll(&p, 1, &limit, nullptr) > 0;
 }
 

@@ -207,7 +207,7 @@ void Executor::set_priority(Core& core, int priority) {
 void Executor::advance(std::int64_t ns) {
     if (!virtual_) {
         const std::int64_t until = monotonic_ns() + ns;
-        const timespec at{until / 1'000'000'000, until % 1'000'000'000};
+        const timespec at = to_timespec(until);
         while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &at, nullptr) == EINTR) {}
         return;
     }

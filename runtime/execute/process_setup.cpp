@@ -6,6 +6,7 @@
 #include <fcntl.h>
 #include <fstream>
 #include <linux/capability.h>
+#include <pthread.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
 #include <unistd.h>
@@ -21,9 +22,24 @@ bool may_lock_memory() {
     return false;
 }
 
+/// Limits the stacks of helper threads: locked memory is resident as a whole, and glibc's default, the limit of the main thread, is usually
+/// 8 MB. A thread that sets the size of its stack is not affected.
+void limit_helper_stacks() {
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // whose frames are larger
+    constexpr std::size_t most = 1 << 20;
+    pthread_attr_t attributes;
+    if (pthread_getattr_default_np(&attributes) != 0) return;
+    std::size_t size = 0;
+    if (pthread_attr_getstacksize(&attributes, &size) == 0 && size > most && pthread_attr_setstacksize(&attributes, most) == 0)
+        pthread_setattr_default_np(&attributes);
+    pthread_attr_destroy(&attributes);
+#endif
+}
+
 }  // namespace
 
 std::vector<std::string> prepare_process() {
+    limit_helper_stacks();
     std::vector<std::string> refused;
     // Under a small limit MCL_FUTURE would make later allocations fail, which is worse than a page fault.
     const rlimit all{RLIM_INFINITY, RLIM_INFINITY};

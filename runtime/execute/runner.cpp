@@ -101,9 +101,7 @@ void Runner::ask_to_end() {
 bool Runner::join(std::int64_t timeout_ns) {
     timespec until;
     clock_gettime(CLOCK_REALTIME, &until);
-    const std::int64_t end = until.tv_nsec + timeout_ns;
-    until.tv_sec += end / 1'000'000'000;
-    until.tv_nsec = end % 1'000'000'000;
+    until = to_timespec(std::int64_t{until.tv_sec} * 1'000'000'000 + until.tv_nsec + timeout_ns);
     return pthread_timedjoin_np(thread, nullptr, &until) == 0;
 }
 

@@ -207,7 +207,7 @@ void Supervisor::work() {
     std::int64_t asleep_before = asleep();
     while (!quit_) {
         const std::int64_t interval = interval_ns_;
-        const timespec timeout{interval / 1'000'000'000, interval % 1'000'000'000};
+        const timespec timeout = to_timespec(interval);
         pollfd woken{wake_, POLLIN, 0};
         if (ppoll(&woken, 1, &timeout, nullptr) > 0) {
             eventfd_t ignored;

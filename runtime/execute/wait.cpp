@@ -13,12 +13,16 @@
 namespace hal {
 namespace {
 
-timespec to_timespec(std::int64_t ns) noexcept { return {ns / 1'000'000'000, ns % 1'000'000'000}; }
+#ifdef SYS_futex_time64  // on 32-bit machines: the call that takes seconds of 64 bits, as this build has them
+constexpr long futex_call = SYS_futex_time64;
+#else
+constexpr long futex_call = SYS_futex;
+#endif
 
 void relax() noexcept {
 #if defined(__x86_64__) || defined(__i386__)
     __builtin_ia32_pause();
-#elif defined(__aarch64__)
+#elif defined(__aarch64__) || defined(__arm__)
     asm volatile("yield");
 #endif
 }
@@ -43,7 +47,7 @@ bool Wait::sleep(std::int64_t deadline_ns, const std::atomic<std::uint32_t>& bel
     const timespec at = to_timespec(deadline_ns - spin_ns);
     while (monotonic_ns() < deadline_ns - spin_ns) {
         // FUTEX_WAIT_BITSET takes an absolute CLOCK_MONOTONIC time
-        syscall(SYS_futex, &bell, FUTEX_WAIT_BITSET_PRIVATE, heard, &at, nullptr, FUTEX_BITSET_MATCH_ANY);
+        syscall(futex_call, &bell, FUTEX_WAIT_BITSET_PRIVATE, heard, &at, nullptr, FUTEX_BITSET_MATCH_ANY);
         if (bell.load(std::memory_order_acquire) != heard) return false;
     }
     return true;
@@ -51,7 +55,7 @@ bool Wait::sleep(std::int64_t deadline_ns, const std::atomic<std::uint32_t>& bel
 
 void Wait::ring(std::atomic<std::uint32_t>& bell) noexcept {
     bell.fetch_add(1, std::memory_order_release);
-    syscall(SYS_futex, &bell, FUTEX_WAKE_PRIVATE, INT_MAX, nullptr, nullptr, 0);
+    syscall(futex_call, &bell, FUTEX_WAKE_PRIVATE, INT_MAX, nullptr, nullptr, 0);
 }
 
 std::int64_t Wait::default_spin_ns(std::int64_t period_ns) noexcept { return std::min<std::int64_t>(period_ns * 2 / 5, 150'000); }

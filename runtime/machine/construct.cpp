@@ -2,6 +2,7 @@
 #include "machine/construct.hpp"
 
 #include <algorithm>
+#include <cstdint>
 #include <cstring>
 #include <set>
 
@@ -16,7 +17,7 @@ std::string dashed(std::string text) {
 }
 
 void* allocate_for(Instance& instance, std::size_t bytes, std::size_t align) noexcept {
-    if (bytes > (std::size_t{1} << 32) || align == 0 || align > 4096) return nullptr;
+    if (bytes > std::min<std::uint64_t>(std::uint64_t{1} << 32, PTRDIFF_MAX - 4096) || align == 0 || align > 4096) return nullptr;
     try {
         // space to align by hand: arrays of char are aligned for any ordinary type only
         instance.allocations.push_back(std::make_unique<char[]>(bytes + align));

@@ -25,7 +25,7 @@ struct Part {
 
     void append_to(std::string& out, std::uint64_t index) const {
         if (!elements.empty()) {
-            out += elements[index];
+            out += elements[static_cast<std::size_t>(index)];
         } else if (width > 0) {
             const std::string digits = std::to_string(last >= first ? first + index : first - index);
             out.append(width > digits.size() ? width - digits.size() : 0, '0');
@@ -202,8 +202,8 @@ public:
             bytes += word.longest + word_overhead;
         }
         if (bytes > most_bytes / leader.count) return too_long();
-        std::vector<Command> commands(leader.count);
-        for (std::uint64_t i = 0; i < leader.count; ++i) {
+        std::vector<Command> commands(static_cast<std::size_t>(leader.count));
+        for (std::size_t i = 0; i < commands.size(); ++i) {
             Command& made = commands[i];
             made.span = command_.span;
             made.args.reserve(command_.args.size());
@@ -325,7 +325,7 @@ private:
     const Command& command_;
     Diagnostics& diagnostics_;
     std::vector<Word> words_;
-    std::size_t list_bytes_ = 0;
+    std::uint64_t list_bytes_ = 0;
 };
 
 }  // namespace

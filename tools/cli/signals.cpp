@@ -13,6 +13,8 @@
 #include <unistd.h>
 #include <utility>
 
+#include "hal/clock.hpp"
+
 namespace hal::tools {
 
 namespace {
@@ -108,7 +110,7 @@ bool StopRequest::wait_ns(std::int64_t ns) const {
     while (!requested()) {
         const std::int64_t left = ns < 0 ? 0 : nanoseconds(end - steady_clock::now()).count();
         if (ns >= 0 && left <= 0) break;
-        const timespec timeout{static_cast<time_t>(left / 1'000'000'000), static_cast<long>(left % 1'000'000'000)};
+        const timespec timeout = to_timespec(left);
         pollfd event{event_, POLLIN, 0};
         ::ppoll(&event, 1, ns < 0 ? nullptr : &timeout, nullptr);
     }

@@ -72,6 +72,12 @@ bool capable(int number) {
 }
 constexpr int cap_net_raw = 13, cap_ipc_lock = 14, cap_sys_nice = 23;
 
+/// The end of the names of Debian's kernel packages.
+std::string_view kernel_flavour(std::string_view machine) {
+    if (machine == "aarch64") return "arm64";
+    return machine.starts_with("arm") ? "armmp" : "amd64";
+}
+
 Finding kernel() {
     utsname about{};
     ::uname(&about);
@@ -83,7 +89,14 @@ Finding kernel() {
                                                                             : "no preemption";
     return {Verdict::fair, "kernel",
             fmt::format("{} ({}), not PREEMPT_RT: occasional wake-up latencies of milliseconds", about.release, kind),
-            fmt::format("sudo apt-get install -y linux-image-rt-{}", std::string_view(about.machine) == "aarch64" ? "arm64" : "amd64"), {}, "reboot into it"};
+            fmt::format("sudo apt-get install -y linux-image-rt-{}", kernel_flavour(about.machine)), {}, "reboot into it"};
+}
+
+/// The file with the kernel command line: boards have no GRUB.
+std::string_view command_line_file() {
+    if (::access("/boot/firmware/cmdline.txt", F_OK) == 0) return "/boot/firmware/cmdline.txt";  // Raspberry Pi
+    if (::access("/boot/uEnv.txt", F_OK) == 0) return "cmdline in /boot/uEnv.txt";               // BeagleBone
+    return "GRUB_CMDLINE_LINUX in /etc/default/grub";
 }
 
 Finding machine() {
@@ -183,8 +196,7 @@ Finding isolation() {
                 fmt::format("{} of {}{}", isolated, cpus, full.empty() || full == "(null)" ? "" : ", without ticks: " + full)};
     if (cpus < 2) return {Verdict::fair, "isolated cpus", "one processor only: everything shares it"};
     return {Verdict::fair, "isolated cpus", fmt::format("none of {}: other programs run beside the threads", cpus),
-            fmt::format("add isolcpus={0} nohz_full={0} rcu_nocbs={0} to the kernel command line (GRUB_CMDLINE_LINUX in /etc/default/grub)",
-                        cpus - 1)};
+            fmt::format("add isolcpus={0} nohz_full={0} rcu_nocbs={0} to the kernel command line ({1})", cpus - 1, command_line_file())};
 }
 
 Finding clock_source() {
@@ -193,7 +205,11 @@ Finding clock_source() {
     if (fast) return {Verdict::good, "clock source", source};
     return {Verdict::fair, "clock source",
             fmt::format("{}: reading the clock costs about a microsecond", source.empty() ? "unknown" : source),
+#if defined(__x86_64__) || defined(__i386__)
             "find out why the kernel left tsc: dmesg | grep -i clocksource"};
+#else
+            "processors without a generic timer, such as Cortex-A8, have no faster one: use longer periods"};
+#endif
 }
 
 Finding idle_states() {
@@ -214,6 +230,9 @@ Finding idle_states() {
 
 /// System-management interrupts stop all processors unseen; Intel counts them in a register.
 Finding management_interrupts() {
+#if !defined(__x86_64__) && !defined(__i386__)
+    return {Verdict::good, "firmware", "this processor has no system-management interrupts"};
+#endif
     const int device = ::open("/dev/cpu/0/msr", O_RDONLY | O_CLOEXEC);
     std::uint64_t count = 0;
     const bool read = device >= 0 && ::pread(device, &count, sizeof count, 0x34) == sizeof count;

@@ -340,7 +340,7 @@ std::string spell(std::span<const std::uint8_t> bytes, std::uint16_t code) {
     return text.data();
 }
 
-std::optional<long double> comparable(std::string_view text, std::uint16_t code, unsigned node_id) {
+std::optional<Comparable> comparable(std::string_view text, std::uint16_t code, unsigned node_id) {
     const DataType* type = data_type(code);
     if (type == nullptr || trimmed(text).empty()) return {};
     if (type->kind == Kind::real) {
@@ -348,17 +348,16 @@ std::optional<long double> comparable(std::string_view text, std::uint16_t code,
         if (!value) return {};
         std::uint64_t bits = 0;
         for (std::size_t i = 0; i < value.bytes.size(); ++i) bits |= std::uint64_t{value.bytes[i]} << (8 * i);
-        return type->bits == 32 ? std::bit_cast<float>(static_cast<std::uint32_t>(bits))
-                                : static_cast<long double>(std::bit_cast<double>(bits));
+        return type->bits == 32 ? double{std::bit_cast<float>(static_cast<std::uint32_t>(bits))} : std::bit_cast<double>(bits);
     }
     if (type->kind != Kind::boolean && type->kind != Kind::integer && type->kind != Kind::natural) return {};
     const Encoded value = encode(text, code, node_id);
     if (!value) return {};
     std::uint64_t bits = 0;
     for (std::size_t i = 0; i < value.bytes.size(); ++i) bits |= std::uint64_t{value.bytes[i]} << (8 * i);
-    if (type->kind != Kind::integer) return static_cast<long double>(bits);
+    if (type->kind != Kind::integer) return bits;
     const unsigned unused = 64 - type->bits;
-    return static_cast<long double>(static_cast<std::int64_t>(bits << unused) >> unused);
+    return static_cast<std::int64_t>(bits << unused) >> unused;
 }
 
 }  // namespace hal::canopen::eds

@@ -7,6 +7,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <variant>
 #include <vector>
 
 namespace hal::canopen::eds {
@@ -60,7 +61,10 @@ Encoded encode_strictly(std::string_view text, std::uint16_t code, unsigned node
 /// Decodes a value to the text that the writer uses: hexadecimal for unsigned numbers, decimal for signed ones, strings unchanged.
 std::string spell(std::span<const std::uint8_t> bytes, std::uint16_t code);
 
+/// A value for the comparison with another of the same data type. Exact for each: not every machine has a floating-point type with 64 bits of mantissa.
+using Comparable = std::variant<std::int64_t, std::uint64_t, double>;
+
 /// Returns the value as a number for the comparison with limits; nothing for strings.
-std::optional<long double> comparable(std::string_view text, std::uint16_t code, unsigned node_id);
+std::optional<Comparable> comparable(std::string_view text, std::uint16_t code, unsigned node_id);
 
 }  // namespace hal::canopen::eds

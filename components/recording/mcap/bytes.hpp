@@ -50,8 +50,8 @@ public:
             bytes_ = {};
             return {};
         }
-        const std::string_view part = bytes_.substr(0, count);
-        bytes_.remove_prefix(count);
+        const std::string_view part = bytes_.substr(0, static_cast<std::size_t>(count));
+        bytes_.remove_prefix(part.size());
         return part;
     }
     bool        good() const { return good_; }

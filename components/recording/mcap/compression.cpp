@@ -43,7 +43,7 @@ bool expand(std::string_view compression, std::string_view bytes, std::uint64_t 
     if (compression == "zstd") {
         problem = "a chunk does not decompress";
         if (const auto known = ZSTD_getFrameContentSize(bytes.data(), bytes.size()); known != ZSTD_CONTENTSIZE_UNKNOWN && known != size) return false;
-        to.resize(size);
+        to.resize(static_cast<std::size_t>(size));
         const std::size_t got = ZSTD_decompress(to.data(), to.size(), bytes.data(), bytes.size());
         return !ZSTD_isError(got) && got == size;
     }

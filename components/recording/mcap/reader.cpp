@@ -46,7 +46,7 @@ public:
     std::uint64_t size() const override { return bytes_.size(); }
     bool          read(std::uint64_t offset, std::size_t count, std::string& to) override {
         if (offset > bytes_.size() || count > bytes_.size() - offset) return false;
-        to = bytes_.substr(offset, count);
+        to = bytes_.substr(static_cast<std::size_t>(offset), count);
         return true;
     }
 

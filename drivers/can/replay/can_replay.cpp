@@ -49,7 +49,7 @@ public:
         if (next_ == frames_.size()) return false;
         const auto left = begun_ ? std::max<std::int64_t>(0, frames_[next_].time_ns + shift_ - link::monotonic_ns()) : 0;
         const auto pause = std::clamp<std::int64_t>(at_most_ns, 0, left);
-        const timespec time{pause / 1'000'000'000, pause % 1'000'000'000};
+        const timespec time = link::to_timespec(pause);
         if (pause > 0) nanosleep(&time, nullptr);
         return left <= at_most_ns;
     }

@@ -16,6 +16,12 @@ namespace hal::ethernet::rawether {
 
 namespace {
 
+#ifdef SYS_futex_time64  // on 32-bit machines: the call that takes seconds of 64 bits, as this build has them
+constexpr long futex_call = SYS_futex_time64;
+#else
+constexpr long futex_call = SYS_futex;
+#endif
+
 constexpr std::int64_t wake_up_ns = 30'000;  // latency of waking a thread on another CPU
 constexpr std::int64_t nothing_new_ns = 10'000;  // before a frame's time; a frame queued later leaves after it, even if due earlier
 
@@ -85,7 +91,7 @@ Sent Pacer::send(std::span<const std::uint8_t> frame, const Launch& launch, std:
 
 void Pacer::ring() noexcept {
     bell_.fetch_add(1, std::memory_order_release);
-    syscall(SYS_futex, reinterpret_cast<std::uint32_t*>(&bell_), FUTEX_WAKE_PRIVATE, 1, nullptr, nullptr, 0);
+    syscall(futex_call, reinterpret_cast<std::uint32_t*>(&bell_), FUTEX_WAKE_PRIVATE, 1, nullptr, nullptr, 0);
 }
 
 /// Sleeps until the time or the bell.
@@ -93,9 +99,9 @@ void Pacer::sleep(std::int64_t until_ns) noexcept {
     const auto bell = bell_.load(std::memory_order_acquire);
     asleep_until_.exchange(until_ns, std::memory_order_acq_rel);
     if (outgoing_.front() == nullptr && !ending_.load()) {
-        const timespec t{until_ns / 1'000'000'000, until_ns % 1'000'000'000};
+        const timespec t = link::to_timespec(until_ns);
         // FUTEX_WAIT_BITSET takes an absolute time of CLOCK_MONOTONIC (futex(2)).
-        syscall(SYS_futex, reinterpret_cast<std::uint32_t*>(&bell_), FUTEX_WAIT_BITSET_PRIVATE, bell, until_ns == INT64_MAX ? nullptr : &t,
+        syscall(futex_call, reinterpret_cast<std::uint32_t*>(&bell_), FUTEX_WAIT_BITSET_PRIVATE, bell, until_ns == INT64_MAX ? nullptr : &t,
                 nullptr, FUTEX_BITSET_MATCH_ANY);
     }
     asleep_until_.exchange(INT64_MIN, std::memory_order_acq_rel);

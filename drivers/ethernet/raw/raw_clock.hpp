@@ -73,13 +73,13 @@ private:
 inline void pause_processor() noexcept {
 #if defined(__x86_64__) || defined(__i386__)
     __builtin_ia32_pause();
-#elif defined(__aarch64__)
+#elif defined(__aarch64__) || defined(__arm__)
     asm volatile("yield");
 #endif
 }
 /// Sleeps until a time of CLOCK_MONOTONIC. [realtime], in a thread whose job it is to wait
 inline void sleep_until(std::int64_t time_ns) noexcept {
-    const timespec t{time_ns / 1'000'000'000, time_ns % 1'000'000'000};
+    const timespec t = link::to_timespec(time_ns);
     clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &t, nullptr);
 }
 

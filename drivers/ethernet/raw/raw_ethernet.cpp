@@ -104,7 +104,7 @@ private:
     bool block(std::int64_t now, std::int64_t until) noexcept {
         while (now < until) {
             pollfd p{receiver_.descriptor(), POLLIN, 0};
-            const timespec limit{(until - now) / 1'000'000'000, (until - now) % 1'000'000'000};
+            const timespec limit = link::to_timespec(until - now);
             ::ppoll(&p, 1, &limit, nullptr);
             if (receiver_.ready()) return true;
             if ((p.revents & POLLERR) != 0) {  // the interface went down: reported once, until it is read

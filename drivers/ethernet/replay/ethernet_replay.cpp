@@ -62,7 +62,7 @@ public:
         if (next_ == frames_.size()) return false;
         const auto due = begun_ ? frames_[next_].time_ns + shift_ : link::monotonic_ns();
         const auto end = std::min(due, until_ns);
-        const timespec t{end / 1'000'000'000, end % 1'000'000'000};
+        const timespec t = link::to_timespec(end);
         if (end > link::monotonic_ns()) clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &t, nullptr);
         return due <= until_ns;
     }

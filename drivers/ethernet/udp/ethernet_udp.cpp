@@ -142,7 +142,7 @@ public:
             }
             pollfd p{socket_.get(), POLLIN, 0};
             const auto left = std::max<std::int64_t>(end - now, 0);
-            const timespec limit{left / 1'000'000'000, left % 1'000'000'000};
+            const timespec limit = link::to_timespec(left);
             ::ppoll(&p, 1, &limit, nullptr);
             if ((p.revents & POLLIN) != 0) return true;
             if ((p.revents & POLLERR) != 0) note_refusal();

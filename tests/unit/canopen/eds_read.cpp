@@ -109,6 +109,8 @@ INSTANTIATE_TEST_SUITE_P(
                "is written as a fraction"},
         Defect{"outside_limits", variable("2000", "0x3", "LowLimit=-5\nHighLimit=5\nDefaultValue=6\n"), "", "2000", "DefaultValue=6",
                "is out of range: 6"},
+        Defect{"outside_limits_of_64_bits", variable("2000", "0x1B", "HighLimit=0xFFFFFFFFFFFFFFFE\nDefaultValue=0xFFFFFFFFFFFFFFFF\n"), "", "2000",
+               "DefaultValue=0xFFFFFFFFFFFFFFFF", "is out of range: 0xFFFFFFFFFFFFFFFF"},
         Defect{"limits_exchanged", variable("2000", "0x3", "LowLimit=5\nHighLimit=-5\n"), "", "2000", "LowLimit=5",
                "empty range of 2000: 5..-5"},
         Defect{"mapping_word", "[2000]\nParameterName=x\nDataType=5\nAccessType=ro\nPDOMapping=yes\n", "", "2000", "PDOMapping=yes",

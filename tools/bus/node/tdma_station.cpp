@@ -144,7 +144,7 @@ TdmaStation::~TdmaStation() { ethernet::withdraw_discipline(&discipline_); }
 /// nodes that spin for 40 us each would take a quarter of a CPU.
 std::int64_t TdmaStation::sleep_until(std::int64_t local_ns) const noexcept {
     const auto due = clock_.from_local(local_ns);
-    const timespec at{due / 1'000'000'000, due % 1'000'000'000};
+    const timespec at = link::to_timespec(due);
     while (link::monotonic_ns() < due) clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &at, nullptr);
     return clock_.local(link::monotonic_ns());
 }

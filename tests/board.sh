@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: MIT
+# shellcheck shell=sh
+# `./hal board armhf|arm64`; read by the script `hal`, whose functions it uses. Compiles everything for such a board without optimisation, and
+# runs the unit tests and the netlist tests under qemu-user. The first start makes the sysroot, the libraries and headers of the board's system.
+case ${1-}:$# in
+    armhf:1) triplet=arm-linux-gnueabihf qemu=qemu-arm ;;
+    arm64:1) triplet=aarch64-linux-gnu qemu=qemu-aarch64 ;;
+    *) die "usage: ./hal board armhf|arm64" ;;
+esac
+board=$1 tree=$1-test
+begun_at=$(date +%s)
+if [ "$in_cache" ]; then die "./hal board needs a source tree that can be written to"; fi
+need "$qemu-static=qemu-user-static" "$triplet-g++=g++-$triplet" mmdebstrap=mmdebstrap python3=python3
+
+# The sysroot: packages of Debian 12, unpacked; nothing is installed on this machine. cmake/board.cmake finds it.
+content="libc6-dev libstdc++-12-dev libfmt-dev nlohmann-json3-dev libcli11-dev libedit-dev libcap-dev libgtest-dev libpugixml-dev libzstd-dev libeigen3-dev"
+folder=$build/boards/$board
+if ! { [ -f "$folder/content" ] && [ "$(cat "$folder/content")" = "$content" ]; }; then
+    mirror=${HALCYON_MIRROR:-http://deb.debian.org/debian}
+    say "unpacking Debian's libraries for $board from $mirror in build/boards/$board/sysroot"
+    mkdir -p "$folder"
+    rm -rf "${folder:?}/sysroot" "$folder/content"
+    mmdebstrap --variant=extract --architectures="$board" --include="$(echo "$content" | tr ' ' ,)" bookworm "$folder/sysroot" \
+        "deb $mirror bookworm main" >"$folder/sysroot.log" 2>&1 </dev/null || {
+        tail -n 5 "$folder/sysroot.log" >&2
+        die "cannot make build/boards/$board/sysroot (see $folder/sysroot.log); HALCYON_MIRROR=URL names another mirror of Debian"
+    }
+    echo "$content" >"$folder/content"
+fi
+
+tests=ON
+compile "$tree" "everything for $board" hal hal-bus components unit_tests component_tests canopen_tests \
+    can_timing_tests scocan_tests tdma_tests recording_tests ethercat_tests estimation_tests bus_tests dds_schema_tests
+exec 9>&-
+
+# The tests start programs, which start others: the kernel must run each with qemu-user. Where it is not registered for that, a user namespace
+# has a register of its own (Linux 6.7 and newer); nothing outside of it changes.
+log=$build/$tree-tests.log
+in_board=$build/boards/run.sh
+cat >"$in_board" <<'RUN'
+set -eu
+register=/proc/sys/fs/binfmt_misc
+if ! grep -qs '^enabled' "$register/$1"; then
+    mount -t binfmt_misc none "$register"
+    cat "/usr/lib/binfmt.d/$1.conf" >"$register/register"
+fi
+shift
+exec "$@"
+RUN
+if grep -qs '^enabled' "/proc/sys/fs/binfmt_misc/$qemu"; then namespace=; else namespace="unshare --user --map-root-user --mount"; fi
+# shellcheck disable=SC2086 # a list
+$namespace sh "$in_board" "$qemu" true 2>"$log" ||
+    die "cannot run programs of $board: Linux 6.7 or newer, or a registered $qemu (apt-get install qemu-user-static binfmt-support); see $log"
+say "testing build/$tree under $qemu"
+failed=
+# shellcheck disable=SC2086
+QEMU_LD_PREFIX=$build/boards/$board/sysroot $namespace sh "$in_board" "$qemu" ctest --test-dir "$build/$tree" --output-on-failure \
+    --no-tests=error -j "$(nproc)" -L '^(unit|netlists)$' --output-junit "$log.xml" >"$log" 2>&1 </dev/null || failed=1
+grep -vE '^ *(Start +[0-9]+:|[0-9]+/[0-9]+ .* (Passed|Skipped) )|\(Skipped\)$|\*\*\*Skipped ' "$log" || :
+reasons=$(python3 "$root/tests/skipped.py" "$log.xml")
+[ -z "$reasons" ] || say "skipped, and why (which: $log):
+$reasons"
+say "left out: components/vision, components/dds and tools/python (their libraries are not in the sysroot); tests of real time, of buses between processes, of the command line and of packages, whose times or privileges mean nothing under an emulator"
+say "after $(duration $(($(date +%s) - begun_at)))"
+if [ "$failed" ]; then die "tests of $board failed"; fi
+say "all tests of $board passed"
