@@ -12,7 +12,7 @@
 namespace hal {
 namespace {
 
-std::string missing(std::uint64_t lines) { return "missing here: " + counted(lines, "line") + ", because the reader was too slow"; }
+std::string missing(std::uint64_t lines) { return "missing here: " + counted(static_cast<std::size_t>(lines), "line") + ", because the reader was too slow"; }
 
 }  // namespace
 
@@ -69,7 +69,7 @@ std::vector<JournalEntry> Journal::after(Position& position) {
     std::vector<JournalEntry> all;
     const std::uint64_t first = count_ - entries_.size();
     if (first > position.entry) all.push_back({entries_.front().time_ns, "message", missing(first - position.entry)});
-    for (std::uint64_t i = std::max(first, position.entry); i < count_; ++i) all.push_back(entries_[i - first]);
+    for (std::uint64_t i = std::max(first, position.entry); i < count_; ++i) all.push_back(entries_[static_cast<std::size_t>(i - first)]);
     position.entry = count_;
     for (const FaultRecord& record : state_.faults.records(0)) {
         if (record.number <= position.fault) continue;

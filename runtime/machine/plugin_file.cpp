@@ -50,9 +50,9 @@ std::vector<std::string> names_of(std::string_view content, const std::vector<El
     if (holder == parts.end()) return {};
     const std::uint64_t begin = holder->p_offset + (text - holder->p_vaddr);
     if (begin > content.size()) return {};
-    const std::string_view table = content.substr(begin, size);
+    const std::string_view table = content.substr(static_cast<std::size_t>(begin), static_cast<std::size_t>(size));
     std::vector<std::string> names;
-    for (const std::uint64_t offset : offsets)
+    for (const std::size_t offset : offsets)
         if (offset < table.size()) names.emplace_back(table.substr(offset, table.find('\0', offset) - offset));
     return names;
 }
@@ -72,7 +72,7 @@ PluginFile read_plugin_file(const std::string& path) {
     for (unsigned i = 0; i < header->e_phnum; ++i) {
         const auto part = at<ElfW(Phdr)>(content, header->e_phoff + i * sizeof(ElfW(Phdr)));
         if (!part) return {"the file is cut short", {}};
-        if (part->p_type == PT_LOAD) needed = std::max<std::uint64_t>(needed, part->p_offset + part->p_filesz);
+        if (part->p_type == PT_LOAD) needed = std::max<std::uint64_t>(needed, std::uint64_t{part->p_offset} + part->p_filesz);
         parts.push_back(*part);
     }
     if (needed > content.size()) return {grouped_bytes(content.size(), needed), {}};
