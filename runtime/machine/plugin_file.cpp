@@ -35,7 +35,7 @@ std::string grouped_bytes(std::uint64_t there, std::uint64_t needed) {
 std::vector<std::string> names_of(std::string_view content, const std::vector<ElfW(Phdr)>& parts) {
     const auto dynamic = std::find_if(parts.begin(), parts.end(), [](const ElfW(Phdr)& part) { return part.p_type == PT_DYNAMIC; });
     if (dynamic == parts.end()) return {};
-    std::vector<std::uint64_t> offsets;
+    std::vector<std::size_t> offsets;
     std::uint64_t text = 0, size = 0;
     for (std::uint64_t i = 0; i < dynamic->p_filesz / sizeof(ElfW(Dyn)); ++i) {
         const auto entry = at<ElfW(Dyn)>(content, dynamic->p_offset + i * sizeof(ElfW(Dyn)));
