@@ -75,7 +75,7 @@ ROWS = {
     "components/fieldbus/scocan/wire": ["components/fieldbus/scocan/table"],
     "components/fieldbus/scocan/station": ["components/fieldbus/scocan/wire"],
     "components/fieldbus/scocan/plan": ["components/fieldbus/scocan/table", "components/fieldbus/can_timing"],
-    "components/fieldbus/scocan/plugins": ["components/fieldbus/scocan/station", "runtime/sdk", "drivers/discipline"],
+    "components/fieldbus/scocan/plugins": ["components/fieldbus/scocan/station", "components/fieldbus/messages", "runtime/sdk", "drivers/discipline"],
     "components/fieldbus/messages": ["runtime/sdk", "drivers/link"],
     "components/fieldbus/tdma/wire": ["runtime/sdk", "runtime/text", "drivers/link"],
     "components/fieldbus/tdma/station": ["components/fieldbus/tdma/wire", "drivers/discipline"],

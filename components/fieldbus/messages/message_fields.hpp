@@ -7,10 +7,10 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
-#include <limits>
 #include <string>
 #include <variant>
 
+#include "field_values.hpp"
 #include "hal/component.hpp"
 
 namespace hal::messages {
@@ -111,13 +111,10 @@ public:
             const Field&  f = slots_[i].field;
             std::uint64_t raw = 0;
             if (const auto* b = std::get_if<P<bool>>(&slots_[i].pin)) raw = b->get() ? 1 : 0;
-            else if (const auto* u = std::get_if<P<std::uint32_t>>(&slots_[i].pin)) raw = std::min<std::uint64_t>(u->get(), largest(f));
-            else if (const auto* s = std::get_if<P<std::int32_t>>(&slots_[i].pin)) {
-                const std::int64_t half = std::int64_t{1} << (8 * f.bytes - 1);
-                raw = static_cast<std::uint64_t>(std::clamp<std::int64_t>(s->get(), -half, half - 1));
-            } else if (const auto* r = std::get_if<P<double>>(&slots_[i].pin)) {
-                raw = f.kind == Kind::f64 ? std::bit_cast<std::uint64_t>(r->get()) : std::bit_cast<std::uint32_t>(single(r->get()));
-            }
+            else if (const auto* u = std::get_if<P<std::uint32_t>>(&slots_[i].pin)) raw = unsigned_bits(u->get(), f.bytes);
+            else if (const auto* s = std::get_if<P<std::int32_t>>(&slots_[i].pin)) raw = signed_bits(s->get(), f.bytes);
+            else if (const auto* r = std::get_if<P<double>>(&slots_[i].pin))
+                raw = f.kind == Kind::f64 ? std::bit_cast<std::uint64_t>(r->get()) : single_bits(r->get());
             for (unsigned n = 0; n < f.bytes; ++n) to[f.offset + n] = static_cast<std::uint8_t>(raw >> (8 * n));
         }
     }
@@ -147,11 +144,6 @@ private:
         for (const KindRow& row : kinds)
             if (row.kind == kind) return row.name;
         return "";
-    }
-    static std::uint64_t largest(const Field& f) noexcept { return (std::uint64_t{1} << (8 * f.bytes)) - 1; }
-    static float         single(double value) noexcept {
-        constexpr double most = std::numeric_limits<float>::max();
-        return static_cast<float>(std::isfinite(value) ? std::clamp(value, -most, most) : value);
     }
 
     std::array<Slot, 8> slots_;

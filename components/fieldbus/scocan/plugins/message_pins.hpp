@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 
+#include "fieldbus/messages/field_values.hpp"
 #include "fieldbus/scocan/station/station.hpp"
 #include "hal/component.hpp"
 
@@ -36,13 +37,13 @@ public:
         case FieldType::f64: real_ = std::make_unique<Pin<double>>(c, f, name.c_str(), doc.c_str()); break;
         }
     }
-    /// Writes the value of the pin into the data. [realtime]
+    /// Writes the value of the pin, limited to the range of the field, into the data. [realtime]
     void encode(can::Frame& frame) const noexcept {
         std::uint64_t bits = 0;
-        if (u32_) bits = u32_->get();
-        else if (s32_) bits = static_cast<std::uint32_t>(s32_->get());
+        if (u32_) bits = messages::unsigned_bits(u32_->get(), size_of(field_.type));
+        else if (s32_) bits = messages::signed_bits(s32_->get(), size_of(field_.type));
         else if (field_.type == FieldType::f64) bits = std::bit_cast<std::uint64_t>(real_->get());
-        else bits = std::bit_cast<std::uint32_t>(static_cast<float>(real_->get()));
+        else bits = messages::single_bits(real_->get());
         for (std::uint32_t i = 0; i < size_of(field_.type); ++i) frame.data[field_.at + i] = static_cast<std::uint8_t>(bits >> 8 * i);
     }
     /// Writes the value in the data to the pin. [realtime]
