@@ -62,6 +62,11 @@ public:
         case Event::monitor_lost: return "idle slots are not announced any more: monitor lost; nodes of type B do not use idle slots";
         case Event::monitor_found: return "idle slots are announced again";
         case Event::frame_too_long: return "frame " + named(h.id) + " with " + value + " bytes does not fit into any slot";
+        case Event::not_allowed:
+            return "frame " + named(h.id) + " not sent: " +
+                   (is_reserved(h.id) ? "reserved identifier; use 0x010..0x77F"
+                                      : "identifier of node " + t_.nodes[h.who].name + "; use one of node " + own_) +
+                   "; further ones are counted in dropped";
         }
         return {};
     }

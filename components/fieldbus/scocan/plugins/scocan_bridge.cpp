@@ -77,5 +77,6 @@ The netlist:
     addf scocan-bridge.0.transmit bus
 
 The messages of the bridge in the table are those of the participant and have no pins.
-Frames with an identifier of another node are dropped and counted in `rejected`. Otherwise the node is one like any other, see `hal doc scocan`.
+Frames with a reserved identifier (0x000..0x00F, 0x780..0x7FF) or one that the table gives to another node, in a private slot or as a message, are dropped and
+counted in `rejected`; the first of each identifier is reported. Otherwise the node is one like any other, see `hal doc scocan`.
 )")

@@ -29,7 +29,7 @@ struct StationPins {
     hal::Out<std::uint64_t> missed{c, f, "missed", "private slots in which a frame could not be sent"};
     hal::Out<std::uint64_t> foreign{c, f, "foreign", "frames of other nodes outside of their slots"};
     hal::Out<std::uint64_t> late{c, f, "late", "own frames outside of their slots"};
-    hal::Out<std::uint64_t> dropped{c, f, "dropped", "frames not accepted: queue full, or identifier of another node"};
+    hal::Out<std::uint64_t> dropped{c, f, "dropped", "frames not accepted: queue full, or identifier reserved or of another node"};
     hal::Out<std::uint32_t> waiting{c, f, "waiting", "frames waiting for a slot"};
 
     /// Shows the state of the station. [realtime]

@@ -35,7 +35,8 @@ public:
     void receive(Time now) noexcept;  ///< [realtime]
     void transmit(Time now, Time period) noexcept;  ///< [realtime]
     /// Queues a frame: for a private slot of this node that carries its identifier, else for shared slots. `state`: a value, which replaces
-    /// an older one that still waits. `slot`: a certain private slot. Returns rejected for an identifier of another node. [realtime]
+    /// an older one that still waits. `slot`: a certain private slot. Returns rejected for an identifier that is reserved or of another node,
+    /// and reports the first such frame of each identifier. [realtime]
     can::Sent send(const can::Frame&, bool state, std::uint32_t slot = no_slot) noexcept;
     void      withdraw(std::uint32_t id) noexcept { queue_.withdraw(id); }  ///< Removes a waiting value. [realtime]
     /// Asks all nodes for a mode change. Only the node that sends the SYNC; returns false on all others. [realtime]
@@ -95,6 +96,7 @@ private:
     void          close_cycle() noexcept;
     std::uint32_t owner_of(std::uint32_t id) const noexcept;
     // station_transmit.cpp
+    can::Sent         not_allowed(std::uint32_t id, std::uint32_t sender) noexcept;
     bool              may_send(std::uint64_t cycle) const noexcept;
     void              plan_ahead(Time now, Time period) noexcept;
     void              plan(std::uint64_t cycle, std::uint32_t slot, Time begin) noexcept;
@@ -165,6 +167,7 @@ private:
     std::array<can::Frame, 16>           frames_;  ///< within receive()
     std::array<std::uint8_t, most_slots> last_index_{};  ///< by slot: identifier sent last
     std::array<std::uint32_t, 2048>      foreign_{};
+    std::array<bool, identifiers>        not_allowed_{};  ///< by identifier: reported
     std::array<bool, most_slots>         seen_{}, told_{};  ///< slots of this cycle with a frame, with an announcement
     std::uint32_t                        foreign_in_cycle_ = 0, foreign_id_ = 0, unannounced_cycles_ = 0, offences_ = 0;
     Time                                 first_offence_ = 0;

@@ -44,6 +44,7 @@ enum class Event : std::uint8_t {
     monitor_lost,    ///< idle slots are not announced any more
     monitor_found,
     frame_too_long,  ///< id; value: bytes: does not fit into any slot
+    not_allowed,     ///< id, who: its owner by the table, or no_node for a reserved one: not sent; once for each identifier
 };
 inline constexpr std::uint32_t no_node = UINT32_MAX;
 

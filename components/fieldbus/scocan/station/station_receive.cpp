@@ -37,6 +37,7 @@ void Station::attach(can::Link& link) noexcept {
     counter_ = mode_ = offences_ = unannounced_cycles_ = 0;
     first_seen_ = last_begin_ = INT64_MIN;
     leader_ = no_node;
+    not_allowed_.fill(false);
 }
 
 void Station::receive(Time now) noexcept {

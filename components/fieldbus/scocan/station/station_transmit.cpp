@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
+#include <utility>
 
 #include "link/timing.hpp"
 #include "station.hpp"
@@ -7,11 +8,10 @@
 namespace hal::scocan {
 
 can::Sent Station::send(const can::Frame& frame, bool state, std::uint32_t slot) noexcept {
-    if (frame.extended || frame.fd || !frame.valid() || frame.id < 0x10 || table_.last_start(frame.length) < 0)
-        return ++count_.dropped, can::Sent::rejected;
-    const Use* owner = table_.owner(mode_, frame.id);
-    bool       priv = owner != nullptr;
-    if (owner != nullptr && owner->node != node_) return ++count_.dropped, can::Sent::rejected;
+    if (frame.extended || frame.fd || !frame.valid() || table_.last_start(frame.length) < 0) return ++count_.dropped, can::Sent::rejected;
+    if (const std::uint32_t sender = owner_of(frame.id); is_reserved(frame.id) || (sender != no_node && sender != node_))
+        return not_allowed(frame.id, sender);
+    bool priv = table_.owner(mode_, frame.id) != nullptr;
     if (slot != no_slot) {
         const Use* use = slot < table_.slots ? table_.use(mode_, slot, counter_) : nullptr;
         if (use == nullptr || use->node != node_ || !use->carries(frame.id)) return ++count_.dropped, can::Sent::rejected;
@@ -19,6 +19,13 @@ can::Sent Station::send(const can::Frame& frame, bool state, std::uint32_t slot)
     }
     if (queue_.push(frame, slot, priv, state)) return can::Sent::queued;
     return ++count_.dropped, can::Sent::full;
+}
+
+/// Drops a frame whose identifier is reserved or of another node; the first of each identifier is reported.
+can::Sent Station::not_allowed(std::uint32_t id, std::uint32_t sender) noexcept {
+    ++count_.dropped;
+    if (!std::exchange(not_allowed_[id], true)) raise(Event::not_allowed, sender, id);
+    return can::Sent::rejected;
 }
 
 void Station::transmit(Time now, Time period) noexcept {

@@ -14,6 +14,8 @@ constexpr std::uint32_t monitor_cycles = 10;     // without announcements until 
 std::uint32_t Station::owner_of(std::uint32_t id) const noexcept {
     if (const Use* use = table_.owner(mode_, id)) return static_cast<std::uint32_t>(use->node);
     if (const Message* m = table_.message(id)) return static_cast<std::uint32_t>(m->node);
+    for (const Mode& mode : table_.modes)
+        if (const Use* use = table_.owner(mode.number, id)) return static_cast<std::uint32_t>(use->node);
     return no_node;
 }
 

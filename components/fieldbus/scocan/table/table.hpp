@@ -28,7 +28,9 @@ const char* code_of(Topic);  ///< "scocan-line", …: the diagnostic's code
 
 inline constexpr std::uint32_t sync_id = 0, announce_id = 1, request_id = 0x780, answer_id = 0x781;
 inline constexpr std::uint32_t identifiers = 0x800;
-inline constexpr std::size_t   most_nodes = 126, most_slots = 256, most_modes = 16, counter_cycles = 64;
+/// Returns whether the discipline itself uses the identifier: 0x000..0x00F, 0x780..0x7FF. [realtime]
+constexpr bool               is_reserved(std::uint32_t id) noexcept { return id < 0x10 || id >= request_id; }
+inline constexpr std::size_t most_nodes = 126, most_slots = 256, most_modes = 16, counter_cycles = 64;
 /// An error flag with its delimiter: bits that the bus is busy after a disturbed frame.
 inline constexpr std::uint32_t error_bits = 20;
 /// Longest SYNC: DLC 2 with all stuff bits and the intermission.

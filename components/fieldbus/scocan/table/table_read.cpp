@@ -113,7 +113,7 @@ private:
         const auto value = parse_natural(w.text);
         if (!value || *value > 0x7ff) return error(Topic::value, w.at, "invalid identifier " + quoted(w.text), "write 0x010..0x77F"), false;
         out = static_cast<std::uint32_t>(*value);
-        if (out >= 0x10 && out < request_id) return true;
+        if (!is_reserved(out)) return true;
         const bool is_sync = out < 0x10;
         error(Topic::value, w.at, "reserved identifier " + id_text(out),
               is_sync ? "0x000..0x00F are for the SYNC and the announcements; use 0x010..0x77F"
