@@ -97,6 +97,19 @@ std::string arithmetic(const Table& t, const Latency& l) {
     return text + fmt::format(" = {} ms", ms(l.worst));
 }
 
+/// Explains why a message is late, and what to change.
+std::pair<std::string, std::string> reason(const Table& t, const Latency& l) {
+    const Message& m = t.messages[l.message];
+    if (l.worst < 0) return {"", "give it a private slot, use more shared slots, a higher bit rate, or a longer period"};
+    const Time turn = l.gap * l.turns;
+    std::string why;
+    if (l.worst > l.deadline) why += fmt::format(", deadline {} ms", ms(l.deadline));
+    if (!l.priv) return {why, "give it a private slot, use more shared slots, a higher bit rate, or a longer period"};
+    if (m.period > 0 && turn > m.period)
+        why += fmt::format(", period {} ms is shorter than {} ms between two turns", ms(m.period), ms(turn));
+    return {why, "give it more private slots, a shorter cycle, or a longer period and deadline"};
+}
+
 std::string text_of(const Table& t, const plan::Plan& p) {
     const Mode& m = *t.mode(p.mode);
     std::string text =
@@ -193,11 +206,12 @@ int run_scocan_plan(const ScocanPlanOptions& options) {
     if (!print(options.json ? json_text(t, p) : text_of(t, p))) return 1;
     if (p.fits) return 0;
     std::string late;
-    for (const Latency& l : p.latencies)
-        if (!l.in_time)
-            late += fmt::format("{}:{}: {}{}\n", file, t.messages[l.message].at.line, arithmetic(t, l),
-                                l.worst < 0 ? "" : fmt::format(", deadline {} ms", ms(l.deadline)));
-    write_all(STDERR_FILENO, late + "  = help: give it a private slot, use more shared slots, a higher bit rate, or a longer period\n");
+    for (const Latency& l : p.latencies) {
+        if (l.in_time) continue;
+        const auto [why, help] = reason(t, l);
+        late += fmt::format("{}:{}: {}{}\n  = help: {}\n", file, t.messages[l.message].at.line, arithmetic(t, l), why, help);
+    }
+    write_all(STDERR_FILENO, late);
     return 1;
 }
 
