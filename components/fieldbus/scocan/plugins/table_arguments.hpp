@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "fieldbus/scocan/station/station_events.hpp"
 #include "hal/component.hpp"
 #include "hal/texts.hpp"
+#include "text/suggest.hpp"
 
 namespace hal::scocan {
 
@@ -62,8 +64,25 @@ struct TableArguments {
             throw hal::ArgumentError("node", "node=" + node.get() + " has the role " + to_string(role) + "; load it by: loadrt " +
                                                  components[static_cast<std::size_t>(role)] + " node=" + node.get());
         }
+        check_receives(file);
         if (link.get().empty()) throw std::invalid_argument("missing link=; write link=sim:NAME or link=can:can0");
         loaded = true;
+    }
+
+    /// Rejects a name in receive= that is not that of a message. [setup]
+    void check_receives(const std::string& file) const {
+        const std::string& list = receives.get();
+        if (list == "all" || list == "none") return;
+        std::vector<std::string> all;
+        for (const Message& m : table.messages) all.push_back(m.name);
+        for (std::size_t at = 0; at <= list.size();) {
+            const std::size_t end = std::min(list.find(',', at), list.size());
+            const std::string one = list.substr(at, end - at);
+            if (std::find(all.begin(), all.end(), one) == all.end())
+                throw hal::ArgumentError("receive", "receive: unknown message '" + one + "' in " + file + "; " +
+                                                        suggestion(one, all, "write all, none, or names of messages"));
+            at = end + 1;
+        }
     }
 
     StationOptions options() const {
