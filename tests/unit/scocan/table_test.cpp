@@ -61,13 +61,36 @@ TEST(Table, that_cannot_work_is_rejected_with_the_calculation) {
         "backups or longer slots",
         errors(std::string(head) + "node b A backup 7\n" + run));
     EXPECT_EQ(
-        "t:2:6: error: guard 1 us is too short: 3 bits + 0.3 us + 4 ppm of the cycle = 3.34 us; delete the line guard, or write a longer "
-        "time",
+        "t:2:6: error: guard 1 us is too short: 3 bits + 0.3 us + 4 ppm of the 10 cycles that nodes coast = 3.7 us; delete the line guard, "
+        "write a longer time, or fewer cycles in the line lost",
         errors(std::string("guard 1us\n") + head + run));
     EXPECT_EQ(
         "t:7:9: error: identifier 0x150 of 'a' is in the range of private slots (0x100..0x2FF) and has none; give it a slot: 3 private ir "
         "0x150, or use 0x300..0x77F",
         errors(std::string(head) + run + "message a 0x150 node ir\n"));
+}
+
+TEST(Guard, covers_the_time_that_nodes_coast) {
+    EXPECT_EQ(
+        "t:3:6: error: guard 4 us is too short: 3 bits + 0.3 us + 4 ppm of the 1000 cycles that nodes coast = 43.3 us; delete the line "
+        "guard, write a longer time, or fewer cycles in the line lost",
+        errors(std::string("lost 1000\nguard 4us\n") + head + run));
+    EXPECT_EQ("", errors(std::string("lost 1000\nguard 44us\n") + head + run));
+    EXPECT_EQ(44'000, read(std::string("lost 1000\n") + head + run).table.guard);
+}
+
+TEST(Message, that_contradicts_itself_or_the_pins_of_its_components_is_rejected) {
+    const std::string table = std::string(head) + run + "2 private motor 0x10A\n";
+    for (const char* name : {"send", "sent", "fresh", "received", "age", "interval"})
+        EXPECT_EQ("t:8:42: error: reserved field name '" + std::string(name) +
+                      "'; each message has pins send, sent, fresh, received, age and interval; choose another name",
+                  errors(table + "message position 0x10A fields a:s16,b:s8," + name + ":s32\n"));
+    EXPECT_EQ("", errors(table + "message position 0x10A fields send-a:s16,data:s32\n"));
+    EXPECT_EQ("t:8:36: error: period and event are both given; delete one of them; event T is the shortest interval of an event",
+              errors(table + "message m 0x011 node ir period 1ms event 2ms\n"));
+    EXPECT_EQ("t:8:35: error: period and event are both given; delete one of them; event T is the shortest interval of an event",
+              errors(table + "message m 0x011 node ir event 1ms period 2ms\n"));
+    EXPECT_EQ("t:8:33: error: duplicate key 'bytes'; delete one of them", errors(table + "message m 0x011 node ir bytes 1 bytes 2\n"));
 }
 
 TEST(Slot, may_be_shared_by_cycles) {

@@ -66,11 +66,11 @@ private:
 
     void times() {
         const Span& at = t_.nodes.front().at;
-        if (t_.guard < t_.required_guard(t_.cycle))
+        if (const Time required = t_.required_guard(t_.cycle * t_.lost); t_.guard < required)
             error(at,
-                  "guard " + microseconds(t_.guard) +
-                      " is too short: 3 bits + 0.3 us + 4 ppm of the cycle = " + microseconds(t_.required_guard(t_.cycle)),
-                  "delete the line guard, or write a longer time");
+                  "guard " + microseconds(t_.guard) + " is too short: 3 bits + 0.3 us + 4 ppm of the " + std::to_string(t_.lost) +
+                      " cycles that nodes coast = " + microseconds(required),
+                  "delete the line guard, write a longer time, or fewer cycles in the line lost");
         if (t_.enabled() < t_.bits(4))
             error(at,
                   "idle " + microseconds(t_.idle) +

@@ -241,6 +241,10 @@ private:
         bool sender = false, sized = false;
         for (std::size_t i = 3; i < w.size(); i += 2) {
             const std::string& key = w[i].text;
+            for (std::size_t k = 3; k < i; k += 2)
+                if (const std::string& other = w[k].text; other == key || is_interval(other, key))
+                    return error(Topic::line, w[i].at, other == key ? "duplicate key " + quoted(key) : "period and event are both given",
+                                 other == key ? "delete one of them" : "delete one of them; event T is the shortest interval of an event");
             if (i + 1 == w.size())
                 return error(Topic::line, w[i].at, quoted(key) + " has no value", std::string("write ") + keys().at("message").usage);
             const Word& value = w[i + 1];
@@ -272,8 +276,13 @@ private:
         out_.table.messages.push_back(std::move(m));
     }
 
+    static bool is_interval(std::string_view a, std::string_view b) {
+        return (a == "period" && b == "event") || (a == "event" && b == "period");
+    }
+
     bool fields(const Word& value, Message& m) {
-        std::uint32_t at = 0;
+        constexpr std::string_view pins[] = {"send", "sent", "fresh", "received", "age", "interval"};
+        std::uint32_t              at = 0;
         for (const Word& one : text::list_of(value)) {
             const auto          colon = one.text.find(':');
             constexpr FieldType types[] = {FieldType::u8,  FieldType::s8,  FieldType::u16, FieldType::s16,
@@ -286,6 +295,10 @@ private:
                        false;
             const Word field_name = text::part(one, 0, colon);
             if (!name(field_name)) return false;
+            if (std::find(std::begin(pins), std::end(pins), field_name.text) != std::end(pins))
+                return error(Topic::value, field_name.at, "reserved field name " + quoted(field_name.text),
+                             "each message has pins send, sent, fresh, received, age and interval; choose another name"),
+                       false;
             for (const Field& other : m.fields)
                 if (other.name == field_name.text)
                     return error(Topic::value, field_name.at, "duplicate field " + quoted(field_name.text)), false;
