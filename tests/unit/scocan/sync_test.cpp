@@ -73,6 +73,49 @@ TEST(Sync, lost_for_too_long_silences_a_node_that_recovers) {
     EXPECT_GT(motor.station.count().sent_private, before);
 }
 
+TEST(Sync, with_any_phase_ends_silence_at_once) {
+    Bus bus;
+    Member& clock = bus.add("clock");
+    Member& motor = bus.add("motor");
+    const auto send = [&] { motor.station.send({0x10A, {7}}, true); };
+    bus.run(100 * ms, 500 * us, send);
+    clock.station.detach();
+    bus.run(200 * ms, 500 * us, send);
+    ASSERT_EQ(State::silent, motor.station.state());
+    bus.now += 1234567;  // the restarted node begins its cycles at any instant
+    clock.station.attach(*clock.link);
+    const auto syncs = motor.station.count().syncs;
+    while (motor.station.count().syncs == syncs) bus.run(500 * us, 500 * us, send);
+    EXPECT_EQ(State::running, motor.station.state()) << "at the first SYNC";
+    bus.run(100 * ms, 500 * us, send);
+    EXPECT_EQ(State::running, motor.station.state());
+    EXPECT_EQ(0U, motor.times(Event::sync_late) + motor.times(Event::sync_doubled));
+    EXPECT_EQ(1U, motor.times(Event::sync_jumped));
+    EXPECT_EQ(0U, motor.station.count().syncs_ignored);
+    EXPECT_EQ(0U, motor.station.count().late);
+    EXPECT_NEAR(0, motor.station.clock().error(), 10);
+}
+
+TEST(Sync, at_a_rate_that_is_not_that_of_a_clock_is_reported) {
+    for (const double ppm : {900.0, 1100.0, -1100.0, 5000.0, 300'000.0}) {
+        Bus bus;
+        bus.add("clock");
+        Member& motor = bus.add("motor", {.crystal = {.ppm = ppm}});
+        bus.run(1000 * ms);
+        const auto& n = motor.station.count();
+        if (ppm == 900.0) {
+            EXPECT_EQ(State::running, motor.station.state());
+            EXPECT_EQ(0U, n.syncs_ignored + motor.times(Event::sync_off_rate));
+            continue;
+        }
+        EXPECT_EQ(State::listening, motor.station.state()) << ppm;
+        EXPECT_GE(n.syncs_ignored, 190U);
+        ASSERT_GE(motor.times(Event::sync_off_rate), 100U);
+        EXPECT_EQ(Event::sync_off_rate, motor.events.back().event);
+        EXPECT_NEAR(ppm, static_cast<double>(motor.events.back().value), 5);
+    }
+}
+
 TEST(Sync, late_or_doubled_is_ignored) {
     Bus bus;
     bus.add("clock", {.single_shot = false});

@@ -35,6 +35,9 @@ public:
             return "SYNC " + microseconds(std::abs(h.value)) + (h.value > 0 ? " late" : " early") +
                    ", ignored; if this repeats, disable automatic retransmission on node " + sync_node();
         case Event::sync_doubled: return "second SYNC in one cycle ignored; disable automatic retransmission on node " + sync_node();
+        case Event::sync_off_rate:
+            return "not synchronised: the interval of the SYNC is " + value +
+                   " ppm off the cycle (limit 1000 ppm); correct the clock of this node or of node " + sync_node();
         case Event::sync_jumped: return "the SYNC has a new phase, followed";
         case Event::other_sync: return "second SYNC node on the bus; this one is on standby; remove one of them, or make it a backup";
         case Event::leading: return "sends the SYNC";
@@ -109,6 +112,7 @@ class FaultWords {
 public:
     FaultWords(const Table& t, const EventWords& words) {
         text_[Event::sync_lost] = "no SYNC for {} cycles (limit " + std::to_string(t.lost) + "); sends nothing until the next SYNC";
+        text_[Event::sync_off_rate] = "not synchronised: the interval of the SYNC is {} ppm off the cycle (limit 1000 ppm)";
         text_[Event::other_sync] = "second SYNC node on the bus; this one is on standby";
         text_[Event::other_table] = "table differs from that of the SYNC node; receives only";
         text_[Event::unknown_mode] = "mode {} of the SYNC is not in the table; receives only";

@@ -22,7 +22,8 @@ struct StationPins {
     hal::Out<double>        drift{c, f, "drift", "rate of this node's clock against that of the SYNC node", {.unit = "ppm"}};
     hal::Out<std::uint64_t> syncs{c, f, "syncs", "SYNCs received or sent"};
     hal::Out<std::uint64_t> syncs_lost{c, f, "syncs-lost", "cycles without a SYNC"};
-    hal::Out<std::uint64_t> syncs_ignored{c, f, "syncs-ignored", "SYNCs ignored: late, doubled or invalid"};
+    hal::Out<std::uint64_t> syncs_ignored{c, f, "syncs-ignored",
+                                          "SYNCs ignored: late, doubled, invalid, or at a rate more than 1000 ppm off"};
     hal::Out<std::uint64_t> sent_private{c, f, "sent-private", "frames sent in private slots"};
     hal::Out<std::uint64_t> sent_shared{c, f, "sent-shared", "frames sent in shared slots"};
     hal::Out<std::uint64_t> sent_recycled{c, f, "sent-recycled", "frames sent in idle private slots"};

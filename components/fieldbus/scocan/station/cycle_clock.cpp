@@ -43,7 +43,13 @@ CycleClock::Taken CycleClock::take(Time stamp) noexcept {
     const double d = static_cast<double>(stamp - epoch_) - p_;
     const double n = std::round(d / period_);
     if (taken_ == 1) {
-        if (n < 1 || n > 8 || std::abs(d / n / nominal_ - 1) > largest_drift) return begin();
+        if (n < 1 || n > 8) return begin();
+        const double off = d / n / nominal_ - 1;
+        if (std::abs(off) > largest_drift) {
+            off_ = off;
+            begin();
+            return Taken::off_rate;
+        }
         period_ = d / n;
         cycle_ += static_cast<std::uint64_t>(n);
         p_ += d, taken_ = 2, lost_ = 0, seen_ = true;
@@ -54,7 +60,7 @@ CycleClock::Taken CycleClock::take(Time stamp) noexcept {
     const double limit = taken_ < settling ? nominal_ / 4 : std::max(5 * sigma(), floor_);
     if (n < 0 || std::abs(e) > limit) {
         error_ = e;
-        if (++rejected_ < 3) return Taken::rejected;
+        if (++rejected_ <= most_rejected) return Taken::rejected;
         const double kept = period_;
         begin();
         period_ = kept, taken_ = 2;

@@ -18,13 +18,16 @@ public:
         clear();
     }
 
-    enum class Taken : std::uint8_t { first, good, rejected, duplicate, jumped };
+    /// off_rate: the interval of two SYNCs differs by more than 1000 ppm from the cycle; the estimate begins anew.
+    enum class Taken : std::uint8_t { first, good, rejected, duplicate, jumped, off_rate };
 
     void clear() noexcept;  ///< Discards the estimate. [realtime]
     /// Begins a cycle of the nominal period at `begin`, without a SYNC of others. [realtime]
     void lead(Time begin) noexcept;
     /// Uses the stamp of a SYNC: the begin of its cycle. [realtime]
     Taken take(Time stamp) noexcept;
+    /// Lets the next SYNC have any phase, after a time in which the prediction has become too inaccurate. [realtime]
+    void accept_any_phase() noexcept { rejected_ = most_rejected; }
     /// Notes that the SYNC of this cycle was sent by this node: it keeps its time. [realtime]
     void own(Time stamp) noexcept;
     /// Begins the cycles whose SYNC is `wait` overdue at `now`. Returns how many. [realtime]
@@ -41,14 +44,17 @@ public:
     double period() const noexcept { return period_; }  ///< ns of this node's clock
     double error() const noexcept { return error_; }  ///< of the last SYNC, ns
     double sigma() const noexcept;  ///< rms of the errors, ns
+    double off_ppm() const noexcept { return off_ * 1e6; }  ///< deviation of the last interval that was off_rate
     double ppm() const noexcept { return (period_ / nominal_ - 1) * 1e6; }  ///< rate of this clock against that of the SYNC's sender
 
 private:
     void advance(std::uint32_t cycles) noexcept;
 
+    static constexpr std::uint32_t most_rejected = 2;  // in a row; the next one is a new phase
+
     const double  nominal_, per_nominal_, floor_;
     Time          epoch_ = 0;  // p_ counts from here, so that it keeps fractions of a nanosecond
-    double        p_ = 0, period_ = 0, error_ = 0, square_ = 0;
+    double        p_ = 0, period_ = 0, error_ = 0, square_ = 0, off_ = 0;
     std::uint32_t taken_ = 0, lost_ = 0, rejected_ = 0;
     bool          seen_ = false;
     std::uint64_t cycle_ = 0;

@@ -169,9 +169,10 @@ private:
     std::array<std::uint32_t, 2048>      foreign_{};
     std::array<bool, identifiers>        not_allowed_{};  ///< by identifier: reported
     std::array<bool, most_slots>         seen_{}, told_{};  ///< slots of this cycle with a frame, with an announcement
-    std::uint32_t                        foreign_in_cycle_ = 0, foreign_id_ = 0, unannounced_cycles_ = 0, offences_ = 0;
-    Time                                 first_offence_ = 0;
-    bool                                 monitored_ = false, monitor_lost_ = false, babbled_ = false;
+    std::uint32_t                        foreign_in_cycle_ = 0, foreign_id_ = 0, unannounced_cycles_ = 0, offences_ = 0,
+                  off_rate_ = 0;  ///< off_rate_: SYNC intervals in a row that no clock explains
+    Time first_offence_ = 0;
+    bool monitored_ = false, monitor_lost_ = false, babbled_ = false;
 };
 
 }  // namespace hal::scocan

@@ -25,6 +25,7 @@ enum class Event : std::uint8_t {
     sync_lost,       ///< value: SYNCs lost; the node stops sending
     sync_late,       ///< value: ns behind (or before) its time; ignored
     sync_doubled,    ///< a second SYNC in one cycle; ignored
+    sync_off_rate,   ///< value: ppm of the SYNC's interval against the cycle; ignored: the node does not synchronise
     sync_jumped,     ///< a new phase: adopted
     other_sync,      ///< who: a second SYNC node sends; this one is on standby
     leading,         ///< this node sends the SYNC

@@ -7,6 +7,10 @@
 
 namespace hal::scocan {
 
+namespace {
+constexpr std::uint32_t most_off_rate = 3;  // intervals in a row, until the rate is reported: one may be that of a disturbed SYNC
+}
+
 const char* to_string(State state) noexcept {
     constexpr const char* words[] = {"listening", "running", "silent", "listen-only", "silenced", "down"};
     return words[static_cast<std::size_t>(state)];
@@ -34,7 +38,7 @@ void Station::attach(can::Link& link) noexcept {
     silenced_ = listen_only_ = mode_unknown_ = was_down_ = was_silent_ = false;
     numbered_ = leading_ = standby_ = monitored_ = monitor_lost_ = false;
     armed_ = {}, change_ = {};
-    counter_ = mode_ = offences_ = unannounced_cycles_ = 0;
+    counter_ = mode_ = offences_ = unannounced_cycles_ = off_rate_ = 0;
     first_seen_ = last_begin_ = INT64_MIN;
     leader_ = no_node;
     not_allowed_.fill(false);
@@ -100,7 +104,11 @@ void Station::sync(const can::Frame& frame, Time begin) noexcept {
     const bool          was_known = clock_.known();
     switch (clock_.take(stamp)) {
     case CycleClock::Taken::first: numbered_ = false; break;
-    case CycleClock::Taken::good: break;
+    case CycleClock::Taken::good: off_rate_ = 0; break;
+    case CycleClock::Taken::off_rate:
+        ++count_.syncs_ignored, numbered_ = false;
+        if (++off_rate_ >= most_off_rate) raise(Event::sync_off_rate, no_node, 0, std::llround(clock_.off_ppm()));
+        return;
     case CycleClock::Taken::rejected: ++count_.syncs_ignored; return raise(Event::sync_late, no_node, 0, std::llround(clock_.error()));
     case CycleClock::Taken::duplicate: ++count_.syncs_ignored; return raise(Event::sync_doubled);
     case CycleClock::Taken::jumped: raise(Event::sync_jumped); break;
@@ -184,6 +192,7 @@ void Station::judge(Time now) noexcept {
     const Time age = std::max<Time>(now - clock_.start(), 0) + table_.cycle * clock_.lost();
     const bool silent =
         clock_.known() && !leading_ && (clock_.lost() > table_.lost || table_.required_guard(age) > table_.guard + table_.bits(1));
+    if (silent) clock_.accept_any_phase();
     if (silent && !was_silent_) ++count_.losses, raise(Event::sync_lost, no_node, 0, clock_.lost());
     was_silent_ = silent;
     const State before = state_;
