@@ -32,6 +32,59 @@ TEST(Node, sends_at_the_begin_of_its_private_slot) {
     EXPECT_EQ(0U, clock.station.count().foreign);
 }
 
+/// Steps the SYNC node every 500 us and the motor in a thread of `period`. Returns the turns of the motor's slot from 200 ms on, within 1 s.
+std::size_t turns_in_a_slow_thread(Bus& bus, Member& clock, Member& motor, Time period) {
+    std::size_t before = 0;
+    for (const Time begin = bus.now; bus.now < begin + 1200 * ms; bus.now += 500 * us) {
+        clock.station.receive(bus.now);
+        clock.station.transmit(bus.now, 500 * us);
+        if ((bus.now - begin) % period == 0) {
+            if (before == 0 && bus.now >= begin + 200 * ms) before = clock.count(0x10A);
+            motor.station.receive(bus.now);
+            motor.station.send({0x10A, {static_cast<std::uint8_t>(bus.now / period)}}, true);
+            motor.station.transmit(bus.now, period);
+        }
+    }
+    return clock.count(0x10A) - before;
+}
+
+TEST(Node_in_a_slow_thread, sends_its_newest_value_in_each_turn) {
+    for (const Time period : {5 * ms, 7 * ms, 10 * ms, 20 * ms, 50 * ms}) {  // the cycle is 5 ms
+        Bus bus;
+        Member& clock = bus.add("clock");
+        Member& motor = bus.add("motor");
+        EXPECT_NEAR(200, static_cast<double>(turns_in_a_slow_thread(bus, clock, motor, period)), 11) << period;
+        EXPECT_EQ(0U, motor.station.count().missed);
+        EXPECT_EQ(0U, motor.station.count().late + clock.station.count().foreign);
+        for (std::size_t i = 1; i < clock.received.size(); ++i) {
+            const Time between = clock.received[i].begin - clock.received[i - 1].begin;
+            if (clock.received[i].begin > clock.received.front().begin + 200 * ms)
+                EXPECT_NEAR(5e6, static_cast<double>(between), 1000) << period;
+            EXPECT_LE((clock.received[i].frame.data[0] - clock.received[i - 1].frame.data[0] + 256) % 256, 2) << "an old value";
+        }
+    }
+}
+
+TEST(Node_in_a_slow_thread, without_windows_counts_and_reports_the_turns_that_it_misses) {
+    for (const Time period : {500 * us, 10 * ms, 20 * ms, 50 * ms}) {
+        Bus bus;
+        Member& clock = bus.add("clock");
+        Member& motor = bus.add("motor", {.windows = false});
+        const std::size_t sent = turns_in_a_slow_thread(bus, clock, motor, period);
+        const auto missed = motor.station.count().missed;
+        EXPECT_NEAR(235, static_cast<double>(clock.count(0x10A) + missed), 25) << period << ": " << sent << " sent, " << missed << " missed";
+        if (period == 500 * us) {
+            EXPECT_EQ(0U, missed);
+            EXPECT_EQ(0U, motor.times(Event::slot_missed));
+            continue;
+        }
+        EXPECT_EQ(missed, motor.times(Event::slot_missed));
+        ASSERT_GT(missed, 100U);
+        for (const test::Happened& h : motor.events)
+            if (h.event == Event::slot_missed) EXPECT_TRUE(h.id == 0x10A && h.value == period);
+    }
+}
+
 /// Random messages of shared slots, so that the bus is always full.
 struct Load {
     explicit Load(Member& sender, std::uint32_t identifier) : node(sender), id(identifier) {}

@@ -50,6 +50,9 @@ public:
         case Event::foreign_frame: return foreign(h.id, h.who, value);
         case Event::babbling:
             return "babbling node: " + value + " frames outside of their slots in one cycle, the last " + named(h.id) + owner(h.who);
+        case Event::slot_missed:
+            return "frame " + named(h.id) + " missed its slot: no cycle of the thread of " + microseconds(h.value) +
+                   " began within its transmit window of " + microseconds(t_.enabled()) + "; use a faster thread, or a longer idle time";
         case Event::late_frame:
             return "own frame " + named(h.id) + " started " + microseconds(h.value) +
                    " behind its transmit window; use a faster thread, or a longer idle time";

@@ -46,7 +46,8 @@ The sender of a message sets its fields, `scocan.0.position.a`; a value out of t
 message with a private slot is sent in each turn of its slot, one with a period in shared slots at that period; an event message is sent at a rising edge of
 `send`. Other components send through the slots of a node by a link: `link = scocan:motor`, or `scocan:motor?slot=3` for a certain private slot.
 
-On a bus in memory frames start at their instant, whatever the period of the thread. On `can:` and `udp:` a frame leaves in the cycle of the thread that is
+On a bus in memory frames start at their instant, whatever the period of the thread; a thread slower than the turns of a slot sends its newest value again in
+each of them. On `can:` and `udp:` a frame leaves in the cycle of the thread that is
 within its window: let the thread be several times faster than the slots, and make `idle` and `guard` of the table longer than its wake-up latency.
 
 A node that has lost more SYNCs than `lost` of the table sends nothing until the next one. A node whose table differs from that of the SYNC node receives

@@ -30,6 +30,14 @@ void SendQueue::withdraw(std::uint32_t id) noexcept {
         if (entries_[i].state && !entries_[i].in_flight && entries_[i].frame.id == id) remove(i);
 }
 
+SendQueue::Entry* SendQueue::handed_over(std::uint32_t id, Time planned) noexcept {
+    for (std::size_t i = size_; i-- > 0;) {
+        Entry& e = entries_[i];
+        if (e.in_flight && e.priv && e.state && e.frame.id == id && e.planned == planned) return &e;
+    }
+    return nullptr;
+}
+
 bool SendQueue::confirm(const can::Frame& echo, Entry& sent) noexcept {
     for (std::size_t i = 0; i < size_; ++i) {
         if (!entries_[i].in_flight || !entries_[i].frame.same(echo)) continue;

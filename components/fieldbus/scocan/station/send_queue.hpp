@@ -22,7 +22,7 @@ public:
         bool          state = false;            ///< a value: a newer one replaces it
         bool          in_flight = false;
         Time          until = 0;                ///< in flight: when its slot has ended
-        Time          due = 0;                  ///< in flight: begin of its window
+        Time          planned = INT64_MIN;  ///< in flight: time of the call that handed it over
     };
 
     /// Queues a frame behind those of the same priority. Returns false when full. [realtime]
@@ -36,6 +36,8 @@ public:
             if (!entries_[i].in_flight && fits(entries_[i])) return &entries_[i];
         return nullptr;
     }
+    /// Returns the newest value of an identifier that was handed over in the call at `planned`, or nullptr. [realtime]
+    Entry* handed_over(std::uint32_t id, Time planned) noexcept;
     /// Removes the frame in flight that was echoed. Returns false when there is none; `sent` is a copy. [realtime]
     bool confirm(const can::Frame&, Entry& sent) noexcept;
     /// Ends the flight of frames whose slot is over: they wait again. Returns how many private ones missed theirs. [realtime]

@@ -80,6 +80,9 @@ private:
         std::uint32_t mode = 0;
         std::uint64_t at = 0;  ///< cycle of the switch
     };
+    struct Value {  // of a private message
+        Time last = INT64_MIN, since = 0;  ///< calls in which it was queued: the last one, the first one of a sequence
+    };
 
     // station_receive.cpp
     void  arrived(const can::Frame&) noexcept;
@@ -104,6 +107,8 @@ private:
     void              recycle_announced(Time now) noexcept;
     void              start_now(Time now) noexcept;
     SendQueue::Entry* next_private(const Use&, std::uint32_t slot) noexcept;
+    SendQueue::Entry* repeated(const Use&, std::uint32_t slot) noexcept;
+    void              count_turns(Time now, Time period) noexcept;
     bool              emit(const can::Frame&, can::Window) noexcept;
     Time              begin_of(std::uint64_t cycle, std::uint32_t slot) const noexcept { return clock_.at(cycle, table_.slot() * slot); }
     std::uint32_t     counter_of(std::uint64_t cycle) const noexcept {
@@ -160,13 +165,14 @@ private:
     std::uint64_t announced_cycle_ = 0;
 
     bool          leading_ = false, standby_ = false;  ///< standby: another primary sends
-    Time          now_ = 0;  ///< of the link, in transmit()
+    Time          now_ = 0, last_call_ = INT64_MIN;  ///< of the link: in receive() and transmit(), and of the last transmit()
     Time          first_seen_ = INT64_MIN;  ///< first call
     std::uint32_t leader_ = no_node;  ///< sender field of the last SYNC
 
     std::array<can::Frame, 16>           frames_;  ///< within receive()
     std::array<std::uint8_t, most_slots> last_index_{};  ///< by slot: identifier sent last
     std::array<std::uint32_t, 2048>      foreign_{};
+    std::array<Value, identifiers>       values_{};
     std::array<bool, identifiers>        not_allowed_{};  ///< by identifier: reported
     std::array<bool, most_slots>         seen_{}, told_{};  ///< slots of this cycle with a frame, with an announcement
     std::uint32_t                        foreign_in_cycle_ = 0, foreign_id_ = 0, unannounced_cycles_ = 0, offences_ = 0,

@@ -35,6 +35,7 @@ enum class Event : std::uint8_t {
     unknown_mode,    ///< value: mode of the SYNC; receives only
     foreign_frame,   ///< id, who: its owner by the table; value: slot in which it was
     babbling,        ///< id, who; value: frames outside of their slots in one cycle
+    slot_missed,     ///< id; value: period of the thread, ns: no cycle of it was within the transmit window
     late_frame,      ///< own frame; value: ns behind the end of its transmit window
     silenced,        ///< this node
     silenced_by_monitor,     ///< this node, by the monitor

@@ -42,10 +42,13 @@ void Station::attach(can::Link& link) noexcept {
     first_seen_ = last_begin_ = INT64_MIN;
     leader_ = no_node;
     not_allowed_.fill(false);
+    values_.fill({});
+    last_call_ = INT64_MIN;
 }
 
 void Station::receive(Time now) noexcept {
     if (link_ == nullptr) return;
+    now_ = now;
     if (first_seen_ == INT64_MIN) {
         first_seen_ = crystal_.epoch = now;
         first_seen_ = crystal_.local(now);
@@ -97,6 +100,7 @@ void Station::sync(const can::Frame& frame, Time begin) noexcept {
     if (frame.own) return sync_sent(begin);
     Sync s;
     if (!decode(frame, s)) return void(++count_.syncs_ignored);
+    const bool led = leading_;
     if (is_sync_node()) other_sync(s);
     if (leading_) return;
     const Time          stamp = begin - table_.sync_offset(s.sender);
@@ -110,7 +114,9 @@ void Station::sync(const can::Frame& frame, Time begin) noexcept {
         if (++off_rate_ >= most_off_rate) raise(Event::sync_off_rate, no_node, 0, std::llround(clock_.off_ppm()));
         return;
     case CycleClock::Taken::rejected: ++count_.syncs_ignored; return raise(Event::sync_late, no_node, 0, std::llround(clock_.error()));
-    case CycleClock::Taken::duplicate: ++count_.syncs_ignored; return raise(Event::sync_doubled);
+    case CycleClock::Taken::duplicate:
+        ++count_.syncs_ignored;
+        return led ? void() : raise(Event::sync_doubled);  // led: the first one was its own
     case CycleClock::Taken::jumped: raise(Event::sync_jumped); break;
     }
     ++count_.syncs;

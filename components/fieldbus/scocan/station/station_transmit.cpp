@@ -17,6 +17,11 @@ can::Sent Station::send(const can::Frame& frame, bool state, std::uint32_t slot)
         if (use == nullptr || use->node != node_ || !use->carries(frame.id)) return ++count_.dropped, can::Sent::rejected;
         priv = true;
     }
+    if (priv && state) {
+        Value& v = values_[frame.id];
+        if (v.last != last_call_) v.since = now_;
+        v.last = now_;
+    }
     if (queue_.push(frame, slot, priv, state)) return can::Sent::queued;
     return ++count_.dropped, can::Sent::full;
 }
@@ -35,9 +40,10 @@ void Station::transmit(Time now, Time period) noexcept {
     if (is_sync_node() && state_ != State::down && state_ != State::silenced) lead(local);
     if (clock_.known()) {
         if (windows_) plan_ahead(local, period);
-        else start_now(local);
+        else count_turns(local, period), start_now(local);
     }
     link_->flush(now);
+    last_call_ = now;
 }
 
 /// Plans the slots that begin until the next call.
@@ -78,6 +84,21 @@ SendQueue::Entry* Station::next_private(const Use& use, std::uint32_t slot) noex
     return queue_.next(fits);
 }
 
+/// In a thread slower than the turns of a slot, the newest value is sent again in each of them. A bridge sends each frame of its participant once.
+SendQueue::Entry* Station::repeated(const Use& use, std::uint32_t slot) noexcept {
+    if (role_ == Role::bridge) return nullptr;
+    for (std::size_t k = 1; k <= use.ids.size(); ++k) {
+        const auto              index = (last_index_[slot] + k) % use.ids.size();
+        const SendQueue::Entry* before = queue_.handed_over(use.ids[index], now_);
+        if (before == nullptr || (before->slot != no_slot && before->slot != slot)) continue;
+        const can::Frame frame = before->frame;
+        if (!queue_.push(frame, before->slot, true, true)) return ++count_.missed, nullptr;
+        last_index_[slot] = static_cast<std::uint8_t>(index);
+        return queue_.next([&](const SendQueue::Entry& e) { return e.priv && e.state && e.frame.id == frame.id; });
+    }
+    return nullptr;
+}
+
 void Station::plan(std::uint64_t cycle, std::uint32_t slot, Time begin) noexcept {
     if (slot == 0) {
         if (is_sync_node()) plan_sync(cycle);
@@ -87,13 +108,16 @@ void Station::plan(std::uint64_t cycle, std::uint32_t slot, Time begin) noexcept
     const Use* use = table_.use(mode_of(cycle), slot, counter_of(cycle));
     if (!numbered_ && (use == nullptr || use->every > 1)) return;  // the slot may be private
     if (use == nullptr || use->kind == Kind::shared) return plan_shared(begin, {.not_before_ns = begin});
-    if (use->node == node_)
-        if (SendQueue::Entry* e = next_private(*use, slot)) {
+    if (use->node == node_) {
+        SendQueue::Entry* e = next_private(*use, slot);
+        if (e == nullptr) e = repeated(*use, slot);
+        if (e != nullptr) {
             const Time last = begin + (single_shot_ ? table_.enabled() : table_.last_start(e->frame.length));
             e->in_flight = emit(e->frame, {.not_before_ns = begin, .last_start_ns = last, .single_shot = single_shot_});
-            e->until = begin + table_.slot() - table_.guard;
+            e->until = begin + table_.slot() - table_.guard, e->planned = now_;
             return;
         }
+    }
     const Time idle_from = begin - table_.guard / 2, idle_until = begin + table_.idle - table_.bits(1);
     if (role_ == Role::monitor) {
         const Time at = begin + table_.idle;
@@ -128,6 +152,30 @@ void Station::recycle_announced(Time now) noexcept {
     if (w.cycle == announced_cycle_ && w.slot == announced_slot_ && may_send(w.cycle))
         plan_shared(begin_of(w.cycle, w.slot), {.not_before_ns = now});
     announced_slot_ = no_slot;
+}
+
+/// Without transmit windows: counts the turns of own slots that passed since the last call without a cycle of the thread in their window,
+/// although a value was there.
+void Station::count_turns(Time now, Time period) noexcept {
+    Time next = begin_of(next_cycle_, next_slot_);
+    if (next < now - 2 * period - table_.cycle || next > now + table_.cycle) {  // the first call, or the clock has jumped
+        const Where w = where(now);
+        next_cycle_ = w.cycle, next_slot_ = w.slot;
+        next = begin_of(next_cycle_, next_slot_);
+    }
+    for (; next + table_.enabled() < now; next = begin_of(next_cycle_, next_slot_)) {
+        const Use* use = may_send(next_cycle_) ? table_.use(mode_of(next_cycle_), next_slot_, counter_of(next_cycle_)) : nullptr;
+        const bool used = used_cycle_ == next_cycle_ && used_slot_ == next_slot_;
+        if (use != nullptr && numbered_ && !used && use->kind == Kind::priv && use->node == node_)
+            for (const std::uint32_t id : use->ids) {
+                const Value& v = values_[id];
+                if (v.last != now_ || crystal_.local(v.since) > next) continue;
+                ++count_.missed;
+                if (period > table_.enabled()) raise(Event::slot_missed, static_cast<std::uint32_t>(node_), id, period);
+                break;
+            }
+        if (++next_slot_ == table_.slots) next_slot_ = 0, ++next_cycle_;
+    }
 }
 
 /// Without transmit windows: sends what may start now, one frame at a time.
