@@ -2,6 +2,7 @@
 """Recordings of values: hal record FILE NAMES, hal sim --record, hal plot, hal replay, and the flight recorder."""
 import collections
 import csv
+import os
 import re
 import resource
 import signal
@@ -83,6 +84,12 @@ setp io.fault-emcy-storm 1
         self.assertIn("--record needs --for TIME", self.bad("sim", "a.hal", "--record", "x.mcap"))
         self.assertIn("name the file .mcap or .csv", self.bad("sim", "a.hal", "--for", "1s", "--record", "x.bag"))
         self.assertIn("No such file", self.bad("sim", "a.hal", "--for", "1s", "--record", "nowhere/x.mcap"))
+        (self.folder / "folder.mcap").mkdir()
+        self.assertEqual("hal sim: cannot write 'folder.mcap': it is a folder; name a file in it\n", self.bad("sim", "a.hal", "--for", "1s", "--record", "folder.mcap"))
+        for name in ("sine,sin", "sin"):
+            self.assertEqual("hal sim: --values: no pin, parameter or signal matches 'sin'; did you mean 'sine'?\n",
+                             self.bad("sim", "a.hal", "-q", "--for", "1s", "--record", "x.mcap", "--values", name))
+        self.assertFalse((self.folder / "x.mcap").exists())
         self.assertIn("cannot read 'x.mcap': No such file", self.bad("plot", "x.mcap"))
         self.assertIn("missing netlist", self.bad("replay", "x.mcap"))
 
@@ -132,7 +139,7 @@ class Live(Case):
 
     def test_a_running_machine_is_recorded_without_a_sampler(self):
         out = self.good("record", "run.csv", "sine", "wave.*", "servo.missed", "--for", "300ms")
-        self.assertRegex(out, r"^run\.csv: \d+ rows of \d+ values, 0\.\d MB(, \d+ rows? lost)?\n$")
+        self.assertRegex(out, r"^run\.csv: \d+ rows of \d+ values, \d+\.\d kB(, \d+ rows? lost)?\n$")
         with open(self.folder / "run.csv", newline="") as file:
             rows = list(csv.DictReader(file))
         self.assertEqual(len(rows), int(out.split()[1]))
@@ -203,6 +210,74 @@ class Live(Case):
         self.assertEqual(1, done.returncode)
         self.assertRegex(done.stderr, r"^hal record: cannot write 'run\.mcap': File too large; the file is complete up to there\n$")
         self.good("plot", "run.mcap", "sine")
+
+    def test_two_recorders_do_not_share_a_file(self):
+        for name in ("run.mcap", "run.csv"):
+            first = self.recorder(name, "sine")
+            wait_until(lambda: any(path.stat().st_size > 0 for path in self.folder.glob(f"{name}*")), "the file is begun")
+            self.assertEqual(f"hal record: cannot write '{name}': another recorder is writing it; end that one, or name another file\n",
+                             self.bad("record", name, "sine", "--for", "100ms"))
+            out, err = self.end(first, signal.SIGINT)
+            self.assertEqual((0, ""), (first.returncode, err))
+            self.assertRegex(out, rf"^{re.escape(name)}: \d+ rows of 1 value")
+            self.good("plot", name, "sine")
+
+    def test_what_a_killed_recorder_left_is_kept(self):
+        left = self.recorder("run.mcap", "sine")
+        wait_until(lambda: (self.folder / "run.mcap.part").exists() and (self.folder / "run.mcap.part").stat().st_size > 3000, "a chunk is written")
+        left.kill()
+        left.communicate()
+        before = (self.folder / "run.mcap.part").read_bytes()
+        out = self.good("record", "run.mcap", "sine", "--for", "100ms")
+        self.assertTrue(out.startswith("'run.mcap.part' was left by a recorder that was killed; it is now 'run-unfinished-001.mcap'\n"), out)
+        self.assertEqual(before, (self.folder / "run-unfinished-001.mcap").read_bytes())
+        self.assertIn("ends without a summary", self.run_program("plot", "run-unfinished-001.mcap").stderr)
+        self.assertIn("<svg", (self.folder / "run-unfinished-001.svg").read_text())
+        self.assertFalse((self.folder / "run.mcap.part").exists())
+
+    def test_the_destination_is_checked_at_the_start(self):
+        (self.folder / "folder.mcap").mkdir()
+        os.mkfifo(self.folder / "pipe.mcap")
+        for last in ([], ["--last", "10s"]):
+            self.assertEqual("hal record: cannot write 'nowhere/x.mcap': No such file or directory\n", self.bad("record", "nowhere/x.mcap", "sine", *last))
+            self.assertEqual("hal record: cannot write 'folder.mcap': it is a folder; name a file in it\n", self.bad("record", "folder.mcap", "sine", *last))
+            self.assertEqual("hal record: cannot write 'pipe.mcap': it is a pipe or a device; name a file\n", self.bad("record", "pipe.mcap", "sine", *last))
+        self.assertTrue((self.folder / "pipe.mcap").is_fifo())
+
+    def test_a_link_is_followed(self):
+        (self.folder / "big").mkdir()
+        for name in ("run.mcap", "run.csv"):
+            (self.folder / name).symlink_to(f"big/{name}")
+            self.good("record", name, "sine", "--for", "100ms")
+            self.assertTrue((self.folder / name).is_symlink())
+            self.assertGreater((self.folder / "big" / name).stat().st_size, 1000)
+        self.assertEqual(["run.csv", "run.mcap"], sorted(path.name for path in (self.folder / "big").iterdir()))
+
+    def test_the_machine_is_killed(self):
+        process = self.recorder("run.mcap", "sine")
+        wait_until((self.folder / "run.mcap.part").exists, "the file is begun")
+        self.machine.kill()
+        out, err = process.communicate(timeout=60)
+        self.assertEqual((1, "hal record: instance 'default' was killed; the file is complete up to there\n"), (process.returncode, err))
+        self.assertRegex(out, r"^run\.mcap: \d+ rows? of 1 value")
+
+    def test_a_trigger_that_never_fires_is_told(self):
+        self.shell("newsig", "crash", "bit")
+        self.assertEqual("nothing was written: there was no fault, and 'crash' did not become TRUE or non-zero\n",
+                         self.good("record", "box.mcap", "sine", "--last", "1s", "--trigger", "crash", "--for", "200ms"))
+        self.shell("sets", "crash", "TRUE")
+        self.assertEqual("nothing was written: there was no fault, and 'crash' was TRUE or non-zero all the time\n",
+                         self.good("record", "box.mcap", "sine", "--last", "1s", "--trigger", "crash", "--for", "200ms"))
+        self.assertEqual("nothing was written: there was no fault\n", self.good("record", "box.mcap", "sine", "--last", "1s", "--for", "200ms"))
+
+    def test_a_disk_without_room_leaves_no_empty_file(self):
+        def none():
+            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+            resource.setrlimit(resource.RLIMIT_FSIZE, (20, resource.RLIM_INFINITY))
+        for name, left in (("run.mcap", ""), ("run.csv", "; no row was written")):
+            done = subprocess.run([str(HAL), "record", name, "sine", "--for", "1s"], env=self.environment, cwd=self.folder, preexec_fn=none, capture_output=True, text=True, timeout=60)
+            self.assertEqual((1, "", f"hal record: cannot write '{name}': File too large{left}\n"), (done.returncode, done.stdout, done.stderr))
+        self.assertEqual([], list(self.folder.glob("run.mcap*")))
 
     def test_words(self):
         self.assertIn("did you mean 'sine'?", self.bad("record", "run.mcap", "sin"))

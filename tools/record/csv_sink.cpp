@@ -2,10 +2,13 @@
 #include <algorithm>
 #include <bit>
 #include <cerrno>
+#include <cstring>
 #include <fmt/core.h>
+#include <unistd.h>
 
 #include "link/record_file.hpp"
 #include "record/sink.hpp"
+#include "recording/mcap/held_file.hpp"
 
 namespace hal::tools {
 namespace {
@@ -20,7 +23,10 @@ std::string field(const std::string& text) {
 /// A line per row: the time, then all values; those of other threads are empty. Events have no place in it.
 class CsvSink final : public Sink {
 public:
-    CsvSink(const std::string& path, const std::vector<ProbeColumn>& columns) : columns_(columns), file_(path) {
+    ~CsvSink() override { close(); }
+    CsvSink(const std::string& path, const std::vector<ProbeColumn>& columns)
+        : columns_(columns), path_(path), held_(mcap::hold_file(path)), file_(held_.file) {
+        if (held_.file < 0) return;
         std::string line = "time_s";
         for (const ProbeColumn& column : columns_) line += "," + field(column.name);
         put(line + "\n");
@@ -28,7 +34,7 @@ public:
 
     bool layout(const std::vector<ProbeGroup>& groups) override {
         groups_ = groups;
-        return file_.error() == 0;
+        return error() == 0;
     }
 
     bool row(std::size_t group, std::uint64_t, std::int64_t time_ns, const std::uint64_t* words) override {
@@ -40,10 +46,18 @@ public:
     }
 
     bool event(const ProbeClient::Entry&) override { return true; }
-    bool flush() override { return file_.flush(); }
-    bool close() override { return file_.close(); }
+    bool flush() override { return error() == 0 && file_.flush(); }
+    bool close() override {
+        file_.close();
+        if (held_.file >= 0 && ::close(held_.file) != 0 && closing_ == 0) closing_ = errno;
+        held_.file = -1;
+        return error() == 0;
+    }
     std::uint64_t bytes() const override { return bytes_; }
-    int error() const override { return file_.error(); }
+    int error() const override { return held_.error != 0 ? held_.error : file_.error() != 0 ? file_.error() : closing_; }
+    std::string problem() const override { return !held_.problem.empty() ? held_.problem : error() != 0 ? std::strerror(error()) : ""; }
+    std::string where() const override { return held_.error == 0 ? path_ : ""; }
+    std::uint64_t rows() const override { return file_.records() == 0 ? 0 : file_.records() - 1; }
 
 private:
     static std::string text(hal_type type, std::uint64_t word) {
@@ -52,6 +66,7 @@ private:
         return std::to_string(word);
     }
     bool put(const std::string& line) {
+        if (error() != 0) return false;
         bytes_ += line.size();
         return file_.put(line);
     }
@@ -60,7 +75,10 @@ private:
     std::vector<ProbeGroup> groups_;
     std::vector<std::string> cells_;
     std::uint64_t bytes_ = 0;
+    const std::string path_;
+    mcap::HeldFile held_;
     RecordFile file_;
+    int closing_ = 0;
 };
 
 }  // namespace
@@ -71,6 +89,22 @@ std::unique_ptr<Sink> make_csv_sink(const std::string& path, const std::vector<P
 
 std::unique_ptr<Sink> make_sink(const std::string& path, const std::vector<ProbeColumn>& columns, const Origin& origin) {
     return path.ends_with(".csv") ? make_csv_sink(path, columns) : make_mcap_sink(path, columns, origin);
+}
+
+std::string cannot_write(Sink& sink, const std::string& path) {
+    const std::string problem = sink.problem();
+    sink.close();
+    const std::string where = sink.where();
+    return fmt::format("cannot write '{}': {}{}", path, problem,
+                       where.empty()      ? ""
+                       : sink.rows() == 0 ? "; no row was written"
+                       : where == path    ? "; the file is complete up to there"
+                                          : "; what was recorded is in '" + where + "'");
+}
+
+std::string kept_line(const Sink& sink, const std::string& path) {
+    if (sink.kept().empty()) return "";
+    return fmt::format("'{}.part' was left by a recorder that was killed; it is now '{}'\n", path, sink.kept());
 }
 
 bool add_batch(Sink& sink, const ProbeBatch& batch, std::int64_t begin_ns, std::int64_t end_ns, std::uint64_t& rows) {

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include <cstring>
 #include <map>
 #include <nlohmann/json.hpp>
 
@@ -72,6 +73,12 @@ public:
     bool close() override { return writer_.close(); }
     std::uint64_t bytes() const override { return writer_.bytes(); }
     int error() const override { return writer_.error(); }
+    std::string problem() const override {
+        return !writer_.problem().empty() ? writer_.problem() : writer_.error() != 0 ? std::strerror(writer_.error()) : "";
+    }
+    std::string kept() const override { return writer_.kept(); }
+    std::string where() const override { return writer_.where(); }
+    std::uint64_t rows() const override { return writer_.messages() - writer_.messages(events_); }
 
 private:
     struct Group {

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <cstring>
 #include <deque>
 #include <filesystem>
 #include <fmt/core.h>
@@ -14,10 +13,16 @@
 #include "record/flight.hpp"
 #include "record/names.hpp"
 #include "record/sink.hpp"
+#include "recording/mcap/held_file.hpp"
 #include "text/quoting.hpp"
 
 namespace hal::tools {
 namespace {
+
+std::string file_size(std::uint64_t bytes) {
+    const double size = static_cast<double>(bytes);
+    return size < 1e6 ? fmt::format("{:.1f} kB", size * 1e-3) : fmt::format("{:.1f} MB", size * 1e-6);
+}
 
 class Recorder {
 public:
@@ -43,6 +48,8 @@ public:
     }
 
     int flight() {
+        if (const std::string problem = mcap::unwritable(what_.file); !problem.empty())
+            return fail(options_, fmt::format("cannot write '{}': {}", what_.file, problem));
         FlightMemory memory(probe_.groups(), what_.last_ns);
         FlightTrigger trigger(what_.last_ns, what_.after_ns);
         const bool forever = what_.for_ns < 0;
@@ -61,13 +68,13 @@ public:
                 memory.add(std::move(batch_));
                 memory.prune(now_ns_, trigger.pending() ? trigger.begin_ns() : INT64_MAX);
             }
-            // one that ends in order removes its socket
-            if (got == ProbeClient::Got::disconnected && std::filesystem::exists(socket_path(client_.instance()))) trigger.event(now_ns_, "end-of-machine");
+            if (got == ProbeClient::Got::disconnected && was_killed()) trigger.event(now_ns_, "end-of-machine");
             if (trigger.pending() && (over || now_ns_ >= trigger.end_ns())) {
                 if (!write(memory, trigger)) return cannot_write();
                 trigger.done();
             }
         }
+        if (files_ == 0) nothing_written();
         return 0;
     }
 
@@ -88,8 +95,9 @@ private:
         rows_ = 0;
         ++files_;
         sink_ = make_sink(path, probe_.columns(), origin_);
+        if (sink_->error() == 0) print(kept_line(*sink_, path));
         if (sink_->error() == 0 && sink_->layout(probe_.groups())) return true;
-        fail(options_, fmt::format("cannot write '{}': {}", path, std::strerror(sink_->error())));
+        cannot_write();
         return false;
     }
 
@@ -104,6 +112,16 @@ private:
         return open(file_name());
     }
 
+    /// One that ends in order removes its socket.
+    bool was_killed() const { return std::filesystem::exists(socket_path(client_.instance())); }
+
+    void nothing_written() {
+        const std::string trigger = what_.trigger.empty() ? ""
+                                    : was_on_             ? fmt::format(", and '{}' was TRUE or non-zero all the time", what_.trigger)
+                                                          : fmt::format(", and '{}' did not become TRUE or non-zero", what_.trigger);
+        print(fmt::format("nothing was written: there was no fault{}\n", trigger));
+    }
+
     std::int64_t first_time() const {
         std::int64_t first = -1;
         for (const auto& part : batch_.parts)
@@ -114,9 +132,8 @@ private:
     bool complete() {
         if (!sink_->close()) return false;
         written_.push_back(path_);
-        print(fmt::format("{}: {} of {}, {:.1f} MB{}\n", path_, counted(rows_, "row"), counted(probe_.columns().size(), "value"),
-                          static_cast<double>(sink_->bytes()) * 1e-6,
-                          probe_.lost() == 0 ? "" : ", " + counted(probe_.lost(), "row") + " lost"));
+        print(fmt::format("{}: {} of {}, {}{}\n", path_, counted(rows_, "row"), counted(probe_.columns().size(), "value"),
+                          file_size(sink_->bytes()), probe_.lost() == 0 ? "" : ", " + counted(probe_.lost(), "row") + " lost"));
         // files of this run only; of a flight recorder the first is kept, because it is often the cause of those after it
         const std::size_t first = what_.last_ns >= 0 ? 1 : 0;
         while (what_.keep != 0 && written_.size() > std::max<std::size_t>(what_.keep, 1 + first)) {
@@ -131,14 +148,12 @@ private:
     int lost_machine() {
         const int status = finish();
         if (status != 0) return status;
+        if (was_killed())
+            return fail(options_, fmt::format("instance '{}' was killed; the file is complete up to there", client_.instance()));
         return what_.for_ns < 0 ? 0 : fail(options_, fmt::format("instance '{}' has ended before the time was over", client_.instance()));
     }
 
-    int cannot_write() {
-        const int error = sink_->error();
-        sink_->close();
-        return fail(options_, fmt::format("cannot write '{}': {}; the file is complete up to there", path_, std::strerror(error)));
-    }
+    int cannot_write() { return fail(options_, tools::cannot_write(*sink_, path_)); }
 
     /// The time of the first row in which the trigger has become non-zero.
     std::optional<std::int64_t> triggered() {
@@ -159,7 +174,8 @@ private:
     }
 
     bool write(const FlightMemory& memory, const FlightTrigger& trigger) {
-        path_ = flight_name(what_.file, probe_.unix_ns(trigger.begin_ns() + what_.last_ns), trigger.cause(), ++files_);
+        do path_ = flight_name(what_.file, probe_.unix_ns(trigger.begin_ns() + what_.last_ns), trigger.cause(), ++files_);
+        while (std::filesystem::exists(path_));  // of another recorder
         rows_ = 0;
         Origin origin = origin_;
         origin.cause = trigger.cause();

@@ -31,12 +31,24 @@ public:
     virtual bool close() = 0;
     virtual std::uint64_t bytes() const = 0;
     virtual int error() const = 0;  ///< errno of the first failure, or 0
+    /// Why nothing more is written: a reason without the name of the file; "" when nothing failed.
+    virtual std::string problem() const = 0;
+    /// What the unfinished file of an earlier recorder is called now; "" when there was none.
+    virtual std::string kept() const { return ""; }
+    /// After close(): the file that has what was written, "" when there is none, and how many rows it has.
+    virtual std::string where() const = 0;
+    virtual std::uint64_t rows() const = 0;
 };
 
 /// The sink for a path, by its ending: .mcap or .csv.
 std::unique_ptr<Sink> make_sink(const std::string& path, const std::vector<ProbeColumn>& columns, const Origin& origin);
 std::unique_ptr<Sink> make_mcap_sink(const std::string& path, const std::vector<ProbeColumn>& columns, const Origin& origin);
 std::unique_ptr<Sink> make_csv_sink(const std::string& path, const std::vector<ProbeColumn>& columns);
+
+/// Returns "cannot write 'FILE': REASON; WHAT IS LEFT" for a sink that failed. Closes it.
+std::string cannot_write(Sink& sink, const std::string& path);
+/// Returns the line that says where the unfinished file of an earlier recorder is now; "" when there was none.
+std::string kept_line(const Sink& sink, const std::string& path);
 
 /// Adds the rows of a batch with begin <= time < end, in the order of time. Returns false after a failed write.
 bool add_batch(Sink& sink, const ProbeBatch& batch, std::int64_t begin_ns, std::int64_t end_ns, std::uint64_t& rows);

@@ -95,6 +95,7 @@ int run_sim(const SimOptions& options) {
     auto nodes = requested_nodes(options);
     if (!nodes) return 1;
     if (!nodes->empty() && !options.record.empty()) return fail(options, "--record records one machine; add --node NAME");
+    if (!options.record.empty() && check_recording(options) != 0) return 1;
     if (!nodes->empty()) return sim_cell(options, std::move(*nodes));
     HostedMachine machine(options, options.name.empty() ? fmt::format("sim-{}", ::getpid()) : options.name, true);
     if (!machine.serve(!options.name.empty())) return 1;

@@ -56,12 +56,8 @@ std::string content(const ChunkIndex& index) {
 
 }  // namespace
 
-Writer::Writer(std::string path) : path_(std::move(path)) {
-    file_ = ::open((path_ + ".part").c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0640);
-    if (file_ < 0) {
-        error_ = errno;
-        return;
-    }
+Writer::Writer(std::string path) : path_(std::move(path)), held_(hold_part(path_)), file_(held_.file), error_(held_.error) {
+    if (file_ < 0) return;
     std::string header;
     put_text(header, "");  // profile
     put_text(header, "halcyon");
@@ -166,7 +162,7 @@ bool Writer::flush() {
     const auto indexes = std::exchange(indexes_, {});
     if (!write(bytes)) return false;
     auto& counts = counts_.emplace_back();
-    for (const auto& [channel, entries] : indexes) messages_ += counts[channel] = entries.size() / 16;
+    for (const auto& [channel, entries] : indexes) counts[channel] = entries.size() / 16;
     chunks_.push_back(std::move(index));
     return true;
 }
@@ -286,10 +282,29 @@ bool Writer::close() {
     }
     if (failed != 0) error_ = failed;
     if (::fsync(file_) != 0 && errno != EINVAL && error_ == 0) error_ = errno;
+    // Under the lock, so that no other recorder takes the part for one that was left.
+    if (error_ != 0 && messages() == 0) removed_ = ::unlink(held_.path.c_str()) == 0;
+    else if (std::rename(held_.path.c_str(), held_.target.c_str()) == 0) named_ = true;
+    else if (error_ == 0) error_ = errno;
     if (::close(file_) != 0 && error_ == 0) error_ = errno;
     file_ = -1;
-    if (std::rename((path_ + ".part").c_str(), path_.c_str()) != 0 && error_ == 0) error_ = errno;
     return error_ == 0;
+}
+
+std::string Writer::where() const { return named_ ? path_ : removed_ || held_.error != 0 ? "" : held_.path; }
+
+std::uint64_t Writer::messages() const {
+    std::uint64_t sum = 0;
+    for (const auto& chunk : counts_)
+        for (const auto& [channel, count] : chunk) sum += count;
+    return sum;
+}
+
+std::uint64_t Writer::messages(std::uint16_t channel) const {
+    std::uint64_t sum = 0;
+    for (const auto& chunk : counts_)
+        if (const auto at = chunk.find(channel); at != chunk.end()) sum += at->second;
+    return sum;
 }
 
 }  // namespace hal::mcap

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Writes an MCAP file: chunked, indexed, with CRCs and a summary. Until close() the file is NAME.part, readable up to its last chunk.
+// Writes an MCAP file: chunked, indexed, with CRCs and a summary. Until close() the file is NAME.part, readable up to its last chunk, and locked.
 #pragma once
 
 #include <cstdint>
@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "recording/mcap/compression.hpp"
+#include "recording/mcap/held_file.hpp"
 #include "recording/mcap/records.hpp"
 
 namespace hal::mcap {
@@ -19,7 +20,7 @@ public:
     static constexpr std::size_t   chunk_bytes = std::size_t{1} << 20;
     static constexpr std::uint64_t chunk_ns = 1'000'000'000;  ///< a chunk is written after this time at the latest
 
-    /// Creates PATH.part; see error().
+    /// Creates PATH.part; see error(). A PATH.part that a killed recorder left gets another name, kept().
     explicit Writer(std::string path);
     ~Writer();  ///< close()
     Writer(const Writer&) = delete;
@@ -34,12 +35,17 @@ public:
     bool attachment(std::string_view name, std::string_view media_type, std::string_view data, std::uint64_t time_ns);
     /// Writes the chunk that is being filled.
     bool flush();
-    /// Writes the summary, and gives the file its name. Returns false when anything was lost; what was written is complete even then.
+    /// Writes the summary, and gives the file its name. Returns false when anything was lost; what was written is complete even then. A file without a
+    /// message that could not be written is removed.
     bool close();
 
-    int                error() const { return error_; }                       ///< errno of the first failure, or 0
+    int                error() const { return error_; }  ///< errno of the first failure, or 0
     std::uint64_t      bytes() const { return size_ + chunk_.size(); }  ///< of the file, with the chunk that is being filled
-    std::uint64_t      messages() const { return messages_; }
+    const std::string& problem() const { return held_.problem; }  ///< why the file could not be created; "" otherwise
+    const std::string& kept() const { return held_.kept; }
+    std::string        where() const;  ///< the file that has what was written; "" when there is none
+    std::uint64_t      messages() const;
+    std::uint64_t      messages(std::uint16_t channel) const;
     const std::string& path() const { return path_; }
 
 private:
@@ -52,15 +58,17 @@ private:
     std::string summary() const;
 
     const std::string                                   path_;
+    HeldFile                                            held_;
     int                                                 file_ = -1, error_ = 0;
+    bool                                                named_ = false, removed_ = false;
     std::uint64_t                                       size_ = 0;
-    std::uint32_t                                       crc_ = 0;                        // of all bytes so far
+    std::uint32_t                                       crc_ = 0;  // of all bytes so far
     std::vector<Schema>                                 schemas_;
     std::vector<Channel>                                channels_;
-    std::string                                         declared_;                         // all schemas and channels, as records
+    std::string                                         declared_;  // all schemas and channels, as records
     std::string                                         chunk_, compressed_;
-    std::uint64_t                                       chunk_begin_ = 0, chunk_end_ = 0, messages_ = 0;
-    std::map<std::uint16_t, std::string>                indexes_; // of the chunk: time and offset of each message
+    std::uint64_t                                       chunk_begin_ = 0, chunk_end_ = 0;
+    std::map<std::uint16_t, std::string>                indexes_;  // of the chunk: time and offset of each message
     std::vector<ChunkIndex>                             chunks_;
     std::vector<std::map<std::uint16_t, std::uint64_t>> counts_;  // of the messages in each chunk
     std::vector<Place>                                  attachments_, metadata_;
