@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <type_traits>
 #include <utility>
 #include <variant>
@@ -25,12 +26,13 @@ struct Playback : hal::Component {
     explicit Playback(const hal_host* host)
         : Component(host),
           file(*this, "file", "", "recording to play: .mcap or .csv, beside the netlist"),
-          values(*this, "values", "*", "values to play, as patterns separated by commas") {
+          values(*this, "values", "*", "values to play, as patterns separated by commas"),
+          types(*this, "types", "", "types of values of a .csv, NAME:TYPE separated by commas; the others are float") {
         read();
         for (Track& track : tracks_) declare(track);
     }
 
-    hal::TextArgument file, values;
+    hal::TextArgument file, values, types;
     hal::In<bool>     enable{*this, "enable", "FALSE holds the time and the values", {.initial = true}};
     hal::In<bool>     restart{*this, "restart", "a rising edge starts again at the beginning"};
     hal::Param<bool>  loop{*this, "loop", "TRUE starts again after the end"};
@@ -74,15 +76,35 @@ private:
         return false;
     }
 
+    std::map<std::string, hal_type> given_types() const {
+        std::map<std::string, hal_type> given;
+        const std::string&              all = types.get();
+        if (!all.empty() && !file.get().ends_with(".csv"))
+            throw hal::ArgumentError("types", "types=" + all + ": the recording has types of its own; only a .csv needs them");
+        for (std::size_t at = 0; at < all.size();) {
+            const std::size_t end = std::min(all.find(',', at), all.size());
+            const std::string one = all.substr(at, end - at);
+            const std::size_t colon = one.rfind(':');
+            const auto        type = hal::mcap::type_of_word(colon == one.npos ? "" : std::string_view(one).substr(colon + 1));
+            if (!type)
+                throw hal::ArgumentError("types", "types=" + one + ": type NAME:TYPE; the types are bit, float, s32, u32, s64 and u64");
+            given[one.substr(0, colon)] = *type;
+            at = end + 1;
+        }
+        return given;
+    }
+
     void read() {
         if (file.get().empty()) return;
         const hal::Texts texts(*this);
         if (!texts.offered()) return;
         hal::mcap::Recording recording;
         std::string          problem;
-        if (!hal::mcap::load(texts.find(file.get()), recording, problem))
+        if (!hal::mcap::load(texts.find(file.get()), recording, problem, {.types = given_types()}))
             throw hal::ArgumentError("file", "file=" + file.get() + ": " + problem);
-        if (recording.tables.empty()) throw hal::ArgumentError("file", "file=" + file.get() + ": the recording has no rows");
+        if (recording.tables.empty())
+            throw hal::ArgumentError(
+                "file", "file=" + file.get() + ": the recording has no rows" + (recording.unread.empty() ? "" : "; " + recording.unread));
         begin_ns_ = recording.begin_ns();
         for (hal::mcap::Table& table : recording.tables) tracks_.push_back({std::move(table)});
     }
@@ -151,6 +173,8 @@ HAL_COMPONENT(Playback, "playback", "Plays a recording into pins", R"(
 The file is one that `hal record` wrote, or another MCAP file with flat ROS 2 messages. Each recorded value becomes an output of its own name and
 type: `x-pid.error` is `playback.0.x-pid.error`. In each cycle the outputs have the values that were recorded at that time after the first row; a
 recording of a thread of the same period is played row by row. The whole file is read when the component is loaded, at most 1 GiB of values.
+
+A table (.csv) has no types: its values are float, but for those that `types` names, as in `types=on:bit,count:s32`.
 
     loadrt playback file=run.csv values=x-*
     loadrt lowpass names=filter

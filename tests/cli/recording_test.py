@@ -5,6 +5,7 @@ import csv
 import os
 import re
 import resource
+import shutil
 import signal
 import subprocess
 import unittest
@@ -116,6 +117,58 @@ setp io.fault-emcy-storm 1
         self.assertRegex(out, r"effort  differs by up to 1: 2 instead of 1 at 0\.\d+ s\n")
         self.assertIn("1 differs by more than 1e-09", out)
         self.assertIn("nothing of the recording is an input", self.bad("replay", "run.mcap", "whole.hal", "--", "GAIN=1"))
+
+    def test_a_replay_of_a_table_has_the_types_of_the_netlist(self):
+        logic = "loadrt threads name1=servo period1=1000000\nloadrt and2 names=both\nloadrt conv_s32_float names=to\naddf both servo\naddf to servo\nnet a => both.in0\nnet b => both.in1\nnet y both.out\nnet n => to.in\nnet x to.out\n"
+        self.write("logic.hal", logic)
+        self.write("run.csv", "time_s,a,b,y,n,x\n" + "".join(f"{0.001 * i:.3f},{i & 1},{i >> 1 & 1},{int(i & 3 == 3)},{-i},{-i}\n" for i in range(1, 101)))
+        out = self.good("replay", "run.csv", "logic.hal", "--tolerance", "0")
+        self.assertRegex(out, r"^y  equal in 100 rows\nx  equal in 100 rows\n0\.099 s of recording: 3 inputs driven, 2 values compared, none differs\n$")
+        self.write("bad.csv", "time_s,a,b\n0.001,0,0\n0.002,0.5,0\n")
+        self.assertEqual("hal replay: 'bad.csv', line 3: '0.5' of 'a' is not a value of type bit\n", self.bad("replay", "bad.csv", "logic.hal"))
+
+    def test_a_test_that_tests_nothing_fails(self):
+        self.write("control.hal", "loadrt threads name1=servo period1=1000000\nsetp loop.command 1\n".replace("setp", CONTROL + "setp"))
+        self.write("run.csv", "time_s,feedback,effort\n0.001,0,nan\n0.002,0,1\n0.003,0,1\n")
+        words = ("replay", "run.csv", "control.hal")
+        self.assertIn("--tolerance: nan is not a number; use 0 or more", self.bad(*words, "--tolerance", "nan", "--", "GAIN=1"))
+        self.assertEqual("0.002 s of recording: 1 input driven, 0 values compared: nothing was tested; record values that the netlist computes too\n",
+                         self.bad_output(*words, "--tolerance", "1", "--names", "feedback", "--", "GAIN=1"))
+        self.assertEqual("hal replay: --names: the recording has no value 'efort'; did you mean 'effort'?\n",
+                         self.bad(*words, "--names", "feedback,efort", "--", "GAIN=1"))
+        self.assertIn("effort  differs by up to inf: 1 instead of nan at 0.000000 s\n", self.bad_output(*words, "--tolerance", "1", "--", "GAIN=1"))
+
+    def test_a_plot_of_what_the_scope_wrote_and_of_the_largest_values(self):
+        self.write("scope.csv", "time_s,a\n-0.002,1\n-0.001,-1\n0.000,1\n")
+        self.good("plot", "scope.csv")
+        self.assertIn(">-1</text>", (self.folder / "scope.svg").read_text())
+        self.write("large.csv", "time_s,a,b\n0,-1e308,1e17\n1,1.7e308,100000000000000016\n2,0,1e17\n")
+        self.good("plot", "large.csv")
+        svg = (self.folder / "large.svg").read_text()
+        self.assertNotRegex(svg, "nan|inf")
+        self.assertIn(">1e+308</text>", svg)
+        self.assertEqual(2, svg.count('fill="none" stroke="#999"'), "each has a strip of its own")
+
+    def test_values_of_other_sizes_have_a_scale_of_their_own(self):
+        self.write("run.csv", "time_s,a,b,small,zero\n" + "".join(f"{i},{i % 7},{i % 5 - 2},{(i % 3) * 0.01},0\n" for i in range(20)))
+        self.good("plot", "run.csv")
+        svg = (self.folder / "run.svg").read_text()
+        self.assertEqual(2, svg.count('fill="none" stroke="#999"'))
+        y = {name: re.search(rf'y="([\d.]+)"[^>]*>{name}</text>', svg)[1] for name in ("a", "b", "small", "zero")}
+        self.assertEqual(y["a"], y["b"])
+        self.assertEqual(y["a"], y["zero"])
+        self.assertNotEqual(y["a"], y["small"])
+
+    def test_the_ending_of_a_plot(self):
+        self.write("run.csv", "time_s,a\n0,1\n1,2\n")
+        self.assertEqual("hal plot: unknown format of 'x.jpg'; name the file .svg or .png\n", self.bad("plot", "run.csv", "-o", "x.jpg"))
+        if shutil.which("rsvg-convert"):
+            self.good("plot", "run.csv", "-o", "x.png")
+            self.assertEqual(b"\x89PNG", (self.folder / "x.png").read_bytes()[:4])
+        error = self.bad("plot", "run.csv", "-o", "y.png", environment={"PATH": str(self.folder)})
+        self.assertIn("cannot draw 'y.png': ", error)
+        self.assertIn("(or name the file .svg)", error)
+        self.assertFalse((self.folder / "y.png").exists())
 
     def bad_output(self, *words):
         done = self.run_program(*words)

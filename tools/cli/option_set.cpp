@@ -3,6 +3,8 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
+#include <cstdlib>
 #include <fmt/core.h>
 
 #include "base/types.hpp"
@@ -13,7 +15,10 @@ void DeclaredOption::in(int least, int most) { option_->check(CLI::Range(least, 
 void DeclaredOption::in(double least, double most) { option_->check(CLI::Range(least, most)); }
 void DeclaredOption::quietly_in(int least, int most) { option_->check(CLI::Range(least, most).description("")); }
 void DeclaredOption::not_negative() {
-    option_->check([](const std::string& text) { return text.starts_with('-') ? fmt::format("{} is negative; use 0 or more", text) : std::string(); });
+    option_->check([](const std::string& text) {
+        if (text.starts_with('-')) return fmt::format("{} is negative; use 0 or more", text);
+        return std::isnan(std::strtod(text.c_str(), nullptr)) ? fmt::format("{} is not a number; use 0 or more", text) : std::string();
+    });
 }
 
 OptionSet::OptionSet(Options& options, const char* name, const char* summary)

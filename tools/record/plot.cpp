@@ -6,6 +6,7 @@
 #include <fmt/core.h>
 #include <fnmatch.h>
 
+#include "cli/filter.hpp"
 #include "cli/output.hpp"
 #include "text/suggest.hpp"
 
@@ -30,11 +31,14 @@ std::size_t add_traces(const mcap::Recording& recording, const std::string& want
 
 int run_plot(const PlotOptions& options) {
     const std::string& file = options.words.front();
+    if (const std::string& to = options.output; !to.empty() && to != "-" && !to.ends_with(".svg") && !to.ends_with(".png"))
+        return fail(options, fmt::format("unknown format of '{}'; name the file .svg or .png", to));
     mcap::Recording recording;
     std::string problem;
     if (!mcap::load(file, recording, problem)) return fail(options, problem);
     if (!recording.note.empty()) std::fputs(fmt::format("{}: {}\n", options.program, recording.note).c_str(), stderr);
-    if (recording.tables.empty()) return fail(options, fmt::format("'{}' has no rows", file));
+    if (recording.tables.empty())
+        return fail(options, fmt::format("'{}' has no rows{}", file, recording.unread.empty() ? "" : "; " + recording.unread));
     std::vector<Trace> traces;
     for (std::size_t i = 1; i < options.words.size(); ++i) {
         if (add_traces(recording, options.words[i], traces) != 0) continue;
@@ -55,7 +59,13 @@ int run_plot(const PlotOptions& options) {
     const std::string svg = plot_svg(traces, recording.events, begin_ns, end_ns, options.width);
     if (options.output == "-") return print(svg) ? 0 : 1;
     const std::string output = options.output.empty() ? file.substr(0, file.rfind('.')) + ".svg" : options.output;
-    problem = write_file(output, svg);
+    std::string picture;
+    if (!output.ends_with(".png")) picture = svg;
+    else {
+        problem = run_filter({"rsvg-convert", "--format=png"}, svg, picture, "librsvg2-bin");
+        if (!problem.empty()) return fail(options, fmt::format("cannot draw '{}': {} (or name the file .svg)", output, problem));
+    }
+    problem = write_file(output, picture);
     if (!problem.empty()) return fail(options, problem);
     return print(fmt::format("{}\n", output)) ? 0 : 1;
 }

@@ -21,6 +21,9 @@ struct Strip {
     double low = 0, high = 1, y = 0, height = 0;
 };
 
+// A fourth of the height of its scale: the whole one may be more than a double has.
+double quarter(const Strip& strip) { return strip.high / 4 - strip.low / 4; }
+
 // 1, 2 or 5 times a power of ten, for about `parts` intervals.
 double tick_step(double span, double parts) {
     const double raw = span / parts, power = std::pow(10, std::floor(std::log10(raw))), digit = raw / power;
@@ -77,7 +80,8 @@ private:
         return left + plot_ * static_cast<double>(time_ns - begin_) / static_cast<double>(end_ - begin_);
     }
     static double y_of(const Strip& strip, double value) {
-        return strip.y + strip.height - strip.height * (std::clamp(value, strip.low, strip.high) - strip.low) / (strip.high - strip.low);
+        const double share = (std::clamp(value, strip.low, strip.high) / 4 - strip.low / 4) / quarter(strip);
+        return strip.y + strip.height - strip.height * share;
     }
 
     void time_axis(double bottom) {
@@ -93,8 +97,8 @@ private:
     }
 
     void value_axis(const Strip& strip) {
-        const double step = tick_step(strip.high - strip.low, 4);
-        for (double value = std::ceil(strip.low / step) * step; value <= strip.high + step / 1000; value += step) {
+        const double step = tick_step(quarter(strip), 1);
+        for (double value = std::ceil(strip.low / step) * step; value / 4 <= strip.high / 4 + step / 4000; value += step) {
             const double y = y_of(strip, value);
             svg_ += fmt::format(
                 "<path d=\"M{0:.0f} {1:.1f}H{2:.0f}\" stroke=\"#ddd\"/><text x=\"{3:.0f}\" y=\"{4:.1f}\" "
@@ -135,7 +139,9 @@ private:
             pen = std::isfinite(last);
             if (pen) at = text(last);
         }
-        if (pen) path += fmt::format("H{:.1f}", row < times.size() ? left + plot_ : std::min(x_of(std::max(times.back(), begin_)), left + plot_));
+        if (pen)
+            path +=
+                fmt::format("H{:.1f}", row < times.size() ? left + plot_ : std::min(x_of(std::max(times.back(), begin_)), left + plot_));
         svg_ += fmt::format("<path d=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.4\" stroke-linejoin=\"round\"/>\n", path, stroke);
     }
 
@@ -159,22 +165,46 @@ private:
     std::string svg_;
 };
 
-// The extremes between the times, with a margin.
-void scale(Strip& strip, std::int64_t begin_ns, std::int64_t end_ns) {
-    double low = std::numeric_limits<double>::infinity(), high = -low;
-    for (const Trace* trace : strip.traces) {
-        const auto& times = trace->table->times_ns;
-        auto row = static_cast<std::size_t>(std::upper_bound(times.begin(), times.end(), begin_ns) - times.begin());
-        for (row -= row > 0 ? 1 : 0; row < times.size() && times[row] <= end_ns; ++row) {
-            const double value = trace->table->real(row, trace->column);
-            if (std::isfinite(value)) low = std::min(low, value), high = std::max(high, value);
-        }
+struct Range {
+    double low = std::numeric_limits<double>::infinity(), high = -std::numeric_limits<double>::infinity();  // nothing
+    double least = 0;  // the smallest size of what was added; 0: only zeros
+
+    bool empty() const { return !(low <= high); }
+    double half() const { return high / 2 - low / 2; }
+    double size() const { return empty() ? 0 : std::max(std::abs(low), std::abs(high)); }
+    void add(const Range& other) {
+        if (const double size = other.size(); size != 0) least = least == 0 ? size : std::min(least, size);
+        low = std::min(low, other.low), high = std::max(high, other.high);
     }
-    if (!(low <= high)) low = 0, high = 1;
-    if (low == high) low -= std::max(std::abs(low) * 0.1, 0.5), high += std::max(std::abs(high) * 0.1, 0.5);
-    const double margin = (high - low) * 0.05;
-    strip.low = low - margin;
-    strip.high = high + margin;
+};
+
+// The extremes between the times.
+Range range_of(const Trace& trace, std::int64_t begin_ns, std::int64_t end_ns) {
+    Range range;
+    const auto& times = trace.table->times_ns;
+    auto row = static_cast<std::size_t>(std::upper_bound(times.begin(), times.end(), begin_ns) - times.begin());
+    for (row -= row > 0 ? 1 : 0; row < times.size() && times[row] <= end_ns; ++row) {
+        const double value = trace.table->real(row, trace.column);
+        if (std::isfinite(value)) range.low = std::min(range.low, value), range.high = std::max(range.high, value);
+    }
+    return range;
+}
+
+// The range with a margin, so high that its parts differ.
+void scale(Strip& strip, Range range) {
+    constexpr double most = std::numeric_limits<double>::max();
+    if (range.empty()) range = {0, 1};
+    const double size = std::max(std::abs(range.low), std::abs(range.high));
+    const double margin = range.low == range.high ? std::max(size * 0.1, 0.5) : std::max({range.half() * 0.1, size * 1e-10, 1e-290});
+    strip.low = std::max(range.low - margin, -most);
+    strip.high = std::min(range.high + margin, most);
+}
+
+// Values without a unit are often of different kinds: the smaller would be a line in the strip of the larger. Zero goes with all.
+bool alike(const Range& strip, const Range& range) {
+    constexpr double most = 20;
+    const double size = range.size();
+    return size == 0 || strip.size() == 0 || (size / most <= strip.least && strip.size() / most <= size);
 }
 
 }  // namespace
@@ -182,22 +212,27 @@ void scale(Strip& strip, std::int64_t begin_ns, std::int64_t end_ns) {
 std::string plot_svg(const std::vector<Trace>& traces, const std::vector<mcap::Event>& events, std::int64_t begin_ns, std::int64_t end_ns,
                      int width) {
     std::vector<Strip> strips;
+    std::vector<Range> ranges;  // of the strips
     for (const Trace& trace : traces) {
+        const Range range = range_of(trace, begin_ns, end_ns);
         const bool bit = trace.type == HAL_TYPE_BIT, integer = trace.type != HAL_TYPE_FLOAT;
         const auto fits = [&](const Strip& strip) {
             const Trace& other = *strip.traces[0];
-            return !bit && !strip.bit && other.unit == trace.unit && (other.type != HAL_TYPE_FLOAT) == integer;
+            const Range& own = ranges[static_cast<std::size_t>(&strip - strips.data())];
+            return !bit && !strip.bit && other.unit == trace.unit && (other.type != HAL_TYPE_FLOAT) == integer &&
+                   (!trace.unit.empty() || alike(own, range));
         };
-        const auto at = std::find_if(strips.begin(), strips.end(), fits);
-        Strip& strip = at == strips.end() ? strips.emplace_back() : *at;
-        strip.traces.push_back(&trace);
-        strip.bit = bit;
+        const auto at = static_cast<std::size_t>(std::find_if(strips.begin(), strips.end(), fits) - strips.begin());
+        if (at == strips.size()) strips.emplace_back(), ranges.emplace_back();
+        strips[at].traces.push_back(&trace);
+        strips[at].bit = bit;
+        ranges[at].add(range);
+    }
+    for (std::size_t i = 0; i < strips.size(); ++i) {
+        if (strips[i].bit) strips[i].low = -0.15, strips[i].high = 1.15;
+        else scale(strips[i], ranges[i]);
     }
     std::stable_partition(strips.begin(), strips.end(), [](const Strip& strip) { return !strip.bit; });
-    for (Strip& strip : strips) {
-        if (strip.bit) strip.low = -0.15, strip.high = 1.15;
-        else scale(strip, begin_ns, end_ns);
-    }
     return Picture(events, begin_ns, end_ns, width).draw(std::move(strips));
 }
 

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <fmt/core.h>
 #include <fnmatch.h>
+#include <limits>
 #include <map>
 #include <set>
 #include <unistd.h>
@@ -15,7 +16,9 @@
 #include "cli/output.hpp"
 #include "recording/mcap/recording.hpp"
 #include "run/hosted_machine.hpp"
+#include "run/sim_summary.hpp"
 #include "text/quoting.hpp"
+#include "text/suggest.hpp"
 
 namespace hal::tools {
 namespace {
@@ -48,12 +51,19 @@ struct Compared {
 
 class Replay {
 public:
-    Replay(const ReplayOptions& options, const mcap::Recording& recording, HostedMachine& machine)
+    Replay(const ReplayOptions& options, mcap::Recording& recording, HostedMachine& machine)
         : options_(options), recording_(recording), machine_(machine) {}
 
     /// Connects the player to what has no writer. Returns the exit status.
     int connect(const std::string& file) {
         std::vector<std::vector<std::string>> commands{{"loadrt", "playback", "names=" + std::string(player), "file=" + file}};
+        if (const std::string unknown = unknown_name(); !unknown.empty()) return fail(options_, unknown);
+        if (file.ends_with(".csv")) {
+            std::string problem;
+            const std::string types = take_types(problem);
+            if (!problem.empty()) return fail(options_, problem);
+            if (!types.empty()) commands[0].push_back("types=" + types);
+        }
         {
             const auto lock = machine_.session.lock();
             const Model& model = machine_.session.model();
@@ -102,10 +112,11 @@ public:
         std::size_t width = 0;
         for (const Compared& one : compared_) width = std::max(width, one.name.size());
         std::string text;
-        std::size_t different = 0;
+        std::size_t different = 0, rows = 0;
         for (const Compared& one : compared_) {
             const bool differs = options_.tolerance >= 0 && !(one.worst <= options_.tolerance);
             different += differs;
+            rows += one.rows;
             if (options_.quiet && !differs) continue;
             if (one.rows == 0) text += fmt::format("{:{}}  no row at the same time\n", one.name, width);
             else if (one.worst == 0) text += fmt::format("{:{}}  equal in {}\n", one.name, width, counted(one.rows, "row"));
@@ -114,20 +125,56 @@ public:
                                     one.replayed, one.recorded, static_cast<double>(one.at_ns) * 1e-9);
         }
         const double seconds = static_cast<double>(recording_.end_ns() - recording_.begin_ns()) * 1e-9;
-        if (!options_.quiet || different != 0)
+        const bool nothing = options_.tolerance >= 0 && rows == 0;  // a test that tests nothing
+        if (!options_.quiet || different != 0 || nothing)
             text += fmt::format("{:.6g} s of recording: {} driven, {} compared{}\n",
                                 options_.for_ns < 0 ? seconds : std::min(seconds, static_cast<double>(options_.for_ns) * 1e-9),
                                 counted(driven_.size(), "input"), counted(compared_.size(), "value"),
                                 options_.tolerance < 0 ? ""
+                                : nothing              ? ": nothing was tested; record values that the netlist computes too"
                                 : different == 0
                                     ? ", none differs"
                                     : fmt::format(", {} by more than {:g}",
                                                   different == 1 ? "1 differs" : fmt::format("{} differ", different), options_.tolerance));
         if (!print(text)) return 1;
-        return different != 0 ? 1 : status;
+        return different != 0 || nothing ? 1 : status;
     }
 
 private:
+    /// Says which name or pattern of --names the recording does not have; "" when it has all.
+    std::string unknown_name() const {
+        std::vector<std::string> names;
+        for (const mcap::Table& table : recording_.tables)
+            for (const mcap::Column& column : table.columns) names.push_back(column.name);
+        for (const std::string& one : names_in({options_.names})) {
+            if (std::any_of(names.begin(), names.end(), [&](const std::string& name) { return matches(one, name); })) continue;
+            const std::string hint = suggestion(one, names, "it has");
+            return fmt::format("--names: the recording has no value '{}'{}", one, hint.empty() ? "" : "; " + hint);
+        }
+        return "";
+    }
+
+    /// A table has no types: its values get those that the netlist has. Returns them as playback's argument.
+    std::string take_types(std::string& problem) {
+        mcap::LoadOptions options;
+        std::string text;
+        {
+            const auto lock = machine_.session.lock();
+            const Model& model = machine_.session.model();
+            for (const mcap::Column& column : recording_.tables.front().columns) {
+                const Pin* const pin = model.find_pin(column.name);
+                const Signal* const signal = pin ? nullptr : model.find_signal(column.name);
+                const hal_type type = pin ? pin->type : signal ? signal->type : HAL_TYPE_FLOAT;
+                if (type == HAL_TYPE_FLOAT || type == HAL_TYPE_PORT || !matches(options_.names, column.name)) continue;
+                options.types[column.name] = type;
+                text += (text.empty() ? "" : ",") + column.name + ":" + hal::name(type);
+            }
+        }
+        mcap::Recording typed;
+        if (mcap::load(options_.words.front(), typed, problem, options)) recording_ = std::move(typed);
+        return text;
+    }
+
     std::string thread_name(const Model& model) {
         const Thread* thread = nullptr;
         if (!options_.thread.empty()) {
@@ -185,7 +232,10 @@ private:
         const hal_type type = one.table->columns[one.column].type;
         const double recorded = one.table->real(one.row, one.column), replayed = real_of(type, word);
         ++one.rows;
-        const double apart = std::isnan(recorded) && std::isnan(replayed) ? 0 : recorded == replayed ? 0 : std::abs(recorded - replayed);
+        const bool no_number = std::isnan(recorded) != std::isnan(replayed);
+        const double apart = no_number                                      ? std::numeric_limits<double>::infinity()
+                             : recorded == replayed || std::isnan(recorded) ? 0
+                                                                            : std::abs(recorded - replayed);
         if (apart <= one.worst) return;
         one.worst = apart;
         one.recorded = recorded;
@@ -194,7 +244,7 @@ private:
     }
 
     const ReplayOptions& options_;
-    const mcap::Recording& recording_;
+    mcap::Recording& recording_;
     HostedMachine& machine_;
     std::set<std::string> driven_, seen_;
     std::vector<Compared> compared_;
@@ -210,7 +260,9 @@ int run_replay(const ReplayOptions& options) {
     mcap::Recording recording;
     std::string problem;
     if (!mcap::load(options.words.front(), recording, problem)) return fail(options, problem);
-    if (recording.tables.empty()) return fail(options, fmt::format("'{}' has no rows", options.words.front()));
+    if (recording.tables.empty())
+        return fail(options,
+                    fmt::format("'{}' has no rows{}", options.words.front(), recording.unread.empty() ? "" : "; " + recording.unread));
     ReplayOptions netlists = options;
     netlists.words.erase(netlists.words.begin());
     HostedMachine machine(netlists, fmt::format("replay-{}", ::getpid()), true);

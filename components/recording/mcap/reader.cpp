@@ -16,7 +16,7 @@
 namespace hal::mcap {
 namespace {
 
-constexpr std::size_t record_head = 9, footer_bytes = record_head + 20;
+constexpr std::size_t record_head = 9, footer_bytes = record_head + 20, message_head = 2 + 4 + 8 + 8;
 
 class FileSource final : public Source {
 public:
@@ -93,13 +93,16 @@ bool Reader::open(std::unique_ptr<Source> source) {
     std::string begin;
     if (!source_->read(0, magic.size(), begin) || begin != magic)
         return fail("not an MCAP file: it does not begin with the bytes that such a file has");
-    if (read_summary()) return true;
+    const bool summary = read_summary();
+    if (summary && !chunks_.empty()) return true;
+    const bool footer = ends_;
     schemas_.clear();
     channels_.clear();
     chunks_.clear();
     metadata_.clear();
-    unfinished_ = true;
-    return scan();
+    if (!scan()) return false;
+    unfinished_ = !(ends_ && (summary || footer));
+    return true;
 }
 
 // A schema, a channel or an index: from the summary, or found by a scan.
@@ -148,7 +151,9 @@ bool Reader::read_summary() {
     fields.get<std::uint64_t>();
     const auto          crc = fields.get<std::uint32_t>();
     const std::uint64_t footer = size - magic.size() - footer_bytes;
-    if (fields.rest() != magic || begin == 0 || begin > footer || footer - begin > most_chunk) return false;
+    if (fields.rest() != magic) return false;
+    ends_ = begin == 0;  // a file without a summary may be whole
+    if (begin == 0 || begin > footer || footer - begin > most_chunk) return false;
     std::string summary;
     if (!source_->read(begin, static_cast<std::size_t>(footer - begin), summary)) return false;
     if (crc != 0 && crc32(std::string_view(end).substr(0, footer_bytes - 4), crc32(summary)) != crc) return false;
@@ -164,12 +169,20 @@ bool Reader::read_summary() {
 bool Reader::scan() {
     const std::uint64_t size = source_->size();
     std::string         head, content;
-    for (std::uint64_t at = magic.size(); at + record_head <= size && source_->read(at, record_head, head);) {
+    ends_ = false;
+    for (std::uint64_t at = magic.size(); at + record_head <= size;) {
+        if (!source_->read(at, static_cast<std::size_t>(std::min<std::uint64_t>(record_head + message_head, size - at)), head)) break;
         Fields     fields(head);
         const auto opcode = fields.get<std::uint8_t>();
         const auto length = fields.get<std::uint64_t>();
-        if (length > size - at - record_head || opcode == op_data_end) break;
-        if (opcode == op_chunk) {
+        ends_ = opcode == op_data_end;
+        if (length > size - at - record_head || ends_) break;
+        if (opcode == op_message) {
+            if (length < message_head || length > most_chunk || chunks_.size() >= most_entries) break;
+            fields.get<std::uint16_t>();
+            fields.get<std::uint32_t>();
+            add_loose(at, record_head + length, fields.get<std::uint64_t>());
+        } else if (opcode == op_chunk) {
             constexpr std::size_t fixed = 8 + 8 + 8 + 4 + 4;
             if (length < fixed || !source_->read(at + record_head, static_cast<std::size_t>(std::min<std::uint64_t>(length, 256)), content))
                 break;
@@ -204,8 +217,24 @@ bool Reader::scan() {
     return true;
 }
 
+// A message, to the run of messages before it when that ends here.
+void Reader::add_loose(std::uint64_t at, std::uint64_t length, std::uint64_t time) {
+    constexpr std::uint64_t run = std::uint64_t{1} << 20;
+    if (chunks_.empty() || !chunks_.back().loose || chunks_.back().offset + chunks_.back().length != at || chunks_.back().length >= run) {
+        ChunkIndex& index = chunks_.emplace_back();
+        index.begin_time = index.end_time = time;
+        index.offset = at;
+        index.loose = true;
+    }
+    ChunkIndex& index = chunks_.back();
+    index.begin_time = std::min(index.begin_time, time);
+    index.end_time = std::max(index.end_time, time);
+    index.length += length;
+}
+
 bool Reader::load_chunk(const ChunkIndex& chunk, std::string& records) {
     std::string bytes;
+    if (chunk.loose) return source_->read(chunk.offset, static_cast<std::size_t>(chunk.length), records) || fail("a message is missing");
     if (chunk.length < record_head || chunk.length > most_chunk || chunk.size > most_chunk) return fail("a chunk is larger than 256 MiB");
     if (!source_->read(chunk.offset, static_cast<std::size_t>(chunk.length), bytes))
         return fail("missing chunk at the position in the index: the file is damaged or truncated");

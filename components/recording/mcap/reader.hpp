@@ -34,10 +34,10 @@ public:
     static constexpr std::uint64_t most_chunk = std::uint64_t{256} << 20;   ///< bytes of a chunk, expanded
     static constexpr std::size_t   most_entries = 1'000'000;                   ///< chunks, or other records of the summary
 
-    /// Reads what the file contains. Without a summary it scans the file. Returns false and sets problem() when it is not an MCAP file.
+    /// Reads what the file contains. Without a summary, or chunks in it, it scans the file: messages that are in no chunk count as chunks of 1 MiB. Returns false and sets problem() when it is not an MCAP file.
     bool               open(std::unique_ptr<Source> source);
     const std::string& problem() const { return problem_; }
-    /// True: the file has no summary, as after a power failure; it was read up to its last complete chunk.
+    /// True: the file has no end, as after a power failure; it was read up to its last complete chunk or message.
     bool unfinished() const { return unfinished_; }
 
     const std::map<std::uint16_t, Schema>&  schemas() const { return schemas_; }
@@ -61,12 +61,13 @@ private:
     }
     bool read_summary();
     bool scan();
+    void add_loose(std::uint64_t at, std::uint64_t length, std::uint64_t time);
     bool take(std::uint8_t opcode, std::string_view content);
     bool load_chunk(const ChunkIndex& chunk, std::string& records);
 
     std::unique_ptr<Source>          source_;
     std::string                      problem_;
-    bool                             unfinished_ = false;
+    bool                             unfinished_ = false, ends_ = false;  // ends_: with a footer and the end of the data
     std::map<std::uint16_t, Schema>  schemas_;
     std::map<std::uint16_t, Channel> channels_;
     std::vector<ChunkIndex>          chunks_;

@@ -4,9 +4,12 @@
 #include <algorithm>
 #include <bit>
 #include <charconv>
+#include <cmath>
+#include <limits>
 #include <map>
 #include <numeric>
 #include <sstream>
+#include <type_traits>
 #include <utility>
 
 #include "recording/mcap/reader.hpp"
@@ -47,6 +50,8 @@ void sort(Table& table) {
     table = std::move(sorted);
 }
 
+constexpr const char* flat_only = "; CDR messages with a 'ros2msg' schema of numbers and bool only are";
+
 bool load_mcap(const std::string& path, Recording& to, std::string& problem, const LoadOptions& options) {
     Reader reader;
     auto   source = open_file(path, problem);
@@ -55,7 +60,7 @@ bool load_mcap(const std::string& path, Recording& to, std::string& problem, con
         problem = "'" + path + "': " + reader.problem();
         return false;
     }
-    if (reader.unfinished()) to.note = "'" + path + "' ends without a summary: it was read up to its last complete chunk";
+    if (reader.unfinished()) to.note = "'" + path + "' ends without a summary: it was read up to its last complete chunk or message";
     std::map<std::uint16_t, std::pair<RowReader, std::size_t>> rows;
     std::map<std::uint16_t, bool>                              events;
     for (const auto& [id, channel] : reader.channels()) {
@@ -64,6 +69,9 @@ bool load_mcap(const std::string& path, Recording& to, std::string& problem, con
         if (schema != reader.schemas().end() && row.open(schema->second, channel)) {
             to.tables.push_back({channel.topic, row.columns(), {}, {}});
             rows.emplace(id, std::pair{std::move(row), to.tables.size() - 1});
+        } else if (to.unread.empty() && channel.topic != "/hal/events") {
+            const std::string why = schema == reader.schemas().end() ? "it has no schema" : row.problem();
+            to.unread = "topic '" + channel.topic.substr(0, 60) + "' is not read: " + why + flat_only;
         }
         events[id] = channel.topic == "/hal/events" && channel.encoding == "json";
     }
@@ -73,8 +81,12 @@ bool load_mcap(const std::string& path, Recording& to, std::string& problem, con
         const auto time_ns = static_cast<std::int64_t>(message.log_time);
         bytes += 8;
         if (const auto at = rows.find(message.channel); at != rows.end()) {
-            if (!at->second.first.read(message.payload, values)) return true;
             Table& table = to.tables[at->second.second];
+            if (!at->second.first.read(message.payload, values)) {
+                if (to.unread.empty())
+                    to.unread = "a message of topic '" + table.topic.substr(0, 60) + "' is shorter than its schema, or big-endian";
+                return true;
+            }
             table.times_ns.push_back(time_ns);
             table.words.insert(table.words.end(), values.begin(), values.end());
             bytes += values.size() * 8;
@@ -110,6 +122,50 @@ std::vector<std::string> csv_words(const std::string& line) {
     return words;
 }
 
+bool number_of(const std::string& text, double& value) {
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    return error == std::errc() && end == text.data() + text.size();
+}
+
+template <class Int>
+bool whole_number(const std::string& text, std::uint64_t& word) {
+    Int value = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (error == std::errc() && end == text.data() + text.size()) {
+        word = static_cast<std::uint64_t>(static_cast<std::conditional_t<std::is_signed_v<Int>, std::int64_t, std::uint64_t>>(value));
+        return true;
+    }
+    double real = 0;  // "1.0", "1e3": of another program
+    if (!number_of(text, real) || real != std::floor(real) || std::abs(real) > 0x1p53) return false;
+    if (real < static_cast<double>(std::numeric_limits<Int>::min()) || real > static_cast<double>(std::numeric_limits<Int>::max()))
+        return false;
+    word = static_cast<std::uint64_t>(static_cast<std::int64_t>(real));
+    return true;
+}
+
+/// The word of a value of that type. Returns false, and leaves it, when the text is none.
+bool word_of(const std::string& text, hal_type type, std::uint64_t& word) {
+    double        real = 0;
+    std::uint64_t bit = 0;
+    switch (type) {
+    case HAL_TYPE_BIT:
+        if (!whole_number<std::uint8_t>(text, bit) || bit > 1) return false;
+        word = bit;
+        return true;
+    case HAL_TYPE_S32: return whole_number<std::int32_t>(text, word);
+    case HAL_TYPE_U32: return whole_number<std::uint32_t>(text, word);
+    case HAL_TYPE_S64: return whole_number<std::int64_t>(text, word);
+    case HAL_TYPE_U64: return whole_number<std::uint64_t>(text, word);
+    default:
+        if (!number_of(text, real)) return false;
+        word = std::bit_cast<std::uint64_t>(real);
+        return true;
+    }
+}
+
+constexpr std::pair<std::string_view, hal_type> type_words[] = {{"bit", HAL_TYPE_BIT}, {"float", HAL_TYPE_FLOAT}, {"s32", HAL_TYPE_S32},
+                                                                {"u32", HAL_TYPE_U32}, {"s64", HAL_TYPE_S64},     {"u64", HAL_TYPE_U64}};
+
 bool load_csv(const std::string& path, Recording& to, std::string& problem, const LoadOptions& options) {
     const auto  source = open_file(path, problem);
     std::string text, line;
@@ -126,26 +182,34 @@ bool load_csv(const std::string& path, Recording& to, std::string& problem, cons
         return false;
     }
     Table table{"", {}, {}, {}};
-    for (std::size_t i = 1; i < names.size(); ++i) table.columns.push_back({names[i], HAL_TYPE_FLOAT, ""});
-    std::vector<double> held(table.columns.size());
+    for (std::size_t i = 1; i < names.size(); ++i) {
+        const auto type = options.types.find(names[i]);
+        table.columns.push_back({names[i], type == options.types.end() ? HAL_TYPE_FLOAT : type->second, ""});
+    }
+    std::vector<std::uint64_t> held(table.columns.size());
     for (std::size_t number = 2; std::getline(file, line); ++number) {
         const std::vector<std::string> words = csv_words(line);
+        const std::string              place = "'" + path + "', line " + std::to_string(number) + ": ";
         double                         time_s = 0;
-        const auto                     number_of = [](const std::string& word, double& value) {
-            const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-            return error == std::errc() && end == word.data() + word.size();
-        };
-        bool good = words.size() == names.size() && number_of(words[0], time_s) && time_s >= 0 && time_s < 9e9;
-        for (std::size_t i = 1; good && i < words.size(); ++i)
-            good = words[i].empty() || number_of(words[i], held[i - 1]);  // empty: as before
-        if (!good) {
-            problem = "'" + path + "', line " + std::to_string(number) + ": not a row of " + std::to_string(names.size()) + " numbers";
+        if (words.size() != names.size() || !number_of(words[0], time_s) || !(std::abs(time_s) < 9e9)) {
+            problem = place + "not a row of " + std::to_string(names.size()) + " numbers";
             return false;
         }
-        const auto time_ns = static_cast<std::int64_t>(time_s * 1e9 + 0.5);
+        for (std::size_t i = 1; i < words.size(); ++i) {
+            const hal_type type = table.columns[i - 1].type;
+            if (words[i].empty() || word_of(words[i], type, held[i - 1])) continue;  // empty: as before
+            const auto word =
+                std::find_if(std::begin(type_words), std::end(type_words), [type](const auto& one) { return one.second == type; });
+            if (type == HAL_TYPE_FLOAT) problem = place + "not a row of " + std::to_string(names.size()) + " numbers";
+            else
+                problem =
+                    place + "'" + words[i].substr(0, 40) + "' of '" + names[i] + "' is not a value of type " + std::string(word->first);
+            return false;
+        }
+        const auto time_ns = static_cast<std::int64_t>(std::llround(time_s * 1e9));
         if (time_ns < options.begin_ns || time_ns >= options.end_ns) continue;
         table.times_ns.push_back(time_ns);
-        for (const double value : held) table.words.push_back(std::bit_cast<std::uint64_t>(value));
+        table.words.insert(table.words.end(), held.begin(), held.end());
         if (table.words.size() * 8 <= options.most_bytes) continue;
         problem = "'" + path + "' has more than " + std::to_string(options.most_bytes >> 20) + " MiB of values; choose a part of it";
         return false;
@@ -155,6 +219,12 @@ bool load_csv(const std::string& path, Recording& to, std::string& problem, cons
 }
 
 }  // namespace
+
+std::optional<hal_type> type_of_word(std::string_view word) {
+    for (const auto& [own, type] : type_words)
+        if (own == word) return type;
+    return std::nullopt;
+}
 
 double Table::real(std::size_t row, std::size_t column) const {
     const std::uint64_t value = word(row, column);
@@ -174,16 +244,17 @@ std::int64_t Recording::begin_ns() const {
 }
 
 std::int64_t Recording::end_ns() const {
-    std::int64_t time = 0;
+    std::int64_t time = INT64_MIN;
     for (const Table& table : tables)
         if (table.rows() != 0) time = std::max(time, table.times_ns.back());
-    return time;
+    return time == INT64_MIN ? 0 : time;
 }
 
 bool load(const std::string& path, Recording& to, std::string& problem, const LoadOptions& options) {
     if (!(path.ends_with(".csv") ? load_csv : load_mcap)(path, to, problem, options)) return false;
     for (Table& table : to.tables) sort(table);
     std::erase_if(to.tables, [](const Table& table) { return table.rows() == 0; });
+    if (!to.tables.empty()) to.unread.clear();
     return true;
 }
 

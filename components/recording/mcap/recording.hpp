@@ -3,12 +3,18 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "recording/mcap/rows.hpp"
 
 namespace hal::mcap {
+
+/// Returns the type of "bit", "float" or "s32", "u32", "s64", "u64".
+std::optional<hal_type> type_of_word(std::string_view word);
 
 /// Rows of one channel: those of one thread.
 struct Table {
@@ -31,6 +37,7 @@ struct Recording {
     std::vector<Table> tables;
     std::vector<Event> events;
     std::string        note;                      ///< what is wrong with the file though it was read; "" when nothing is
+    std::string        unread;  ///< of a file without rows: which of its topics is not read, and why; else ""
 
     std::int64_t begin_ns() const;
     std::int64_t end_ns() const;
@@ -38,8 +45,9 @@ struct Recording {
 
 /// Options of load().
 struct LoadOptions {
-    std::size_t  most_bytes = std::size_t{1} << 30;
-    std::int64_t begin_ns = 0, end_ns = INT64_MAX;  ///< of Unix time
+    std::size_t                     most_bytes = std::size_t{1} << 30;
+    std::int64_t                    begin_ns = INT64_MIN, end_ns = INT64_MAX;  ///< of Unix time; of the table's time for .csv
+    std::map<std::string, hal_type> types = {};  ///< of columns of a .csv, which does not have them; others are FLOAT
 };
 
 /// Loads a recording (.mcap, or .csv as `hal record` writes it). Returns false and sets `problem`.

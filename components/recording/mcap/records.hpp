@@ -53,6 +53,7 @@ struct ChunkIndex {
     std::uint64_t                          message_index_length = 0;
     std::string                            compression;
     std::uint64_t                          compressed_size = 0, size = 0;
+    bool                                   loose = false;  ///< messages that are in the file without a chunk
 };
 
 }  // namespace hal::mcap

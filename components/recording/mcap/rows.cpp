@@ -103,15 +103,23 @@ void RowWriter::write(const std::uint64_t* values, std::string& to) const {
 bool RowReader::open(const Schema& schema, const Channel& channel) {
     columns_.clear();
     fields_.clear();
-    if (channel.encoding != "cdr" || schema.encoding != "ros2msg") return false;
+    problem_.clear();
+    const auto other = [this](std::string sentence) {
+        problem_ = std::move(sentence);
+        return false;
+    };
+    if (channel.encoding != "cdr") return other("its messages are '" + channel.encoding.substr(0, 40) + "'");
+    if (schema.encoding != "ros2msg") return other("its schema is '" + schema.encoding.substr(0, 40) + "'");
     for (std::string_view text = schema.data; !text.empty();) {
         std::string_view       line = next_line(text);
         const std::string_view type = next_word(line), name = next_word(line);
         if (type.empty()) continue;
-        if (type.starts_with("===")) return false;  // other messages follow: it is not flat
+        if (type.starts_with("===")) return other("its schema has other messages in it");
         if (name.empty() || line.find('=') != line.npos || name.find('=') != name.npos) continue;  // a constant
         const auto kind = std::find_if(std::begin(kinds), std::end(kinds), [&](const Kind& one) { return one.word == type; });
-        if (kind == std::end(kinds) || columns_.size() >= most_columns) return false;
+        if (kind == std::end(kinds))
+            return other("its field '" + std::string(name.substr(0, 60)) + "' is " + std::string(type.substr(0, 60)));
+        if (columns_.size() >= most_columns) return other("it has more than " + std::to_string(most_columns) + " fields");
         const auto metadata = [&](const char* prefix, std::string_view otherwise) {
             const auto at = channel.metadata.find(prefix + std::string(name));
             return at == channel.metadata.end() ? std::string(otherwise) : at->second;
@@ -119,7 +127,7 @@ bool RowReader::open(const Schema& schema, const Channel& channel) {
         columns_.push_back({metadata("pin.", name), kind->type, metadata("unit.", "")});
         fields_.push_back({kind->bytes, kind->is_signed, kind->is_float});
     }
-    return !columns_.empty();
+    return !columns_.empty() || other("its schema has no field");
 }
 
 bool RowReader::read(std::string_view payload, std::vector<std::uint64_t>& values) const {

@@ -39,8 +39,9 @@ private:
 /// Reads rows of a channel, ours or another writer's, as long as its message is flat: numbers and bool.
 class RowReader {
 public:
-    /// Returns false when the channel has other messages.
+    /// Returns false when the channel has other messages, and sets problem(), as "its messages are json".
     bool                       open(const Schema& schema, const Channel& channel);
+    const std::string&         problem() const { return problem_; }
     const std::vector<Column>& columns() const { return columns_; }
     /// Replaces `values` by a word per column. Returns false when the message is too short.
     bool read(std::string_view payload, std::vector<std::uint64_t>& values) const;
@@ -52,6 +53,7 @@ private:
     };
     std::vector<Column> columns_;
     std::vector<Field>  fields_;
+    std::string         problem_;
 };
 
 }  // namespace hal::mcap

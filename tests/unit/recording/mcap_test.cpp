@@ -205,6 +205,99 @@ TEST(Recording, What_is_not_a_recording_is_rejected) {
     EXPECT_NE(problem.find("line 3"), std::string::npos) << problem;
 }
 
+/// An MCAP file of another writer: nothing of it is in a chunk, and it has no summary.
+std::string without_chunks(std::string_view encoding, std::string_view schema_encoding, std::string_view schema, std::string_view payload) {
+    std::string file(magic), content;
+    const auto add = [&](Opcode opcode) {
+        put_record(file, opcode, content);
+        content.clear();
+    };
+    put_text(content, "");
+    put_text(content, "other");
+    add(op_header);
+    put(content, std::uint16_t{1});
+    for (const std::string_view text : {std::string_view("p/msg/X"), schema_encoding, schema}) put_text(content, text);
+    add(op_schema);
+    put(content, std::uint16_t{1});
+    put(content, std::uint16_t{1});
+    for (const std::string_view text : {std::string_view("/t"), encoding, std::string_view()}) put_text(content, text);
+    add(op_channel);
+    for (std::uint32_t i = 0; i < 100; ++i) {
+        put(content, std::uint16_t{1});
+        put(content, i);
+        put(content, start_ns + i * period_ns);
+        put(content, std::uint64_t{0});
+        content += payload;
+        add(op_message);
+    }
+    put(content, std::uint32_t{0});
+    add(op_data_end);
+    content.assign(20, '\0');
+    add(op_footer);
+    return file + std::string(magic);
+}
+
+TEST(Recording, Messages_without_a_chunk_are_read) {
+    const Folder folder;
+    const std::string whole = without_chunks("cdr", "ros2msg", "float64 a\n", std::string_view("\0\1\0\0\0\0\0\0\0\0\xf8\x3f", 12));
+    put_file(folder.file("a.mcap"), whole);
+    Recording recording;
+    std::string problem;
+    ASSERT_TRUE(load(folder.file("a.mcap"), recording, problem)) << problem;
+    EXPECT_EQ(recording.note, "") << "such a file is whole";
+    ASSERT_EQ(recording.tables.size(), 1u);
+    ASSERT_EQ(recording.tables[0].rows(), 100u);
+    EXPECT_EQ(recording.tables[0].real(99, 0), 1.5);
+    EXPECT_EQ(recording.end_ns(), static_cast<std::int64_t>(start_ns + 99 * period_ns));
+    put_file(folder.file("cut.mcap"), std::string_view(whole).substr(0, whole.size() - 500));
+    Recording cut;
+    ASSERT_TRUE(load(folder.file("cut.mcap"), cut, problem)) << problem;
+    EXPECT_NE(cut.note, "");
+    ASSERT_EQ(cut.tables.size(), 1u);
+    EXPECT_GT(cut.tables[0].rows(), 80u);
+    EXPECT_LT(cut.tables[0].rows(), 100u);
+}
+
+TEST(Recording, What_cannot_be_read_is_named) {
+    const Folder folder;
+    const auto unread = [&](const std::string& bytes) {
+        put_file(folder.file("a.mcap"), bytes);
+        Recording recording;
+        std::string problem;
+        EXPECT_TRUE(load(folder.file("a.mcap"), recording, problem)) << problem;
+        EXPECT_TRUE(recording.tables.empty());
+        return recording.unread.substr(0, recording.unread.find(';'));
+    };
+    EXPECT_EQ(unread(without_chunks("json", "jsonschema", "{}", "{}")), "topic '/t' is not read: its messages are 'json'");
+    EXPECT_EQ(unread(without_chunks("cdr", "ros2idl", "", "")), "topic '/t' is not read: its schema is 'ros2idl'");
+    EXPECT_EQ(unread(without_chunks("cdr", "ros2msg", "float64[] a\n", "")), "topic '/t' is not read: its field 'a' is float64[]");
+    EXPECT_EQ(unread(without_chunks("cdr", "ros2msg", "", "")), "topic '/t' is not read: its schema has no field");
+    EXPECT_EQ(unread(without_chunks("cdr", "ros2msg", "float64 a\n", "")), "a message of topic '/t' is shorter than its schema, or big-endian");
+}
+
+TEST(Recording, A_table_has_the_types_that_are_given) {
+    const Folder folder;
+    put_file(folder.file("a.csv"), "time_s,on,n,big\n-0.002,1,-5,9007199254740993\n-0.001,0,2147483648,18446744073709551615\n");
+    Recording recording;
+    std::string problem;
+    const auto get = [&](std::map<std::string, hal_type> types) {
+        recording = {};
+        return load(folder.file("a.csv"), recording, problem, {.types = std::move(types)});
+    };
+    ASSERT_TRUE(get({{"on", HAL_TYPE_BIT}, {"n", HAL_TYPE_S64}, {"big", HAL_TYPE_U64}})) << problem;
+    const Table& table = recording.tables[0];
+    EXPECT_EQ(recording.begin_ns(), -2'000'000);
+    EXPECT_EQ(recording.end_ns(), -1'000'000);
+    EXPECT_EQ(table.word(0, 0), 1u);
+    EXPECT_EQ(static_cast<std::int64_t>(table.word(0, 1)), -5);
+    EXPECT_EQ(table.word(0, 2), 9007199254740993u);
+    EXPECT_EQ(table.word(1, 2), UINT64_MAX);
+    EXPECT_FALSE(get({{"n", HAL_TYPE_S32}}));
+    EXPECT_NE(problem.find("line 3: '2147483648' of 'n' is not a value of type s32"), std::string::npos) << problem;
+    EXPECT_FALSE(get({{"n", HAL_TYPE_BIT}}));
+    EXPECT_NE(problem.find("line 2: '-5' of 'n' is not a value of type bit"), std::string::npos) << problem;
+}
+
 TEST(Recording, Crc_is_that_of_zlib) {
     EXPECT_EQ(crc32("123456789"), 0xCBF43926u);
     EXPECT_EQ(crc32("6789", crc32("12345")), 0xCBF43926u);
