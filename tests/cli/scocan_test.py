@@ -91,16 +91,16 @@ class Plan(Case):
         self.write("robot.scocan", ROBOT.replace("period 10ms fields", "period 3ms fields"))
         done = self.run_program("scocan", "plan", "robot.scocan")
         self.assertEqual(1, done.returncode)
-        self.assertEqual("robot.scocan:14: 0x10A position: 10.000 to the next turn of its slot + 0.004 guard + 0.135 frame = 10.139 ms, "
+        self.assertEqual("robot.scocan:13: 0x10A position: 10.000 to the next turn of its slot + 0.004 guard + 0.135 frame = 10.139 ms, "
                          "period 3.000 ms is shorter than 10.000 ms between two turns\n"
                          "  = help: give it more private slots, a shorter cycle, or a longer period and deadline\n", done.stderr)
         self.write("robot.scocan", ROBOT.replace("period 10ms fields", "period 10ms deadline 8ms fields"))
-        self.assertEqual("robot.scocan:14: 0x10A position: 10.000 to the next turn of its slot + 0.004 guard + 0.135 frame = 10.139 ms, "
+        self.assertEqual("robot.scocan:13: 0x10A position: 10.000 to the next turn of its slot + 0.004 guard + 0.135 frame = 10.139 ms, "
                          "deadline 8.000 ms\n"
                          "  = help: give it more private slots, a shorter cycle, or a longer period and deadline\n",
                          self.run_program("scocan", "plan", "robot.scocan").stderr)
         self.write("robot.scocan", ROBOT.replace("fields a:s32", "fields send:s32"))
-        self.assertIn("robot.scocan:14:42: error: reserved field name 'send' [scocan-", self.bad("scocan", "plan", "robot.scocan"))
+        self.assertIn("robot.scocan:13:43: error: reserved field name 'send' [scocan-", self.bad("scocan", "plan", "robot.scocan"))
         self.assertEqual("hal scocan plan: cannot read 'none.scocan': No such file or directory\n", self.bad("scocan", "plan", "none.scocan"))
 
 

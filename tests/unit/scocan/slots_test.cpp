@@ -72,7 +72,8 @@ TEST(Node_in_a_slow_thread, without_windows_counts_and_reports_the_turns_that_it
         Member& motor = bus.add("motor", {.windows = false});
         const std::size_t sent = turns_in_a_slow_thread(bus, clock, motor, period);
         const auto missed = motor.station.count().missed;
-        EXPECT_NEAR(235, static_cast<double>(clock.count(0x10A) + missed), 25) << period << ": " << sent << " sent, " << missed << " missed";
+        EXPECT_NEAR(235, static_cast<double>(clock.count(0x10A) + missed), 25)
+            << period << ": " << sent << " sent, " << missed << " missed";
         if (period == 500 * us) {
             EXPECT_EQ(0U, missed);
             EXPECT_EQ(0U, motor.times(Event::slot_missed));

@@ -73,6 +73,16 @@ TEST(Sync, lost_for_too_long_silences_a_node_that_recovers) {
     EXPECT_GT(motor.station.count().sent_private, before);
 }
 
+TEST(Backup, in_a_slow_thread_does_not_report_its_own_sync_as_doubled) {
+    Bus bus;
+    bus.add("clock");
+    Member& spare = bus.add("spare");
+    bus.run(1000 * ms, 100 * ms);  // both have begun to lead before either could hear the other
+    EXPECT_EQ(1U, spare.times(Event::standby));
+    EXPECT_EQ(0U, spare.times(Event::sync_doubled));
+    EXPECT_EQ(State::running, spare.station.state());
+}
+
 TEST(Sync, with_any_phase_ends_silence_at_once) {
     Bus bus;
     Member& clock = bus.add("clock");
