@@ -11,6 +11,7 @@
 #include "classic.hpp"
 #include "cli/standard_streams.hpp"
 #include "commands.hpp"
+#include "execute/process_setup.hpp"
 
 namespace {
 
@@ -32,6 +33,7 @@ int main(int argc, char** argv) {
     // With file capabilities the kernel leaves no core dump and gives /proc/PID to root. Every user who can start this program can load code into
     // it, so it holds no secrets; still, only a process with the same capabilities can trace it.
     if (::getauxval(AT_SECURE) != 0) ::prctl(PR_SET_DUMPABLE, 1UL);
+    hal::limit_helper_stacks();
     end_with_machine();
     std::string_view program = argc > 0 ? argv[0] : "hal";
     program.remove_prefix(program.find_last_of('/') + 1);

@@ -22,8 +22,8 @@ bool may_lock_memory() {
     return false;
 }
 
-/// Limits the stacks of helper threads: locked memory is resident as a whole, and glibc's default, the limit of the main thread, is usually
-/// 8 MB. A thread that sets the size of its stack is not affected.
+}  // namespace
+
 void limit_helper_stacks() {
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // whose frames are larger
     constexpr std::size_t most = 1 << 20;
@@ -36,10 +36,7 @@ void limit_helper_stacks() {
 #endif
 }
 
-}  // namespace
-
 std::vector<std::string> prepare_process() {
-    limit_helper_stacks();
     std::vector<std::string> refused;
     // Under a small limit MCL_FUTURE would make later allocations fail, which is worse than a page fault.
     const rlimit all{RLIM_INFINITY, RLIM_INFINITY};
