@@ -264,6 +264,12 @@ class Live(Case):
         self.assertRegex(done.stderr, r"^hal record: cannot write 'run\.mcap': File too large; the file is complete up to there\n$")
         self.good("plot", "run.mcap", "sine")
 
+    def test_too_many_values_are_rejected_with_what_to_type(self):
+        large = "loadrt threads name1=servo period1=1000000\nloadrt siggen count=250\n" + "".join(f"addf siggen.{i}.update servo\n" for i in range(250))
+        self.start("run", self.write("big.hal", large), "--name", "big", instance="big")
+        self.assertRegex(self.bad("record", "big.mcap", "--name", "big", "--all", "--for", "100ms"),
+                         r"^hal record: the probe needs up to \d+ MiB of memory, more than 64; name fewer values, or type a larger --every\n$")
+
     def test_two_recorders_do_not_share_a_file(self):
         for name in ("run.mcap", "run.csv"):
             first = self.recorder(name, "sine")
