@@ -225,7 +225,7 @@ int record_values(const Options& options, const std::string& instance, Recording
     wanted.journal = true;
     const auto probe = ProbeClient::attach(*client, names, wanted, problem);
     if (const std::size_t advice = problem.find("; sample fewer values"); !probe && advice != std::string::npos)
-        problem = problem.substr(0, advice) + "; name fewer values, or type a larger --every";  // buffer_ms is no option here
+        problem = problem.substr(0, advice) + "; name fewer values, or type a larger --every";  // hal record has no buffer_ms
     if (!probe) return fail(options, problem);
     Recorder recorder(options, what, *client, *probe);
     return what.last_ns >= 0 ? recorder.flight() : recorder.to_files();

@@ -45,9 +45,9 @@ std::unique_ptr<Sink> make_sink(const std::string& path, const std::vector<Probe
 std::unique_ptr<Sink> make_mcap_sink(const std::string& path, const std::vector<ProbeColumn>& columns, const Origin& origin);
 std::unique_ptr<Sink> make_csv_sink(const std::string& path, const std::vector<ProbeColumn>& columns);
 
-/// Returns "cannot write 'FILE': REASON; WHAT IS LEFT" for a sink that failed. Closes it.
+/// Returns "cannot write 'FILE': REASON; WHAT REMAINS" for a sink that failed. Closes it.
 std::string cannot_write(Sink& sink, const std::string& path);
-/// Returns the line that says where the unfinished file of an earlier recorder is now; "" when there was none.
+/// Returns the line that states where the unfinished file of an earlier recorder is now; "" when there was none.
 std::string kept_line(const Sink& sink, const std::string& path);
 
 /// Adds the rows of a batch with begin <= time < end, in the order of time. Returns false after a failed write.

@@ -141,7 +141,7 @@ public:
     }
 
 private:
-    /// Says which name or pattern of --names the recording does not have; "" when it has all.
+    /// States which name or pattern of --names the recording does not have; "" when it has all.
     std::string unknown_name() const {
         std::vector<std::string> names;
         for (const mcap::Table& table : recording_.tables)

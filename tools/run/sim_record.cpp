@@ -32,7 +32,7 @@ std::vector<std::string> chosen(const Model& model, const std::vector<std::strin
     return {all.begin(), all.end()};
 }
 
-/// Says which of the names there is not; "" when all are known. The session's lock must be held.
+/// States which of the names there is not; "" when all are known. The session's lock must be held.
 std::string unknown_name(const Model& model, const std::vector<std::string>& patterns) {
     for (const std::string& one : patterns) {
         if (model.find_pin(one) || model.find_signal(one) || !chosen(model, {one}).empty()) continue;

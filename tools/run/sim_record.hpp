@@ -6,7 +6,7 @@
 
 namespace hal::tools {
 
-/// Says what speaks against the file of --record, before anything is loaded. Returns the exit status.
+/// States what speaks against the file of --record, before anything is loaded. Returns the exit status.
 int check_recording(const SimOptions& options);
 
 /// Advances by --for or --cycles and records meanwhile: the same netlist gives the same file. Returns the exit status.
