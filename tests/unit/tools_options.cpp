@@ -68,7 +68,7 @@ TEST_F(OptionSetTest, shows_words_values_and_ranges_in_the_help) {
                           "  --name NAME              a name; may be repeated\n"
                           "  --for TIME               end after 2s\n"
                           "  --factor F               a factor\n"
-                          "  --level N:INT in [0 - 3] a level\n"
+                          "  --level N:0..3           a level\n"
                           "  -l, --loud               with noise\n"
                           "  -h, --help               print this\n");
 }

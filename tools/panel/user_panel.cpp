@@ -78,9 +78,13 @@ std::string UserPanel::write(std::string_view name, const Json& value) {
 void UserPanel::page_active() {
     active_ = true;
     if (std::exchange(begun_, true)) return;
-    for (const PanelPin& pin : layout_.pins)  // until now they had their safe values
-        if (pin.output && !pin.safe.is_null() && !pin.initial.is_null()) write(pin.name, pin.initial);
-    if (on_values) on_values(values());
+    bool any = false;
+    for (const PanelPin& pin : layout_.pins) {  // until now they had their safe values
+        if (!pin.output || pin.safe.is_null() || pin.initial.is_null()) continue;
+        write(pin.name, pin.initial);
+        any = true;
+    }
+    if (any && on_values) on_values(values());
 }
 
 void UserPanel::page_lost() {
