@@ -36,7 +36,7 @@ endif()
 if(HALCYON_SANITIZE)
     # Omits the checks that double the compile time: a null pointer ends the program anyway, and x86 and ARM load from any address.
     add_compile_options("-fsanitize=${HALCYON_SANITIZE}" -fno-sanitize=null,alignment -fno-sanitize-recover=all -fno-omit-frame-pointer -g1)
-    string(REPLACE "-O2" "-O1" CMAKE_CXX_FLAGS_RELEASE "${CMAKE_CXX_FLAGS_RELEASE}")  # with -O0 the tests take three times as long
+    string(REPLACE "-O2" "-O1" CMAKE_CXX_FLAGS_RELEASE "${CMAKE_CXX_FLAGS_RELEASE}")  # without optimisation the tests of the command line are too slow
     add_link_options("-fsanitize=${HALCYON_SANITIZE}")
 endif()
 # The environment of a program that loads plugins. The leak checker takes a plugin's thread-local memory for what it is not, and dies of it,
@@ -101,7 +101,7 @@ endfunction()
 
 find_program(HALCYON_CCACHE ccache)
 if(HALCYON_CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
-    set(HALCYON_LAUNCHER "${CMAKE_CURRENT_LIST_DIR}/cached_compile.sh" "${HALCYON_CCACHE}")
+    set(HALCYON_LAUNCHER sh "${CMAKE_CURRENT_LIST_DIR}/cached_compile.sh" "${HALCYON_CCACHE}")
     set(CMAKE_C_COMPILER_LAUNCHER ${HALCYON_LAUNCHER})
     set(CMAKE_CXX_COMPILER_LAUNCHER ${HALCYON_LAUNCHER})
     if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
@@ -114,7 +114,7 @@ if(HALCYON_MOLD AND NOT CMAKE_CROSSCOMPILING)  # a cross compiler looks for one 
 endif()
 
 # halcyon_in_programs(VARIABLE LIBRARY [OTHER...]): how to link a shared library, with those it needs itself: programs take it from its archive where
-# there is one, since loading eight small libraries takes half of the time of `hal getp`.
+# there is one: loading eight small libraries takes about half of the processor time in which `hal` starts.
 function(halcyon_in_programs variable library)
     cmake_path(REPLACE_EXTENSION library LAST_ONLY ".a" OUTPUT_VARIABLE archive)
     set(archives "${archive}")

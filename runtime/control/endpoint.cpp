@@ -4,6 +4,7 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <utility>
 
 #include <fcntl.h>
 #include <sys/file.h>
@@ -106,16 +107,19 @@ bool Endpoint::listen_at(Diagnostics& diagnostics) {
     return false;
 }
 
+void Endpoint::stop_listening() {
+    if (socket_ < 0) return;
+    unlink(path_.c_str());
+    close(std::exchange(socket_, -1));
+}
+
 void Endpoint::close_all() {
-    if (socket_ >= 0) {
-        unlink(path_.c_str());
-        close(socket_);
-    }
+    stop_listening();
     if (lock_ >= 0) {
         if (!lock_file_.empty()) unlink(lock_file_.c_str());
         close(lock_);
     }
-    socket_ = lock_ = -1;
+    lock_ = -1;
     lock_file_.clear();
 }
 

@@ -17,6 +17,8 @@ public:
 
     /// False after reporting: the name is bad, the folder is not ours alone, an instance of this name runs.
     bool open(std::string_view name, Diagnostics& diagnostics);
+    /// Removes the socket. Clients whose connection closes afterwards find it gone: this end is in order.
+    void stop_listening();
     void close_all();
     int fd() const { return socket_; }
     const std::string& path() const { return path_; }

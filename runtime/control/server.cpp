@@ -179,6 +179,7 @@ void Server::State::serve() {
         }
         if (!client->gone) send_out(*client);
     }
+    endpoint.stop_listening();
     clients.clear();
     connected = 0;
 }

@@ -22,6 +22,11 @@ void store(hal_pin& pin, std::int32_t value) noexcept { __atomic_store_n(&pin.sl
 void store(hal_pin& pin, std::uint32_t value) noexcept { __atomic_store_n(&pin.slot->u32, value, __ATOMIC_RELAXED); }
 void store(hal_pin& pin, bool value) noexcept { __atomic_store_n(&pin.slot->bit, value, __ATOMIC_RELAXED); }
 
+struct Current {  // outlives no core: on the virtual clock the session's own thread runs them all
+    explicit Current(Core* core) noexcept { current_core = core; }
+    ~Current() { current_core = nullptr; }
+};
+
 struct Guard {
     Guard() noexcept { if (__rtsan_realtime_enter) __rtsan_realtime_enter(); }
     ~Guard() { if (__rtsan_realtime_exit) __rtsan_realtime_exit(); }
@@ -39,7 +44,7 @@ Core::Core(std::uint32_t id, std::int64_t period_ns, ThreadPins pins, FaultBoard
 }
 
 void Core::cycle(std::int64_t grid_ns, std::int64_t due_ns, std::int64_t woke_ns) noexcept {
-    current_core = this;
+    const Current current(this);
     const Guard guard;
     grid_ns_ = grid_ns;
     info_.start_ns = due_ns;
@@ -70,6 +75,7 @@ void Core::cycle(std::int64_t grid_ns, std::int64_t due_ns, std::int64_t woke_ns
 }
 
 void Core::service() noexcept {
+    const Current current(this);
     take_over();
     if (int free = nobody; !live() && !safe_ && turn_.compare_exchange_strong(free, thread, std::memory_order_acq_rel)) {
         make_safe();
@@ -308,6 +314,7 @@ void Core::make_safe() noexcept {
 }
 
 void Core::make_safe_at_end() noexcept {
+    const Current current(this);
     for (int free = nobody; !turn_.compare_exchange_weak(free, thread, std::memory_order_acq_rel); free = nobody) sched_yield();
     make_safe();
     turn_.store(nobody, std::memory_order_release);

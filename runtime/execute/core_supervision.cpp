@@ -97,7 +97,7 @@ std::uint32_t Core::interrupted_function() const noexcept {
 
 std::uint32_t Core::hung_function() const noexcept { return busy_since_ns() != 0 ? interrupted_function() : 0; }
 
-// Where the newest sample of the cycle that woke at `woke_ns` found it; 0: there is none.
+// Where the newest sample of the cycle that woke at `woke_ns` found it; 0: that cycle has no sample.
 std::uint32_t Core::slow_function(std::int64_t woke_ns) const noexcept {
     if (seen_since_.load(std::memory_order_acquire) != woke_ns) return 0;
     return function_of(plan_, seen_step_.load(std::memory_order_relaxed));

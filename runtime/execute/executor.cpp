@@ -86,7 +86,7 @@ bool hangs(const Core& core, std::int64_t timeout_ns) {
 bool Executor::remove(Core& core, std::int64_t timeout_ns) {
     Runner& leaving = runner(core);
     if (virtual_) {
-        core.make_safe();
+        core.make_safe_at_end();
     } else if (leaving.started()) {
         const std::int64_t longest_ns = timeout_ns + leaving.options.period_ns;
         leaving.ask_to_end();

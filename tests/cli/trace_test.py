@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: MIT
 """hal trace: the file is decoded by protoc, which knows nothing of the program, and its timeline is checked."""
 import shutil
+import signal
 import subprocess
 import threading
 import time
 import unittest
 
-from harness import HAL, Case
+from harness import HAL, TIMEOUT, Case, wait_until
 
 MACHINE = """loadrt threads name1=fast period1=1000000 name2=servo period2=5000000
 loadrt sum2 names=adder,second
@@ -90,7 +91,7 @@ class Trace(Case):
     def setUp(self):
         super().setUp()
         stall = f"loadrt stall names=slow file={self.folder}/log\nsetp slow.ms 20\naddf slow servo\n"
-        self.start("run", self.write("a.hal", MACHINE.replace("net total", stall + "net total")))
+        self.machine = self.start("run", self.write("a.hal", MACHINE.replace("net total", stall + "net total")))
 
     def trace(self, *words):
         out = self.good("trace", "t.pftrace", *words)
@@ -181,6 +182,20 @@ class Trace(Case):
             self.assertIn("nothing was written", self.good("trace", name, "--on-fault", "--for", "100ms"))
         self.assertFalse((self.folder / "new.pftrace").exists())
         self.assertEqual("kept", (self.folder / "old.pftrace").read_text())
+
+    def end_of_trace(self, number):
+        """What the command prints, and its exit status, when its machine ends by that signal."""
+        tracer = subprocess.Popen([HAL, "trace", "end.pftrace"], cwd=self.folder, env=self.environment, stdin=subprocess.DEVNULL,
+                                  stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+        wait_until(lambda: (self.folder / "end.pftrace").exists() and (self.folder / "end.pftrace").stat().st_size > 1000, "it traces")
+        self.machine.send_signal(number)
+        return tracer.communicate(timeout=TIMEOUT)[1], tracer.returncode
+
+    def test_a_machine_that_ends_in_order_ends_the_trace(self):
+        self.assertEqual(("", 0), self.end_of_trace(signal.SIGTERM))
+
+    def test_a_machine_that_is_killed_is_reported(self):
+        self.assertEqual(("hal trace: instance 'default' has ended without being stopped\n", 1), self.end_of_trace(signal.SIGKILL))
 
 
 if __name__ == "__main__":

@@ -241,7 +241,7 @@ TEST(LiveProbes, Attached_and_detached_under_load_they_lose_nothing_and_disturb_
                 ASSERT_EQ(seen[k].values[0], seen[k].values[1]) << "of one cycle";
                 if (k > 0 && (keeps_up || rows.lost == 0)) { ASSERT_EQ(seen[k].values[0], seen[k - 1].values[0] + 1) << "no row lost or doubled"; }
             }
-        if (keeps_up) EXPECT_EQ(rows.lost, 0u);
+        if (keeps_up) { EXPECT_EQ(rows.lost, 0u); }
         const auto lock = machine.session.lock();
         machine.session.probes().detach(probe);
     }

@@ -50,6 +50,7 @@ TEST_F(OptionSetTest, reports_a_request_for_help) { EXPECT_EQ(set.read({"--help"
 
 TEST_F(OptionSetTest, names_the_option_and_the_invalid_value) {
     EXPECT_EQ(set.read({"one", "--factor", "fast"}).problem, "--factor: 'fast' is not a number");
+    EXPECT_EQ(set.read({"one", "--factor", "x"}).problem, "--factor: 'x' is not a number");
     EXPECT_EQ(set.read({"one", "--for", "long"}).problem, "--for: invalid duration 'long'; use 10s, 250ms or 2min");
     EXPECT_TRUE(set.read({"one", "--level", "7"}).problem.starts_with("--level: Value 7 not in range "));  // the rest is the library's
 }

@@ -10,6 +10,14 @@
 #include "base/types.hpp"
 
 namespace hal::tools {
+namespace {
+
+bool is_whole(std::string_view text) {
+    if (text.starts_with('-') || text.starts_with('+')) text.remove_prefix(1);
+    return !text.empty() && text.find_first_not_of("0123456789") == text.npos;
+}
+
+}  // namespace
 
 void DeclaredOption::in(int least, int most) { option_->check(CLI::Range(least, most).description(fmt::format("{}..{}", least, most))); }
 void DeclaredOption::in(double least, double most) { option_->check(CLI::Range(least, most)); }
@@ -84,7 +92,7 @@ OptionSet::Reading OptionSet::read(std::vector<std::string> arguments) {
         constexpr std::string_view unread = "Could not convert: ";  // --speed = fast
         if (const auto equals = what.find(" = "); what.starts_with(unread) && equals != std::string::npos)
             what = fmt::format("{}: '{}' is {}", what.substr(unread.size(), equals - unread.size()), what.substr(equals + 3),
-                               what.find_first_not_of("0123456789", equals + 4) == what.npos ? "out of range" : "not a number");
+                               is_whole(std::string_view(what).substr(equals + 3)) ? "out of range" : "not a number");
         std::replace(what.begin(), what.end(), '\n', ' ');
     }
     return reading;

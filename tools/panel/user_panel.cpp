@@ -5,10 +5,8 @@
 #include <cmath>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
-#include <unistd.h>
 #include <utility>
 
-#include "cli/output.hpp"
 #include "panel/event_log.hpp"
 
 namespace hal::tools {
@@ -147,12 +145,7 @@ void UserPanel::machine_line(std::string_view line, std::string_view) {
     const Json reply = Json::parse(line, nullptr, false);
     if (!reply.is_object() || !reply.contains("id")) return;
     const bool good = reply.value("ok", false);
-    if (!good) {
-        log_.add("panel", "the machine rejects the panel's component: " + reply.value("error", ""));
-        if (reply["id"] == 1)
-            write_all(STDERR_FILENO, "hal panel: the machine rejects the panel's component, so its widgets have no pins: " +
-                                         reply.value("error", "") + "\n");
-    }
+    if (!good) log_.add("panel", "the machine rejects the panel's component: " + reply.value("error", ""));
     if (reply["id"] == 1 && good) {
         registered_ = true;
         changed_.clear();

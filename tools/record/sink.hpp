@@ -35,7 +35,7 @@ public:
     virtual std::string problem() const = 0;
     /// What the unfinished file of an earlier recorder is called now; "" when there was none.
     virtual std::string kept() const { return ""; }
-    /// After close(): the file that has what was written, "" when there is none, and how many rows it has.
+    /// After close(): the file that has what was written, "" if nothing was, and its number of rows.
     virtual std::string where() const = 0;
     virtual std::uint64_t rows() const = 0;
 };

@@ -274,14 +274,14 @@ int Tracer::finish() {
         const std::string& why = client_->closed_because();
         const std::string ended = why.empty() ? fmt::format("instance '{}' has ended", client_->instance())
                                               : fmt::format("instance '{}' closed the connection: {}", client_->instance(), why);
-        // One that ends in order removes its socket.
-        if (ring() && fired_ns_ == 0 && std::filesystem::exists(socket_path(client_->instance()))) {
+        const bool killed = std::filesystem::exists(socket_path(client_->instance()));  // one that ends in order removes its socket
+        if (ring() && fired_ns_ == 0 && killed) {
             fired_ns_ = now_ns(CLOCK_MONOTONIC);
             cause_ = ended + " without being stopped";
         } else if (options_.for_ns >= 0) {
             status = fail(options_, ended + " before the time was over");
-        } else {
-            status = fail(options_, ended);
+        } else if (killed || !why.empty()) {
+            status = fail(options_, killed && why.empty() ? ended + " without being stopped" : ended);
         }
     }
     if (ring() && fired_ns_ == 0) {

@@ -143,7 +143,7 @@ bool whole_number(const std::string& text, std::uint64_t& word) {
     return true;
 }
 
-/// The word of a value of that type. Returns false, and leaves it, when the text is none.
+/// Reads a value of that type into `word`. Returns false, and keeps `word`, when the text is invalid.
 bool word_of(const std::string& text, hal_type type, std::uint64_t& word) {
     double        real = 0;
     std::uint64_t bit = 0;

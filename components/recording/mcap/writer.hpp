@@ -43,7 +43,7 @@ public:
     std::uint64_t      bytes() const { return size_ + chunk_.size(); }  ///< of the file, with the chunk that is being filled
     const std::string& problem() const { return held_.problem; }  ///< why the file could not be created; "" otherwise
     const std::string& kept() const { return held_.kept; }
-    std::string        where() const;  ///< the file that has what was written; "" when there is none
+    std::string        where() const;  ///< the file that has what was written; "" before there is a file
     std::uint64_t      messages() const;
     std::uint64_t      messages(std::uint16_t channel) const;
     const std::string& path() const { return path_; }
