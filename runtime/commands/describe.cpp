@@ -53,6 +53,7 @@ void describe_pins(std::string& to, Session& session, bool parameters, const Pat
         if (pin->signal) object["signal"] = pin->signal->name;
         if (const LoadedComponent* const component = owner(*pin)) object["component"] = component->name;
         if (pin->instance) object["instance"] = pin->instance->name;
+        if (pin->instance && pin->instance->loaded.known()) object["file"] = session.sources.get(pin->instance->loaded.source).name;
         if (const Thread* const thread = thread_of(*pin)) object["thread"] = thread->name;
         if (*pin->doc) object["doc"] = pin->doc;
         if (*pin->unit) object["unit"] = pin->unit;

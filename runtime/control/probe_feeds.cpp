@@ -133,6 +133,7 @@ void ProbeFeeds::publish(Feed& feed, std::int64_t now_ns, std::string& events) {
         const auto lock = session_.lock();
         results = session_.probes().take(*feed.probe);
     }
+    if (!results.empty() && results.back().bytes.size() >= Probes::most_at_once) feed.due_ns = now_ns;  // more is waiting
     const std::string probe = "\"probe\":" + number(feed.id);
     for (const ProbeRows& rows : results) {
         if (rows.layout) {

@@ -288,25 +288,25 @@ std::size_t move_rows(const LiveProbe& probe, RingGroup& group, std::int64_t unt
 std::vector<ProbeRows> Probes::take(LiveProbe& probe, std::size_t most) {
     std::vector<ProbeRows> results;
     const std::int64_t now_ns = state_.executor->now_ns();
+    // Returns the time before which no row remains.
     const auto collect = [&](std::vector<RingGroup>& groups, ProbeRows& to, std::int64_t until_ns) {
-        bool all = true;
+        std::int64_t reached_ns = until_ns;
         for (std::size_t i = 0; i < groups.size(); ++i) {
             RingGroup& group = groups[i];
             if (!group.ring) continue;
             const std::uint64_t lost = group.ring->lost();  // before the rows: a loss is named with or before the row after it
             const std::size_t rows = move_rows(probe, group, until_ns, most, to.bytes);
             if (rows > 0 || lost > group.reported) to.parts.push_back({i, rows, lost - std::exchange(group.reported, lost)});
-            // until_ns must hold for the remaining rows, too
-            if (group.ring->size() > 0 && static_cast<std::int64_t>(group.ring->row(0)[1]) < until_ns) all = false;
+            if (group.ring->size() > 0) reached_ns = std::min(reached_ns, static_cast<std::int64_t>(group.ring->row(0)[1]));
         }
-        return all;
+        return reached_ns;
     };
     while (!probe.ended.empty()) {
         auto& ended = probe.ended.front();
         ProbeRows rows;
         rows.layout_number = ended.number;
         rows.until_ns = probe.until_ns;
-        const bool all = collect(ended.groups, rows, INT64_MAX);
+        const bool all = collect(ended.groups, rows, INT64_MAX) == INT64_MAX;
         if (!rows.parts.empty()) results.push_back(std::move(rows));
         if (!all) return results;
         probe.lost += lost_in(ended.groups);
@@ -322,7 +322,7 @@ std::vector<ProbeRows> Probes::take(LiveProbe& probe, std::size_t most) {
     for (const RingGroup& group : probe.groups)
         if (group.ring) until_ns = std::min(until_ns, std::max(group.ring->reached_ns(), now_ns - patience_ns));
     until_ns = std::max(until_ns == INT64_MAX ? now_ns : until_ns, probe.until_ns);
-    if (collect(probe.groups, rows, until_ns)) probe.until_ns = until_ns;
+    probe.until_ns = std::max(probe.until_ns, collect(probe.groups, rows, until_ns));
     rows.until_ns = probe.until_ns;
     for (std::size_t i = 0; i < probe.groups.size(); ++i) {
         RingGroup& group = probe.groups[i];

@@ -72,7 +72,8 @@ public:
     /// Returns how many rows did not fit since the probe was attached.
     static std::uint64_t lost(const LiveProbe& probe);
     /// Takes the rows that have come, at most so many bytes in each result. There is one result per layout in force since the last call.
-    std::vector<ProbeRows> take(LiveProbe& probe, std::size_t most_bytes = std::size_t{1} << 18);
+    std::vector<ProbeRows> take(LiveProbe& probe, std::size_t most_bytes = most_at_once);
+    static constexpr std::size_t most_at_once = std::size_t{1} << 18;
 
     /// For the compiler's result that threads are going to take: gives each plan its probes.
     void enter(Compiled& compiled);

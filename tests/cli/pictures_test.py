@@ -8,7 +8,7 @@ import sys
 import unittest
 from pathlib import Path
 
-from harness import HAL, ROOT, Case
+from harness import HAL, ROOT, SANITIZED, Case
 
 
 class Pictures(Case):
@@ -39,6 +39,7 @@ class Pictures(Case):
         self.assertEqual(0, done.returncode, done.stderr)
         self.same(ROOT / "halfiles/yair/slots.svg", made)
 
+    @unittest.skipIf(SANITIZED, "36 simulations take minutes, and all they do is done in other tests")
     def test_jitter_experiment(self):
         said = self.make(ROOT / "halfiles/jitter/experiment", self.folder)
         self.assertIn(said, (ROOT / "docs/tutorials/network-and-control.md").read_text(encoding="utf-8"), "the tutorial shows other figures")

@@ -190,6 +190,21 @@ class Live(Case):
         with open(self.folder / name, newline="") as file:
             return [float(row[0]) for row in list(csv.reader(file))[1:]]
 
+    def test_a_group_is_an_instance_a_component_a_thread_or_a_file(self):
+        def columns(*words):
+            self.good("record", "group.csv", *words, "--for", "20ms")
+            with open(self.folder / "group.csv", newline="") as file:
+                return next(csv.reader(file))[1:]
+        self.assertEqual(["above.equal", "above.in0", "sine", "high", "above.hyst"], [name for name in columns("--group", "above") if "time" not in name])
+        self.assertIn("offset.in1", columns("--group", "sum2"))
+        self.assertNotIn("offset.in1", columns("--group", "above"))
+        self.assertTrue({"offset.in1", "shifted", "above.hyst"} <= set(columns("--group", "offset", "--group", "above")))
+        for group in ("servo", "a.hal", str(self.folder / "a.hal")):
+            self.assertTrue({"offset.in1", "shifted", "sine", "high"} <= set(columns("--group", group)), group)
+        self.assertEqual("hal record: --group: 'abov' is not a component, an instance, a thread or a netlist file with values; hal shell show all lists them\n",
+                         self.bad("record", "group.csv", "--group", "abov"))
+        self.assertEqual("hal record: --all has every --group; leave one out\n", self.bad("record", "group.csv", "--all", "--group", "above"))
+
     def test_a_running_machine_is_recorded_without_a_sampler(self):
         out = self.good("record", "run.csv", "sine", "wave.*", "servo.missed", "--for", "300ms")
         self.assertRegex(out, r"^run\.csv: \d+ rows of \d+ values, \d+\.\d kB(, \d+ rows? lost)?\n$")
@@ -264,11 +279,19 @@ class Live(Case):
         self.assertRegex(done.stderr, r"^hal record: cannot write 'run\.mcap': File too large; the file is complete up to there\n$")
         self.good("plot", "run.mcap", "sine")
 
-    def test_too_many_values_are_rejected_with_what_to_type(self):
-        large = "loadrt threads name1=servo period1=1000000\nloadrt siggen count=250\n" + "".join(f"addf siggen.{i}.update servo\n" for i in range(250))
-        self.start("run", self.write("big.hal", large), "--name", "big", instance="big")
-        self.assertRegex(self.bad("record", "big.mcap", "--name", "big", "--all", "--for", "100ms"),
-                         r"^hal record: the probe needs up to \d+ MiB of memory, more than 64; name fewer values, or type a larger --every\n$")
+    def test_thousands_of_values_are_recorded_up_to_a_limit(self):
+        def machine(name, count):
+            large = f"loadrt threads name1=servo period1=1000000\nloadrt siggen count={count}\n" + "".join(f"addf siggen.{i}.update servo\n" for i in range(count))
+            self.start("run", self.write(f"{name}.hal", large), "--name", name, instance=name)
+        machine("big", 250)
+        out = self.good("record", "big.csv", "--name", "big", "--all", "--for", "100ms")
+        rows, values = int(out.split()[1]), int(out.split()[4])
+        self.assertGreater(values, 2500)
+        lost = int(out.split()[-3]) if "lost" in out else 0
+        self.assertGreaterEqual(rows + lost, 80)
+        machine("huge", 400)
+        self.assertRegex(self.bad("record", "huge.csv", "--name", "huge", "--all", "--for", "100ms"),
+                         r"^hal record: \d{4} values are more than 4096; name fewer, or type --group NAME\n$")
 
     def test_two_recorders_do_not_share_a_file(self):
         for name in ("run.mcap", "run.csv"):

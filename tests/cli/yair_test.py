@@ -33,6 +33,8 @@ class TwoProcesses(Case):
         self.shell("sets", "emergency", "FALSE", instance="robot")
         wait_until(lambda: self.value("pc-alarm.bits", "pc") in ("0", "0x00000000"), "the PC takes the end of the alarm")
         self.shell("setp", "estop.reset", "FALSE", instance="pc")
+        seen = int(self.value("control.threadbeat", "pc")) + 1
+        wait_until(lambda: int(self.value("control.threadbeat", "pc")) > seen, "a whole cycle has passed: the latch looks for a rising edge")
         self.shell("setp", "estop.reset", "TRUE", instance="pc")
         wait_until(lambda: not self.rests(), "the robot drives again")
         wait_until(lambda: int(self.value("sonar.bursts", "pc")) > 5, "ultrasonic bursts are complete behind the bridge")

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: MIT
 """The Python package mcap reads what `hal sim --record` writes, with all CRCs, decodes it as ROS 2 messages, and finds a time window through the
 index: recording_mcap_test.py PROGRAM."""
+import math
 import subprocess
 import sys
 import tempfile
@@ -86,4 +87,18 @@ with tempfile.TemporaryDirectory() as folder:
     window = list(reader.iter_decoded_messages(topics=["/hal/servo-thread"], starting_at=begin, ending_before=begin + 100_000_000))
     check("a time window", [message.sequence for _, _, message, _ in window] == [message.sequence for message, _ in rows[2500:2600]], len(window))
     check("without reading the whole file", counted.bytes < path.stat().st_size / 3, f"{counted.bytes} of {path.stat().st_size} bytes")
+    (Path(folder) / "axis.hal").write_text("loadrt threads name1=servo period1=1000000\nloadrt two_mass names=axis\nsetp axis.torque 0.1\naddf axis.update servo\n")
+    subprocess.run([sys.argv[1], "sim", "axis.hal", "--for", "1s", "--record", "axis.mcap", "--values", "axis.*"], cwd=folder, check=True)
+    with open(Path(folder) / "axis.mcap", "rb") as file:
+        reader = make_reader(file, validate_crcs=True, decoder_factories=[DecoderFactory()])
+        rows = {message.log_time: decoded for _, _, message, decoded in reader.iter_decoded_messages(topics=["/hal/servo"])}
+        joints = [(message, decoded) for _, channel, message, decoded in reader.iter_decoded_messages(topics=["/hal/servo/joints"])]
+        check("joints 50 times a second", len(joints) == 50, len(joints))
+        check("of the values with units", {tuple(joint.name) for _, joint in joints} == {("axis.load", "axis.motor", "axis")}, [joint.name for _, joint in joints[:1]])
+        check("at the time of their row", all(message.log_time == joint.header.stamp.sec * 10 ** 9 + joint.header.stamp.nanosec for message, joint in joints))
+        check("with its values", all(list(joint.position) == [rows[m.log_time].axis_load_angle, rows[m.log_time].axis_motor_angle, rows[m.log_time].axis_twist]
+                                     and list(joint.velocity)[:2] == [rows[m.log_time].axis_load_velocity, rows[m.log_time].axis_motor_velocity] for m, joint in joints))
+        check("NaN where there is none", all(math.isnan(joint.velocity[2]) and math.isnan(joint.effort[1]) and joint.effort[0] == 0 for _, joint in joints))
+    said = subprocess.run([sys.argv[1], "replay", "axis.mcap", "axis.hal"], cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True).stdout
+    check("replay does not mention the second copy", "not read" not in said, said)
 sys.exit(failed != 0)

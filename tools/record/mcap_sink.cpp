@@ -3,6 +3,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "record/joints.hpp"
 #include "record/sink.hpp"
 #include "recording/mcap/rows.hpp"
 #include "recording/mcap/writer.hpp"
@@ -42,8 +43,13 @@ public:
         groups_.clear();
         for (const ProbeGroup& group : groups) {
             std::vector<mcap::Column> columns;
-            for (const std::size_t i : group.columns) columns.push_back({columns_[i].name, columns_[i].type, columns_[i].unit});
+            std::vector<ProbeColumn> probed;
+            for (const std::size_t i : group.columns) {
+                columns.push_back({columns_[i].name, columns_[i].type, columns_[i].unit});
+                probed.push_back(columns_[i]);
+            }
             mcap::RowWriter rows(columns);
+            Joints joints(probed);
             const std::string thread = group.thread.empty() ? "no-thread" : group.thread;
             const int number = ++layouts_[thread];  // a schema never changes: after an edit a thread's rows have another topic
             const std::string suffix = number == 1 ? "" : "_" + std::to_string(number);
@@ -52,15 +58,24 @@ public:
             metadata["period_ns"] = std::to_string(group.period_ns);
             const auto schema = writer_.add_schema(
                 "halcyon_msgs/msg/" + message_name(thread) + (number == 1 ? "" : "V" + std::to_string(number)), "ros2msg", rows.schema());
-            groups_.push_back({writer_.add_channel(schema, "/hal/" + thread + suffix, "cdr", std::move(metadata)), std::move(rows)});
+            groups_.push_back({writer_.add_channel(schema, "/hal/" + thread + suffix, "cdr", std::move(metadata)), std::move(rows), std::move(joints)});
+            if (groups_.back().joints.empty()) continue;
+            if (joint_schema_ == 0) joint_schema_ = writer_.add_schema(Joints::message, "ros2msg", Joints::schema());
+            groups_.back().joint_channel = writer_.add_channel(joint_schema_, "/hal/" + thread + suffix + "/joints", "cdr", {});
+            joint_channels_.push_back(groups_.back().joint_channel);
         }
         return writer_.error() == 0;
     }
 
     bool row(std::size_t group, std::uint64_t cycle, std::int64_t time_ns, const std::uint64_t* words) override {
-        groups_[group].rows.write(words, payload_);
-        return writer_.message(groups_[group].channel, static_cast<std::uint32_t>(cycle), static_cast<std::uint64_t>(time_ns + offset_ns_),
-                               payload_);
+        Group& to = groups_[group];
+        const std::int64_t unix_ns = time_ns + offset_ns_;
+        to.rows.write(words, payload_);
+        if (!writer_.message(to.channel, static_cast<std::uint32_t>(cycle), static_cast<std::uint64_t>(unix_ns), payload_)) return false;
+        if (to.joints.empty() || time_ns < to.joints_due_ns) return true;
+        to.joints_due_ns = time_ns + Joints::every_ns;
+        to.joints.write(words, unix_ns, payload_);
+        return writer_.message(to.joint_channel, static_cast<std::uint32_t>(cycle), static_cast<std::uint64_t>(unix_ns), payload_);
     }
 
     bool event(const ProbeClient::Entry& entry) override {
@@ -78,19 +93,27 @@ public:
     }
     std::string kept() const override { return writer_.kept(); }
     std::string where() const override { return writer_.where(); }
-    std::uint64_t rows() const override { return writer_.messages() - writer_.messages(events_); }
+    std::uint64_t rows() const override {
+        std::uint64_t rows = writer_.messages() - writer_.messages(events_);
+        for (const std::uint16_t channel : joint_channels_) rows -= writer_.messages(channel);
+        return rows;
+    }
 
 private:
     struct Group {
         std::uint16_t channel;
         mcap::RowWriter rows;
+        Joints joints;
+        std::uint16_t joint_channel = 0;
+        std::int64_t joints_due_ns = 0;
     };
     const std::vector<ProbeColumn> columns_;
     const std::int64_t offset_ns_;
     mcap::Writer writer_;
     std::vector<Group> groups_;
     std::map<std::string, int> layouts_;
-    std::uint16_t events_ = 0;
+    std::uint16_t events_ = 0, joint_schema_ = 0;
+    std::vector<std::uint16_t> joint_channels_;
     std::uint32_t number_ = 0;
     std::string payload_;
 };

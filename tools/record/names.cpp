@@ -42,6 +42,23 @@ std::vector<std::string> probed_names(Client& client, const std::vector<std::str
     return names;
 }
 
+std::vector<std::string> group_names(Client& client, const std::string& group, std::string& problem) {
+    std::vector<std::string> names;
+    std::unordered_set<std::string> seen;
+    for (const char* kind : {"pin", "param"})
+        for (const json& object : client.request({{"describe", kind}}).value("objects", json::array())) {
+            const std::string file = object.value("file", "");
+            const bool of_it = object.value("component", "") == group || object.value("instance", "") == group || object.value("thread", "") == group ||
+                               file == group || file.substr(file.rfind('/') + 1) == group;
+            if (!of_it || object.value("type", "") == "port") continue;
+            std::string name = object.value("signal", object.value("name", ""));
+            if (seen.insert(name).second) names.push_back(std::move(name));
+        }
+    if (names.empty())
+        problem = "--group: '" + group + "' is not a component, an instance, a thread or a netlist file with values; hal shell show all lists them";
+    return names;
+}
+
 std::vector<std::string> all_names(Client& client) {
     std::vector<std::string> names = described(client, "sig", json::array(), true);
     for (const char* kind : {"pin", "param"})

@@ -10,6 +10,7 @@
 #include "cli/output.hpp"
 #include "cli/signals.hpp"
 #include "machine/address.hpp"
+#include "machine/probes.hpp"
 #include "record/flight.hpp"
 #include "record/names.hpp"
 #include "record/sink.hpp"
@@ -204,7 +205,8 @@ private:
 int record_values(const Options& options, const std::string& instance, Recording what) {
     if (!what.file.ends_with(".mcap") && !what.file.ends_with(".csv"))
         return fail(options, fmt::format("unknown format of '{}'; name the file .mcap or .csv", what.file));
-    if (what.names.empty() && !what.all) return fail(options, "missing names of values; or --all");
+    if (what.names.empty() && what.groups.empty() && !what.all) return fail(options, "missing names of values; or --group NAME; or --all");
+    if (what.all && !what.groups.empty()) return fail(options, "--all has every --group; leave one out");
     if (what.last_ns >= 0 && what.rotate_ns >= 0) return fail(options, "--last and --rotate exclude each other; leave one out");
     if (what.last_ns < 0 && what.after_ns >= 0) return fail(options, "--after needs --last TIME");
     if (what.last_ns < 0 && what.rotate_ns < 0 && what.keep != 0) return fail(options, "--keep needs --rotate TIME or --last TIME");
@@ -217,14 +219,27 @@ int record_values(const Options& options, const std::string& instance, Recording
     if (!what.trigger.empty()) what.names.push_back(what.trigger);
     std::vector<std::string> names = probed_names(*client, what.names, problem);
     if (!problem.empty()) return fail(options, problem);
-    if (what.all)
-        for (std::string& name : all_names(*client))
+    const auto add = [&](std::vector<std::string> more) {
+        for (std::string& name : more)
             if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(std::move(name));
+    };
+    if (what.all) add(all_names(*client));
+    for (const std::string& group : what.groups) {
+        add(group_names(*client, group, problem));
+        if (!problem.empty()) return fail(options, problem);
+    }
+    if (names.size() > Probes::most_names)
+        return fail(options, fmt::format("{} values are more than {}; name fewer, or type --group NAME", names.size(), Probes::most_names));
     ProbeClient::Options wanted;
     wanted.every = what.every;
     wanted.journal = true;
-    const auto probe = ProbeClient::attach(*client, names, wanted, problem);
-    if (const std::size_t advice = problem.find("; sample fewer values"); !probe && advice != std::string::npos)
+    auto probe = ProbeClient::attach(*client, names, wanted, problem);
+    const auto too_much = [&] { return probe ? std::string::npos : problem.find("; sample fewer values"); };
+    while (too_much() != std::string::npos && wanted.buffer_ms > 100) {  // a machine of thousands of values: a shorter delay of the disk loses rows
+        wanted.buffer_ms /= 2;
+        probe = ProbeClient::attach(*client, names, wanted, problem);
+    }
+    if (const std::size_t advice = too_much(); advice != std::string::npos)
         problem = problem.substr(0, advice) + "; name fewer values, or type a larger --every";  // hal record has no buffer_ms
     if (!probe) return fail(options, problem);
     Recorder recorder(options, what, *client, *probe);

@@ -13,7 +13,7 @@ namespace hal::tools {
 /// What is recorded, and how long.
 struct Recording {
     std::string file;
-    std::vector<std::string> names;
+    std::vector<std::string> names, groups;
     bool all = false;
     std::uint32_t every = 1;
     std::int64_t for_ns = -1, rotate_ns = -1;  ///< -1: not given
@@ -25,6 +25,7 @@ struct Recording {
 
     void declare(OptionSet& set) {
         set.flag("-a,--all", all, "record all signals, and all pins and parameters without a signal");
+        set.values("--group", groups, "NAME", "record the signals and pins of a component, an instance, a thread or a netlist file");
         set.value("--every", every, "N", "record each N-th cycle of each thread (default 1)").in(1, 1'000'000);
         set.duration("--for", for_ns, "end after this time of the machine", 1);
         set.value("--limit", most_mb, "MB", "end when the file has this size").not_negative();
@@ -39,7 +40,7 @@ struct Recording {
     }
     /// Something of it was given: the words are FILE NAMES.
     bool asked() const {
-        return all || every != 1 || for_ns >= 0 || most_mb > 0 || rotate_ns >= 0 || last_ns >= 0 || keep != 0 || !trigger.empty() || after_ns >= 0;
+        return all || !groups.empty() || every != 1 || for_ns >= 0 || most_mb > 0 || rotate_ns >= 0 || last_ns >= 0 || keep != 0 || !trigger.empty() || after_ns >= 0;
     }
 };
 

@@ -50,6 +50,12 @@ void sort(Table& table) {
     table = std::move(sorted);
 }
 
+/// Our own files have these values in their rows too.
+bool is_joint_state(const Reader& reader, const Channel& channel) {
+    const auto schema = reader.schemas().find(channel.schema);
+    return channel.topic.starts_with("/hal/") && schema != reader.schemas().end() && schema->second.name == "sensor_msgs/msg/JointState";
+}
+
 constexpr const char* flat_only = "; CDR messages with a 'ros2msg' schema of numbers and bool only are";
 
 bool load_mcap(const std::string& path, Recording& to, std::string& problem, const LoadOptions& options) {
@@ -69,7 +75,7 @@ bool load_mcap(const std::string& path, Recording& to, std::string& problem, con
         if (schema != reader.schemas().end() && row.open(schema->second, channel)) {
             to.tables.push_back({channel.topic, row.columns(), {}, {}});
             rows.emplace(id, std::pair{std::move(row), to.tables.size() - 1});
-        } else if (to.unread.empty() && channel.topic != "/hal/events") {
+        } else if (to.unread.empty() && channel.topic != "/hal/events" && !is_joint_state(reader, channel)) {
             const std::string why = schema == reader.schemas().end() ? "it has no schema" : row.problem();
             to.unread = "topic '" + channel.topic.substr(0, 60) + "' is not read: " + why + flat_only;
         }
