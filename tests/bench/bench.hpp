@@ -59,6 +59,7 @@ void load(const Options&, Report&);
 void shell(const Options&, Report&);
 void edit(const Options&, Report&);
 void probe(const Options&, Report&);
+void trace(const Options&, Report&);
 void coherence(const Options&, Report&);
 void python(const Options&, Report&);
 void can(const Options&, Report&);

@@ -34,6 +34,7 @@ constexpr Section sections[] = {
     {"shell", "one-shot commands, a thousand setp, save, against halcmd", shell, true},
     {"edit", "live edits: missed periods, delay, a hundred thousand of them", edit, true},
     {"probe", "sampling values in the cycle: cost, and lost rows at 10 kHz", probe},
+    {"trace", "each function of each cycle recorded: cost, and lost events", trace},
     {"coherence", "whether a slow thread sees one state of a fast one, against LinuxCNC", coherence},
     {"python", "a component of 100 pins in Python", python, true},
     {"can", "CANopen over SocketCAN: SDO, SYNC and PDOs, against a plain raw socket program and the Python package", can, true},

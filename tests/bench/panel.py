@@ -82,6 +82,24 @@ def page_size(port):
     row(f"page, {len(seen)} files", "kB", sum(seen.values()) / 1000, "<= 200")
 
 
+def floor(browser):
+    """What an empty canvas of the scope's size costs in this browser."""
+    browser.open("about:blank")
+    browser.wait("location.href === 'about:blank'")
+    browser.evaluate("""(() => {
+        const canvas = document.createElement('canvas'), draw = canvas.getContext('2d');
+        document.body.append(canvas);
+        [canvas.width, canvas.height] = [innerWidth - 16, innerHeight - 100];
+        let x = 0;
+        const look = () => { draw.clearRect(0, 0, canvas.width, canvas.height); draw.fillRect(x++ % 100, 9, 9, 9); requestAnimationFrame(look); };
+        look();
+    })()""")
+    time.sleep(2)
+    cpu, begun = ticks(browser.process.pid), time.monotonic()
+    time.sleep(SECONDS)
+    row("CPU of the browser with an empty canvas, 60 frames/s", "%", 100 * (ticks(browser.process.pid) - cpu) / (time.monotonic() - begun))
+
+
 def scope(browser, port, panel):
     channels = ",".join(f"{name}-sine:1:{3.5 - 7 * i / 15:.3g}" for i, name in enumerate(NAMES))
     for mode, query in (("roll", "mode=roll"), ("triggered", f"mode=normal&trigger={NAMES[0]}-sine&edge=rising&level=0")):
@@ -98,7 +116,8 @@ def scope(browser, port, panel):
         passed = (after["at"] - before["at"]) / 1000
         row(f"scope, 16 channels at 10 kHz, {mode}: frames per second", "", (after["frames"] - before["frames"]) / passed, ">= 60" if mode == "roll" else "")
         row(f"rows per second in the page, {mode}", "", (after["rows"] - before["rows"]) / passed)
-        row(f"lost rows, {mode}", "", after["lost"] + after["gaps"], "<= 0")
+        row(f"lost rows, {mode}", "", after["lost"] - before["lost"], "<= 0")
+        row(f"cycles that the machine missed itself, {mode}", "", after["gaps"] - before["gaps"])
         row(f"CPU of the browser and hal-panel, {mode}", "%", 100 * (cpu + server) / passed, "<= 30")
         row(f"of which hal-panel, {mode}", "%", 100 * server / passed)
 
@@ -115,6 +134,7 @@ def main():
         browser = Browser(case)
         page_size(port)
         first_picture(browser, port)
+        floor(browser)
         scope(browser, port, panel)
     finally:
         case.doCleanups()
