@@ -13,6 +13,7 @@
 #include "base/types.hpp"
 #include "cli/output.hpp"
 #include "machine/address.hpp"
+#include "panel/css_colours.hpp"
 #include "panel/panel_errors.hpp"
 #include "panel/panel_layout.hpp"
 #include "text/config_text.hpp"
@@ -264,6 +265,10 @@ void Reader::widget(const Kind& kind, const std::vector<Word>& words) {
             else error(word.at, fmt::format("{} must be a number, not '{}'", key, word.text.substr(0, 60)));
         } else if (key == "on" || key == "off" || key == "unit") {
             options[key] = word.text;
+            if (key == "unit" || is_css_colour(word.text)) continue;
+            const std::string similar = did_you_mean(word.text, {css_colours.begin(), css_colours.end()});
+            error(word.at, fmt::format("{}: unknown colour '{}'", key, word.text.substr(0, 60)),
+                  similar.empty() ? "write a name like green, or #rrggbb" : similar);
         }
     }
     if (options.contains("min") && options.contains("max") && options["min"].get<double>() >= options["max"].get<double>())
