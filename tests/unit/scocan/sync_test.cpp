@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The SYNC: lost, late, doubled, sent by two; backups; mode changes.
 #include "bus.hpp"
+#include "components/fieldbus/scocan/plugins/event_words.hpp"
 
 namespace {
 
@@ -265,6 +266,16 @@ TEST(Babbler, is_reported_once_and_the_private_slots_survive) {
     const auto missed = motor.station.count().missed;
     bus.run(100 * ms, 500 * us, [&] { motor.station.send({0x10A, {7}}, true); });
     EXPECT_EQ(missed, motor.station.count().missed);
+}
+
+TEST(Foreign_frame, has_a_sender_only_where_the_table_knows_one) {
+    Bus bus;
+    Member& ir = bus.add("ir");
+    const EventWords words(bus.table, static_cast<std::size_t>(ir.station.node()), "reset");
+    EXPECT_EQ(words.foreign(sync_id, no_node, "3"), "frame 0x000 in slot 3, outside of its own; a SYNC, of node clock or a backup");
+    EXPECT_EQ(words.foreign(announce_id, no_node, "3"), "frame 0x001 in slot 3, outside of its own; an idle slot announced by the monitor");
+    EXPECT_EQ(words.foreign(answer_id, no_node, "3"), "frame 0x781 in slot 3, outside of its own; reserved for the bus itself");
+    EXPECT_EQ(words.foreign(0x555, no_node, "3"), "frame 0x555 in slot 3, outside of its own; its sender is not in the table");
 }
 
 TEST(Bus_off, is_reported_and_recovers) {

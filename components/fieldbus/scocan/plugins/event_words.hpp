@@ -49,7 +49,7 @@ public:
         case Event::unknown_mode: return "mode " + value + " of the SYNC is not in the table; receives only";
         case Event::foreign_frame: return foreign(h.id, h.who, value);
         case Event::babbling:
-            return "babbling node: " + value + " frames outside of their slots in one cycle, the last " + named(h.id) + owner(h.who);
+            return "babbling node: " + value + " frames outside of their slots in one cycle, the last " + named(h.id) + owner(h.who, h.id);
         case Event::slot_missed:
             return "frame " + named(h.id) + " missed its slot: no cycle of the thread of " + microseconds(h.value) +
                    " began within its transmit window of " + microseconds(t_.enabled()) + "; use a faster thread, or a longer idle time";
@@ -81,7 +81,7 @@ public:
     static std::string subject(const Happened& h) { return std::to_string(static_cast<int>(h.event)) + ' ' + std::to_string(h.id); }
 
     std::string foreign(std::uint32_t id, std::uint32_t who, const std::string& slot) const {
-        return "frame " + named(id) + " in slot " + slot + ", outside of its own" + owner(who);
+        return "frame " + named(id) + " in slot " + slot + ", outside of its own" + owner(who, id);
     }
     std::string sync_node() const {
         for (const Node& n : t_.nodes)
@@ -94,8 +94,12 @@ private:
         const Message* m = t_.message(id);
         return id_text(id) + (m != nullptr ? " (" + m->name + ")" : "");
     }
-    std::string owner(std::uint32_t who) const {
-        if (who >= t_.nodes.size()) return "; its sender is not in the table";
+    std::string owner(std::uint32_t who, std::uint32_t id) const {
+        if (who >= t_.nodes.size())
+            return id == sync_id       ? "; a SYNC, of node " + sync_node() + " or a backup"
+                   : id == announce_id ? "; an idle slot announced by the monitor"
+                   : is_reserved(id)   ? "; reserved for the bus itself"
+                                       : "; its sender is not in the table";
         return (t_.nodes[who].name == own_ ? "; sent by this node, " : "; probably sent by node ") + t_.nodes[who].name;
     }
     std::string refused(const Happened& h) const {
@@ -126,6 +130,7 @@ public:
         text_[Event::mode_refused] = "mode change cancelled: a node did not agree";
         text_[Event::monitor_lost] = "monitor lost: idle slots are not announced any more";
         foreign_other_ = "frame of an unknown node in slot {}, which is private";
+        for (const std::uint32_t id : {sync_id, announce_id, request_id, answer_id}) foreign_[id] = words.foreign(id, no_node, "{}");
         for (const Message& m : t.messages) foreign_[m.id] = words.foreign(m.id, static_cast<std::uint32_t>(m.node), "{}");
         for (const Mode& mode : t.modes)
             for (const auto& uses : mode.slots)
