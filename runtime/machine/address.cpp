@@ -40,6 +40,14 @@ std::string socket_folder() {
 
 std::string socket_path(std::string_view name) { return socket_folder() + "/" + std::string(name) + ".sock"; }
 
+bool was_killed(std::string_view name) {
+    constexpr int looks = 100, apart_us = 10'000;  // the kernel closes the connections of a killed process a little before its lock
+    for (int i = 0; i < looks && access(socket_path(name).c_str(), F_OK) == 0; ++i) {
+        if (!held(lock_path(name))) return true;
+        usleep(apart_us);
+    }
+    return false;
+}
 std::string lock_path(std::string_view name) { return socket_folder() + "/" + std::string(name) + std::string(lock_ending); }
 
 std::vector<std::string> running_instances() {

@@ -17,6 +17,10 @@ std::string socket_path(std::string_view name);
 /// The file beside the socket that a running instance keeps locked; it contains the process id.
 std::string lock_path(std::string_view name);
 
+/// Returns whether the instance of this name left its socket behind: one that ends in order removes it, and one that runs holds its lock.
+/// Waits up to 1 s for a process that is just ending.
+bool was_killed(std::string_view name);
+
 /// Names of the instances that run now and belong to this user, sorted.
 std::vector<std::string> running_instances();
 

@@ -195,7 +195,7 @@ class Trace(Case):
         self.assertEqual(("", 0), self.end_of_trace(signal.SIGTERM))
 
     def test_a_machine_that_is_killed_is_reported(self):
-        self.assertEqual(("hal trace: instance 'default' has ended without being stopped\n", 1), self.end_of_trace(signal.SIGKILL))
+        self.assertEqual(("hal trace: instance 'default' was killed\n", 1), self.end_of_trace(signal.SIGKILL))
 
 
 if __name__ == "__main__":

@@ -98,7 +98,7 @@ with tempfile.TemporaryDirectory() as folder:
         check("at the time of their row", all(message.log_time == joint.header.stamp.sec * 10 ** 9 + joint.header.stamp.nanosec for message, joint in joints))
         check("with its values", all(list(joint.position) == [rows[m.log_time].axis_load_angle, rows[m.log_time].axis_motor_angle, rows[m.log_time].axis_twist]
                                      and list(joint.velocity)[:2] == [rows[m.log_time].axis_load_velocity, rows[m.log_time].axis_motor_velocity] for m, joint in joints))
-        check("NaN where there is none", all(math.isnan(joint.velocity[2]) and math.isnan(joint.effort[1]) and joint.effort[0] == 0 for _, joint in joints))
+        check("NaN for a missing quantity", all(math.isnan(joint.velocity[2]) and math.isnan(joint.effort[1]) and joint.effort[0] == 0 for _, joint in joints))
     said = subprocess.run([sys.argv[1], "replay", "axis.mcap", "axis.hal"], cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True).stdout
     check("replay does not mention the second copy", "not read" not in said, said)
 sys.exit(failed != 0)

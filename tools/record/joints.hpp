@@ -20,7 +20,7 @@ public:
     /// A value in rad or m is a position, in rad/s or m/s a velocity, in N*m or N an effort. Those whose names differ in their last word only
     /// belong to one joint: `motor-position` and `motor-velocity` to `motor`.
     explicit Joints(const std::vector<ProbeColumn>& columns);
-    /// Returns whether there is none with a position.
+    /// Returns whether no value is a position.
     bool empty() const { return joints_.empty(); }
     /// Writes the message of a row (one word per column) as CDR.
     void write(const std::uint64_t* words, std::int64_t unix_ns, std::string& to) const;

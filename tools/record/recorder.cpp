@@ -69,7 +69,7 @@ public:
                 memory.add(std::move(batch_));
                 memory.prune(now_ns_, trigger.pending() ? trigger.begin_ns() : INT64_MAX);
             }
-            if (got == ProbeClient::Got::disconnected && was_killed()) trigger.event(now_ns_, "end-of-machine");
+            if (got == ProbeClient::Got::disconnected && was_killed(client_.instance())) trigger.event(now_ns_, "end-of-machine");
             if (trigger.pending() && (over || now_ns_ >= trigger.end_ns())) {
                 if (!write(memory, trigger)) return cannot_write();
                 trigger.done();
@@ -113,9 +113,6 @@ private:
         return open(file_name());
     }
 
-    /// One that ends in order removes its socket.
-    bool was_killed() const { return std::filesystem::exists(socket_path(client_.instance())); }
-
     void nothing_written() {
         const std::string trigger = what_.trigger.empty() ? ""
                                     : was_on_             ? fmt::format(", and '{}' was TRUE or non-zero all the time", what_.trigger)
@@ -149,8 +146,10 @@ private:
     int lost_machine() {
         const int status = finish();
         if (status != 0) return status;
-        if (was_killed())
+        if (was_killed(client_.instance()))
             return fail(options_, fmt::format("instance '{}' was killed; the file is complete up to there", client_.instance()));
+        if (std::filesystem::exists(socket_path(client_.instance())))
+            return fail(options_, fmt::format("instance '{}' closed the connection, and runs on; the file is complete up to there", client_.instance()));
         return what_.for_ns < 0 ? 0 : fail(options_, fmt::format("instance '{}' has ended before the time was over", client_.instance()));
     }
 
@@ -235,7 +234,7 @@ int record_values(const Options& options, const std::string& instance, Recording
     wanted.journal = true;
     auto probe = ProbeClient::attach(*client, names, wanted, problem);
     const auto too_much = [&] { return probe ? std::string::npos : problem.find("; sample fewer values"); };
-    while (too_much() != std::string::npos && wanted.buffer_ms > 100) {  // a machine of thousands of values: a shorter delay of the disk loses rows
+    while (too_much() != std::string::npos && wanted.buffer_ms > 100) {  // thousands of values: the disk may be late for a shorter time only
         wanted.buffer_ms /= 2;
         probe = ProbeClient::attach(*client, names, wanted, problem);
     }

@@ -272,16 +272,19 @@ int Tracer::finish() {
     int status = 0;
     if (!client_->connected()) {
         const std::string& why = client_->closed_because();
-        const std::string ended = why.empty() ? fmt::format("instance '{}' has ended", client_->instance())
-                                              : fmt::format("instance '{}' closed the connection: {}", client_->instance(), why);
-        const bool killed = std::filesystem::exists(socket_path(client_->instance()));  // one that ends in order removes its socket
+        const bool killed = was_killed(client_->instance());
+        const bool runs = !killed && std::filesystem::exists(socket_path(client_->instance()));
+        const std::string ended = !why.empty() ? fmt::format("instance '{}' closed the connection: {}", client_->instance(), why)
+                                  : killed     ? fmt::format("instance '{}' was killed", client_->instance())
+                                  : runs       ? fmt::format("instance '{}' closed the connection, and runs on", client_->instance())
+                                               : fmt::format("instance '{}' has ended", client_->instance());
         if (ring() && fired_ns_ == 0 && killed) {
             fired_ns_ = now_ns(CLOCK_MONOTONIC);
-            cause_ = ended + " without being stopped";
+            cause_ = ended;
         } else if (options_.for_ns >= 0) {
             status = fail(options_, ended + " before the time was over");
-        } else if (killed || !why.empty()) {
-            status = fail(options_, killed && why.empty() ? ended + " without being stopped" : ended);
+        } else if (killed || runs || !why.empty()) {
+            status = fail(options_, ended);
         }
     }
     if (ring() && fired_ns_ == 0) {
