@@ -110,15 +110,19 @@ std::optional<ClockReport> Reports::clock() const {
 std::vector<std::string> Reports::missing_privileges() const {
     const SessionState& s = state_;
     std::vector<std::string> missing;
-    bool scheduling = false;
-    for (const auto& [thread, core] : s.cores) scheduling = scheduling || s.executor->granted(*core).refused;
-    const std::string grant = "; grant it with: " + grant_command() + " (or by limits of a group: hal doctor)";
-    if (scheduling) missing.push_back("no real-time scheduling here: threads run as ordinary ones and are late under load" + grant);
+    std::string what, effect;
+    for (const auto& [thread, core] : s.cores)
+        if (s.executor->granted(*core).refused) what = "real-time scheduling", effect = "threads are late under load";
+    for (const std::string& one : s.refused) {
+        what += (what.empty() ? "" : " and ") + one;
+        effect += std::string(effect.empty() ? "" : ", and ") + "a page fault can delay a cycle";
+    }
+    if (!what.empty())
+        missing.push_back("no " + what + " here: " + effect + "; grant it with: " + grant_command() +
+                          " (or by limits of a group: hal doctor)");
     if (!s.cores.empty() && !s.options.virtual_clock && !s.executor->supervisor().has_own_cpu())
         missing.push_back("the threads use every CPU: their supervisor interrupts them every " +
                           format_duration(static_cast<double>(s.executor->supervisor().interval_ns())) + " for some microseconds");
-    for (const std::string& one : s.refused)
-        missing.push_back("no " + one + " here: a page fault can delay a cycle" + (scheduling ? "; the same command grants it" : grant));
     return missing;
 }
 

@@ -120,14 +120,39 @@ class Chroot(unittest.TestCase):
             for subject in ("SCHED_FIFO", "memory locking", "capabilities", "raw Ethernet"):
                 self.assertRegex(report, rf"good +{subject}")
 
+            restricted = self.page_commands("dpkg-statoverride").replace("sudo ", "").replace("USER", "tester")
+            self.good(restricted)
+            self.assertEqual(capabilities, self.good("getcap /usr/bin/hal"), "restricted to a group, as docs/packages.md describes")
+            self.of_user("hal --version")
+            self.assertNotEqual(0, self.inside("su -s /bin/sh nobody -c 'hal --version'").returncode)
+            self.good("dpkg-statoverride --remove /usr/bin/hal; chown root:root /usr/bin/hal; chmod 0755 /usr/bin/hal; dpkg-reconfigure halcyon; gpasswd -d tester realtime")
+            self.check_withheld()
+
+    def page_commands(self, word):
+        """The block of docs/packages.md that has this word."""
+        blocks = re.findall(r"(?s)```sh\n(.*?)```", (ROOT / "docs/packages.md").read_text())
+        return next(block for block in blocks if word in block)
+
+    def check_withheld(self):
+        """Installed where the capabilities are withheld: one notice, and a remedy that does not make the program unusable."""
+        without = "capsh --drop=cap_sys_nice,cap_ipc_lock,cap_net_raw -- -c "
+        self.good(without + "'dpkg-reconfigure halcyon'")
+        report = self.good(without + "'su tester -c \"hal run /usr/share/halcyon/halfiles/furuta/hang.hal --for 1s 2>&1\"'")
+        self.assertEqual(1, len(re.findall(r"(?m)^no .* here: ", report)), report)
+        self.assertIn("no real-time scheduling and memory locking here: ", report)
+        self.assertIn("--cap-add=SYS_NICE --cap-add=IPC_LOCK --cap-add=NET_RAW in the command that starts this container", report)
+        self.assertNotIn("setcap", self.good(without + "'su tester -c \"hal doctor --seconds 0\"'"))
+        self.good("dpkg-reconfigure halcyon")
+
     def check_machine(self):
         self.assertRegex(self.of_user("hal --version"), r"^hal \d+\.\d+\.\d+ ")
         report = self.of_user("cd; hal run /usr/share/halcyon/halfiles/furuta/hang.hal --for 2s 2>&1")
         self.assertRegex(report, r"servo-thread +1 ms +\d{4}")
         if self.good("getcap /usr/bin/hal"):
             self.assertIn("SCHED_FIFO", report)
-        shown = self.of_user("cd; hal sim /usr/share/halcyon/halfiles/furuta/swing-up.hal --for 1s 2>&1")
+        shown = self.of_user("cd; hal sim /usr/share/halcyon/halfiles/furuta/swing-up.hal --for 1s --show pendulum-angle 2>&1")
         self.assertNotIn("error", shown)
+        self.assertGreater(abs(float(re.search(r"pendulum-angle +(\S+)", shown)[1])), 0.1, "the pendulum of docs/packages.md moves")
         self.assertIn("first-order", self.of_user("hal doc lowpass").lower())
         self.assertIn("NAME", self.of_user("hal doc lqr"))
         self.assertEqual("hal-pid.9.gz", Path(self.good("ls /usr/share/man/man9/hal-pid.9.gz").strip()).name)

@@ -58,10 +58,12 @@ std::string own_path() {
     return problem ? "hal" : path.string();
 }
 
-/// The alternative to file capabilities for scheduling and memory locking: limits for a group of users.
-constexpr const char* limits_of_a_group =
-    "sudo groupadd -f realtime; sudo usermod -aG realtime $USER; "
-    "printf '@realtime - rtprio 98\\n@realtime - memlock unlimited\\n' | sudo tee /etc/security/limits.d/realtime.conf, then log in again";
+/// Returns the alternative to file capabilities for scheduling and memory locking: limits for a group of users, which Halcyon's package has.
+std::string limits_of_a_group() {
+    if (::access("/etc/security/limits.d/halcyon-realtime.conf", F_OK) == 0) return "sudo usermod -aG realtime $USER, then log in again";
+    return "sudo groupadd -f realtime; sudo usermod -aG realtime $USER; "
+           "printf '@realtime - rtprio 98\\n@realtime - memlock unlimited\\n' | sudo tee /etc/security/limits.d/realtime.conf, then log in again";
+}
 
 /// Returns true for a capability in the effective set of this process.
 bool capable(int number) {
@@ -129,7 +131,7 @@ Finding scheduling() {
     const std::string why = capable(cap_sys_nice) ? "cap_sys_nice" : fmt::format("limit rtprio {}", limit.rlim_cur);
     if (problem == 0) return {Verdict::good, "SCHED_FIFO", fmt::format("allowed up to priority 98 ({})", why)};
     return {Verdict::poor, "SCHED_FIFO", fmt::format("denied ({}): threads compete with every other program", why),
-            grant_command(), limits_of_a_group};
+            grant_command(), limits_of_a_group()};
 }
 
 Finding memory() {
@@ -139,7 +141,7 @@ Finding memory() {
     if (limit.rlim_cur == RLIM_INFINITY) return {Verdict::good, "memory locking", "allowed (limit memlock unlimited)"};
     return {Verdict::poor, "memory locking",
             fmt::format("limited to {} KiB: a page fault in a cycle costs 1 us to 10 ms", limit.rlim_cur / 1024),
-            grant_command(), limits_of_a_group};
+            grant_command(), limits_of_a_group()};
 }
 
 Finding capabilities() {

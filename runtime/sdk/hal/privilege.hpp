@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include <linux/capability.h>
+#include <sys/prctl.h>
 #include <sys/syscall.h>
 #include <unistd.h>
 
@@ -21,6 +22,15 @@ inline std::uint64_t permitted() {
     std::array<__user_cap_data_struct, _LINUX_CAPABILITY_U32S_3> sets{};
     if (syscall(SYS_capget, &header, sets.data()) != 0) return 0;
     return std::uint64_t{sets[1].permitted} << 32 | sets[0].permitted;
+}
+
+/// Returns true where no program may have the capabilities of real-time threads and raw frames, as in a container that withholds them. The
+/// kernel does not even start a program whose file has them.
+inline bool withheld() {
+    constexpr std::array needed = {13UL, 14UL, 23UL};  // CAP_NET_RAW, CAP_IPC_LOCK, CAP_SYS_NICE
+    for (const unsigned long one : needed)
+        if (prctl(PR_CAPBSET_READ, one, 0UL, 0UL, 0UL) == 0) return true;
+    return false;
 }
 
 inline std::string program() {
@@ -44,8 +54,11 @@ inline std::string shell_word(const std::string& word) {
 
 /// Returns the command that grants this program the capabilities of real-time threads and raw frames, and CAP_NET_ADMIN where `net_admin` is
 /// set or it already has that one: `sudo setcap ... /usr/local/bin/hal`. File capabilities are replaced as a whole, so it names all of
-/// them. [setup]
+/// them. In a container that withholds them, returns what to add to the command that starts it. [setup]
 inline std::string grant_command(bool net_admin = false) {
+    if (privilege::withheld())
+        return std::string("--cap-add=SYS_NICE --cap-add=IPC_LOCK --cap-add=NET_RAW") + (net_admin ? " --cap-add=NET_ADMIN" : "") +
+               " in the command that starts this container, which withholds them";
     constexpr unsigned cap_net_admin = 12;
     const bool admin = net_admin || (geteuid() != 0 && ((privilege::permitted() >> cap_net_admin) & 1U) != 0);
     return "sudo setcap cap_sys_nice,cap_ipc_lock,cap_net_raw" + std::string(admin ? ",cap_net_admin" : "") + "=ep " +
