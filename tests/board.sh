@@ -48,13 +48,14 @@ shift
 exec "$@"
 RUN
 if grep -qs '^enabled' "/proc/sys/fs/binfmt_misc/$qemu"; then namespace=; else namespace="unshare --user --map-root-user --mount"; fi
+export QEMU_LD_PREFIX="$build/boards/$board/sysroot"
 # shellcheck disable=SC2086 # a list
-$namespace sh "$in_board" "$qemu" true 2>"$log" ||
+$namespace sh "$in_board" "$qemu" "$build/$tree/bin/hal" --version >"$log" 2>&1 ||
     die "cannot run programs of $board: Linux 6.7 or newer, or a registered $qemu (apt-get install qemu-user-static binfmt-support); see $log"
 say "testing build/$tree under $qemu"
 failed=
 # shellcheck disable=SC2086
-QEMU_LD_PREFIX=$build/boards/$board/sysroot $namespace sh "$in_board" "$qemu" ctest --test-dir "$build/$tree" --output-on-failure \
+$namespace sh "$in_board" "$qemu" ctest --test-dir "$build/$tree" --output-on-failure \
     --no-tests=error --test-output-size-passed 1000000 -j "$(nproc)" -L '^(unit|netlists)$' --output-junit "$log.xml" >"$log" 2>&1 </dev/null || failed=1
 grep -vE '^ *(Start +[0-9]+:|[0-9]+/[0-9]+ .* (Passed|Skipped) )|\(Skipped\)$|\*\*\*Skipped ' "$log" || :
 reasons=$(python3 "$root/tests/skipped.py" "$log.xml")
