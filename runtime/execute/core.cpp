@@ -256,6 +256,11 @@ void Core::run_steps(const plan::Step* first, const plan::Step* last) noexcept {
         step->step(step->self, &info_);
         return stopped_.load(std::memory_order_relaxed);
     };
+    // A processor predicts the target of a call by its place in the code: in each cycle a step is called at the same of the eight, wherever the
+    // range begins, so the first ones up to a multiple of eight are called one by one.
+    const auto place = [](const plan::Step* step) noexcept { return reinterpret_cast<std::uintptr_t>(step) / sizeof(plan::Step) % 8; };
+    for (; first != last && place(first) != 0; ++first)
+        if (call(first)) [[unlikely]] return;
     for (; last - first >= 8; first += 8)
         if (call(first) || call(first + 1) || call(first + 2) || call(first + 3) || call(first + 4) || call(first + 5) || call(first + 6) ||
             call(first + 7)) [[unlikely]]
