@@ -6,7 +6,7 @@
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
-#include <fmt/core.h>
+#include <fmt/format.h>
 #include <memory>
 #include <optional>
 #include <type_traits>
@@ -38,6 +38,7 @@
 #include "cli/capabilities.hpp"
 #include "cli/option_set.hpp"
 #include "cli/output.hpp"
+#include "commands/table.hpp"
 #include "comp/compile.hpp"
 #include "comp/new.hpp"
 #include "completion.hpp"
@@ -263,6 +264,8 @@ int no_such_command(const std::vector<std::string>& typed) {
     if (!word.empty() && word[0] == '-') return fail(options, fmt::format("unknown option '{}'; type: hal help", word));
     const auto ends = [&](std::string_view end) { return word.size() > end.size() && word.ends_with(end); };
     if (ends(".hal") || ends(".ini")) return fail(options, fmt::format("'{0}' is not a command; to run it type: hal run {0}", word));
+    if (find_command(word))
+        return fail(options, fmt::format("'{0}' is a command of the shell; to run it in a running machine type: hal shell {1}", word, fmt::join(typed, " ")));
     std::vector<std::string> names = {"help"};
     std::string where = "hal help";
     if (const Group* group = find_group(word)) {

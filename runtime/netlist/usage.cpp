@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <unordered_map>
 
 namespace hal {
 namespace {
@@ -62,14 +63,16 @@ std::string to_string(const Usage& usage) {
     return text;
 }
 
-std::vector<std::vector<UsageWord>> usage_forms(std::string_view arguments) {
-    std::vector<std::vector<UsageWord>> forms;
-    for (const std::string_view form : forms_of(arguments)) forms.push_back(words_of(form));
-    return forms;
+const std::vector<std::vector<UsageWord>>& usage_forms(std::string_view arguments) {
+    thread_local std::unordered_map<std::string_view, std::vector<std::vector<UsageWord>>> known;  // each command of a file asks
+    const auto [at, missing] = known.try_emplace(arguments);
+    if (missing)
+        for (const std::string_view form : forms_of(arguments)) at->second.push_back(words_of(form));
+    return at->second;
 }
 
 bool check_arity(const Usage& usage, const Token& name, std::span<const Token> args, Diagnostics& diagnostics) {
-    const auto forms = usage_forms(usage.arguments);
+    const auto& forms = usage_forms(usage.arguments);
     const auto by_option = std::find_if(forms.begin() + 1, forms.end(), [&](const auto& form) {
         return !form.empty() && !args.empty() && form.front().text == args.front().text;
     });

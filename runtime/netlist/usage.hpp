@@ -28,8 +28,8 @@ struct UsageWord {
     bool repeats = false;
     bool of_option = false; ///< stands behind an option in one bracket: TYPE in "[-t TYPE]"
 };
-/// The words of each form: "FUNCTION THREAD [POSITION]" has three.
-std::vector<std::vector<UsageWord>> usage_forms(std::string_view arguments);
+/// The words of each form: "FUNCTION THREAD [POSITION]" has three. `arguments` lives as long as the program does.
+const std::vector<std::vector<UsageWord>>& usage_forms(std::string_view arguments);
 
 /// Checks the number of arguments of the command named by `name`. Returns false after reporting wrong-arguments.
 bool check_arity(const Usage& usage, const Token& name, std::span<const Token> args, Diagnostics& diagnostics);

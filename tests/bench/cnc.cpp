@@ -135,6 +135,7 @@ struct Result {
     double refresh = 0;     ///< cycles between two frames of a node, on average
     double missed = 0;      ///< share of the control's cycles
     double busy_us = 0;     ///< the control's thread, median
+    std::array<double, 2> parts_us{};  ///< of it: TDMA, the CANopen master
     double round_trip = 0;  ///< cycles, there and back
     bool holds() const { return booted && refresh > 0 && refresh <= 1.01 && missed <= 0.01; }
 };
@@ -155,11 +156,14 @@ Result watch_it(const Options& options, ethernet::Port& port, int axes, int cycl
     const double beats = asked_hex(options, "servo.threadbeat"), missed = asked_hex(options, "servo.missed"),
                  edges = asked(options, "getp", "updown.0.count");
     const auto end = link::monotonic_ns() + (options.quick ? 700'000'000 : 2'000'000'000);
-    std::vector<double> busy;
+    std::vector<double> busy, tdma, canopen;
+    const auto function_us = [&](const char* function) { return asked(options, "getp", fmt::format("{}.time", function)) / 1000; };
     std::uint64_t frames = 0;
     std::int64_t first = 0, newest = 0;
     while (link::monotonic_ns() < end) {
         busy.push_back(asked(options, "getp", "servo.time") / 1000);
+        tdma.push_back(function_us("tdma.0.receive") + function_us("tdma.0.transmit"));
+        canopen.push_back(function_us("canopen.0.receive") + function_us("canopen.0.transmit"));
         while (const auto arrival = port.receive(0)) {
             if (first == 0) first = arrival->time_ns;
             newest = arrival->time_ns, ++frames;
@@ -169,6 +173,7 @@ Result watch_it(const Options& options, ethernet::Port& port, int axes, int cycl
     const double turns = asked_hex(options, "servo.threadbeat") - beats, rises = asked(options, "getp", "updown.0.count") - edges;
     result.missed = (asked_hex(options, "servo.missed") - missed) / std::max(1.0, turns);
     result.busy_us = median(busy);
+    result.parts_us = {median(tdma), median(canopen)};
     if (frames != 0) result.refresh = static_cast<double>(newest - first) / 1e3 / cycle_us * (axes + 1) / static_cast<double>(frames);
     if (rises > 0) result.round_trip = turns / rises / 2;
     return result;
@@ -261,6 +266,9 @@ void measure(const Options& options, Report& report) {
     report.row({"refresh of all process data, 5 axes and 64 I/O at 1 ms", "cycles", five.refresh, "", {}, limit(1.01)});
     report.row({"round trip pin, remote pin, pin", "cycles", five.round_trip, "", {}, limit(2.1)});
     report.row({"CPU of the master's thread per cycle, p50", "us", five.busy_us, "bare loop, the same frames", floor, {}});
+    report.row({"  of it TDMA: tdma.0.receive, tdma.0.transmit", "us", five.parts_us[0], "bare loop, the same frames", floor, at_most(1.3)});
+    report.row({.what = "  of it the CANopen master", .unit = "us", .ours = five.parts_us[1]});
+    report.row({.what = "  of it paths, loops, drives, the clock", .unit = "us", .ours = five.busy_us - five.parts_us[0] - five.parts_us[1]});
     report.row({.what = "  cycles it missed", .unit = "%", .ours = 100 * five.missed});
 
     // The search is bounded: steps, and the time for them.

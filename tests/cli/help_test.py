@@ -53,6 +53,8 @@ class WrongWords(Case):
 
     def test_unknown_command_without_likeness_points_to_help(self):
         self.assertEqual("hal: unknown command 'qqqqqqqq'; type: hal help\n", self.bad("qqqqqqqq"))
+        self.assertEqual("hal: 'getp' is a command of the shell; to run it in a running machine type: hal shell getp and2.0.out\n",
+                         self.bad("getp", "and2.0.out"))
 
     def test_a_netlist_as_command_suggests_hal_run(self):
         self.assertEqual("hal: 'x.hal' is not a command; to run it type: hal run x.hal\n", self.bad("x.hal"))
