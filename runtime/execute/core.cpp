@@ -15,6 +15,12 @@ extern "C" {
 
 namespace hal {
 namespace {
+constexpr std::uintptr_t cache_line = 64;
+
+void fetch_times(const plan::FunctionTimes& times) noexcept {
+    for (std::uintptr_t at = 0; at < sizeof times; at += cache_line) __builtin_prefetch(reinterpret_cast<const char*>(&times) + at, 1);
+}
+
 thread_local Core* current_core = nullptr;
 
 // the shell may look at any moment
@@ -96,11 +102,10 @@ void Core::output() noexcept {
 // half of the cycle's time. A thread that spins towards its deadline has the time to fetch them before.
 void Core::warm(std::int64_t until_ns) const noexcept {
     if (!plan_) return;
-    constexpr std::uintptr_t line = 64;
     unsigned fetched = 0;
     const auto fetch = [&](const void* memory, std::size_t bytes) noexcept {
         const auto begin = reinterpret_cast<std::uintptr_t>(memory);
-        for (std::uintptr_t at = begin & ~(line - 1); at < begin + bytes; at += line) {
+        for (std::uintptr_t at = begin & ~(cache_line - 1); at < begin + bytes; at += cache_line) {
             if (fetched++ % 32 == 0 && monotonic_ns() >= until_ns) return false;
             __builtin_prefetch(reinterpret_cast<const void*>(at));
         }
@@ -222,6 +227,7 @@ void Core::run() noexcept {
             } else {
                 const plan::Function& function = functions[sampled_];
                 sampled_ = sampled_ + 1 == functions.size() ? 0 : sampled_ + 1;
+                fetch_times(*function.times);  // of many functions, they are in no near cache
                 run_rows(row, steps, steps + function.begin);
                 run_timed(function, steps);
                 run_rows(row, steps + function.end, steps + functions.back().end);
