@@ -1,32 +1,14 @@
 # SPDX-License-Identifier: MIT
 # shellcheck shell=sh
 # `./hal board armhf|arm64`; read by the script `hal`, whose functions it uses. Compiles everything for such a board without optimisation, and
-# runs the unit tests and the netlist tests under qemu-user. The first start makes the sysroot, the libraries and headers of the board's system.
+# runs the unit tests and the netlist tests under qemu-user.
 case ${1-}:$# in
-    armhf:1) triplet=arm-linux-gnueabihf qemu=qemu-arm ;;
-    arm64:1) triplet=aarch64-linux-gnu qemu=qemu-aarch64 ;;
+    armhf:1 | arm64:1) ;;
     *) die "usage: ./hal board armhf|arm64" ;;
 esac
-board=$1 tree=$1-test
 begun_at=$(date +%s)
-if [ "$in_cache" ]; then die "./hal board needs a source tree that can be written to"; fi
-need "$qemu-static=qemu-user-static" "$triplet-g++=g++-$triplet" mmdebstrap=mmdebstrap python3=python3
-
-# The sysroot: packages of Debian 12, unpacked; nothing is installed on this machine. cmake/board.cmake finds it.
-content="libc6-dev libstdc++-12-dev libfmt-dev nlohmann-json3-dev libcli11-dev libedit-dev libcap-dev libgtest-dev libpugixml-dev libzstd-dev libeigen3-dev"
-folder=$build/boards/$board
-if ! { [ -f "$folder/content" ] && [ "$(cat "$folder/content")" = "$content" ]; }; then
-    mirror=${HALCYON_MIRROR:-http://deb.debian.org/debian}
-    say "unpacking Debian's libraries for $board from $mirror in build/boards/$board/sysroot"
-    mkdir -p "$folder"
-    rm -rf "${folder:?}/sysroot" "$folder/content"
-    mmdebstrap --variant=extract --architectures="$board" --include="$(echo "$content" | tr ' ' ,)" bookworm "$folder/sysroot" \
-        "deb $mirror bookworm main" >"$folder/sysroot.log" 2>&1 </dev/null || {
-        tail -n 5 "$folder/sysroot.log" >&2
-        die "cannot make build/boards/$board/sysroot (see $folder/sysroot.log); HALCYON_MIRROR=URL names another mirror of Debian"
-    }
-    echo "$content" >"$folder/content"
-fi
+use_board "$1"
+tree=$board-test
 
 tests=ON
 compile "$tree" "everything for $board" hal hal-bus components unit_tests component_tests canopen_tests \
@@ -48,7 +30,7 @@ shift
 exec "$@"
 RUN
 if grep -qs '^enabled' "/proc/sys/fs/binfmt_misc/$qemu"; then namespace=; else namespace="unshare --user --map-root-user --mount"; fi
-export QEMU_LD_PREFIX="$build/boards/$board/sysroot"
+export QEMU_LD_PREFIX="$sysroot"
 # shellcheck disable=SC2086 # a list
 $namespace sh "$in_board" "$qemu" "$build/$tree/bin/hal" --version >"$log" 2>&1 ||
     die "cannot run programs of $board: Linux 6.7 or newer, or a registered $qemu (apt-get install qemu-user-static binfmt-support); see $log"

@@ -1,6 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""build.py ROOT BUILD OUTPUT: Debian packages from the build tree BUILD, in OUTPUT. Needs dpkg-dev and binutils."""
+"""build.py ROOT BUILD OUTPUT [ARCHITECTURE SYSROOT]: Debian packages from the build tree BUILD, in OUTPUT. Needs dpkg-dev and binutils.
+
+SYSROOT: the unpacked system of another architecture, with its packages in /var/cache/apt/archives."""
 import gzip
 import hashlib
 import os
@@ -34,10 +36,12 @@ def is_elf(path):
 
 
 class Packages:
-    def __init__(self, root, build, output):
-        self.root, self.build, self.output = root, build, output
-        self.version = re.search(r"project\(Halcyon VERSION (\S+)", (root / "CMakeLists.txt").read_text())[1]
-        self.architecture = run("dpkg", "--print-architecture").strip()
+    def __init__(self, root, build, output, architecture="", sysroot=""):
+        self.root, self.build, self.output = (Path(path).resolve() for path in (root, build, output))
+        self.sysroot = Path(sysroot).resolve() if sysroot else None
+        self.version = re.search(r"project\(Halcyon VERSION (\S+)", (self.root / "CMakeLists.txt").read_text())[1]
+        self.architecture = architecture or run("dpkg", "--print-architecture").strip()
+        self.triplet = run("dpkg-architecture", "-a", self.architecture, "-q", "DEB_HOST_MULTIARCH").strip()
         self.date = self.source_date()
         self.scratch = Path(tempfile.mkdtemp(prefix="halcyon-package-"))
 
@@ -87,8 +91,11 @@ class Packages:
         # Where pages link to the machines, as in the source tree.
         link = self.tree("halcyon-doc") / "usr/share/doc/halcyon/halfiles"
         link.symlink_to("../../halcyon/halfiles")
-        for package in list(PACKAGES):
-            if not self.tree(package).exists():
+        for package, about in list(PACKAGES.items()):
+            if self.sysroot and about.get("fields", {}).get("Architecture") == "all":
+                print(f"left out: {package}: ./hal package makes it, for all architectures")
+                del PACKAGES[package]
+            elif not self.tree(package).exists():
                 print(f"left out: {package}: not in this build (see cmake/optional)")
                 del PACKAGES[package]
 
@@ -96,11 +103,11 @@ class Packages:
         """Strips programs, compresses manuals, adds changelog and copyright, and sets modes as Debian has them."""
         tree = self.tree(package)
         if elf := [path for path in sorted(tree.rglob("*")) if is_elf(path)]:
-            run("strip", "--strip-unneeded", "--remove-section=.comment", *elf)
+            run(self.strip, "--strip-unneeded", "--remove-section=.comment", *elf)
             # The system's libraries are in the system's folders.
             run("cmake", "-P", self.script("\n".join(f'file(RPATH_REMOVE FILE "{path}")' for path in elf)))
         if archives := list(tree.glob("usr/lib/*.a")):
-            run("strip", "--strip-debug", *archives)
+            run(self.strip, "--strip-debug", *archives)
         for path in tree.glob("usr/share/man/*/*.[1-9]"):
             (path.parent / f"{path.name}.gz").write_bytes(gzip.compress(path.read_bytes(), 9, mtime=0))
             path.unlink()
@@ -115,6 +122,10 @@ class Packages:
                 continue
             executable = path.is_dir() or path.stat().st_mode & stat.S_IXUSR and not path.suffix == ".so" and ".so." not in path.name
             path.chmod(0o755 if executable else 0o644)
+
+    @property
+    def strip(self):
+        return f"{self.triplet}-strip" if self.sysroot else "strip"
 
     def script(self, text):
         path = self.scratch / "script.cmake"
@@ -142,9 +153,38 @@ class Packages:
                         for name in PACKAGES for p in self.tree(name).glob("usr/lib/*.so.*") if not p.is_symlink())
         (folder / "debian/shlibs.local").write_text(own + "\n")
         paths = [f"-l{self.tree(name)}/usr/lib" for name in PACKAGES]
-        out = run("dpkg-shlibdeps", "-O", "--warnings=0", *paths, *[f"-e{p}" for p in elf], cwd=folder)
+        if self.sysroot:
+            paths += [f"--admindir={self.database()}", f"-l{self.sysroot}/lib/{self.triplet}", f"-l{self.sysroot}/usr/lib/{self.triplet}"]
+        out = run("dpkg-shlibdeps", "-O", "--warnings=0", *paths, *[f"-e{p}" for p in elf], cwd=folder,
+                  env={**os.environ, "DEB_HOST_ARCH": self.architecture})
         found = out.strip().removeprefix("shlibs:Depends=").split(", ")
         return ", ".join(d for d in found if d and not d.startswith(f"{package} "))
+
+    def database(self):
+        """A database of dpkg with the packages of the sysroot and their files where they lie on this machine."""
+        database = self.scratch / "dpkg"
+        if database.exists():
+            return database
+        info = database / "info"
+        info.mkdir(parents=True)
+        (info / "format").write_text("1\n")
+        (database / "arch").write_text(f"{run('dpkg', '--print-architecture').strip()}\n{self.architecture}\n")
+        status = []
+        for archive in sorted((self.sysroot / "var/cache/apt/archives").glob("*.deb")):
+            control = self.scratch / "control"
+            run("dpkg-deb", "--control", archive, control)
+            fields = (control / "control").read_text()
+            name = re.search("^Package: (.*)$", fields, re.MULTILINE)[1]
+            stem = f"{name}:{self.architecture}" if "\nMulti-Arch: same\n" in fields else name
+            for kind in ("symbols", "shlibs"):
+                if (control / kind).exists():
+                    shutil.copyfile(control / kind, info / f"{stem}.{kind}")
+            packed = (self.sysroot / line.split(None, 5)[5].split(" -> ")[0] for line in run("dpkg-deb", "--contents", archive).splitlines())
+            (info / f"{stem}.list").write_text("".join(f"{path}\n" for file in packed for path in sorted({os.path.normpath(file), os.path.realpath(file)})))
+            status.append(fields.strip() + "\nStatus: install ok installed\n")
+            shutil.rmtree(control)
+        (database / "status").write_text("\n".join(status))
+        return database
 
     def control(self, package, about):
         tree = self.tree(package)
@@ -206,4 +246,4 @@ class Packages:
 
 if __name__ == "__main__":
     os.umask(0o022)
-    Packages(*(Path(argument).resolve() for argument in sys.argv[1:4])).make()
+    Packages(*sys.argv[1:6]).make()
