@@ -88,6 +88,9 @@ TEST_P(Memory, running_out_at_any_allocation_changes_nothing_or_all) {
 #if defined(__SANITIZE_THREAD__)
     GTEST_SKIP() << "one thread only, and the address sanitizer looks closer";
 #endif
+#if defined(HALCYON_EMULATED)
+    GTEST_SKIP() << "an emulator takes an hour for thousands of machines, and nothing of it depends on the processor";
+#endif
     const auto& [edit, lasting] = GetParam();
     Machine machine;
     machine.must(machine_text);
