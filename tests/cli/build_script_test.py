@@ -175,6 +175,29 @@ class Script(unittest.TestCase):
         (self.tools / "broken").unlink()
         self.assertEqual([self.BUILD + "hal component_sum2 component_pid"], self.hal("run", "a.hal"))
 
+    def test_a_board_is_one_of_two_and_its_libraries_are_unpacked_once(self):
+        for name in ("cmake/board.sh", "tests/board.sh"):
+            (self.tree / name).parent.mkdir(exist_ok=True)
+            shutil.copy(ROOT / name, self.tree / name)
+        self.assertEqual([], [line for line in self.hal("board", "mips", status=1) if not line.startswith("apt-get")])
+        self.assertTrue(self.said.endswith("hal: usage: ./hal board armhf|arm64\n"), self.said)
+        self.hal("package", "armhf", "arm64", status=1)
+        self.assertTrue(self.said.endswith("hal: usage: ./hal package [armhf|arm64]\n"), self.said)
+        for name in ("qemu-arm-static", "arm-linux-gnueabihf-g++", "dpkg-shlibdeps"):
+            (self.tools / name).touch(0o755)
+        unpacker, folder = self.tools / "mmdebstrap", self.tree / "build/boards/armhf"
+        unpacker.write_text('#!/bin/sh\necho "E: no mirror"; exit 1\n')
+        unpacker.chmod(0o755)
+        self.hal("package", "armhf", status=1)
+        begun = "hal: unpacking Debian's libraries for armhf from http://deb.debian.org/debian in build/boards/armhf/sysroot\n"
+        self.assertEqual(f"{begun}E: no mirror\nhal: cannot make build/boards/armhf/sysroot (see {folder}/sysroot.log); HALCYON_MIRROR=URL names another mirror of Debian\n", self.said)
+        unpacker.write_text("#!/bin/sh\n")
+        (self.tools / "broken").write_text("")
+        failed = "hal: building everything for armhf in build/armhf\na.cpp:1: error: no\nhal: cannot build build/armhf\n"
+        for said in (begun + failed, failed):
+            self.hal("package", "armhf", status=1)
+            self.assertEqual(said, self.said)
+
     def test_sources_that_cannot_be_compiled_together_are_compiled_one_by_one(self):
         (self.tools / "together").write_text("")
         self.assertEqual(["cmake --preset release -DHALCYON_TESTS=OFF -DHALCYON_QUICK=ON", self.BUILD + "hal",
