@@ -8,6 +8,7 @@
 #include "commands/table.hpp"
 #include "commands/listing.hpp"
 #include "commands/text_writer.hpp"
+#include "model/modules.hpp"
 
 namespace hal {
 namespace {
@@ -52,14 +53,16 @@ void save_comp(Context& context, Text& text) {
     text.add("# components\n");
     std::vector<const LoadedComponent*> oldest_first = components_newest_first(model, {});
     std::reverse(oldest_first.begin(), oldest_first.end());
+    const std::vector<std::string> ours = context.session.host().available_components();
+    const auto contains = [](const std::vector<std::string>& sorted, const std::string& name) { return std::binary_search(sorted.begin(), sorted.end(), name); };
     for (const LoadedComponent* const component : oldest_first) {
         if (component->process != 0) continue;
         for (const std::string& arguments : component->arguments)
-            text.add("loadrt {}{}{}\n", component->name, arguments.empty() ? "" : " ", arguments);
+            text.add("loadrt {}{}{}{}\n", is_module(*component) && contains(ours, component->name) ? "--linuxcnc " : "", component->name, arguments.empty() ? "" : " ", arguments);
     }
     for (const std::string& name : deleted_threads(model)) text.add("delthread {}\n", name);
     for (const auto& thread : model.threads)  // fastest first, so that periods fit
-        if (!thread->component) new_thread(text, *thread);
+        if (!thread->component && !made_by_module(*thread, model)) new_thread(text, *thread);
 }
 
 void save_alias(Context& context, Text& text) {

@@ -8,6 +8,7 @@
 
 #include "machine/construction.hpp"
 #include "machine/setup_call.hpp"
+#include "machine/thread_options.hpp"
 
 namespace hal {
 
@@ -48,6 +49,19 @@ Span span_of(const GivenArgument& given, const Failure& why, const Sources& sour
     if (why.begin >= why.end || why.end > given.value.size() || sources.text(given.at) != why.name + "=" + given.value) return given.at;
     const auto first = static_cast<std::uint32_t>(given.at.begin + before);
     return {given.at.source, first + why.begin, first + why.end};
+}
+
+// Threads that a LinuxCNC module makes. They outlive it, as in LinuxCNC.
+bool add_threads(const Construction& c, Edit& edit, Span at, Diagnostics& diagnostics) {
+    for (const auto& [name, period_ns] : c.threads) {
+        NewThread thread;
+        thread.name = name;
+        thread.at = at;
+        thread.options.period_ns = period_ns;
+        fit_period(c.model, thread, diagnostics);
+        if (!edit.add_thread({thread.name, thread.at}, thread.options)) return false;
+    }
+    return true;
 }
 
 // One instance: memory, constructor, declarations into the model.
@@ -128,7 +142,7 @@ bool construct_one(Edit& edit, LoadedComponent& component, const LoadRequest& re
     Instance& made = *instance;
     if (!edit.add_instance(component, instance, std::move(own))) return false;
     for (const auto& [function, step] : extended) edit.extend_function(*function, step, made);
-    return true;
+    return add_threads(c, edit, request.at, diagnostics);
 }
 
 }  // namespace
@@ -147,18 +161,6 @@ std::shared_ptr<void> block_of(const hal_component& plugin, std::size_t count) {
     return std::shared_ptr<void>(memory, [align](void* p) { ::operator delete(p, align); });
 }
 
-bool all_known(const LoadedComponent& component, const LoadRequest& request, const std::set<std::string>& asked, Diagnostics& diagnostics) {
-    for (const auto& [name, given] : request.arguments) {
-        if (asked.contains(name)) continue;
-        std::vector<std::string> all(asked.begin(), asked.end());
-        all.insert(all.end(), {"names", "count", "personality"});
-        diagnostics.error("unknown-argument", given.at, "component '" + component.name + "' has no argument '" + name + "'",
-                          did_you_mean(name, all), "its arguments: " + listed(all));
-        return false;
-    }
-    return true;
-}
-
 /// In the indices, for more instances like `one`: they grow once and not twenty times.
 void make_room(Model& model, const Instance& one, std::size_t more) {
     std::size_t pins = one.pins.size();
@@ -169,6 +171,18 @@ void make_room(Model& model, const Instance& one, std::size_t more) {
 }
 
 }  // namespace
+
+bool all_known(const LoadedComponent& component, const LoadRequest& request, const std::set<std::string>& asked, Diagnostics& diagnostics) {
+    for (const auto& [name, given] : request.arguments) {
+        if (asked.contains(name)) continue;
+        std::vector<std::string> all(asked.begin(), asked.end());
+        if (!(component.plugin->flags & HAL_COMPONENT_WHOLE_NAMES)) all.insert(all.end(), {"names", "count", "personality"});
+        diagnostics.error("unknown-argument", given.at, "component '" + component.name + "' has no argument '" + name + "'",
+                          did_you_mean(name, all), "its arguments: " + listed(all));
+        return false;
+    }
+    return true;
+}
 
 bool construct_again(Model& beside, Edit& edit, const LoadedComponent& old, LoadedComponent& fresh, Span at, Sources& sources,
                      Diagnostics& diagnostics) {

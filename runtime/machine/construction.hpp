@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "hal/modules.h"
 #include "hal/naming.h"
 #include "hal/texts.h"
 #include "machine/construct.hpp"
@@ -50,10 +51,18 @@ struct Construction {
     bool said_why = false;                  // an error was
     std::size_t said = 0;                   // messages of this text; those beyond the limit are dropped
     std::deque<std::string> found = {};     // what find_text() gave
+    struct NewThread {
+        std::string name;
+        std::int64_t period_ns;
+    };
+    std::vector<NewThread> threads = {};    // that a LinuxCNC module makes
 };
 
 /// The interface for the constructor; its callbacks write to `construction`, which must outlive it. [setup]
 hal_host host_for(Construction& construction);
+
+/// Returns false after reporting a given argument that the constructor has not asked for.
+bool all_known(const LoadedComponent& component, const LoadRequest& request, const std::set<std::string>& asked, Diagnostics& diagnostics);
 
 /// The construction behind the host that a callback got.
 inline Construction& construction_of(const hal_host* host) { return *static_cast<Construction*>(host->data); }
@@ -73,6 +82,7 @@ Result guarded(Construction& c, Result otherwise, Action action) noexcept {
 }
 
 extern const hal_naming naming_extension;  ///< names that LinuxCNC makes otherwise than COMPONENT.N
+extern const hal_modules modules_extension;  ///< what only LinuxCNC's modules do
 extern const hal_texts texts_extension;    ///< finds files the component reads, and takes what it finds wrong in them
 
 }  // namespace hal

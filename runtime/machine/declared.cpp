@@ -6,6 +6,9 @@
 #include <memory>
 #include <new>
 
+#include "hal/modules.h"
+#include "modules/module_host.hpp"
+
 namespace hal {
 
 namespace {
@@ -84,6 +87,11 @@ bool gather(const hal_component& component, Declared& page, std::string& problem
     page.singleton = component.flags & HAL_COMPONENT_SINGLETON;
     page.whole_names = component.flags & HAL_COMPONENT_WHOLE_NAMES;
     page.default_count = component.default_count;
+    if (component.flags & HAL_COMPONENT_MODULE) {  // not run: it may access hardware
+        const auto& module = reinterpret_cast<const halcyon_module&>(component);
+        for (std::size_t i = 0; i < module.parameter_count; ++i) page.arguments.push_back({module.parameters[i].name, text(module.parameters[i].doc), "", false});
+        return true;
+    }
     Gathering gathering{page, {}, {}, {}};
     const hal_host host{sizeof host, &gathering, take_pin, take_function, take_argument, allocate, take_failure, no_extension, take_rejection};
     const std::align_val_t align{component.instance_align};

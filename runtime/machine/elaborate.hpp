@@ -28,6 +28,7 @@ struct Elaboration {
     Diagnostics& diagnostics;
     std::vector<AutoOrder>& auto_orders;
     const Usage& usage;  ///< of the command, for messages
+    bool check_only = false;  ///< `hal check`: code that may access hardware does not run
 };
 
 /// Carries out `addf --auto`.

@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <charconv>
 
-#include "text/quoting.hpp"
 #include "machine/construct.hpp"
+#include "machine/module_library.hpp"
 #include "machine/thread_options.hpp"
+#include "model/modules.hpp"
+#include "text/quoting.hpp"
 
 namespace hal {
 namespace {
@@ -47,16 +49,16 @@ void load_threads(Elaboration& on, const Token& name, Args args, const std::stri
 }
 
 // count=, names= … are the component's own arguments: it names its pins itself.
-bool names_itself(Elaboration& on, const Token& name) {
+bool names_itself(Elaboration& on, const Token& name, Origin origin) {
     if (const LoadedComponent* const loaded = on.model.find_component(name.text))
         return loaded->plugin && (loaded->plugin->flags & HAL_COMPONENT_WHOLE_NAMES);
     Diagnostics ignored;
-    const auto plugin = on.plugins.open(name.text, name.span, ignored);
+    const auto plugin = open_component(on.plugins, name.text, origin, name.span, ignored);
     return plugin && (plugin->component->flags & HAL_COMPONENT_WHOLE_NAMES);
 }
 
 /// Separates the arguments of loadrt that name or count instances from the others. Returns false after reporting.
-bool read_request(Elaboration& on, const Token& name, Args args, LoadRequest& request) {
+bool read_request(Elaboration& on, const Token& name, Origin origin, Args args, LoadRequest& request) {
     request.at = name.span;
     bool good = true;
     Span names_at;
@@ -70,7 +72,7 @@ bool read_request(Elaboration& on, const Token& name, Args args, LoadRequest& re
         }
         const std::string key = token.text.substr(0, equals), value = unquoted(token.text.substr(equals + 1));
         const bool says_instances =
-            (key == "names" || key == "count" || key == "num_chan" || key == "personality") && !names_itself(on, name);
+            (key == "names" || key == "count" || key == "num_chan" || key == "personality") && !names_itself(on, name, origin);
         if (says_instances && key == "names") {
             request.names = split_list(value);
             names_at = token.span;
@@ -114,14 +116,34 @@ bool read_request(Elaboration& on, const Token& name, Args args, LoadRequest& re
     return good;
 }
 
-bool make_instances(Elaboration& on, const Token& name, const LoadRequest& request, const std::string& written) {
+/// Returns false after reporting what stands against loading a component that is loaded already.
+bool may_load_again(Elaboration& on, const Token& name, Origin origin, const LoadedComponent& component) {
+    if (is_module(component)) {
+        on.diagnostics.error("name-taken", name.span,
+                             quoted(name.text) + " is a LinuxCNC module, which is loaded once, and it is already loaded", "",
+                             "for other arguments: unloadrt " + component.name + ", then loadrt again");
+        return false;
+    }
+    if (origin != Origin::linuxcnc) return true;
+    on.diagnostics.error("name-taken", name.span, "the component " + quoted(name.text) + " of this runtime is already loaded", "",
+                         "unloadrt " + component.name + " first, or leave out --linuxcnc");
+    return false;
+}
+
+bool make_instances(Elaboration& on, const Token& name, Origin origin, const LoadRequest& request, const std::string& written) {
     LoadedComponent* component = on.model.find_component(name.text);
+    if (component && !component->plugin && component->process == 0) {
+        on.diagnostics.error("name-taken", name.span, quoted(name.text) + " of this runtime is already loaded", "",
+                             "create all threads with one of them: leave out --linuxcnc");
+        return false;
+    }
     if (component && !component->plugin) {
         on.diagnostics.error("name-taken", name.span, quoted(name.text) + " is a program started by loadusr");
         return false;
     }
+    if (component && !may_load_again(on, name, origin, *component)) return false;
     if (!component) {
-        auto plugin = on.plugins.open(name.text, name.span, on.diagnostics);
+        auto plugin = open_component(on.plugins, name.text, origin, name.span, on.diagnostics);
         if (!plugin) return false;
         component = &on.edit.add_component(plugin->component->name, name.span);
         component->plugin = plugin->component;
@@ -133,6 +155,31 @@ bool make_instances(Elaboration& on, const Token& name, const LoadRequest& reque
     load.personalities = request.personalities;
     on.edit.note_arguments(*component, written, std::move(load));
     return construct(on.model, on.edit, *component, request, on.sources, on.diagnostics);
+}
+
+/// `hal check` does not run a module: it may access hardware. Its parameters are checked from its file.
+bool is_unchecked(Elaboration& on, const Token& name, Origin origin) {
+    Diagnostics ignored;
+    const auto plugin = open_component(on.plugins, name.text, origin, name.span, ignored);
+    return plugin && (plugin->component->flags & HAL_COMPONENT_MODULE);
+}
+
+/// Returns true after reporting that a loaded module uses symbols of this one.
+bool is_used(Elaboration& on, const LoadedComponent& component, Span at) {
+    if (!is_module(component)) return false;
+    std::string users;
+    std::string first;
+    for (std::size_t i = 0;; ++i) {
+        const std::string user = user_of_module(*component.plugin, i);
+        if (user.empty()) break;
+        if (!on.model.find_component(user)) continue;  // unloaded in the same transaction
+        if (first.empty()) first = user;
+        users += (users.empty() ? "" : ", ") + user;
+    }
+    if (users.empty()) return false;
+    on.diagnostics.error("reload-conflict", at, quoted(component.name) + " cannot be unloaded: its code is used by " + users, "",
+                         "unload that first: unloadrt " + first);
+    return true;
 }
 
 LoadedComponent* loaded_component(Elaboration& on, const Token& name) {
@@ -148,14 +195,29 @@ LoadedComponent* loaded_component(Elaboration& on, const Token& name) {
 }  // namespace
 
 void edits::loadrt(Elaboration& on, Args args) {
+    Origin origin = Origin::any;
+    if (args[0].text == "--native" || args[0].text == "--linuxcnc") {
+        origin = args[0].text == "--native" ? Origin::native : Origin::linuxcnc;
+        const Span option = args[0].span;
+        args = args.subspan(1);
+        if (args.empty()) {
+            on.diagnostics.error("wrong-arguments", option, "the name of a component is missing after the option", "",
+                                 "loadrt --linuxcnc NAME");
+            return;
+        }
+    }
     std::string text;
     for (const Token& token : args.subspan(1)) text += (text.empty() ? "" : " ") + written(token.text);
-    if (args[0].text == "threads") return load_threads(on, args[0], args.subspan(1), text);
+    if (args[0].text == "threads" && origin != Origin::linuxcnc) return load_threads(on, args[0], args.subspan(1), text);
     LoadRequest request;
     const bool known = on.model.find_component(args[0].text) || !on.plugins.find(args[0].text).empty();
     Absences& absences = on.edit.absences();
-    std::optional<Absences::Cause> cause = known ? std::nullopt : absences.assumed(args[0].text);
-    if (read_request(on, args[0], args.subspan(1), request) && !cause && make_instances(on, args[0], request, text)) return;
+    std::optional<Absences::Cause> cause = known && origin != Origin::linuxcnc ? std::nullopt : absences.assumed(args[0].text);
+    if (!cause && on.check_only && is_unchecked(on, args[0], origin)) {
+        absences.assume(args[0].text);
+        cause = absences.assumed(args[0].text);
+    }
+    if (read_request(on, args[0], origin, args.subspan(1), request) && !cause && make_instances(on, args[0], origin, request, text)) return;
     if (!known && !cause)
         cause = absences.add("component " + quoted(args[0].text), "which is missing", args[0].span,
                              request.names.empty() ? Absences::Scope::component : Absences::Scope::names);
@@ -177,6 +239,7 @@ void edits::unload(Elaboration& on, Args args) {
     }
     if (Instance* const instance = on.model.find_instance(args[0].text); instance && !on.model.find_component(args[0].text)) {
         LoadedComponent& component = *instance->component;
+        if (is_used(on, component, args[0].span)) return;
         on.edit.remove_instance(*instance);
         if (component.instances.empty()) on.edit.remove_component(component);
         return;
@@ -188,7 +251,8 @@ void edits::unload(Elaboration& on, Args args) {
                              "unloadusr " + component->name + " ends it");
         return;
     }
-    if (component->name == "threads")
+    if (is_used(on, *component, args[0].span)) return;
+    if (component->name == "threads" && !component->plugin)
         for (std::size_t i = on.model.threads.size(); i-- > 0;)
             if (on.model.threads[i]->component == component) on.edit.remove_thread({on.model.threads[i]->name, args[0].span});
     on.edit.remove_component(*component);
@@ -209,6 +273,12 @@ void edits::reload(Elaboration& on, Args args) {
             "no-such-component", name.span,
             component->process != 0 ? quoted(name.text) + " is a program, not a plugin" : quoted(name.text) + " belongs to the runtime", "",
             component->process != 0 ? "unload it and start it again by loadusr" : "its threads are removed by delthread");
+        return;
+    }
+    if (is_module(*component)) {
+        on.diagnostics.error("reload-conflict", name.span,
+                             quoted(name.text) + " is a LinuxCNC module, whose static variables allow one copy at a time", "",
+                             "unloadrt " + component->name + ", then loadrt again");
         return;
     }
     auto plugin = on.plugins.open(name.text, name.span, on.diagnostics);

@@ -15,6 +15,7 @@
 #include <unistd.h>
 
 #include "paths.hpp"
+#include "machine/module_library.hpp"
 #include "machine/plugin_file.hpp"
 #include "machine/source_tree.hpp"
 
@@ -79,6 +80,16 @@ std::string package_of(const std::string& name, const std::vector<std::string>& 
     return {};
 }
 
+void report_missing_module(std::string_view name, Span at, Diagnostics& diagnostics) {
+    std::error_code none;
+    const bool installed = fs::is_directory(module_folder(), none);
+    const std::string quoted = "'" + std::string(name) + "'", folder = module_folder();
+    diagnostics.error("no-such-component", at,
+                      installed ? "LinuxCNC module " + quoted + " does not exist in " + folder
+                                : quoted + " is a module of LinuxCNC, which is not installed: " + folder + " does not exist",
+                      "", installed ? "HAL_RTMOD_DIR names another folder; for a component of ours: loadrt --native " + std::string(name) : "sudo apt-get install linuxcnc-uspace");
+}
+
 }  // namespace
 
 std::string user_folder(std::string_view kind) {
@@ -118,21 +129,30 @@ std::string Plugins::find(std::string_view name) const {
 }
 
 std::optional<Plugin> Plugins::open(std::string_view name, Span at, Diagnostics& diagnostics) const {
-    std::string found = find(name);
-    const bool unbuilt = found.empty() && listed_components(path_).contains(underlined(name));
-    if (unbuilt && build_on_demand(underlined(name))) found = find(name);
+    return open_component(*this, name, Origin::any, at, diagnostics);
+}
+
+std::optional<Plugin> open_component(const Plugins& plugins, std::string_view name, Origin origin, Span at, Diagnostics& diagnostics) {
+    const std::vector<std::string>& path = plugins.path();
+    std::string found = origin == Origin::linuxcnc ? "" : plugins.find(name);
+    const std::string module = origin == Origin::native || !found.empty() ? "" : find_module(name);
+    if (origin == Origin::linuxcnc && module.empty()) return report_missing_module(name, at, diagnostics), std::nullopt;
+    if (!module.empty() && (origin == Origin::linuxcnc || !listed_components(path).contains(underlined(name)))) return open_module(module, at, diagnostics);
+    const bool unbuilt = found.empty() && listed_components(path).contains(underlined(name));
+    if (unbuilt && build_on_demand(underlined(name))) found = plugins.find(name);
     if (found.empty() && unbuilt) {
         diagnostics.error("no-such-component", at, "component '" + std::string(name) + "' is not built yet", "",
                           "in the source tree, type: ./hal build " + underlined(name));
         return {};
     }
     if (found.empty()) {
-        if (const std::string package = package_of(underlined(name), path_); !package.empty()) {
+        if (const std::string package = package_of(underlined(name), path); !package.empty()) {
             diagnostics.error("no-such-component", at, "component '" + std::string(name) + "' was left out of this build: it needs " + package, "",
                               "sudo apt-get install " + package + ", then build again; ./hal does that by itself");
             return {};
         }
-        diagnostics.error("no-such-component", at, "unknown component '" + std::string(name) + "'", did_you_mean(name, available()), "hal doc lists all components");
+        if (origin == Origin::any && is_module_of_linuxcnc(name)) return report_missing_module(name, at, diagnostics), std::nullopt;
+        diagnostics.error("no-such-component", at, "unknown component '" + std::string(name) + "'", did_you_mean(name, plugins.available()), "hal doc lists all components");
         return {};
     }
     const auto bad = [&](const PluginProblem& problem) {

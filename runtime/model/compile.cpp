@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "model/compile.hpp"
+#include "model/modules.hpp"
 
 #include <algorithm>
 #include <map>
@@ -21,7 +22,11 @@ void for_all_pins(const Model& model, Action action) {
 
 class Compiler {
 public:
-    Compiler(const Model& model, const CompileInput& input) : model_(model), input_(input) {}
+    Compiler(const Model& model, const CompileInput& input) : model_(model), input_(input) {
+        for (const auto& component : model.components)
+            if (is_module(*component))
+                for (const auto& function : component->functions) module_functions_.push_back(function.get());
+    }
 
     Compiled run() {
         for (const auto& thread : model_.threads) {
@@ -59,16 +64,21 @@ private:
     Thread* thread_for(const Pin& pin) const {
         if (pin.of_thread) return pin.of_thread;
         if (pin.function) return excluded(pin.function) ? nullptr : pin.function->thread;
-        for (const LoadedFunction* function : pin.instance->functions)
+        for (const LoadedFunction* function : users_of(pin))
             if (function->thread && !excluded(function)) return function->thread;
         return nullptr;
+    }
+
+    // LinuxCNC modules call each other: the pins of one without a function, such as a kinematics module, are used by functions of others.
+    const std::vector<LoadedFunction*>& users_of(const Pin& pin) const {
+        return pin.instance->functions.empty() && pin.instance->component && is_module(*pin.instance->component) ? module_functions_ : pin.instance->functions;
     }
 
     // A loose pin whose functions are in two threads; what it is linked to cannot live with one of them.
     bool spread(const Pin& pin) const {
         if (!is_loose(pin)) return false;
         const Thread* first = nullptr;
-        for (const LoadedFunction* function : pin.instance->functions) {
+        for (const LoadedFunction* function : users_of(pin)) {
             if (!function->thread || excluded(function)) continue;
             if (first && function->thread != first) return true;
             first = function->thread;
@@ -137,6 +147,11 @@ private:
                     for (const auto& pin : instance->pins) want(*pin);
                 for (const auto& pin : function->pins) want(*pin);
             }
+        for (const auto& component : model_.components)
+            if (is_module(*component))
+                for (const auto& instance : component->instances)
+                    if (instance->functions.empty())
+                        for (const auto& pin : instance->pins) want(*pin);
         for (const auto& pin : thread.pins) want(*pin);
 
         plan.image_size = wanted.size();
@@ -332,6 +347,7 @@ private:
 
     const Model& model_;
     const CompileInput& input_;
+    std::vector<LoadedFunction*> module_functions_;
     Compiled out_;
     std::unordered_map<Thread*, plan::Plan*> plans_;
     std::map<std::pair<Thread*, Thread*>, std::pair<std::size_t, std::size_t>> channels_;

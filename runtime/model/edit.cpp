@@ -97,7 +97,7 @@ bool Edit::add_instance(LoadedComponent& component, std::unique_ptr<Instance>& o
         return false;
     }
     for (const auto& pin : made->pins)
-        if (!name_free(pin->name, made->loaded, "its pin")) return false;
+        if (!name_free(pin->name, made->loaded, "its pin") || (!pin->alias.empty() && !name_free(pin->alias, made->loaded, "a second name of its pin"))) return false;
     for (const auto& function : functions)
         if (model_.find_function(function->name))
             return fail("name-taken", made->loaded, "function " + quoted(function->name) + " already exists", "its function",
@@ -118,7 +118,7 @@ bool Edit::add_instance(LoadedComponent& component, std::unique_ptr<Instance>& o
             removed_.functions.push_back(std::move(of.functions.back()));
             of.functions.pop_back();
         }
-        for (const auto& pin : made->pins) model_.pin.erase(pin->name);
+        for (const auto& pin : made->pins) model_.leave(*pin);
         model_.instance.erase(made->name);
         removed_.instances.push_back(std::move(of.instances.back()));  // rolled back in reverse order, so it is the last
         of.instances.pop_back();
@@ -128,7 +128,7 @@ bool Edit::add_instance(LoadedComponent& component, std::unique_ptr<Instance>& o
     added_instances_.push_back(made);
     if (component.process == 0) structural_ = true;  // no thread runs a program
     model_.instance.emplace(made->name, made);
-    for (const auto& pin : made->pins) model_.pin.emplace(pin->name, pin.get());
+    for (const auto& pin : made->pins) model_.enter(*pin);
     for (auto function = component.functions.begin() + static_cast<std::ptrdiff_t>(functions_before); function != component.functions.end();
          ++function) {
         model_.function.emplace((*function)->name, function->get());

@@ -320,7 +320,9 @@ inline constexpr CodePage code_pages[] = {
      "pins on signals with the same type and direction, functions that are in threads, the name of the component. Nothing was "
      "changed; the old version continues to run.\n\n"
      "First remove the pin from its signal (`unlinkp PIN`) or the function from its thread (`delf FUNCTION THREAD`); between `begin` "
-     "and `commit` this and the reload take effect together."},
+     "and `commit` this and the reload take effect together.\n\n"
+     "A LinuxCNC module cannot be reloaded, and not be unloaded while another loaded module calls its code: motmod uses a trajectory "
+     "planner, a homing and a kinematics module, the drivers of Mesa cards use hostmot2. Unload that module first."},
     {"reload-dropped",
      "A parameter or an input whose value had been set is missing in the new version of the component, or has a different type. The "
      "reload took effect, and the value is lost.\n\n"

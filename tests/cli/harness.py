@@ -63,7 +63,7 @@ class Case(unittest.TestCase):
         self.addCleanup(shutil.rmtree, self.folder, True)
         keep = {key: value for key, value in os.environ.items() if key == "PATH" or key.endswith("SAN_OPTIONS")}
         self.environment = {**keep, "LC_ALL": "C.UTF-8", "TERM": "xterm", "HOME": str(self.folder), "XDG_RUNTIME_DIR": str(self.folder),
-                            "XDG_STATE_HOME": str(self.folder / "state"), "HALCYON_PLUGIN_PATH": PLUGINS}
+                            "XDG_STATE_HOME": str(self.folder / "state"), "HALCYON_PLUGIN_PATH": PLUGINS, "HAL_RTMOD_DIR": "/nowhere"}  # LinuxCNC may be installed
 
     def write(self, name, text):
         path = self.folder / name

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: MIT
+#include "machine/module_library.hpp"
+
+#include <algorithm>
+#include <cstdlib>
+#include <dlfcn.h>
+#include <filesystem>
+#include <string>
+
+#include "modules/module_host.hpp"
+#include "paths.hpp"
+
+namespace hal {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Library {
+    const halcyon_modules* host = nullptr;
+    std::string problem;
+};
+
+// Never closed: modules are bound to it. RTLD_GLOBAL: they find its symbols in the global scope.
+Library open_library() {
+    std::error_code none;
+    const fs::path program = fs::read_symlink("/proc/self/exe", none).parent_path();
+    const std::string name = "libhalcyon_modules.so." + std::string(paths::version.substr(0, paths::version.rfind('.')));
+    // beside the program's own libraries, or, for other programs such as python3, where this was built or installed
+    const fs::path folders[] = {program / paths::libraries_from_programs, program / "../lib", fs::path(paths::build_components) / "../lib",
+                                fs::path(paths::install_components) / "../.."};
+    for (const fs::path& folder : folders) {
+        const fs::path file = folder / name;
+        if (!fs::is_regular_file(file, none)) continue;
+        void* const library = dlopen(fs::weakly_canonical(file, none).c_str(), RTLD_NOW | RTLD_GLOBAL);
+        if (!library) return {nullptr, dlerror()};
+        const auto entry = reinterpret_cast<const halcyon_modules* (*)()>(dlsym(library, "halcyon_module_host"));
+        if (!entry || entry()->size != sizeof(halcyon_modules))
+            return {nullptr, file.string() + " belongs to another version of this program"};
+        return {entry(), ""};
+    }
+    return {nullptr, name + ", which runs LinuxCNC's modules, is missing beside this program"};
+}
+
+const Library& library() {
+    static const Library opened = open_library();
+    return opened;
+}
+
+}  // namespace
+
+std::string module_folder() {
+    const char* const folder = std::getenv("HAL_RTMOD_DIR");
+    return folder && *folder ? folder : "/usr/lib/linuxcnc/modules";
+}
+
+std::string find_module(std::string_view name) {
+    if (name.empty() || name.find('/') != name.npos) return {};
+    std::string underlined(name), dashed(name);
+    std::replace(underlined.begin(), underlined.end(), '-', '_');
+    std::replace(dashed.begin(), dashed.end(), '_', '-');
+    for (const std::string& candidate : {std::string(name), underlined, dashed}) {
+        std::error_code none;
+        if (fs::is_regular_file(module_folder() + "/" + candidate + ".so", none)) return candidate;
+    }
+    return {};
+}
+
+bool is_module_of_linuxcnc(std::string_view name) {
+    constexpr std::string_view beginnings[] = {"hm2_", "mesa_"};
+    constexpr std::string_view names[] = {
+        "5axiskins", "classicladder_rt", "corexy_by_hal", "genhexkins", "genserkins",  "gentrivkins", "hal_bb_gpio",
+        "hal_gm",    "hal_parport",      "hal_pi_gpio",   "hal_ppmc",   "hal_speaker", "homecomp",    "homemod",
+        "hostmot2",  "lineardeltakins",  "matrixkins",    "maxkins",    "motmod",      "pentakins",   "pumakins",
+        "rosekins",  "rotarydeltakins",  "rotatekins",    "scarakins",  "scope_rt",    "setsserial",  "tpcomp",
+        "tpmod",     "tripodkins",       "trivkins",      "userkins"};
+    return std::any_of(std::begin(beginnings), std::end(beginnings), [&](std::string_view one) { return name.starts_with(one); }) ||
+           std::find(std::begin(names), std::end(names), name) != std::end(names);
+}
+
+std::optional<Plugin> open_module(const std::string& name, Span at, Diagnostics& diagnostics) {
+    const std::string path = module_folder() + "/" + name + ".so";
+    const auto bad = [&](const std::string& why, const std::string& help) {
+        diagnostics.error("bad-plugin", at, "'" + path + "' is not a usable LinuxCNC module: " + why, "", help);
+        return std::nullopt;
+    };
+    if (name == "hal_lib") return bad("it is LinuxCNC's own HAL, whose place this runtime takes", "other modules need no loadrt hal_lib");
+    if (!library().host) {
+        diagnostics.error("bad-plugin", at, "'" + path + "' cannot be loaded: " + library().problem, "",
+                          "install this program again: cmake --install BUILD");
+        return {};
+    }
+    halcyon_module_problem problem{};
+    const halcyon_module* const module = library().host->open(module_folder().c_str(), name.c_str(), &problem);
+    if (!module) return bad(problem.why, problem.help);
+    return Plugin{&module->component,
+                  {const_cast<halcyon_module*>(module), [](void* m) { library().host->close(static_cast<const halcyon_module*>(m)); }},
+                  path};
+}
+
+std::string user_of_module(const hal_component& component, std::size_t index) {
+    const char* const user = library().host->user(reinterpret_cast<const halcyon_module*>(&component), index);
+    return user ? user : "";
+}
+
+}  // namespace hal

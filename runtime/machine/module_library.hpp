@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: MIT
+// LinuxCNC's compiled modules: finds them in its module folder and opens them by libhalcyon_modules.so, which is loaded at the first one.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "machine/plugins.hpp"
+
+namespace hal {
+
+/// Where `loadrt` takes a component from.
+enum class Origin { any, native, linuxcnc };
+
+/// Plugins::open(), which is for any origin: a LinuxCNC module where there is no plugin.
+std::optional<Plugin> open_component(const Plugins& plugins, std::string_view name, Origin origin, Span at, Diagnostics& diagnostics);
+
+/// $HAL_RTMOD_DIR, or where the package linuxcnc-uspace installs them.
+std::string module_folder();
+/// Returns the name of the module's file without its folder and `.so` (`-` and `_` are the same); empty: there is none.
+std::string find_module(std::string_view name);
+/// Whether LinuxCNC 2.9 has a module of that name, installed or not. Only names that are not components of ours.
+bool is_module_of_linuxcnc(std::string_view name);
+/// Reads the module's file; its code is not mapped before its instance is created. Nothing after reporting bad-plugin.
+std::optional<Plugin> open_module(const std::string& name, Span at, Diagnostics& diagnostics);
+/// Returns the name of a loaded module that uses symbols of this one; empty: none. `component` is a module's.
+std::string user_of_module(const hal_component& component, std::size_t index);
+
+}  // namespace hal

@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: MIT
+// Components, their memory, functions and threads.
+#include <cerrno>
+#include <cstring>
+#include <map>
+#include <string>
+#include <sys/mman.h>
+
+#include "modules/module.hpp"
+
+char* hal_shmem_base = nullptr;
+
+namespace hal::modules {
+namespace {
+
+constexpr std::size_t name_length = 47, chunk_bytes = 1 << 20;
+
+struct Component {
+    std::string name;
+    Module* module;
+    bool ready;
+};
+std::map<int, Component> components;
+int last_id = 0;
+
+/// Memory of hal_malloc(): cleared, never moved, and kept until no module is left, because modules keep pointers into each other's.
+struct Chunk {
+    char* memory;
+    std::size_t bytes, used;
+};
+std::vector<Chunk> chunks;
+
+bool add_chunk(std::size_t least) {
+    const std::size_t bytes = (least + chunk_bytes - 1) / chunk_bytes * chunk_bytes;
+    chunks.reserve(chunks.size() + 1);
+    void* const memory = mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    if (memory == MAP_FAILED) return false;
+    chunks.push_back({static_cast<char*>(memory), bytes, 0});
+    return true;
+}
+
+int fail(const char* function, const char* name, const char* why) {
+    rtapi_print_msg(1, "%s: '%s': %s\n", function, name ? name : "(null)", why);
+    return -EINVAL;
+}
+
+struct Function {
+    void (*code)(void*, long);
+    void* arg;
+    Module* module;
+};
+
+void call(void* self, const hal_cycle* cycle) {
+    const Function* const function = static_cast<const Function*>(self);
+    in_cycle = true;
+    function->code(function->arg, static_cast<long>(cycle->period_ns));
+    in_cycle = false;
+}
+void call_with_parameters(void* self, const hal_cycle* cycle) {
+    Module& module = *static_cast<const Function*>(self)->module;
+    module.sync_parameters();
+    call(self, cycle);
+    module.sync_parameters();
+}
+// Which of the two applies is known once all parameters are declared.
+void call_first(void* self, const hal_cycle* cycle) {
+    (static_cast<const Function*>(self)->module->parameters.empty() ? call : call_with_parameters)(self, cycle);
+}
+
+}  // namespace
+
+bool prepare_memory() noexcept {
+    return guarded([] {
+        if (chunks.empty() && !add_chunk(chunk_bytes)) return -ENOMEM;
+        hal_shmem_base = chunks.front().memory;
+        return 0;
+    }) == 0;
+}
+
+void release_components(Module& module) noexcept {
+    for (const int id : module.components) {
+        release_segments(id);
+        components.erase(id);
+    }
+    module.components.clear();
+    if (!Module::all_running().empty() || Module::current()) return;
+    for (const Chunk& chunk : chunks) munmap(chunk.memory, chunk.bytes);
+    chunks.clear();
+    hal_shmem_base = nullptr;
+}
+
+int declaring(const char* function, const char* name, int comp) {
+    if (!Module::current()) return fail(function, name, "only while a module is loaded"), -EPERM;
+    const auto component = components.find(comp);
+    if (component == components.end()) return fail(function, name, "unknown component");
+    if (component->second.ready) return fail(function, name, "the component is ready already");
+    if (!name || !*name) return fail(function, name, "the name is empty");
+    return std::strlen(name) > name_length ? fail(function, name, "the name is longer than 47 characters") : 0;
+}
+
+}  // namespace hal::modules
+
+using namespace hal::modules;
+
+extern "C" {
+
+int hal_init(const char* name) {
+    return guarded([&] {
+        Module* const module = Module::current();
+        if (!module) return fail("hal_init", name, "only while a module is loaded");
+        if (!name || !*name || std::strlen(name) > name_length) return fail("hal_init", name, "a name has 1 to 47 characters");
+        for (const auto& [id, component] : components)
+            if (component.name == name) return fail("hal_init", name, "duplicate component name");
+        const int id = ++last_id;
+        components[id] = {name, module, false};
+        module->components.insert(id);
+        return id;
+    });
+}
+
+int hal_ready(int comp) {
+    const auto component = components.find(comp);
+    if (component == components.end() || component->second.ready) return -EINVAL;
+    component->second.ready = true;
+    return 0;
+}
+
+int hal_set_unready(int comp) {
+    const auto component = components.find(comp);
+    if (component == components.end() || !component->second.ready || !Module::current()) return -EINVAL;
+    component->second.ready = false;
+    return 0;
+}
+
+int hal_exit(int comp) {
+    const auto component = components.find(comp);
+    if (component == components.end()) return -EINVAL;
+    components.erase(component);
+    return 0;
+}
+
+void* hal_malloc(long bytes) {
+    if (bytes <= 0 || in_cycle) return nullptr;
+    const auto wanted = static_cast<std::size_t>(bytes);
+    void* result = nullptr;
+    guarded([&] {
+        if (chunks.empty() || chunks.back().bytes - chunks.back().used < wanted + 16)
+            if (!add_chunk(wanted + 16)) return -ENOMEM;
+        Chunk& chunk = chunks.back();
+        chunk.used = (chunk.used + 15) / 16 * 16;
+        result = std::memset(chunk.memory + chunk.used, 0, wanted);  // touched now: no page fault in a cycle
+        chunk.used += wanted;
+        return 0;
+    });
+    return result;
+}
+
+char* hal_comp_name(int comp) {
+    const auto component = components.find(comp);
+    return component == components.end() ? nullptr : component->second.name.data();
+}
+
+int hal_export_funct(const char* name, void (*code)(void*, long), void* arg, int, int, int comp) {
+    return guarded([&] {
+        if (const int wrong = declaring("hal_export_funct", name, comp); wrong != 0) return wrong;
+        if (!code) return fail("hal_export_funct", name, "no code");
+        Module& module = *Module::current();
+        if (!module.functions.insert(name).second) return fail("hal_export_funct", name, "duplicate function name");
+        const hal_host* const host = module.host();
+        void* const memory = host->allocate(host, sizeof(Function), alignof(Function));
+        if (!memory) return -ENOMEM;
+        Function* const function = new (memory) Function{code, arg, &module};
+        const hal_function_decl decl{sizeof decl, 0, name, "", call_first, function, function, nullptr};
+        return host->function(host, &decl) ? 0 : -EINVAL;
+    });
+}
+
+int hal_create_thread(const char* name, unsigned long period_ns, int) {
+    return guarded([&] {
+        Module* const module = Module::current();
+        if (!module) return fail("hal_create_thread", name, "only while a module is loaded");
+        if (!name || !*name || std::strlen(name) > name_length) return fail("hal_create_thread", name, "a name has 1 to 47 characters");
+        if (period_ns == 0) return fail("hal_create_thread", name, "the period is 0");
+        if (!module->extension().thread(module->host(), name, static_cast<std::int64_t>(period_ns)))
+            return fail("hal_create_thread", name, "the name is invalid or taken");
+        const int id = ++last_id;  // LinuxCNC has a component per thread; nothing refers to it
+        return id;
+    });
+}
+
+// The runtime takes a module's functions out of the threads, at a cycle boundary, before it is unloaded: the others go on.
+int hal_stop_threads() { return 0; }
+int hal_del_funct_from_thread(const char* function, const char*) {
+    for (const Module* const module : Module::all_running())
+        if (function && module->functions.contains(function)) return 0;
+    return -EINVAL;
+}
+}

@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: MIT
+#include "modules/elf_file.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <elf.h>
+#include <fstream>
+#include <iterator>
+#include <link.h>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+namespace hal::modules {
+namespace {
+
+#if defined(__x86_64__)
+constexpr unsigned this_machine = EM_X86_64;
+#elif defined(__aarch64__)
+constexpr unsigned this_machine = EM_AARCH64;
+#elif defined(__arm__)
+constexpr unsigned this_machine = EM_ARM;
+#elif defined(__riscv)
+constexpr unsigned this_machine = EM_RISCV;
+#else
+constexpr unsigned this_machine = EM_NONE;
+#endif
+constexpr bool is_64_bit = sizeof(void*) == 8;
+
+template <class T>
+std::optional<T> at(std::string_view content, std::uint64_t offset) {
+    T value;
+    if (offset > content.size() || content.size() - offset < sizeof value) return {};
+    std::memcpy(&value, content.data() + offset, sizeof value);
+    return value;
+}
+
+std::string text_at(std::string_view table, std::uint64_t offset) {
+    if (offset >= table.size()) return {};
+    return std::string(table.substr(offset, table.find('\0', offset) - offset));
+}
+
+std::string machine_name(unsigned machine) {
+    switch (machine) {
+    case EM_X86_64: return "x86-64";
+    case EM_386: return "32-bit x86";
+    case EM_AARCH64: return "64-bit ARM";
+    case EM_ARM: return "32-bit ARM";
+    case EM_RISCV: return "RISC-V";
+    default: return "machine type " + std::to_string(machine);
+    }
+}
+
+std::uint64_t symbol_of(std::uint64_t info) { return is_64_bit ? info >> 32 : info >> 8; }
+
+}  // namespace
+
+ElfFile::ElfFile(const std::string& path) {
+    std::ifstream file(path, std::ios::binary);
+    if (!file) {
+        problem_ = std::strerror(errno);
+        return;
+    }
+    content_.assign(std::istreambuf_iterator<char>(file), {});
+    read();
+}
+
+void ElfFile::read() {
+    const auto header = at<ElfW(Ehdr)>(content_, 0);
+    if (content_.size() < SELFMAG || std::memcmp(content_.data(), ELFMAG, SELFMAG) != 0) {
+        problem_ = content_.empty() ? "the file is empty" : "it is not a shared object";
+        return;
+    }
+    // e_machine is in the same place in both classes
+    const auto machine = at<std::uint16_t>(content_, 18);
+    if (!header || !machine || content_[EI_CLASS] != (is_64_bit ? ELFCLASS64 : ELFCLASS32) ||
+        (this_machine != EM_NONE && *machine != this_machine)) {
+        problem_ = "it is built for " + (machine ? machine_name(*machine) : "an unknown machine") + ", this program for " +
+                   machine_name(this_machine);
+        return;
+    }
+    std::vector<ElfW(Shdr)> all;
+    for (unsigned i = 0; i < header->e_shnum; ++i) {
+        const auto section = at<ElfW(Shdr)>(content_, header->e_shoff + std::uint64_t{i} * sizeof(ElfW(Shdr)));
+        const bool whole = section && (section->sh_type == SHT_NOBITS ||
+                                       (section->sh_offset <= content_.size() && section->sh_size <= content_.size() - section->sh_offset));
+        if (!whole) {
+            problem_ = "the file is cut short";
+            return;
+        }
+        all.push_back(*section);
+        if ((section->sh_flags & SHF_ALLOC) && section->sh_type != SHT_NOBITS)
+            sections_[section->sh_addr] = {section->sh_addr, section->sh_offset, section->sh_size};
+    }
+    std::vector<ElfW(Sym)> symbols;
+    for (const auto& section : all) {
+        if (section.sh_type != SHT_DYNSYM || section.sh_link >= all.size()) continue;
+        const auto& names = all[section.sh_link];
+        const std::string_view table = std::string_view(content_).substr(names.sh_offset, names.sh_type == SHT_NOBITS ? 0 : names.sh_size);
+        for (std::uint64_t i = 0; i < section.sh_size / sizeof(ElfW(Sym)); ++i) {
+            const auto symbol = at<ElfW(Sym)>(content_, section.sh_offset + i * sizeof(ElfW(Sym)));
+            if (!symbol) break;
+            symbols.push_back(*symbol);
+            const std::string name = text_at(table, symbol->st_name);
+            const bool weak = ELF64_ST_BIND(symbol->st_info) == STB_WEAK;
+            if (name.empty()) continue;
+            if (symbol->st_shndx == SHN_UNDEF) {
+                if (!weak) undefined_.insert(name);
+            } else {
+                defined_.emplace(name, symbol->st_value);
+            }
+        }
+    }
+    if (symbols.empty()) {
+        problem_ = "it has no table of symbols";
+        return;
+    }
+    for (const auto& section : all) {
+        if (section.sh_type != SHT_RELA && section.sh_type != SHT_REL) continue;
+        const bool with_addend = section.sh_type == SHT_RELA;
+        const std::uint64_t size = with_addend ? sizeof(ElfW(Rela)) : sizeof(ElfW(Rel));
+        for (std::uint64_t i = 0; i < section.sh_size / size; ++i) {
+            const auto entry = at<ElfW(Rel)>(content_, section.sh_offset + i * size);
+            if (!entry) break;
+            std::uint64_t target = 0;
+            if (with_addend) {
+                target = static_cast<std::uint64_t>(at<ElfW(Rela)>(content_, section.sh_offset + i * size).value_or(ElfW(Rela){}).r_addend);
+            } else if (const auto there = at<ElfW(Addr)>(at_address(entry->r_offset), 0)) {
+                target = *there;
+            }
+            const std::uint64_t index = symbol_of(entry->r_info);
+            if (index < symbols.size()) target += symbols[index].st_value;
+            pointers_.emplace(entry->r_offset, target);
+        }
+    }
+}
+
+std::string_view ElfFile::at_address(std::uint64_t address) const {
+    auto section = sections_.upper_bound(address);
+    if (section == sections_.begin()) return {};
+    const Section& of = std::prev(section)->second;
+    if (address - of.address >= of.size) return {};
+    return std::string_view(content_).substr(of.offset + (address - of.address), of.size - (address - of.address));
+}
+
+std::string ElfFile::text_of(const std::string& symbol) const {
+    const auto variable = defined_.find(symbol);
+    if (variable == defined_.end()) return {};
+    const auto pointer = pointers_.find(variable->second);
+    return pointer == pointers_.end() ? std::string() : text_at(at_address(pointer->second), 0);
+}
+
+std::int32_t ElfFile::number_of(const std::string& symbol, std::int32_t otherwise) const {
+    const auto variable = defined_.find(symbol);
+    if (variable == defined_.end()) return otherwise;
+    return at<std::int32_t>(at_address(variable->second), 0).value_or(otherwise);
+}
+
+}  // namespace hal::modules

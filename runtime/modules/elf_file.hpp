@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: MIT
+// A shared object as a file: its symbols and the texts that its data refers to, without mapping or running it.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <set>
+#include <string>
+
+namespace hal::modules {
+
+class ElfFile {
+public:
+    /// Reads the file; problem() is empty if it can be used.
+    explicit ElfFile(const std::string& path);
+
+    /// Returns why the file is not a shared object for this machine; empty: it is one.
+    const std::string& problem() const { return problem_; }
+    /// Names that other objects must define; weak references are left out.
+    const std::set<std::string>& undefined() const { return undefined_; }
+    bool defines(const std::string& symbol) const { return defined_.contains(symbol); }
+    /// Names and addresses of all symbols that the file exports.
+    const std::map<std::string, std::uint64_t>& defined() const { return defined_; }
+
+    /// Returns the text that the exported variable `symbol`, a `const char *`, points to; empty: there is none.
+    std::string text_of(const std::string& symbol) const;
+    /// Returns the value of the exported `int` variable; `otherwise` if there is none.
+    std::int32_t number_of(const std::string& symbol, std::int32_t otherwise) const;
+
+private:
+    void read();
+    /// The file's bytes from a virtual address to the end of its section.
+    std::string_view at_address(std::uint64_t address) const;
+
+    std::string content_, problem_;
+    std::set<std::string> undefined_;
+    std::map<std::string, std::uint64_t> defined_;
+    std::map<std::uint64_t, std::uint64_t> pointers_;  // address of a pointer: what it points to
+    struct Section {
+        std::uint64_t address, offset, size;
+    };
+    std::map<std::uint64_t, Section> sections_;  // those with content in memory, by address
+};
+
+}  // namespace hal::modules

@@ -1,0 +1,249 @@
+// SPDX-License-Identifier: MIT
+#include "modules/module.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <dlfcn.h>
+#include <filesystem>
+
+#include "modules/messages.hpp"
+
+namespace hal::modules {
+
+thread_local bool in_cycle __attribute__((tls_model("initial-exec"))) = false;
+
+namespace {
+
+Module* constructing = nullptr;
+std::vector<Module*> running_modules;  // in the order of loading
+
+constexpr const char* info = "rtapi_info_";
+
+bool create_instance(const hal_host* host, void* memory) {
+    const auto* const extension = static_cast<const hal_modules*>(host->extension(host, HAL_MODULES));
+    if (!extension || extension->size < sizeof *extension) return host->fail(host, "this host cannot run LinuxCNC's modules"), false;
+    // the description is the first member of what the module owns
+    const auto* const description = reinterpret_cast<const halcyon_module*>(extension->component(host));
+    return guarded([&] {
+        for (Module* const other : running_modules)
+            if (other->name() == description->component.name)
+                return host->fail(host, "it is still loaded: an unload in the same transaction takes effect at its end"), 0;
+        Module& module = Module::of(*description);
+        *static_cast<Module**>(memory) = &module;
+        return module.create(host, *extension) ? 1 : 0;
+    }) == 1;
+}
+bool start_instance(void* memory, const hal_host*) {
+    (*static_cast<Module**>(memory))->start();
+    return true;
+}
+void stop_instance(void*) {}
+void destroy_instance(void* memory) { (*static_cast<Module**>(memory))->destroy(); }
+
+/// "component:TEXT" and the like: what the module's author wrote for its manual page.
+struct Record {
+    std::string key, text;
+};
+std::vector<Record> records_of(const ElfFile& file) {
+    std::map<long, Record> by_line;
+    const std::string prefix = std::string(info) + "linuxcnc_";
+    for (const auto& [symbol, address] : file.defined()) {
+        if (!symbol.starts_with(prefix)) continue;
+        const std::string text = file.text_of(symbol);
+        const auto colon = text.find(':');
+        if (colon != text.npos)
+            by_line[std::strtol(symbol.c_str() + prefix.size(), nullptr, 10)] = {text.substr(0, colon), text.substr(colon + 1)};
+    }
+    std::vector<Record> records;
+    for (auto& [line, record] : by_line) records.push_back(std::move(record));
+    return records;
+}
+
+}  // namespace
+
+Module::Module(std::string folder, std::string name, ElfFile file)
+    : name_(std::move(name)), path_(folder + "/" + name_ + ".so"), folder_(std::move(folder)), file_(std::move(file)) {
+    const std::string type = std::string(info) + "type_";
+    for (const auto& [symbol, address] : file_.defined()) {
+        if (!symbol.starts_with(type)) continue;
+        const std::string parameter = symbol.substr(type.size()), kind = file_.text_of(symbol);
+        if (kind.size() != 1 || !std::strchr("ils", kind[0]) || !file_.defines(std::string(info) + "address_" + parameter)) continue;
+        texts_.push_back(std::make_unique<Described>(Described{parameter, file_.text_of(std::string(info) + "description_" + parameter)}));
+        described_.push_back({texts_.back()->name.c_str(), texts_.back()->doc.c_str(), kind[0],
+                              file_.number_of(std::string(info) + "size_" + parameter, 0)});
+    }
+    summary_ = "LinuxCNC module";
+    for (const Record& record : records_of(file_)) {
+        if (record.key == "component") {
+            const auto colon = record.text.find(':');
+            const std::string text = colon == record.text.npos ? "" : record.text.substr(colon + 1);
+            if (!text.empty()) summary_ = text;
+        } else if (record.key == "funct" || record.key == "pin" || record.key == "param") {
+            doc_ += (doc_.empty() ? "" : "\n\n") + record.key + ": " + record.text;
+        }
+    }
+    if (const std::string text = file_.text_of(std::string(info) + "description"); !text.empty()) summary_ = text;
+    for (const char* const key : {"author", "license", "supported_device"})
+        if (const std::string text = file_.text_of(std::string(info) + key); !text.empty())
+            doc_ += (doc_.empty() ? "" : "\n\n") + std::string(key) + ": " + text;
+    doc_ += (doc_.empty() ? "" : "\n\n") + std::string("A compiled module of LinuxCNC: ") + path_;
+    description_ = {{{sizeof(hal_component), HAL_ABI_MAJOR, HAL_ABI_MINOR, name_.c_str(), summary_.c_str(), doc_.c_str(),
+                      HAL_COMPONENT_SINGLETON | HAL_COMPONENT_WHOLE_NAMES | HAL_COMPONENT_LOOSE_PINS | HAL_COMPONENT_MODULE, 1,
+                      sizeof(Module*), alignof(Module*), create_instance, start_instance, stop_instance, destroy_instance},
+                     path_.c_str(),
+                     described_.data(),
+                     described_.size()},
+                    this};
+}
+
+Module* Module::current() { return constructing; }
+const std::vector<Module*>& Module::all_running() { return running_modules; }
+
+namespace {
+
+/// "tpmod", "trivkins, genhexkins and 18 more": the modules in the folder that define the symbol.
+std::string definers_of(const std::string& symbol, const std::string& folder, std::string& first) {
+    std::vector<std::string> names;
+    std::error_code none;
+    for (const auto& entry : std::filesystem::directory_iterator(folder, none)) {
+        if (entry.path().extension() != ".so") continue;
+        const ElfFile file(entry.path().string());
+        if (file.problem().empty() && file.defines(symbol)) names.push_back(entry.path().stem().string());
+    }
+    std::sort(names.begin(), names.end());
+    const auto usual =
+        std::find_if(names.begin(), names.end(), [](const std::string& n) { return n == "trivkins" || n == "homemod" || n == "tpmod"; });
+    if (usual != names.end()) std::rotate(names.begin(), usual, usual + 1);
+    if (names.empty()) return {};
+    first = names[0];
+    if (names.size() == 1) return "module '" + first + "'";
+    return "'" + first + "' and " + std::to_string(names.size() - 1) + " other modules";
+}
+
+}  // namespace
+
+void Module::find_neighbours() {
+    uses_.clear();
+    for (Module* const other : running_modules)
+        if (std::any_of(file_.undefined().begin(), file_.undefined().end(),
+                        [&](const std::string& symbol) { return other->file_.defines(symbol); }))
+            uses_.insert(other);
+}
+
+// The loader names the first missing symbol only, and not who defines it.
+void Module::explain_loading(std::string problem) const {
+    std::vector<std::string> missing;
+    for (const std::string& symbol : file_.undefined())
+        if (!dlsym(RTLD_DEFAULT, symbol.c_str())) missing.push_back(symbol);
+    if (missing.empty() || problem.find("undefined symbol") == problem.npos) return host_->fail(host_, problem.c_str());
+    std::string first;
+    const std::string owners = definers_of(missing[0], folder_, first);
+    const std::string text =
+        "it uses " + missing[0] +
+        (missing.size() == 1 ? ", which" : " and " + std::to_string(missing.size() - 1) + " more missing symbols; " + missing[0]) +
+        (owners.empty() ? " is defined neither by this runtime nor by a module in " + folder_ : " is defined by " + owners);
+    const std::string help = owners.empty() ? "check that it was built for LinuxCNC 2.9" : "load that first: loadrt " + first;
+    const hal_rejection rejection{sizeof rejection, HAL_SUBJECT_INSTANCE, "", 0, 0, "", text.c_str(), help.c_str()};
+    host_->reject(host_, &rejection);
+}
+
+bool Module::create(const hal_host* host, const hal_modules& extension) {
+    if (broken_) return host->fail(host, "it crashed while it was loaded; end this machine and start it again before you load it"), false;
+    if (!prepare_memory()) return host->fail(host, "out of memory"), false;
+    find_neighbours();
+    host_ = host;
+    extension_ = &extension;
+    constructing = this;
+    begin_capture();
+    const halcyon_message_handler handler = rtapi_get_msg_handler();
+    const int level = rtapi_get_msg_level();
+    bool good = false;
+    library_ = dlopen(path_.c_str(), RTLD_NOW | RTLD_GLOBAL);
+    if (!library_) explain_loading(dlerror());
+    else good = take_arguments() && extension.arguments_known(host) && run_main();
+    constructing = nullptr;
+    if (good) {
+        sync_parameters();
+        running_ = true;
+        running_modules.push_back(this);
+        start_printer();
+        return true;
+    }
+    end_capture();
+    rtapi_set_msg_handler(handler);
+    rtapi_set_msg_level(level);
+    release();
+    return false;
+}
+
+bool Module::run_main() {
+    const auto main = reinterpret_cast<int (*)()>(dlsym(library_, "rtapi_app_main"));
+    struct Call {
+        int (*main)();
+        int result;
+    } call{main, 0};
+    const int signal = run_guarded_from_crashes([](void* c) { static_cast<Call*>(c)->result = static_cast<Call*>(c)->main(); }, &call);
+    std::string printed = captured();
+    while (printed.ends_with('\n')) printed.pop_back();
+    for (std::size_t at; (at = printed.find('\n')) != printed.npos;) printed.replace(at, 1, "; ");
+    if (signal != 0) {
+        broken_ = true;  // its code stays mapped: who knows who has a pointer to it
+        host_->fail(host_,
+                    ("rtapi_app_main crashed (" + std::string(crash_text(signal)) + ")" + (printed.empty() ? "" : ": " + printed)).c_str());
+        return false;
+    }
+    if (call.result >= 0) return true;
+    const std::string why = std::string(std::strerror(-call.result)) + " (" + std::to_string(call.result) + ")";
+    host_->fail(host_, (printed.empty() ? "rtapi_app_main failed: " + why : printed + " (rtapi_app_main: " + why + ")").c_str());
+    return false;
+}
+
+void Module::start() { print_captured(); }
+
+void Module::destroy() {
+    if (!running_) return;
+    const std::vector<Module*> others = running_modules;
+    for (auto other = others.rbegin(); other != others.rend(); ++other)
+        if (*other != this && (*other)->uses(*this)) (*other)->destroy();
+    running_ = false;
+    std::erase(running_modules, this);
+    const auto exit = reinterpret_cast<void (*)()>(dlsym(library_, "rtapi_app_exit"));
+    const int signal = run_guarded_from_crashes([](void* e) { reinterpret_cast<void (*)()>(e)(); }, reinterpret_cast<void*>(exit));
+    if (signal != 0) {
+        broken_ = true;
+        rtapi_print_msg(1, "%s: rtapi_app_exit crashed (%s)\n", name_.c_str(), crash_text(signal));
+    }
+    print_captured();
+    if (running_modules.empty()) stop_printer();
+    release();
+}
+
+void Module::release() {
+    release_components(*this);
+    parameters.clear();
+    functions.clear();
+    for (auto& names : names_) names.clear();
+    if (library_ && !broken_) dlclose(library_);
+    library_ = nullptr;
+    strings_.clear();
+    host_ = nullptr;
+    uses_.clear();
+}
+
+void Module::sync_parameters() noexcept {
+    for (Parameter* const p : parameters) {
+        hal_value outside{.raw = __atomic_load_n(&p->pin.slot->raw, __ATOMIC_RELAXED)}, inside{.raw = 0};
+        std::memcpy(&inside, const_cast<const void*>(p->value), p->width);
+        if (std::memcmp(&outside, &p->last, p->width) != 0) {
+            std::memcpy(const_cast<void*>(p->value), &outside, p->width);
+            p->last = hal_value{.raw = 0};
+            std::memcpy(&p->last, &outside, p->width);
+        } else if (std::memcmp(&inside, &p->last, p->width) != 0) {
+            __atomic_store_n(&p->pin.slot->raw, inside.raw, __ATOMIC_RELAXED);
+            p->last = inside;
+        }
+    }
+}
+
+}  // namespace hal::modules

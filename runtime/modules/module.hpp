@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: MIT
+// One LinuxCNC module: its file, its code while it is loaded, and what it has declared. Setup calls come one at a time, under the
+// session's lock; a module has static variables, so it is loaded once per process.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <new>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "hal/modules.h"
+#include "modules/elf_file.hpp"
+#include "modules/module_host.hpp"
+#include "modules/rtapi_interface.hpp"
+
+namespace hal::modules {
+
+/// A parameter lives twice: where the runtime reads and writes it, and in the module's variable, which has the width of its type only.
+struct Parameter {
+    hal_pin pin;
+    volatile void* value;
+    hal_value last;  ///< what both had when they were last compared
+    std::uint32_t width;
+};
+
+class Module {
+    struct Shown {
+        halcyon_module shown;  ///< first
+        Module* owner;
+    };
+
+public:
+    Module(std::string folder, std::string name, ElfFile file);
+    Module(const Module&) = delete;
+
+    const halcyon_module& description() const { return description_.shown; }
+    /// The module behind a description that description() gave.
+    static Module& of(const halcyon_module& description) { return *reinterpret_cast<const Shown&>(description).owner; }
+    const std::string& name() const { return name_; }
+    bool running() const { return running_; }
+    bool uses(const Module& other) const { return uses_.contains(&other); }
+
+    /// Maps the code, takes the arguments and runs rtapi_app_main(). Returns false after reporting; then nothing remains of it.
+    bool create(const hal_host* host, const hal_modules& extension);
+    /// Prints what the module has printed while it was created.
+    void start();
+    /// Runs rtapi_app_exit() and unmaps the code: that of modules that use this one first.
+    void destroy();
+
+    // --- for the functions of the interface -----------------------------------------------------------------------------
+    /// The module that create() is running for; nullptr: none.
+    static Module* current();
+    static const std::vector<Module*>& all_running();
+    const hal_host* host() const { return host_; }
+    const hal_modules& extension() const { return *extension_; }
+    /// Copies parameters whose value has changed, in both directions. [realtime]
+    void sync_parameters() noexcept;
+    bool take_name(bool parameter, const std::string& name) { return names_[parameter].insert(name).second; }
+
+    std::vector<Parameter*> parameters;  ///< in memory of the instance
+    std::set<int> components;            ///< ids that it has from hal_init() and has not given back
+    std::set<std::string> functions;
+
+private:
+    void find_neighbours();
+    void explain_loading(std::string problem) const;
+    bool take_arguments();
+    bool run_main();
+    void release();
+
+    std::string name_, path_, folder_, summary_, doc_;
+    ElfFile file_;
+    struct Described {
+        std::string name, doc;
+    };
+    std::vector<std::unique_ptr<Described>> texts_;
+    std::vector<halcyon_module_parameter> described_;
+    Shown description_{};
+    std::set<const Module*> uses_;
+    std::vector<std::unique_ptr<char[]>> strings_;  // values of text parameters
+    std::set<std::string> names_[2];                // of pins and of parameters
+    void* library_ = nullptr;
+    const hal_host* host_ = nullptr;
+    const hal_modules* extension_ = nullptr;
+    bool running_ = false, broken_ = false;
+};
+
+/// True in a function that a real-time thread runs: nothing may be declared, allocated or printed directly.
+extern thread_local bool in_cycle __attribute__((tls_model("initial-exec")));
+
+/// Runs an action for a module. An exception must not cross its C frames. Returns a negative errno for one.
+template <class Action>
+int guarded(Action action) noexcept {
+    try {
+        return action();
+    } catch (const std::bad_alloc&) {
+        return -12;  // ENOMEM
+    } catch (...) {
+        return -22;  // EINVAL
+    }
+}
+
+/// Runs `action` so that a crash in it returns the signal's number; 0: it has returned. Not nested. [setup]
+int run_guarded_from_crashes(void (*action)(void*), void* argument) noexcept;
+const char* crash_text(int signal) noexcept;
+
+/// components.cpp: forgets the ids of a module, and with the last module the memory of hal_malloc().
+void release_components(Module& module) noexcept;
+/// Sets up what the modules share, before the first one is mapped. Returns false when out of memory.
+bool prepare_memory() noexcept;
+/// shared_memory.cpp: detaches the segments that a component id holds.
+void release_segments(int comp) noexcept;
+
+}  // namespace hal::modules

@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: MIT
+// Pins and parameters. A pin's slot, a pointer in the module's memory, follows the pin when it is linked (hal_pin_decl.pointer).
+#include <cerrno>
+#include <cstdarg>
+#include <cstdio>
+#include <cstring>
+
+#include "modules/module.hpp"
+
+namespace hal::modules {
+
+int declaring(const char* function, const char* name, int comp);
+
+namespace {
+
+enum Type { bit = 1, real = 2, s32 = 3, u32 = 4 };
+enum Direction { in = 16, out = 32, io = 48, read_only = 64, read_write = 192 };
+
+bool type_of(int type, hal_type& to, std::uint32_t& width) {
+    switch (type) {
+    case bit: to = HAL_TYPE_BIT, width = 1; return true;
+    case real: to = HAL_TYPE_FLOAT, width = 8; return true;
+    case s32: to = HAL_TYPE_S32, width = 4; return true;
+    case u32: to = HAL_TYPE_U32, width = 4; return true;
+    default: return false;  // ports: no module of the package has one
+    }
+}
+
+int fail(const char* function, const char* name, const char* why) {
+    rtapi_print_msg(1, "%s: '%s': %s\n", function, name, why);
+    return -EINVAL;
+}
+
+int new_pin(const char* name, int type, int dir, void** slot, int comp) {
+    if (const int wrong = declaring("hal_pin_new", name, comp); wrong != 0) return wrong;
+    Module& module = *Module::current();
+    hal_pin_decl decl{};
+    decl.size = sizeof decl;
+    std::uint32_t width = 0;
+    if (!slot) return fail("hal_pin_new", name, "no pointer");
+    if (!type_of(type, decl.type, width)) return fail("hal_pin_new", name, "unsupported type");
+    if (dir != in && dir != out && dir != io) return fail("hal_pin_new", name, "invalid direction");
+    if (!module.take_name(false, name)) return fail("hal_pin_new", name, "duplicate pin name");
+    const hal_host* const host = module.host();
+    hal_pin* const pin = static_cast<hal_pin*>(host->allocate(host, sizeof(hal_pin), alignof(hal_pin)));
+    if (!pin) return -ENOMEM;
+    decl.dir = dir == in ? HAL_DIR_IN : dir == out ? HAL_DIR_OUT : HAL_DIR_IO;
+    decl.name = name;
+    decl.doc = decl.unit = "";
+    decl.pointer = reinterpret_cast<hal_value**>(slot);
+    return host->pin(host, &decl, pin) ? 0 : -EINVAL;
+}
+
+int new_parameter(const char* name, int type, int dir, void* value, int comp) {
+    if (const int wrong = declaring("hal_param_new", name, comp); wrong != 0) return wrong;
+    Module& module = *Module::current();
+    hal_pin_decl decl{};
+    decl.size = sizeof decl;
+    std::uint32_t width = 0;
+    if (!value) return fail("hal_param_new", name, "no variable");
+    if (!type_of(type, decl.type, width)) return fail("hal_param_new", name, "unsupported type");
+    if (dir != read_only && dir != read_write) return fail("hal_param_new", name, "invalid direction");
+    if (!module.take_name(true, name)) return fail("hal_param_new", name, "duplicate parameter name");
+    const hal_host* const host = module.host();
+    void* const memory = host->allocate(host, sizeof(Parameter), alignof(Parameter));
+    if (!memory) return -ENOMEM;
+    Parameter* const parameter = new (memory) Parameter{{}, value, hal_value{.raw = 0}, width};
+    std::memcpy(&parameter->last, value, width);
+    decl.dir = HAL_DIR_PARAM;
+    decl.flags = dir == read_only ? HAL_PIN_READ_ONLY : 0;
+    decl.name = name;
+    decl.doc = decl.unit = "";
+    decl.initial = parameter->last;
+    if (!host->pin(host, &decl, &parameter->pin)) return -EINVAL;
+    module.parameters.push_back(parameter);
+    return 0;
+}
+
+/// Formats the name and passes it on; one that is too long has an error of its own.
+template <class Action>
+int formatted(const char* format, va_list arguments, Action action) {
+    char name[256];
+    const int length = std::vsnprintf(name, sizeof name, format, arguments);
+    if (length < 0 || length > 47) {
+        fail("hal_pin_newf", name, "the name is longer than 47 characters");
+        return -ENOMEM;
+    }
+    return guarded([&] { return action(name); });
+}
+
+}  // namespace
+}  // namespace hal::modules
+
+using namespace hal::modules;
+
+extern "C" {
+
+int hal_pin_new(const char* name, int type, int dir, void** slot, int comp) {
+    return guarded([&] { return new_pin(name, type, dir, slot, comp); });
+}
+int hal_param_new(const char* name, int type, int dir, void* value, int comp) {
+    return guarded([&] { return new_parameter(name, type, dir, value, comp); });
+}
+
+#define HALCYON_DEFINE(suffix, type)                                                                                                       \
+    int hal_pin_##suffix##_new(const char* name, int dir, void** slot, int comp) { return hal_pin_new(name, type, dir, slot, comp); }      \
+    int hal_param_##suffix##_new(const char* name, int dir, void* value, int comp) { return hal_param_new(name, type, dir, value, comp); } \
+    int hal_pin_##suffix##_newf(int dir, void** slot, int comp, const char* format, ...) {                                                 \
+        va_list arguments;                                                                                                                 \
+        va_start(arguments, format);                                                                                                       \
+        const int result = formatted(format, arguments, [&](const char* name) { return new_pin(name, type, dir, slot, comp); });           \
+        va_end(arguments);                                                                                                                 \
+        return result;                                                                                                                     \
+    }                                                                                                                                      \
+    int hal_param_##suffix##_newf(int dir, void* value, int comp, const char* format, ...) {                                               \
+        va_list arguments;                                                                                                                 \
+        va_start(arguments, format);                                                                                                       \
+        const int result = formatted(format, arguments, [&](const char* name) { return new_parameter(name, type, dir, value, comp); });    \
+        va_end(arguments);                                                                                                                 \
+        return result;                                                                                                                     \
+    }
+HALCYON_DEFINE(bit, bit)
+HALCYON_DEFINE(float, real)
+HALCYON_DEFINE(s32, s32)
+HALCYON_DEFINE(u32, u32)
+#undef HALCYON_DEFINE
+
+int hal_param_alias(const char* name, const char* alias) {
+    return guarded([&] {
+        const Module* const module = Module::current();
+        if (!name || !module) return -EINVAL;
+        return module->extension().alias(module->host(), name, alias) ? 0 : -EINVAL;
+    });
+}
+}

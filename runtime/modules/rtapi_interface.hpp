@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: MIT
+// The functions that LinuxCNC's compiled modules (2.9) call, declared from the documented interface: names, types and sizes. Own text;
+// nothing here comes from LinuxCNC's headers. exports.map makes exactly these visible.
+#pragma once
+
+#include <cstdarg>
+#include <cstddef>
+#include <cstdint>
+#include <sys/types.h>
+
+extern "C" {
+
+extern char* hal_shmem_base;
+
+// components, memory, functions, threads: [setup]
+int hal_init(const char* name);
+int hal_ready(int comp);
+int hal_set_unready(int comp);
+int hal_exit(int comp);
+void* hal_malloc(long bytes);
+char* hal_comp_name(int comp);
+int hal_export_funct(const char* name, void (*code)(void*, long), void* arg, int uses_fp, int reentrant, int comp);
+int hal_create_thread(const char* name, unsigned long period_ns, int uses_fp);
+int hal_stop_threads();
+int hal_del_funct_from_thread(const char* function, const char* thread);
+
+// pins and parameters: [setup]. Types: bit 1, float 2, s32 3, u32 4, port 5. Directions: in 16, out 32, io 48, ro 64, rw 192
+int hal_pin_new(const char* name, int type, int dir, void** slot, int comp);
+int hal_param_new(const char* name, int type, int dir, void* value, int comp);
+int hal_param_alias(const char* name, const char* alias);
+#define HALCYON_BOTH_FORMS(type)                                                        \
+    int hal_pin_##type##_new(const char* name, int dir, void** slot, int comp);         \
+    int hal_pin_##type##_newf(int dir, void** slot, int comp, const char* format, ...); \
+    int hal_param_##type##_new(const char* name, int dir, void* value, int comp);       \
+    int hal_param_##type##_newf(int dir, void* value, int comp, const char* format, ...);
+HALCYON_BOTH_FORMS(bit)
+HALCYON_BOTH_FORMS(float)
+HALCYON_BOTH_FORMS(s32)
+HALCYON_BOTH_FORMS(u32)
+#undef HALCYON_BOTH_FORMS
+
+// streams: create, attach, detach and destroy are [setup], the rest [any]
+struct halcyon_stream {
+    int comp, segment;
+    void* fifo;
+};
+union halcyon_stream_value {
+    double real;
+    bool bit;
+    std::int32_t s32;
+    std::uint32_t u32;
+    std::uint64_t raw;
+};
+int hal_stream_create(halcyon_stream* stream, int comp, int key, int depth, const char* types);
+void hal_stream_destroy(halcyon_stream* stream);
+int hal_stream_detach(halcyon_stream* stream);
+int hal_stream_element_count(halcyon_stream* stream);
+int hal_stream_element_type(halcyon_stream* stream, int index);
+int hal_stream_depth(halcyon_stream* stream);
+int hal_stream_maxdepth(halcyon_stream* stream);
+bool hal_stream_readable(halcyon_stream* stream);
+bool hal_stream_writable(halcyon_stream* stream);
+int hal_stream_num_overruns(halcyon_stream* stream);
+int hal_stream_num_underruns(halcyon_stream* stream);
+int hal_stream_read(halcyon_stream* stream, halcyon_stream_value* to, unsigned* number);
+int hal_stream_write(halcyon_stream* stream, halcyon_stream_value* from);
+
+// messages: [any]. Levels: none 0, error 1, warning 2, information 3, debug 4, all 5
+typedef void (*halcyon_message_handler)(int level, const char* format, va_list arguments);
+void rtapi_print(const char* format, ...) __attribute__((format(printf, 1, 2)));
+void rtapi_print_msg(int level, const char* format, ...) __attribute__((format(printf, 2, 3)));
+int rtapi_snprintf(char* to, unsigned long size, const char* format, ...) __attribute__((format(printf, 3, 4)));
+int rtapi_vsnprintf(char* to, unsigned long size, const char* format, va_list arguments);
+int rtapi_set_msg_level(int level);
+int rtapi_get_msg_level();
+halcyon_message_handler rtapi_get_msg_handler();
+void rtapi_set_msg_handler(halcyon_message_handler handler);
+
+// time: [any]
+long long rtapi_get_time();
+long long rtapi_get_clocks();
+void rtapi_delay(long ns);
+long rtapi_delay_max();
+int rtapi_task_self();
+
+// shared memory by key: [setup]
+int rtapi_shmem_new(int key, int comp, unsigned long size);
+int rtapi_shmem_getptr(int segment, void** address);
+int rtapi_shmem_delete(int segment, int comp);
+
+// hardware and the system: [setup]
+struct halcyon_parport;
+struct halcyon_pci_driver;
+struct halcyon_firmware {
+    std::size_t size;
+    const unsigned char* data;
+};
+int rtapi_parport_get(const char* name, halcyon_parport* port, unsigned short base, unsigned short base_hi, unsigned modes);
+void rtapi_parport_release(halcyon_parport* port);
+int rtapi_pci_register_driver(halcyon_pci_driver* driver);
+void rtapi_pci_unregister_driver(halcyon_pci_driver* driver);
+int rtapi_pci_enable_device(void* device);
+int rtapi_pci_disable_device(void* device);
+void* rtapi_pci_ioremap_bar(void* device, int bar);
+void rtapi_iounmap(void* address);
+int rtapi_request_firmware(const halcyon_firmware** result, const char* name, void* device);
+void rtapi_release_firmware(const halcyon_firmware* firmware);
+int rtapi_spawn_as_root(pid_t* process, const char* path, const void* actions, const void* attributes, char* const argv[],
+                        char* const envp[]);
+int rtapi_open_as_root(const char* path, int flags);
+char** rtapi_argv_split(int flags, const char* text, int* count);
+void rtapi_argv_free(char** words);
+long simple_strtol(const char* text, char** end, unsigned base);
+
+}  // extern "C"

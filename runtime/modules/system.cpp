@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: MIT
+// Time, texts, files and hardware. The process has its user's rights and no more: what LinuxCNC's set-uid host does as root, it tries
+// as that user or declines.
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <ctime>
+#include <fcntl.h>
+#include <fstream>
+#include <iterator>
+#include <spawn.h>
+#include <string>
+#include <sys/utsname.h>
+#include <unistd.h>
+#include <vector>
+#if defined(__x86_64__) || defined(__i386__)
+#include <x86intrin.h>
+#endif
+
+#include "modules/module.hpp"
+
+using namespace hal::modules;
+
+namespace {
+
+constexpr long longest_delay_ns = 10'000;
+
+struct Firmware {
+    halcyon_firmware shown;  // first
+    std::string content;
+};
+
+}  // namespace
+
+extern "C" {
+
+long long rtapi_get_time() {
+    timespec now{};
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return now.tv_sec * 1'000'000'000LL + now.tv_nsec;
+}
+long long rtapi_get_clocks() {
+#if defined(__x86_64__) || defined(__i386__)
+    return static_cast<long long>(__rdtsc());
+#else
+    return rtapi_get_time();
+#endif
+}
+long rtapi_delay_max() { return longest_delay_ns; }
+void rtapi_delay(long ns) {
+    const long long end = rtapi_get_time() + std::min(ns, longest_delay_ns);
+    while (rtapi_get_time() < end) {}
+}
+int rtapi_task_self() { return in_cycle ? 0 : -EINVAL; }
+
+long simple_strtol(const char* text, char** end, unsigned base) { return std::strtol(text, end, static_cast<int>(base)); }
+
+char** rtapi_argv_split(int, const char* text, int* count) {
+    if (count) *count = 0;
+    if (!text) return nullptr;
+    const std::size_t length = std::strlen(text), most = length / 2 + 2;
+    char** const words = static_cast<char**>(std::malloc(most * sizeof *words + length + 1));
+    if (!words) return nullptr;
+    char* const copy = reinterpret_cast<char*>(words + most);
+    std::memcpy(copy, text, length + 1);
+    int found = 0;
+    char* rest = nullptr;
+    for (char* word = strtok_r(copy, " \t\n", &rest); word; word = strtok_r(nullptr, " \t\n", &rest)) words[found++] = word;
+    words[found] = nullptr;
+    if (count) *count = found;
+    return words;
+}
+void rtapi_argv_free(char** words) { std::free(words); }
+
+// Modules wait for the process they were given, whatever the result, so "no" is a process that fails.
+int rtapi_spawn_as_root(pid_t* process, const char* path, const void*, const void*, char* const argv[], char* const[]) {
+    std::string command = path ? path : "";
+    for (int i = 1; path && argv && argv[i]; ++i) command += std::string(" ") + argv[i];
+    rtapi_print_msg(2, "not run as root: %s\n", command.c_str());
+    char name[] = "false";
+    char* const words[] = {name, nullptr};
+    pid_t made = -1;
+    const int problem = posix_spawnp(&made, name, nullptr, nullptr, words, environ);
+    if (process) *process = made;
+    return -problem;
+}
+
+int rtapi_open_as_root(const char* path, int flags) {
+    const int file = open(path, flags | O_CLOEXEC);
+    if (file >= 0) return file;
+    const int why = errno;
+    rtapi_print_msg(1, "cannot open %s: %s\n", path, std::strerror(why));
+    return -why;
+}
+
+int rtapi_request_firmware(const halcyon_firmware** result, const char* name, void*) {
+    return guarded([&] {
+        *result = nullptr;
+        utsname kernel{};
+        uname(&kernel);
+        if (!name || std::strstr(name, "..")) return -EINVAL;
+        for (const std::string& folder : {std::string("/lib/firmware/") + kernel.release + "/", std::string("/lib/firmware/")}) {
+            std::ifstream file(folder + name, std::ios::binary);
+            if (!file) continue;
+            auto made = std::make_unique<Firmware>();
+            made->content.assign(std::istreambuf_iterator<char>(file), {});
+            made->shown = {made->content.size(), reinterpret_cast<const unsigned char*>(made->content.data())};
+            *result = &made.release()->shown;
+            return 0;
+        }
+        return -ENOENT;
+    });
+}
+void rtapi_release_firmware(const halcyon_firmware* firmware) { delete reinterpret_cast<const Firmware*>(firmware); }
+
+// Modules access ports by machine code in real-time threads, which inherit the right to do so from a process that had it.
+int rtapi_parport_get(const char* name, halcyon_parport*, unsigned short base, unsigned short, unsigned) {
+    rtapi_print_msg(1, "%s: parallel port at 0x%x: access to I/O ports needs root, and this runtime never runs as root\n", name ? name : "",
+                    base);
+    return -ENODEV;
+}
+void rtapi_parport_release(halcyon_parport*) {}
+
+int rtapi_pci_register_driver(halcyon_pci_driver*) {
+    rtapi_print_msg(1, "access to PCI cards is not supported\n");
+    return -ENODEV;
+}
+void rtapi_pci_unregister_driver(halcyon_pci_driver*) {}
+int rtapi_pci_enable_device(void*) { return -ENODEV; }
+int rtapi_pci_disable_device(void*) { return -ENODEV; }
+void* rtapi_pci_ioremap_bar(void*, int) { return nullptr; }
+void rtapi_iounmap(void*) {}
+}

@@ -1,0 +1,60 @@
+/* SPDX-License-Identifier: MIT */
+/* What the modules of these tests need of LinuxCNC's binary interface: own declarations, none of LinuxCNC's text. */
+#include <stdarg.h>
+#include <stdbool.h>
+#include <stdint.h>
+
+enum { BIT = 1, FLOAT, S32, U32, IN = 16, OUT = 32, IO = 48, RO = 64, RW = 192 };
+
+int hal_init(const char *name);
+int hal_ready(int comp);
+int hal_exit(int comp);
+int hal_set_unready(int comp);
+void *hal_malloc(long bytes);
+char *hal_comp_name(int comp);
+int hal_export_funct(const char *name, void (*code)(void *, long), void *arg, int fp, int reentrant, int comp);
+int hal_create_thread(const char *name, unsigned long period, int fp);
+int hal_stop_threads(void);
+int hal_pin_new(const char *name, int type, int dir, void **slot, int comp);
+int hal_pin_bit_newf(int dir, volatile bool **slot, int comp, const char *format, ...);
+int hal_pin_float_newf(int dir, volatile double **slot, int comp, const char *format, ...);
+int hal_pin_s32_newf(int dir, volatile int32_t **slot, int comp, const char *format, ...);
+int hal_pin_u32_newf(int dir, volatile uint32_t **slot, int comp, const char *format, ...);
+int hal_param_s32_newf(int dir, volatile int32_t *value, int comp, const char *format, ...);
+int hal_param_float_newf(int dir, volatile double *value, int comp, const char *format, ...);
+int hal_param_bit_newf(int dir, volatile bool *value, int comp, const char *format, ...);
+int hal_param_alias(const char *name, const char *alias);
+struct stream { int comp, segment; void *fifo; };
+union stream_value { double f; bool b; int32_t s; uint32_t u; uint64_t raw; };
+int hal_stream_create(struct stream *, int comp, int key, int depth, const char *types);
+void hal_stream_destroy(struct stream *);
+int hal_stream_read(struct stream *, union stream_value *, unsigned *number);
+int hal_stream_write(struct stream *, union stream_value *);
+int hal_stream_depth(struct stream *);
+void rtapi_print(const char *format, ...);
+void rtapi_print_msg(int level, const char *format, ...);
+int rtapi_set_msg_level(int level);
+int rtapi_get_msg_level(void);
+typedef void (*handler)(int level, const char *format, va_list);
+handler rtapi_get_msg_handler(void);
+void rtapi_set_msg_handler(handler);
+int rtapi_snprintf(char *to, unsigned long size, const char *format, ...);
+long long rtapi_get_time(void);
+int rtapi_task_self(void);
+int rtapi_shmem_new(int key, int comp, unsigned long size);
+int rtapi_shmem_getptr(int segment, void **address);
+int rtapi_shmem_delete(int segment, int comp);
+int rtapi_spawn_as_root(int *process, const char *path, const void *, const void *, char *const argv[], char *const envp[]);
+int rtapi_open_as_root(const char *path, int flags);
+char **rtapi_argv_split(int flags, const char *text, int *count);
+void rtapi_argv_free(char **words);
+
+/* How a module describes its parameters: exported variables with these names. */
+#define PARAMETER(name, letter, text)                                                  \
+    const char *rtapi_info_type_##name = letter, *rtapi_info_description_##name = text; \
+    void *rtapi_info_address_##name = &name;
+#define ARRAY(name, letter, number, text)                                              \
+    const char *rtapi_info_type_##name = letter, *rtapi_info_description_##name = text; \
+    int rtapi_info_size_##name = number;                                               \
+    void *rtapi_info_address_##name = name;
+#define DESCRIPTION(text) const char *rtapi_info_description = text, *rtapi_info_license = "MIT";

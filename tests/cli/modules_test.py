@@ -1,0 +1,280 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""LinuxCNC's compiled modules: what a module may do, and what goes wrong with one. The modules are in modules/, compiled here; LinuxCNC is
+not needed (tests/peers/linuxcnc_modules_test.py runs its own)."""
+import re
+import shutil
+import signal
+import subprocess
+import unittest
+from pathlib import Path
+
+import harness
+
+SOURCES = Path(__file__).resolve().parent / "modules"
+CC = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
+THREAD = "loadrt threads name1=t period1=1000000\n"
+
+
+@unittest.skipUnless(CC, "no C compiler")
+class Modules(harness.Case):
+    def setUp(self):
+        super().setUp()
+        self.modules = self.folder / "rtlib"
+        self.modules.mkdir()
+        self.environment["HAL_RTMOD_DIR"] = str(self.modules)
+
+    def build(self, *names, source=None):
+        for name in names:
+            subprocess.run([CC, "-shared", "-fPIC", "-O1", "-o", str(self.modules / f"{name}.so"), str(SOURCES / f"{source or name}.c")], check=True)
+
+    def sim(self, text, *words, **how):
+        return self.run_program("sim", "--quiet", self.write("m.hal", text), *words, **how)
+
+    def error(self, text):
+        """The errors that `hal sim` prints for the netlist."""
+        done = self.sim(text)
+        self.assertEqual(1, done.returncode, done.stdout + done.stderr)
+        return done.stderr.replace(f"{self.folder}/m.hal", "m.hal")
+
+    # --- what works ------------------------------------------------------------------------------------------------------
+
+    def test_a_module_computes_with_pins_parameters_and_arguments(self):
+        self.build("gain")
+        out = self.sim(THREAD + """loadrt gain count=2 offset=0x10 steps=1,3
+addf gain.0 t
+addf gain.1 t
+net x gain.0.out => gain.1.in
+setp gain.0.in 1.5
+start
+advance 4 cycles
+getp gain.0.gain
+getp gain.0.out
+getp gain.1.out
+getp gain.0.threaded
+getp gain.0.cycles
+getp gain.1.cycles
+setp gain.1.limit 5
+setp gain.0.gain 4
+advance 1 cycles
+getp gain.1.cycles
+gets x
+""")
+        self.assertEqual(("", "2\n19\n54\nTRUE\n4\n12\n0\n22\n"), (out.stderr, out.stdout))
+
+    def test_names_go_to_the_module(self):
+        self.build("gain")
+        out = self.sim(THREAD + 'loadrt gain names="left"\naddf left t\nsetp left.in 3\nstart\nadvance 1 cycles\ngetp left.out\n')
+        self.assertEqual(("", "6\n"), (out.stderr, out.stdout))
+
+    def test_it_is_read_only_where_the_module_says_so(self):
+        self.build("gain")
+        self.assertIn("gain.0.cycles", self.error("loadrt gain\nsetp gain.0.cycles 3\n"))
+
+    def test_modules_call_each_other_and_make_threads(self):
+        self.build("planner", "follow")
+        out = self.sim("""loadrt planner
+loadrt follow period=2000000
+loadrt --native sum2 names=sum
+net step sum.out => planner.scale
+net seen planner.last
+setp sum.in0 0.5
+addf sum follow-thread
+addf follow follow-thread
+start
+advance 3 cycles
+getp follow.position
+gets seen
+show thread
+""")
+        self.assertEqual("", out.stderr)
+        self.assertEqual(["1.5", "1.5"], out.stdout.split()[:2])
+        self.assertRegex(out.stdout, r"2000000 .*follow-thread|follow-thread.*2000000")
+
+    def test_a_module_can_be_loaded_again_with_its_first_values(self):
+        self.build("planner", "follow")
+        out = self.sim("""loadrt planner
+loadrt follow
+setp planner.scale 1
+addf follow follow-thread
+start
+advance 3 cycles
+getp follow.position
+unloadrt follow
+unloadrt planner
+advance 1 cycles
+loadrt planner
+loadrt follow
+addf follow follow-thread
+start
+advance 1 cycles
+getp follow.position
+getp planner.scale
+""")
+        self.assertEqual(("", ["3", "0", "0"]), (out.stderr, re.findall(r"(?m)^\d+$", out.stdout)))
+        self.assertIn("it is still loaded: an unload in the same transaction takes effect at its end", self.error("loadrt planner\nunloadrt planner\nloadrt planner\n"))
+
+    def test_the_thread_of_a_module_outlives_it_and_is_used_again(self):
+        self.build("planner", "follow")
+        out = self.sim("""loadrt planner
+loadrt follow
+addf follow follow-thread
+start
+advance 2 cycles
+unloadrt follow
+advance 2 cycles
+getp follow-thread.threadbeat
+loadrt follow
+addf follow follow-thread
+setp planner.scale 2
+advance 2 cycles
+getp follow.position
+""")
+        self.assertEqual(("", "4\n4\n"), (out.stderr, out.stdout))
+
+    def test_what_save_prints_loads_again(self):
+        self.build("planner", "follow")
+        self.build("sum2", source="gain")  # a component of ours has that name
+        first = self.sim("loadrt planner\nloadrt follow period=2000000\nloadrt --linuxcnc sum2 count=2\naddf follow follow-thread\naddf gain.0 follow-thread\naddf gain.1 follow-thread\nsave all\n")
+        self.assertEqual("", first.stderr)
+        self.assertIn("loadrt follow period=2000000\nloadrt --linuxcnc sum2 count=2\n", first.stdout)
+        again = self.sim(first.stdout + "save all\n")
+        self.assertEqual(("", first.stdout), (again.stderr, again.stdout))
+
+    def test_messages_of_a_cycle_are_printed_by_another_thread_within_a_limit(self):
+        self.build("troubled")
+        out = self.sim(THREAD + "loadrt troubled fault=talk\naddf troubled t\nstart\nadvance 1000 cycles\n")
+        self.assertEqual(0, out.returncode, out.stderr)
+        lines = out.stderr.splitlines()
+        self.assertEqual(["troubled: hello", "troubled: message 1"], lines[:2])
+        self.assertLess(len(lines), 400)
+        withheld = [int(line.split()[1]) for line in lines if "not printed (limit 100 per second)" in line]
+        self.assertEqual(1000, sum(withheld) + sum("message" in line and "troubled" in line for line in lines))
+
+    def test_ours_is_loaded_first_unless_told_otherwise(self):
+        self.build("sum2", source="gain")
+        self.assertEqual("0\n", self.good("sim", "--quiet", self.write("m.hal", "loadrt sum2\ngetp sum2.0.in0\n")))
+        self.assertEqual("2\n", self.good("sim", "--quiet", self.write("m.hal", "loadrt --linuxcnc sum2\ngetp gain.0.gain\n")))
+        self.build("gain")
+        self.assertIn("unknown component 'gain'", self.error("loadrt --native gain\n"))
+
+    def test_doc_describes_a_module_without_running_it(self):
+        self.build("gain")
+        page = self.good("doc", "gain")
+        for text in ("Multiplies", "count", "number of instances", "offset", "pin: in:the input", f"A compiled module of LinuxCNC: {self.modules}/gain.so"):
+            self.assertIn(text, page)
+
+    def test_check_does_not_run_a_module(self):
+        self.build("troubled")
+        done = self.run_program("check", self.write("m.hal", THREAD + "loadrt troubled fault=main\naddf troubled t\nsetp troubled.out 1\n"))
+        self.assertEqual(0, done.returncode, done.stderr)
+
+    # --- what goes wrong -------------------------------------------------------------------------------------------------
+
+    def test_a_missing_folder_names_the_package(self):
+        self.environment["HAL_RTMOD_DIR"] = "/nowhere"
+        self.assertEqual("""m.hal:1:8: error: 'motmod' is a module of LinuxCNC, which is not installed: /nowhere does not exist [no-such-component]
+    1 | loadrt motmod
+      |        ^^^^^^
+      = help: sudo apt-get install linuxcnc-uspace
+""", self.error("loadrt motmod\n").split("\n\n")[0] + "\n")
+
+    def test_a_missing_module(self):
+        self.assertIn(f"m.hal:1:19: error: LinuxCNC module 'and2' does not exist in {self.modules} [no-such-component]", self.error("loadrt --linuxcnc and2\n"))
+
+    def test_a_module_for_another_machine(self):
+        self.build("gain")
+        path = self.modules / "gain.so"
+        data = bytearray(path.read_bytes())
+        data[18:20] = (8).to_bytes(2, "little")  # MIPS
+        path.write_bytes(data)
+        self.assertRegex(self.error("loadrt gain\n"), r"error: '.*/gain\.so' is not a usable LinuxCNC module: it is built for machine type 8, this program for \S+ \[bad-plugin\]")
+
+    def test_a_file_that_is_not_a_module(self):
+        (self.modules / "gain.so").write_text("hello")
+        self.assertIn("is not a usable LinuxCNC module: it is not a shared object", self.error("loadrt gain\n"))
+        self.build("gain")
+        path = self.modules / "gain.so"
+        path.write_bytes(path.read_bytes()[:3000])
+        self.assertIn("is not a usable LinuxCNC module: the file is cut short", self.error("loadrt gain\n"))
+        (self.folder / "plain.c").write_text("int nothing;\n")
+        subprocess.run([CC, "-shared", "-fPIC", "-o", str(path), str(self.folder / "plain.c")], check=True)
+        self.assertIn("it is not a LinuxCNC module: it does not export rtapi_app_main", self.error("loadrt gain\n"))
+
+    def test_an_unknown_parameter(self):
+        self.build("gain")
+        self.assertEqual("""m.hal:1:13: error: component 'gain' has no argument 'cout' [unknown-argument]
+    1 | loadrt gain cout=1
+      |             ^^^^^^ did you mean 'count'?
+      = help: its arguments: count, names, offset, steps
+""", self.error("loadrt gain cout=1\n").split("\n\n")[0] + "\n")
+
+    def test_values_that_do_not_fit(self):
+        self.build("gain")
+        for given, why in (("count=x", "count=x is not a whole number"), ("count=1.5", "count=1.5 is not a whole number"), ("count=3000000000", "count=3000000000 is not a whole number"),
+                           ("steps=1,2,3,4,5", "steps=1,2,3,4,5 has more than 4 values"), ("steps=1,,2", "steps= is not a whole number")):
+            with self.subTest(given):
+                self.assertIn(f"error: component 'gain': {why} [bad-argument]", self.error(f"loadrt gain {given}\n"))
+
+    def test_a_failed_main_leaves_nothing_and_its_messages_are_the_error(self):
+        self.build("gain", "troubled")
+        done = self.run_program("sim", "--quiet", "-k", self.write("m.hal", "loadrt gain count=2 names=a\nshow comp\nloadrt troubled fault=fail\nloadrt gain\ngetp gain.0.gain\n"))
+        self.assertIn("component 'gain' cannot make 'gain': count= and names= are mutually exclusive (rtapi_app_main: Invalid argument (-22)) [construct-failed]", done.stderr)
+        self.assertIn("component 'troubled' cannot make 'troubled': troubled: no card (rtapi_app_main: No such device (-19)) [construct-failed]", done.stderr)
+        self.assertNotIn("never printed", done.stderr)
+        self.assertTrue(done.stdout.endswith("2\n"), done.stdout)
+
+    @unittest.skipIf(harness.SANITIZED, "the sanitizer takes crash signals")
+    def test_a_crash_in_main_is_an_error_and_the_machine_goes_on(self):
+        self.build("troubled", "gain")
+        done = self.run_program("sim", "--quiet", "-k", self.write("m.hal", "loadrt gain\nloadrt troubled fault=main\nloadrt troubled\ngetp gain.0.gain\n"))
+        self.assertIn("component 'troubled' cannot make 'troubled': rtapi_app_main crashed (segmentation fault) [construct-failed]", done.stderr)
+        self.assertEqual("2\n", done.stdout)
+
+    @unittest.skipIf(harness.SANITIZED, "the sanitizer takes crash signals")
+    def test_a_crash_in_exit_is_reported(self):
+        self.build("troubled")
+        done = self.sim("loadrt troubled fault=exit\nunloadrt troubled\nshow comp\n")
+        self.assertEqual(0, done.returncode)
+        self.assertIn("troubled: rtapi_app_exit crashed (segmentation fault)", done.stderr)
+
+    @unittest.skipIf(harness.SANITIZED, "the sanitizer takes crash signals")
+    def test_a_crash_in_a_function_names_the_module(self):
+        self.build("troubled")
+        done = self.sim(THREAD + "loadrt troubled fault=cycle\naddf troubled t\nstart\nadvance 5 cycles\n")
+        self.assertEqual(-signal.SIGSEGV, done.returncode)
+        self.assertIn("hal: troubled: function 'troubled' crashed (segmentation fault) at cycle 2; outputs were set to their safe values; the process ends", done.stderr)
+
+    def test_a_missing_symbol_names_the_module_that_has_it(self):
+        self.build("planner", "follow")
+        self.assertEqual("""m.hal:1:8: error: component 'follow' cannot make 'follow': it uses planner_next, which is defined by module 'planner' [construct-failed]
+    1 | loadrt follow
+      |        ^^^^^^
+      = help: load that first: loadrt planner
+""", self.error("loadrt follow\n").split("\n\n")[0] + "\n")
+        (self.modules / "planner.so").unlink()
+        self.assertIn("it uses planner_next, which is defined neither by this runtime nor by a module in", self.error("loadrt follow\n"))
+
+    def test_a_module_in_use_stays(self):
+        self.build("planner", "follow")
+        self.assertEqual("""m.hal:3:10: error: 'planner' cannot be unloaded: its code is used by follow [reload-conflict]
+    3 | unloadrt planner
+      |          ^^^^^^^
+      = help: unload that first: unloadrt follow
+""", self.error("loadrt planner\nloadrt follow\nunloadrt planner\n").split("\n\n")[0] + "\n")
+
+    def test_a_module_is_loaded_once_and_not_reloaded(self):
+        self.build("gain")
+        self.assertIn("'gain' is a LinuxCNC module, which is loaded once, and it is already loaded [name-taken]", self.error("loadrt gain\nloadrt gain names=b\n"))
+        self.assertIn("'gain' is a LinuxCNC module, whose static variables allow one copy at a time [reload-conflict]", self.error("loadrt gain\nreload gain\n"))
+
+    def test_an_edit_that_fails_later_unloads_the_module(self):
+        self.build("gain")
+        done = self.run_program("sim", "--quiet", self.write("m.hal", "loadrt gain\nnet x nothing.out\n"))
+        self.assertEqual(1, done.returncode)
+        done = self.run_program("sim", "--quiet", "-k", self.write("m.hal", "begin\nloadrt gain\nnet x nothing.out\ncommit\nloadrt gain\ngetp gain.0.gain\n"))
+        self.assertTrue(done.stdout.endswith("2\n"), done.stdout + done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
