@@ -146,7 +146,8 @@ getp follow.position
         out = self.sim(THREAD + "loadrt troubled fault=talk\naddf troubled t\nstart\nadvance 1000 cycles\n")
         self.assertEqual(0, out.returncode, out.stderr)
         lines = out.stderr.splitlines()
-        self.assertEqual(["troubled: hello", "troubled: message 1"], lines[:2])
+        self.assertEqual("troubled: hello", lines[0])
+        self.assertIn("troubled: message 1", lines)  # on a busy host, how many were lost comes first
         self.assertLess(len(lines), 400)
         withheld = [int(line.split()[1]) for line in lines if "not printed (limit 100 per second)" in line]
         self.assertEqual(1000, sum(withheld) + sum("message" in line and "troubled" in line for line in lines))
