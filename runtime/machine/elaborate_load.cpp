@@ -157,7 +157,7 @@ bool make_instances(Elaboration& on, const Token& name, Origin origin, const Loa
     return construct(on.model, on.edit, *component, request, on.sources, on.diagnostics);
 }
 
-/// `hal check` does not run a module: it may access hardware. Its parameters are checked from its file.
+/// `hal check` does not run a module: it may access hardware. So neither its arguments nor what names its pins is checked.
 bool is_unchecked(Elaboration& on, const Token& name, Origin origin) {
     Diagnostics ignored;
     const auto plugin = open_component(on.plugins, name.text, origin, name.span, ignored);
