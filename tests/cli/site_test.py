@@ -70,6 +70,18 @@ class Site(Case):
                      '["Commands","can sdo read","commands.html#can-sdo-read"'):
             self.assertIn(text, index)
 
+    def test_every_page_is_reached_by_links_from_the_first(self):
+        self.built()
+        pages = {path.resolve(): Page(path) for path in self.site.rglob("*.html")}
+        reached, open_pages = set(), [(self.site / "index.html").resolve()]
+        while open_pages:
+            path = open_pages.pop()
+            if path in reached or path not in pages:
+                continue
+            reached.add(path)
+            open_pages += [(path.parent / unquote(link).partition("#")[0]).resolve() for link in pages[path].links if not re.match(r"[a-z]+:|#", link)]
+        self.assertEqual([], sorted(str(path.relative_to(self.site.resolve())) for path in pages.keys() - reached))
+
     def test_a_dead_link_in_a_page_fails(self):
         root = self.folder / "root"
         root.mkdir()

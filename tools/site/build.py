@@ -21,10 +21,11 @@ from markdown import Markdown, plain  # noqa: E402
 PICTURES = {".svg", ".png", ".csv"}
 NAVIGATION = (  # title, pages: a path, or a pattern of paths
     ("Start", ("README.md", "docs/glossary.md", "docs/tutorials/write-a-netlist.md", "docs/tutorials/*.md")),
-    ("Guides", ("docs/[!dvgR]*.md", "docs/device-descriptions.md")),
+    ("Guides", ("docs/[!dvgi]*.md", "docs/device-descriptions.md")),
     ("Reference", ("reference/index.html", "commands.html", "errors.html")),
     ("Machines", ("halfiles/README.md", "halfiles/*/README.md")),
     ("Project", ("CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md", "docs/versioning.md", "docs/design.md", "docs/decisions/README.md")),
+    ("Folders", ("[!hir]*/README.md", "runtime/README.md")),
 )
 
 
@@ -103,7 +104,9 @@ class Site:
             text = path.read_text(encoding="utf-8")
             body = re.search(r"<body>\n(.*)</body>", text, re.DOTALL)[1]
             body = re.sub(r"<script>.*?</script>|<nav>.*?</nav>|<p><input id=\"search\".*?</p>", "", body, flags=re.DOTALL)
-            body = body.replace("<table>", '<div class="wide"><table>').replace("</table>", "</table></div>")
+            for table in set(re.findall(r"<table>.*?</table>", body, re.DOTALL)):
+                kind = "wide pins" if 'class="type"' in table else "wide"
+                body = body.replace(table, f'<div class="{kind}">{table}</div>')
             title = re.search(r"<title>(.*?) · Halcyon</title>", text)[1]
             self.pages[f"reference/{path.name}"] = (html.unescape(title), body)
 
@@ -115,7 +118,7 @@ class Site:
         body = f'<h1 id="{name}">{title}</h1>\n<p>{introduction}</p>\n'
         for heading, words in entries:
             anchor = heading.replace(" ", "-")
-            body += f'<h2 id="{anchor}">{html.escape(heading)}</h2>\n<pre>{html.escape(self.printed(*words))}</pre>\n'
+            body += f'<h2 id="{anchor}">{html.escape(heading)}</h2>\n<pre class="printed">{html.escape(self.printed(*words))}</pre>\n'
         self.pages[f"{name}.html"] = (title, body)
 
     def commands(self):
@@ -138,6 +141,19 @@ class Site:
             if shown.returncode == 0 and shown.stdout.startswith(f"hal {' '.join(parts[:count])}:"):
                 return " ".join(parts[:count])
         return None
+
+    def add_below(self):
+        """At the end of a folder's page: the pages below it that it does not link to."""
+        below = {}
+        for where in sorted(self.pages):
+            folders = PurePosixPath(where).parents if not where.endswith("/index.html") else PurePosixPath(where).parent.parents
+            page = next((p for p in (f"{folder}/index.html" for folder in folders if folder.name) if p in self.pages), None)
+            if page and f'href="{html.escape(parent_of(page, where))}' not in self.pages[page][1]:
+                below.setdefault(page, []).append(where)
+        for page, found in below.items():
+            items = "".join(f'<li><a href="{html.escape(parent_of(page, where))}">{html.escape(self.pages[where][0])}</a></li>' for where in found)
+            title, body = self.pages[page]
+            self.pages[page] = (title, f'{body}\n<h2 id="in-this-folder">In this folder</h2>\n<ul>{items}</ul>')
 
     # --- the site
 
@@ -193,6 +209,7 @@ class Site:
         codes = [line.split()[0] for line in self.printed("explain").splitlines() if re.match(r"\s*[a-z][a-z0-9-]+  ", line)]
         self.add_printed("errors", "Diagnostics", "What <code>hal explain CODE</code> prints; the code is in [brackets] at the end of a message.",
                          [(code, ("explain", code)) for code in codes])
+        self.add_below()
         self.write()
         print(f"{len(self.pages)} pages in {self.output}/index.html")
         if self.problems:
