@@ -2,6 +2,9 @@
 // A component's page, and the index of all, as HTML that needs nothing else: no script but the search box's, no other file.
 #include <cctype>
 #include <fmt/core.h>
+#include <string>
+#include <string_view>
+#include <utility>
 
 #include "base/types.hpp"
 #include "cli/xml_escape.hpp"
@@ -72,13 +75,26 @@ std::string as_html(const Page& page, std::string_view home) {
     return writer.text;
 }
 
+namespace {
+
+/// Returns the heading of a group of components: the name of its folder with a capital letter, or as the field spells it.
+std::string heading_of(const std::string& group) {
+    static constexpr std::pair<std::string_view, std::string_view> spellings[] = {
+        {"canopen", "CANopen"}, {"dds", "DDS"}, {"ethercat", "EtherCAT"}, {"io", "I/O"}, {"sim", "Simulation"}};
+    for (const auto& [name, spelling] : spellings)
+        if (group == name) return std::string(spelling);
+    std::string title = group;
+    title[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(title[0])));
+    return title;
+}
+
+}  // namespace
+
 std::string as_html_index(const std::vector<IndexGroup>& groups) {
     std::string text = head("Components · Halcyon") +
                        "<h1>Components</h1>\n<p><input id=\"search\" type=\"search\" placeholder=\"search\" autofocus></p>\n";
     for (const IndexGroup& group : groups) {
-        std::string title = group.name;
-        title[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(title[0])));
-        text += fmt::format("<section>\n<h2 id=\"{}\">{}</h2>\n<table>\n", xml_escape(group.name), xml_escape(title));
+        text += fmt::format("<section>\n<h2 id=\"{}\">{}</h2>\n<table>\n", xml_escape(group.name), xml_escape(heading_of(group.name)));
         for (const Page* const page : group.pages)
             text +=
                 fmt::format("<tr><td><a href=\"{0}.html\">{0}</a></td><td>{1}</td></tr>\n", xml_escape(page->name), xml_escape(page->summary));
