@@ -159,6 +159,12 @@ setp io.fault-emcy-storm 1
         self.assertEqual(y["a"], y["zero"])
         self.assertNotEqual(y["a"], y["small"])
 
+    def test_a_plot_of_too_many_values_asks_for_names(self):
+        names = [f"v{i}" for i in range(25)]
+        self.write("run.csv", f"time_s,{','.join(names)}\n" + "".join(f"{i}{',1' * 25}\n" for i in range(2)))
+        self.assertEqual("hal plot: 25 values are too many for one picture (limit 24); name some: hal plot FILE NAME…\n", self.bad("plot", "run.csv"))
+        self.good("plot", "run.csv", "v1*")
+
     def test_the_ending_of_a_plot(self):
         self.write("run.csv", "time_s,a\n0,1\n1,2\n")
         self.assertEqual("hal plot: unknown format of 'x.jpg'; name the file .svg or .png\n", self.bad("plot", "run.csv", "-o", "x.jpg"))

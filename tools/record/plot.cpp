@@ -50,7 +50,8 @@ int run_plot(const PlotOptions& options) {
     }
     if (options.words.size() == 1) add_traces(recording, "*", traces);
     if (traces.size() > most_traces)
-        return fail(options, fmt::format("{} values are too many for one picture; choose at most {}", traces.size(), most_traces));
+        return fail(options, fmt::format("{} values are too many for one picture (limit {}); name some: hal plot FILE NAME…", traces.size(),
+                                         most_traces));
     const std::int64_t begin_ns = recording.begin_ns() + options.from_ns, last_ns = recording.end_ns();
     const std::int64_t end_ns = options.for_ns < 0 ? last_ns : std::min(last_ns, begin_ns + options.for_ns);
     if (begin_ns >= last_ns && options.from_ns > 0)
