@@ -187,7 +187,7 @@ Finding governor() {
     for (const auto& g : governors) all += (all.empty() ? "" : ", ") + g;
     if (governors == std::set<std::string>{"performance"}) return {Verdict::good, "frequency", "governor performance"};
     return {Verdict::fair, "frequency", fmt::format("governor {}: an idle processor ramps up slowly", all),
-            "sudo cpupower frequency-set -g performance"};
+            "sudo sh -c 'echo performance | tee /sys/devices/system/cpu/cpu*/cpufreq/scaling_governor'"};
 }
 
 Finding isolation() {

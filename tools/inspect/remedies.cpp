@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <fmt/core.h>
+#include <pwd.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -30,6 +31,20 @@ std::string without_sudo(std::string command) {
     return command;
 }
 
+/// Returns the command with the name of this user for $USER, which is root in a shell of root.
+std::string for_this_user(std::string command) {
+    const passwd* const user = ::getpwuid(::getuid());
+    const std::string variable = "$USER";
+    for (std::size_t at = 0; user && (at = command.find(variable, at)) != std::string::npos;)
+        command.replace(at, variable.size(), user->pw_name);
+    return command;
+}
+
+/// Adds what remains to be done to the list `later`, unless it is there.
+void add_later(std::string& later, const Remedy& remedy) {
+    if (!remedy.then.empty() && later.find(remedy.then) == std::string::npos) later += (later.empty() ? "" : ", and ") + remedy.then;
+}
+
 /// Reads a line of standard input. Returns true for y or yes.
 bool agreed() {
     std::string line;
@@ -44,8 +59,12 @@ int carry_out(const DoctorOptions& options, const std::vector<Remedy>& remedies)
     const bool root = ::geteuid() == 0;
     if (!root && !found_in_path("sudo")) {
         std::string text = "\nsudo is not installed; as root (su -), type:\n";
-        for (const Remedy& remedy : remedies) text += "  " + without_sudo(remedy.command) + "\n";
-        print(text);
+        std::string later;
+        for (const Remedy& remedy : remedies) {
+            text += "  " + for_this_user(without_sudo(remedy.command)) + "\n";
+            add_later(later, remedy);
+        }
+        print(text + (later.empty() ? "" : fmt::format("for the change to take effect: {}\n", later)));
         return fail(options, "the fixes need root");
     }
     // $USER of the commands is the user who operates the machine, also under sudo and su.
@@ -63,8 +82,7 @@ int carry_out(const DoctorOptions& options, const std::vector<Remedy>& remedies)
         const int result = std::system(("set -e; " + user + command).c_str());
         if (result == 0) {
             print("done\n");
-            if (!remedy.then.empty() && later.find(remedy.then) == std::string::npos)
-                later += (later.empty() ? "" : ", and ") + remedy.then;
+            add_later(later, remedy);
         } else {
             status = fail(options, fmt::format("failed with status {}: {}", WIFEXITED(result) ? WEXITSTATUS(result) : result, command));
         }
