@@ -264,7 +264,7 @@ int no_such_command(const std::vector<std::string>& typed) {
     if (!word.empty() && word[0] == '-') return fail(options, fmt::format("unknown option '{}'; type: hal help", word));
     const auto ends = [&](std::string_view end) { return word.size() > end.size() && word.ends_with(end); };
     if (ends(".hal") || ends(".ini")) return fail(options, fmt::format("'{0}' is not a command; to run it type: hal run {0}", word));
-    if (find_command(word))
+    if (!find_group(word) && find_command(word))
         return fail(options, fmt::format("'{0}' is a command of the shell; to run it in a running machine type: hal shell {1}", word, fmt::join(typed, " ")));
     std::vector<std::string> names = {"help"};
     std::string where = "hal help";

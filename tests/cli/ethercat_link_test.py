@@ -76,7 +76,7 @@ class EthercatLink(Case):
         text, _ = machine.communicate(timeout=60)
         self.assertEqual(1, machine.returncode, text)
         self.assertEqual(1, text.count("raw Ethernet needs the capability CAP_NET_RAW"), text)
-        self.assertRegex(text, r"'machine' \(ethercat\) cannot start: .*raw Ethernet needs the capability CAP_NET_RAW; type: .*cap_net_raw.*; "
+        self.assertRegex(text, r"'machine' \(ethercat\) cannot start: .*raw Ethernet needs the capability CAP_NET_RAW; grant it with: .*--cap-add=NET_RAW in the command that starts this container.*; "
                                r"to see the capabilities: hal doctor")
 
     def test_an_unknown_interface_names_those_that_exist(self):

@@ -60,7 +60,7 @@ std::string Receiver::open(const Options& options) {
     socket_ = link::Descriptor(::socket(AF_PACKET, SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
     const int refusal = socket_ ? 0 : errno;
     if (refusal == EPERM || refusal == EACCES)
-        return "raw Ethernet needs the capability CAP_NET_RAW; type: " + grant_command() + "; to see the capabilities: hal doctor";
+        return "raw Ethernet needs the capability CAP_NET_RAW; grant it with: " + grant_command() + "; to see the capabilities: hal doctor";
     if (!socket_) return "cannot open a packet socket: " + link::reason(refusal);
     protocol_ = options.types.size() == 1 ? options.types[0] : std::uint16_t{ETH_P_ALL};
     promiscuous_ = options.promiscuous;

@@ -357,7 +357,7 @@ TEST_F(Raw, open_reports_how_to_grant_a_missing_capability) {
     }).join();
     const std::string grant = grant_command();
     EXPECT_TRUE(grant.starts_with("sudo setcap cap_sys_nice,cap_ipc_lock,cap_net_raw=ep /")) << grant;
-    EXPECT_EQ(problem, "eth:" + a_ + ": raw Ethernet needs the capability CAP_NET_RAW; type: " + grant +
+    EXPECT_EQ(problem, "eth:" + a_ + ": raw Ethernet needs the capability CAP_NET_RAW; grant it with: " + grant +
                            "; to see the capabilities: hal doctor");
 }
 
