@@ -65,9 +65,12 @@ std::string to_string(const Usage& usage) {
 
 const std::vector<std::vector<UsageWord>>& usage_forms(std::string_view arguments) {
     thread_local std::unordered_map<std::string_view, std::vector<std::vector<UsageWord>>> known;  // each command of a file asks
-    const auto [at, missing] = known.try_emplace(arguments);
-    if (missing)
-        for (const std::string_view form : forms_of(arguments)) at->second.push_back(words_of(form));
+    auto at = known.find(arguments);
+    if (at == known.end()) {
+        std::vector<std::vector<UsageWord>> forms;  // whole before it is known: memory may run out
+        for (const std::string_view form : forms_of(arguments)) forms.push_back(words_of(form));
+        at = known.emplace(arguments, std::move(forms)).first;
+    }
     return at->second;
 }
 
