@@ -145,9 +145,9 @@ TEST(A_cycle_beyond_its_budget, is_a_fault_once_per_row) {
 
 TEST(Missed_periods, are_counted_and_skipped_and_the_phase_stays) {
     Machine machine(Clock::real);
-    machine.must("newthread t 2000000\nloadrt test-faulty names=f\naddf f.run t");
+    machine.must("newthread t 10000000\nloadrt test-faulty names=f\naddf f.run t");
     machine.start();
-    machine.must("setp f.slow 9000");
+    machine.must("setp f.slow 45000");
     ASSERT_TRUE(eventually([&] { return machine.session.reports().threads()[0].missed >= 8; }));
     machine.must("setp f.slow 0");
     const auto seen = machine.get_all({"t.missed", "t.threadbeat"});
