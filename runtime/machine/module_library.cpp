@@ -86,7 +86,7 @@ std::optional<Plugin> open_module(const std::string& name, Span at, Diagnostics&
     if (name == "hal_lib") return bad("it is LinuxCNC's own HAL, whose place this runtime takes", "other modules need no loadrt hal_lib");
     if (!library().host) {
         diagnostics.error("bad-plugin", at, "'" + path + "' cannot be loaded: " + library().problem, "",
-                          "install this program again: cmake --install BUILD");
+                          "type ./hal build in the source tree, or reinstall Halcyon");
         return {};
     }
     halcyon_module_problem problem{};

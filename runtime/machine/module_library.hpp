@@ -18,7 +18,7 @@ std::optional<Plugin> open_component(const Plugins& plugins, std::string_view na
 
 /// $HAL_RTMOD_DIR, or where the package linuxcnc-uspace installs them.
 std::string module_folder();
-/// Returns the name of the module's file without its folder and `.so` (`-` and `_` are the same); empty: there is none.
+/// Returns the name of the module's file without its folder and `.so` (`-` and `_` are the same); an empty string if the folder has no such file.
 std::string find_module(std::string_view name);
 /// Whether LinuxCNC 2.9 has a module of that name, installed or not. Only names that are not components of ours.
 bool is_module_of_linuxcnc(std::string_view name);

@@ -22,9 +22,9 @@ public:
     /// Names and addresses of all symbols that the file exports.
     const std::map<std::string, std::uint64_t>& defined() const { return defined_; }
 
-    /// Returns the text that the exported variable `symbol`, a `const char *`, points to; empty: there is none.
+    /// Returns the text that the exported variable `symbol`, a `const char *`, points to; an empty string if the file does not export it.
     std::string text_of(const std::string& symbol) const;
-    /// Returns the value of the exported `int` variable; `otherwise` if there is none.
+    /// Returns the value of the exported `int` variable; `otherwise` if the file does not export it.
     std::int32_t number_of(const std::string& symbol, std::int32_t otherwise) const;
 
 private:
