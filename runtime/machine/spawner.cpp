@@ -50,6 +50,15 @@ std::vector<std::string> python_folders(const std::filesystem::path& programs) {
     return {std::string(paths::build_python), std::string(paths::install_python)};
 }
 
+/// Where liblinuxcnchal.so.0 is (runtime/programs), by which LinuxCNC's programs connect to us: before LinuxCNC's own.
+std::vector<std::string> linuxcnc_folders(const std::filesystem::path& programs) {
+    for (const auto& folder : {programs / "../lib/halcyon/linuxcnc", programs / paths::libraries_from_programs / "halcyon/linuxcnc"}) {
+        std::error_code none;
+        if (std::filesystem::exists(folder / "liblinuxcnchal.so.0", none)) return {std::filesystem::canonical(folder, none).string()};
+    }
+    return {};
+}
+
 /// The environment of a child: ours, plus which instance started it, so that `hal shell` in it talks to that one; our own
 /// programs and Python module are found; and it ends when the machine is lost, unless the user wants otherwise.
 std::vector<std::string> environment_of(const std::string& instance) {
@@ -61,6 +70,7 @@ std::vector<std::string> environment_of(const std::string& instance) {
         {"HALCYON_LOST=", lost && *lost ? lost : "end"},
         {"HALCYON_PARENT=", std::to_string(getpid())},
         {"PATH=", with_folders("PATH", {program.parent_path().string(), user_folder("bin")})},
+        {"LD_LIBRARY_PATH=", with_folders("LD_LIBRARY_PATH", linuxcnc_folders(program.parent_path()))},
         {"PYTHONPATH=", with_folders("PYTHONPATH", python_folders(program.parent_path()))}};
     std::vector<std::string> all;
     for (char** entry = environ; *entry; ++entry)

@@ -15,6 +15,7 @@
 #include "modules/elf_file.hpp"
 #include "modules/module_host.hpp"
 #include "modules/rtapi_interface.hpp"
+#include "modules/segments.hpp"
 
 namespace hal::modules {
 
@@ -88,9 +89,6 @@ private:
     bool running_ = false, broken_ = false;
 };
 
-/// True in a function that a real-time thread runs: nothing may be declared, allocated or printed directly.
-extern thread_local bool in_cycle __attribute__((tls_model("initial-exec")));
-
 /// Runs an action for a module. An exception must not cross its C frames. Returns a negative errno for one.
 template <class Action>
 int guarded(Action action) noexcept {
@@ -111,7 +109,5 @@ const char* crash_text(int signal) noexcept;
 void release_components(Module& module) noexcept;
 /// Sets up what the modules share, before the first one is mapped. Returns false when out of memory.
 bool prepare_memory() noexcept;
-/// shared_memory.cpp: detaches the segments that a component id holds.
-void release_segments(int comp) noexcept;
 
 }  // namespace hal::modules

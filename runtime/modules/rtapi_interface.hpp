@@ -53,7 +53,10 @@ union halcyon_stream_value {
 };
 int hal_stream_create(halcyon_stream* stream, int comp, int key, int depth, const char* types);
 void hal_stream_destroy(halcyon_stream* stream);
+int hal_stream_attach(halcyon_stream* stream, int comp, int key, const char* types);
 int hal_stream_detach(halcyon_stream* stream);
+void hal_stream_wait_readable(halcyon_stream* stream, const volatile int* stop);  // of programs
+void hal_stream_wait_writable(halcyon_stream* stream, const volatile int* stop);  // of programs
 int hal_stream_element_count(halcyon_stream* stream);
 int hal_stream_element_type(halcyon_stream* stream, int index);
 int hal_stream_depth(halcyon_stream* stream);

@@ -2,10 +2,12 @@
 // Shared memory by key: System V segments of mode 0600, which LinuxCNC's programs open by the same keys.
 #include <cerrno>
 #include <cstring>
+#include <iterator>
 #include <sys/ipc.h>
 #include <sys/shm.h>
 
-#include "modules/module.hpp"
+#include "modules/rtapi_interface.hpp"
+#include "modules/segments.hpp"
 
 namespace hal::modules {
 namespace {

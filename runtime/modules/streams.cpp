@@ -3,6 +3,7 @@
 #include <atomic>
 #include <cerrno>
 #include <cstring>
+#include <sys/shm.h>
 
 #include "modules/rtapi_interface.hpp"
 
@@ -80,6 +81,20 @@ void hal_stream_destroy(halcyon_stream* stream) {
 int hal_stream_detach(halcyon_stream* stream) {
     stream->fifo = nullptr;
     return rtapi_shmem_delete(stream->segment, stream->comp);
+}
+
+int hal_stream_attach(halcyon_stream* stream, int comp, int key, const char* types) {
+    if (!stream) return -EINVAL;
+    if (shmget(key, 0, 0) < 0) return -errno;  // whoever makes the records creates it
+    const int segment = rtapi_shmem_new(key, comp, data_offset);
+    if (segment < 0) return segment;
+    *stream = {comp, segment, nullptr};
+    rtapi_shmem_getptr(segment, &stream->fifo);
+    const Header& found = header(stream);
+    bool good = found.magic == magic && (!types || std::strlen(types) == static_cast<std::size_t>(found.pins));
+    for (int i = 0; good && types && i < found.pins; ++i) good = type_of(types[i]) == found.types[i];
+    if (!good) hal_stream_detach(stream);
+    return good ? 0 : -EINVAL;
 }
 
 int hal_stream_element_count(halcyon_stream* stream) { return header(stream).pins; }

@@ -94,6 +94,7 @@ constexpr LinuxcncSource linuxcnc_sources[] = {
     {"restore.c", plugin_from_c},
     {"comp_component.c", plugin_from_comp},
     {"program.c", program},
+    {"program_exchange.c", program},
     {"program_protocol.c", program},
     {"program_ports.c", program},
     {"comp_program.c", program_from_comp},

@@ -42,8 +42,9 @@ static bool hal_type_of(hal_type_t type, hal_type *to) {
 
 static size_t width_of(hal_type type) { return type == HAL_TYPE_BIT ? 1 : type == HAL_TYPE_S32 || type == HAL_TYPE_U32 ? 4 : 8; }
 
-static struct pin *new_pin(void) {
-    struct pin *const pin = halcyon_current_host ? halcyon_current_host->allocate(halcyon_current_host, sizeof *pin, _Alignof(struct pin)) : NULL;
+static struct pin *new_pin(int comp) {
+    const hal_host *const host = halcyon_host_of(comp);
+    struct pin *const pin = host ? host->allocate(host, sizeof *pin, _Alignof(struct pin)) : NULL;
     if (!pin) return NULL;
     pin->pin.slot = &pin->pin.own;
     return pin;
@@ -57,7 +58,7 @@ static const char *local_name(const char *name) {
     return name[length] == '.' ? name + length + 1 : name[length] == '\0' ? name + length : NULL;
 }
 
-static int declare(struct pin *pin, hal_type_t type, hal_pdir_t dir, hal_value initial, const char *name) {
+static int declare(int comp, struct pin *pin, hal_type_t type, hal_pdir_t dir, hal_value initial, const char *name) {
     hal_pin_decl decl = {.size = sizeof decl, .name = local_name(name), .doc = "", .unit = "", .initial = initial, .pointer = pin->pointer};
     if (!decl.name || !*decl.name || !hal_type_of(type, &decl.type)) return -EINVAL;
     switch (dir) {
@@ -69,7 +70,8 @@ static int declare(struct pin *pin, hal_type_t type, hal_pdir_t dir, hal_value i
         default: return -EINVAL;
     }
     pin->type = decl.type;
-    if (!halcyon_current_host->pin(halcyon_current_host, &decl, &pin->pin)) return -EINVAL;
+    const hal_host *const host = halcyon_host_of(comp);
+    if (!host->pin(host, &decl, &pin->pin)) return -EINVAL;
     if (pin->pointer) *pin->pointer = pin->pin.slot;
     struct pin **const list = pin->value ? &parameters : &pins;
     pin->next = *list;
@@ -77,25 +79,24 @@ static int declare(struct pin *pin, hal_type_t type, hal_pdir_t dir, hal_value i
     return 0;
 }
 
-static int by_handle(hal_type_t type, bool parameter, hal_pdir_t dir, void *handle, hal_value initial, const char *format, va_list arguments) {
+static int by_handle(int comp, hal_type_t type, bool parameter, hal_pdir_t dir, void *handle, hal_value initial, const char *format, va_list arguments) {
     if (!handle || (dir == HAL_RO || dir == HAL_RW) != parameter) return -EINVAL;
     char name[256];
     const int length = vsnprintf(name, sizeof name, format, arguments);
     if (length < 0 || (size_t)length >= sizeof name) return -EINVAL;
-    struct pin *const pin = new_pin();
+    struct pin *const pin = new_pin(comp);
     if (!pin) return -ENOMEM;
     pin->pointer = handle;
-    return declare(pin, type, dir, initial, name);
+    return declare(comp, pin, type, dir, initial, name);
 }
 
 #define BY_HANDLE(function, type, hal_kind, parameter, member, ctype)                                            \
     int function(int comp, hal_pdir_t dir, type *handle, ctype initial, const char *name, ...) {     \
-        (void)comp;                                                                                                  \
         hal_value value = {.raw = 0};                                                                                \
         value.member = initial;                                                                                      \
         va_list arguments;                                                                                           \
         va_start(arguments, name);                                                                                   \
-        const int result = by_handle(hal_kind, parameter, dir, handle, value, name, arguments);                      \
+        const int result = by_handle(comp, hal_kind, parameter, dir, handle, value, name, arguments);                      \
         va_end(arguments);                                                                                           \
         return result;                                                                                               \
     }
@@ -116,45 +117,41 @@ BY_HANDLE(hal_param_new_ui32, hal_uint_t, HAL_U32, true, u64, rtapi_u32)
 #pragma GCC diagnostic pop
 
 int hal_pin_new_port(int comp, hal_pdir_t dir, hal_port_t *handle, const char *name, ...) {
-    (void)comp;
     va_list arguments;
     va_start(arguments, name);
-    const int result = by_handle(HAL_PORT, false, dir, handle, (hal_value){.raw = 0}, name, arguments);
+    const int result = by_handle(comp, HAL_PORT, false, dir, handle, (hal_value){.raw = 0}, name, arguments);
     va_end(arguments);
     return result;
 }
 
 int hal_param_new_fake(int comp, hal_refs_u *handle) {
-    (void)comp;
-    struct pin *const pin = new_pin();
+    struct pin *const pin = new_pin(comp);
     if (!pin) return -ENOMEM;
     handle->p = (hal_port_t)(void *)&pin->pin.own;
     return 0;
 }
 
 int hal_pin_new(const char *name, hal_type_t type, hal_pdir_t dir, void **pointer, int comp) {
-    (void)comp;
     if (!pointer || dir == HAL_RO || dir == HAL_RW) return -EINVAL;
-    struct pin *const pin = new_pin();
+    struct pin *const pin = new_pin(comp);
     if (!pin) return -ENOMEM;
     pin->pointer = (hal_value **)pointer;
     if (type == HAL_PORT) { /* the pointer leads to a handle, not to the slot */
         pin->pointer = &pin->handle;
         *pointer = &pin->handle;
     }
-    return declare(pin, type, dir, (hal_value){.raw = 0}, name);
+    return declare(comp, pin, type, dir, (hal_value){.raw = 0}, name);
 }
 
 int hal_param_new(const char *name, hal_type_t type, hal_pdir_t dir, volatile void *value, int comp) {
-    (void)comp;
     if (!value || (dir != HAL_RO && dir != HAL_RW)) return -EINVAL;
-    struct pin *const pin = new_pin();
+    struct pin *const pin = new_pin(comp);
     hal_type known;
     if (!pin) return -ENOMEM;
     if (!hal_type_of(type, &known) || known == HAL_TYPE_PORT) return -EINVAL;
     pin->value = value;
     memcpy(&pin->last, (const void *)value, width_of(known));
-    return declare(pin, type, dir, pin->last, name);
+    return declare(comp, pin, type, dir, pin->last, name);
 }
 
 #define NAMED(target)                                                                       \
@@ -177,7 +174,9 @@ BOTH_BY_POINTER(s32, HAL_S32)
 BOTH_BY_POINTER(u32, HAL_U32)
 BOTH_BY_POINTER(s64, HAL_S64)
 BOTH_BY_POINTER(u64, HAL_U64)
+#ifndef HALCYON_LINUXCNC_PROGRAMS /* compiled for LinuxCNC 2.9: another handle (runtime/programs/commands.c) */
 BY_POINTER(port, HAL_PORT)
+#endif
 
 /* A parameter by pointer lives twice: where the runtime reads and writes it, and in the user's variable, which has the width of
  * its type only. Whichever has changed since they were last compared is copied to the other, before and after each function. */
@@ -227,7 +226,7 @@ int hal_export_funct(const char *name, hal_funct_t code, void *arg, int uses_fp,
     struct funct *const funct = halcyon_current_host->allocate(halcyon_current_host, sizeof *funct, _Alignof(struct funct));
     if (!funct) return -ENOMEM;
     *funct = (struct funct){code, arg};
-    const hal_function_decl decl = {sizeof decl, 0, local_name(name), "", call_first, funct, funct};
+    const hal_function_decl decl = {sizeof decl, 0, local_name(name), "", call_first, funct, funct, NULL};
     return halcyon_current_host->function(halcyon_current_host, &decl) ? 0 : -EINVAL;
 }
 int hal_export_functf(hal_funct_t code, void *arg, int uses_fp, int reentrant, int comp, const char *name, ...) {

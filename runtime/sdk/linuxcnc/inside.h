@@ -13,10 +13,11 @@
 #define HALCYON_COMPONENT "component"
 #endif
 
-enum { component_id = 1 };
+enum { component_id = 1 }; /* in a plugin */
 
 /* Names the host of the instance that is being created, else NULL; a program has the same host all the time. plugin.c, program.c */
 extern const hal_host *halcyon_current_host;
+const hal_host *halcyon_host_of(int comp); /* of a component that hal_init() made; NULL: none, or not while an instance is created */
 
 /* declare.c: pins, parameters, functions */
 void halcyon_set_instance(const char *name); /* of a .comp file; the runtime takes names below it. "": names are whole */

@@ -19,6 +19,7 @@ int hal_exit(int comp) { return comp == component_id ? 0 : -EINVAL; }
 char *hal_comp_name(int comp) { return comp == component_id ? component_name : NULL; }
 void *hal_malloc(long size) { return halcyon_current_host && size > 0 ? halcyon_current_host->allocate(halcyon_current_host, (size_t)size, 16) : NULL; }
 
+const hal_host *halcyon_host_of(int comp) { return (void)comp, halcyon_current_host; }
 const hal_host *halcyon_host(void) { return halcyon_current_host; }
 
 bool halcyon_fail(const char *format, ...) {

@@ -7,7 +7,7 @@
 #include "hal/abi.h"
 #include "hal/naming.h"
 
-/* --- program.c: the pins ---------------------------------------------------------------------------------------------------- */
+/* --- program.c: the components, each with its pins ---------------------------------------------------------------------------- */
 
 struct halcyon_link {
     hal_pin *pin;
@@ -22,12 +22,35 @@ struct halcyon_link {
     uint64_t before;   /* what they had before the last change from here */
     long long written_ns;
 };
-extern struct halcyon_link *halcyon_links; /* under the lock, as everything below */
-extern size_t halcyon_link_count;
+struct halcyon_program {
+    char name[HAL_NAME_LEN + 1]; /* "": this place is free */
+    bool ready;
+    struct halcyon_link *links;
+    size_t link_count, link_capacity;
+    unsigned every_ms, timeout_ms;
+    bool alive;         /* reported by the program since the last exchange */
+    long long alive_ns; /* time of the last report to the machine */
+};
+/* Their ids are 1, 2, …. All under the lock. Most programs have one; LinuxCNC's task has one of its own and one of its interpreter. */
+enum { halcyon_most_programs = 16 };
+extern struct halcyon_program halcyon_programs[halcyon_most_programs];
+const char *halcyon_program_name(void); /* of the first, for messages about all of them */
 extern char halcyon_program_prefix[256]; /* of a .comp file's instance; "": names are whole */
 
 locale_t halcyon_lock(void); /* numbers have a point until halcyon_unlock() restores the locale that this returns */
 void halcyon_unlock(locale_t before);
+
+/* --- program_exchange.c: what the machine and this process tell each other; all under the lock ------------------------------------ */
+
+extern bool halcyon_ending; /* the helper thread is to end */
+bool halcyon_find_machine(void);
+bool halcyon_announce(struct halcyon_program *, bool is_ready, bool whole); /* registers it; whole: with safe values of its pins */
+bool halcyon_declare(struct halcyon_program *, struct halcyon_link *);
+void halcyon_unregister(struct halcyon_program *);
+void halcyon_exchange(struct halcyon_program *);
+bool halcyon_start_helper(void); /* false when there is no thread */
+void halcyon_stop_helper(void);  /* not under the lock */
+void halcyon_catch_end_signals(void);
 
 /* --- program_protocol.c: requests and replies --------------------------------------------------------------------------------- */
 

@@ -15,8 +15,9 @@ static unsigned number_in(const char *answer, const char *key) {
 static bool use_port(hal_port_t port, const char *verb, char *to, const char *from, unsigned count, const char *key, unsigned *number) {
     const locale_t before = halcyon_lock();
     const struct halcyon_link *one = NULL;
-    for (size_t i = 0; i < halcyon_link_count; ++i)
-        if ((const volatile void *)halcyon_links[i].pin->slot == (const volatile void *)port) one = &halcyon_links[i];
+    for (const struct halcyon_program *of = halcyon_programs; of < halcyon_programs + halcyon_most_programs; ++of)
+        for (size_t i = 0; i < of->link_count; ++i)
+            if ((const volatile void *)of->links[i].pin->slot == (const volatile void *)port) one = &of->links[i];
     bool done = false;
     if (one && halcyon_connection >= 0) {
         halcyon_add("{\"port\":\"%s.%s\"", one->prefix, one->name);

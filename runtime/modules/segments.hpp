@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: MIT
+// Shared memory by key, for modules and for LinuxCNC's programs. The functions are in rtapi_interface.hpp.
+#pragma once
+
+namespace hal::modules {
+
+/// True in a function that a real-time thread runs: nothing may be declared, allocated or printed directly.
+extern thread_local bool in_cycle __attribute__((tls_model("initial-exec")));
+
+/// Detaches the segments that a component id holds.
+void release_segments(int comp) noexcept;
+
+}  // namespace hal::modules

@@ -1,0 +1,53 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * Some programs of LinuxCNC's (halcmd, halrmt, halmeter, halscope, the Tcl package Hal, Python's _hal) follow pointers through its shared
+ * memory. A machine of ours has no such memory: a program that is linked to these two variables ends before its main(), with the command
+ * that takes its place. It is recognised by where the linker has put them: into the program.
+ */
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+char *hal_data, *hal_shmem_base; /* 8 bytes each: programs have copies of that size */
+const int halcyon_here = 0;
+
+static const struct { const char *name, *instead; } replaced[] = {
+    {"halcmd", "halcmd of Halcyon, which loadusr and hal linuxcnc find first in PATH"},
+    {"halrmt", "hal shell, or the control protocol (docs/protocol.md)"},
+    {"halmeter", "hal meter NAME"},
+    {"halscope", "hal scope, or hal panel --scope in a browser"},
+    {"classicladder", "a component of your own: hal new"},
+};
+
+static void end(const char *name, const char *instead) {
+    fprintf(stderr, "%s: this program reads LinuxCNC's memory directly, which a machine of Halcyon does not have. In its place: %s\n", name, instead);
+    _exit(1);
+}
+
+__attribute__((constructor)) static void check(void) {
+    Dl_info data, here;
+    if (dladdr(&hal_data, &data) == 0 || dladdr(&halcyon_here, &here) == 0 || strcmp(data.dli_fname, here.dli_fname) == 0) return;
+    const char *const slash = strrchr(data.dli_fname, '/'), *const name = slash ? slash + 1 : data.dli_fname;
+    for (size_t i = 0; i < sizeof replaced / sizeof *replaced; ++i)
+        if (strcmp(name, replaced[i].name) == 0) end(name, replaced[i].instead);
+    end(name, "hal shell, hal panel, or Python's hal module");
+}
+
+/* Reached by libraries that walk (Tcl's, Python's): these have no copies. */
+#define WALKER(function)                                                                                        \
+    void *function(void);                                                                                       \
+    void *function(void) { return end(#function, "Python's and Tcl's hal of Halcyon, which loadusr and hal linuxcnc find first"), NULL; }
+WALKER(halpr_find_comp_by_id)
+WALKER(halpr_find_comp_by_name)
+WALKER(halpr_find_funct_by_name)
+WALKER(halpr_find_funct_by_owner)
+WALKER(halpr_find_param_by_name)
+WALKER(halpr_find_param_by_owner)
+WALKER(halpr_find_pin_by_name)
+WALKER(halpr_find_pin_by_owner)
+WALKER(halpr_find_pin_by_sig)
+WALKER(halpr_find_sig_by_name)
+WALKER(halpr_find_thread_by_name)
