@@ -18,7 +18,7 @@ static const struct { const char *name, *instead; } replaced[] = {
     {"halcmd", "halcmd of Halcyon, which loadusr and hal linuxcnc find first in PATH"},
     {"halrmt", "hal shell, or the control protocol (docs/protocol.md)"},
     {"halmeter", "hal meter NAME"},
-    {"halscope", "hal scope, or hal panel --scope in a browser"},
+    {"halscope", "hal scope, or hal panel in a browser"},
     {"classicladder", "a component of your own: hal new"},
 };
 

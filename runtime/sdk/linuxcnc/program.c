@@ -70,9 +70,9 @@ static bool take_pin(const hal_host *host_itself, const hal_pin_decl *decl, hal_
     one.doc = strdup(decl->doc);
     pin->own = decl->initial;
     pin->slot = &pin->own;
-    if (decl->pointer) *decl->pointer = pin->slot;
     good = good && one.prefix && one.name && one.doc && halcyon_declare(of, &one);
     if (good) of->links[of->link_count++] = one;
+    if (good && decl->pointer) *decl->pointer = pin->slot; /* a pin that is rejected leaves the pointer as it is */
     halcyon_unlock(before);
     return good || report_rejection(of->name, decl->name);
 }

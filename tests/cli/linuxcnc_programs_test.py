@@ -1,0 +1,140 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""liblinuxcnchal.so.0: programs that are linked to LinuxCNC's library connect to a running machine. The programs are in linuxcnc_programs/, compiled here;
+LinuxCNC is not needed (tests/peers runs its own)."""
+import shutil
+import signal
+import subprocess
+import unittest
+from pathlib import Path
+
+import harness
+from harness import wait_until
+
+SOURCES = Path(__file__).resolve().parent
+CC = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
+LIBRARY = harness.HAL.parent.parent / "lib/halcyon/linuxcnc"
+NETLIST = """newthread servo 1000000
+loadrt sum2 names=adder
+addf adder servo
+start
+setp adder.in0 5
+"""
+
+
+@unittest.skipUnless(CC, "no C compiler")
+class LinuxcncPrograms(harness.Case):
+    def setUp(self):
+        super().setUp()
+        self.programs = self.folder / "bin"
+        self.programs.mkdir()
+        self.environment["PATH"] = f"{self.programs}:{self.environment['PATH']}"
+        self.environment["HAL_RTMOD_DIR"] = str(self.programs)
+
+    def build(self, name):
+        """Linked as LinuxCNC's are: to the name of the library, without a path to it."""
+        subprocess.run([CC, "-O1", "-o", str(self.programs / name), str(SOURCES / f"linuxcnc_programs/{name}.c"),
+                        f"-L{LIBRARY}", "-l:liblinuxcnchal.so.0"], check=True)
+
+    def machine(self, text=NETLIST):
+        return self.start("run", self.write("m.hal", text))
+
+    def say(self, *words):
+        done = self.shell(*words)
+        self.assertEqual((0, ""), (done.returncode, done.stderr), done.stdout)
+        return done.stdout
+
+    def comes(self, name, value):
+        wait_until(lambda: self.value(name) == value, f"{name} is {value}")
+
+    # --- what works ------------------------------------------------------------------------------------------------------
+
+    def test_loads_and_stores_are_pins_of_the_machine(self):
+        self.build("gauge")
+        machine = self.machine()
+        self.say("loadusr", "-Wn", "gauge", "gauge")
+        components = self.say("show", "comp")
+        self.assertRegex(components, r"User  gauge +\d+ ready\n")
+        self.assertRegex(components, r"User  gauge-helper +\d+ ready\n")
+        self.assertEqual("-7", self.value("gauge.count"))
+        self.say("net", "a", "adder.out", "gauge.0.in")
+        self.comes("gauge.0.twice", "10")
+        self.say("setp", "gauge.gain", "4")
+        self.comes("gauge.0.twice", "20")
+        self.say("net", "b", "gauge.0.twice", "adder.in1")  # through both, every time twice the change
+        self.say("setp", "gauge.gain", "0.5")
+        self.comes("gauge.0.twice", "5")
+        self.say("setp", "gauge.on", "1")
+        self.comes("gauge.seen", "TRUE")
+        self.say("setp", "gauge.count", "12")
+        self.comes("gauge.count", "12")
+        before = int(self.value("gauge.steps"))
+        wait_until(lambda: int(self.value("gauge.steps")) > before, "it counts")
+        self.say("unload", "gauge")
+        wait_until(lambda: "gauge" not in self.say("show", "comp"), "both components are gone")
+        self.end(machine)
+
+    def test_a_program_wires_the_machine_and_asks_for_values(self):
+        self.build("wire")
+        machine = self.machine("newthread servo 1000000\nloadrt sum2 names=adder\nloadrt scale names=gain\nsetp adder.in0 5\nstart\n")
+        done = self.shell("loadusr", "-w", "wire")
+        self.assertEqual(
+            ("new 0\nlink 0 0\naddf 0 0\nstart 0\nset 0\nadder.out: float 5 1\nadder.in1: float 0 0\nx: float 5 1\n"
+             "adder.tmax: type 3 0\nadder.ou: EINVAL\nlink -22\nport -22\nunlink 0 delete 0\n",
+             "wire: linkps failed: wire:1:8: error: unknown pin 'nothing.out' [no-such-pin]\n"
+             "wire: pin 'wire.tx' is a port, which a compiled program of LinuxCNC's cannot have here; compile its source: hal compile\n"),
+            (done.stdout, done.stderr))
+        self.assertEqual("15", self.value("gain.out"))
+        self.end(machine)
+
+    def test_programs_and_modules_meet_in_streams(self):
+        self.build("reader")
+        subprocess.run([CC, "-shared", "-fPIC", "-O1", "-o", str(self.programs / "samples.so"), str(SOURCES / "modules/samples.c")], check=True)
+        machine = self.machine(NETLIST + "loadrt samples\naddf samples servo\nsetp samples.real 2.5\nsetp samples.whole -3\n")
+        done = self.shell("loadusr", "-w", "reader")
+        self.assertEqual(("other key -2, other types -22\n" + "2.5 -3, the next: 1\n" * 2, ""), (done.stdout, done.stderr))
+        self.end(machine)
+
+    # --- what goes wrong --------------------------------------------------------------------------------------------------
+
+    def test_a_killed_program_is_dead_and_its_successor_takes_its_pins(self):
+        self.build("gauge")
+        machine = self.machine()
+        self.say("loadusr", "-Wn", "gauge", "gauge")
+        self.say("net", "a", "adder.out", "gauge.0.in")
+        pid = next(line.split()[3] for line in self.say("show", "comp").splitlines() if " gauge " in line)
+        subprocess.run(["kill", "-9", pid], check=True)
+        wait_until(lambda: "dead since" in self.say("show", "comp"), "it is dead")
+        self.comes("gauge.0.twice", "10")  # the last value
+        self.say("loadusr", "-Wn", "gauge", "gauge")
+        self.say("setp", "adder.in0", "6")
+        self.comes("gauge.0.twice", "12")
+        self.end(machine)
+
+    def test_without_a_machine(self):
+        self.build("gauge")
+        done = subprocess.run([self.programs / "gauge"], env={**self.environment, "LD_LIBRARY_PATH": str(LIBRARY)}, capture_output=True, text=True)
+        self.assertEqual((1, "gauge-helper: no machine 'default' is running (hal run FILE.hal; HALCYON_INSTANCE names another)\n"
+                             "gauge: no machine 'default' is running (hal run FILE.hal; HALCYON_INSTANCE names another)\n"), (done.returncode, done.stderr))
+
+    def test_a_program_that_reads_linuxcncs_memory(self):
+        for name, instead in (("walker", "hal shell, hal panel, or Python's hal module"), ("halscope", "hal scope, or hal panel in a browser")):
+            self.build("walker")
+            if name != "walker":
+                (self.programs / "walker").rename(self.programs / name)
+            done = subprocess.run([self.programs / name], env={**self.environment, "LD_LIBRARY_PATH": str(LIBRARY)}, capture_output=True, text=True)
+            self.assertEqual((1, f"{name}: this program reads LinuxCNC's memory directly, which a machine of Halcyon does not have. "
+                                 f"In its place: {instead}\n"), (done.returncode, done.stderr))
+
+    def test_the_machine_is_killed(self):
+        self.build("gauge")
+        machine = self.machine()
+        self.say("loadusr", "-Wn", "gauge", "gauge")
+        machine.send_signal(signal.SIGKILL)
+        machine.wait()
+        wait_until(lambda: subprocess.run(["pgrep", "-f", f"{self.programs}/gauge"], capture_output=True).returncode != 0 or
+                   subprocess.run(["pgrep", "-x", "gauge"], capture_output=True).returncode != 0, "the program ends with it")
+
+
+if __name__ == "__main__":
+    unittest.main()
