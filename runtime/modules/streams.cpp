@@ -85,7 +85,7 @@ int hal_stream_detach(halcyon_stream* stream) {
 
 int hal_stream_attach(halcyon_stream* stream, int comp, int key, const char* types) {
     if (!stream) return -EINVAL;
-    if (shmget(key, 0, 0) < 0) return -errno;  // whoever makes the records creates it
+    if (shmget(key, 0, 0) < 0) return -errno;  // the writer creates it
     const int segment = rtapi_shmem_new(key, comp, data_offset);
     if (segment < 0) return segment;
     *stream = {comp, segment, nullptr};

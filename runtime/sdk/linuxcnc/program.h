@@ -40,7 +40,7 @@ extern char halcyon_program_prefix[256]; /* of a .comp file's instance; "": name
 locale_t halcyon_lock(void); /* numbers have a point until halcyon_unlock() restores the locale that this returns */
 void halcyon_unlock(locale_t before);
 
-/* --- program_exchange.c: what the machine and this process tell each other; all under the lock ------------------------------------ */
+/* --- program_exchange.c: what the machine and this process exchange; all under the lock ------------------------------------ */
 
 extern bool halcyon_ending; /* the helper thread is to end */
 bool halcyon_find_machine(void);
@@ -48,7 +48,7 @@ bool halcyon_announce(struct halcyon_program *, bool is_ready, bool whole); /* r
 bool halcyon_declare(struct halcyon_program *, struct halcyon_link *);
 void halcyon_unregister(struct halcyon_program *);
 void halcyon_exchange(struct halcyon_program *);
-bool halcyon_start_helper(void); /* false when there is no thread */
+bool halcyon_start_helper(void); /* false when the thread cannot be made */
 void halcyon_stop_helper(void);  /* not under the lock */
 void halcyon_catch_end_signals(void);
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What a program and the machine tell each other (docs/protocol.md): registration, declarations, and the values, which a helper thread
+ * What a program and the machine exchange (docs/protocol.md): registration, declarations, and the values, which a helper thread
  * exchanges some 400 times a second. It sends what the program has changed and stores what the machine has changed, unless the program
  * has changed the same pin in the meantime; then the program's value is sent with the next exchange.
  */
