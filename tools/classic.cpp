@@ -14,6 +14,7 @@
 #include "inspect/play.hpp"
 #include "inspect/record.hpp"
 #include "inspect/shell.hpp"
+#include "linuxcnc/tcl.hpp"
 #include "machine/address.hpp"
 #include "run/run.hpp"
 
@@ -187,7 +188,7 @@ int lcec_conf(int argc, char** argv) {
 }
 
 constexpr Classic table[] = {{"halcmd", halcmd},         {"halcompile", halcompile},   {"halrun", halrun},
-                             {"halsampler", halsampler}, {"halstreamer", halstreamer}, {"lcec_conf", lcec_conf}};
+                             {"halsampler", halsampler}, {"halstreamer", halstreamer}, {"haltcl", haltcl}, {"lcec_conf", lcec_conf}};
 
 }  // namespace
 

@@ -52,6 +52,7 @@
 #include "inspect/tdma_ping.hpp"
 #include "inspect/tdma_status.hpp"
 #include "inspect/top.hpp"
+#include "linuxcnc/linuxcnc.hpp"
 #include "machine/source_tree.hpp"
 #include "panel/panel.hpp"
 #include "paths.hpp"
@@ -104,6 +105,7 @@ constexpr Subcommand command(const char* name, const char* usage, const char* su
 constexpr Subcommand table[] = {
     command<RunOptions, run_run>("run", "FILE… [-- ARG…]", "load netlists and run them in real-time threads"),
     command<SimOptions, run_sim>("sim", "FILE… [--for TIME] [-- ARG…]", "run netlists on a virtual clock: deterministic, as fast as possible"),
+    command<LinuxcncOptions, run_linuxcnc>("linuxcnc", "FILE.ini [-- ARG…]", "run a LinuxCNC configuration: its netlists, task, I/O and display, until the display ends"),
     command<RemoteShellOptions, run_shell>("shell", "[COMMAND…]", "command a running instance: one command, a file of commands, or interactively", true),
     command<CheckOptions, run_check>("check", "FILE… [--assume NAME]", "check netlists without running them"),
     command<FmtOptions, run_fmt>("fmt", "FILE…", "format netlists"),

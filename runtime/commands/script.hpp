@@ -32,7 +32,7 @@ public:
     /// Runs commands whose text is in the session's sources, then ends the last transaction. Returns like run(source).
     int run(const std::vector<Command>& commands);
     /// Several texts with the loads of all of them merged and done first (`[HAL]TWOPASS`).
-    int run_two_pass(const std::vector<std::uint32_t>& texts);
+    int run_two_pass(const std::vector<std::uint32_t>& texts, Pass pass = Pass::both);
 
     /// The `source` and `quit` commands.
     void source(Context& context);

@@ -27,7 +27,7 @@ bool opts_out(std::string_view text) {
 
 }  // namespace
 
-int Script::run_two_pass(const std::vector<std::uint32_t>& texts) {
+int Script::run_two_pass(const std::vector<std::uint32_t>& texts, Pass pass) {
     // Loading is additive here, so that the loads of all files need not be merged into one line per component: doing
     // them first, in order, gives the same instances. loadusr comes before that, as in LinuxCNC's first pass.
     std::vector<Command> programs, loads, rest;
@@ -65,8 +65,14 @@ int Script::run_two_pass(const std::vector<std::uint32_t>& texts) {
     }
     text_is_kept_ = true;
     files_.push_back({"", {}});
-    run_row(programs, 0, programs.size());
-    run_row(loads, 0, loads.size());
+    if (pass != Pass::rest) {
+        run_row(programs, 0, programs.size());
+        run_row(loads, 0, loads.size());
+    }
+    if (pass == Pass::loads) {
+        rest.clear();
+        whole.clear();
+    }
     std::size_t at = 0;
     for (std::size_t i = 0; i < whole.size(); ++i) {
         run_row(rest, at, whole[i]);

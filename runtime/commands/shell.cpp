@@ -6,7 +6,8 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <span>
+#include <iterator>
+#include <sstream>
 #include <utility>
 #include <vector>
 
@@ -171,59 +172,108 @@ int Shell::read_ini(const std::string& path, Output& output) {
     return 0;
 }
 
+/// One netlist named by [HAL]HALFILE or [HAL]POSTGUI_HALFILE.
+struct HalFile {
+    std::string name;  ///< as messages call it; of a script, its path
+    std::string text;
+    bool script = false;
+    std::vector<std::string> arguments = {};  ///< of a script
+};
+
+namespace {
+
+std::vector<std::string> words_of(const std::string& line) {
+    std::istringstream in(line);
+    return {std::istream_iterator<std::string>(in), {}};
+}
+
+}  // namespace
+
+void Shell::run_scripts_with(ScriptRunner runner) { state_->run_script = std::move(runner); }
+
+/// Reads the files that a key of [HAL] names, relative to the folder of the INI file. Returns 1 after reporting those that cannot be read.
+int Shell::take_files(const std::string& path, const char* key, std::vector<HalFile>& files, Output& output) {
+    int status = 0;
+    std::string at;  // of a file named by a relative path
+    for (const std::string& entry : state_->session.ini.all("HAL", key)) {
+        std::vector<std::string> words = words_of(entry);
+        const std::string file = words.empty() ? "" : words[0];
+        std::string text, problem = "it is a Tcl script";
+        const bool script = file.ends_with(".tcl");
+        if ((!script || state_->run_script) && read_netlist(file, options.directory, at, text, problem)) {
+            // Messages name it as the INI file was named.
+            const std::string beside = resolve_path(file, options.directory);
+            if (script) files.push_back({at, "", true, {words.begin() + 1, words.end()}});
+            else files.push_back({at == beside ? resolve_path(file, folder_of(path)) : at, std::move(text)});
+            continue;
+        }
+        if (options.check) state_->session.absences().note_missing_text(file);
+        status = script && !state_->run_script
+                     ? cannot_read(*this, output, file, problem, "unsupported-file",
+                                   "`hal linuxcnc " + path + "` runs Tcl; or rewrite it as a .hal file, where loops become ranges: pid.[0..5].command")
+                     : cannot_read(*this, output, file, problem, "unreadable-file",
+                                   "named by [HAL]" + std::string(key) + " in " + path +
+                                       "; HALLIB_PATH and HALLIB_DIR are further search paths");
+    }
+    return status;
+}
+
+int Shell::run_halfiles(const std::string& path, Output& output) {
+    const Borrowed in_folder(options.directory, folder_of(canonical_path(resolve_path(path, options.directory))));
+    std::vector<HalFile> files;
+    const int status = take_files(path, "HALFILE", files, output);
+    if (status != 0 && !options.keep_going) return status;
+    bool quit = false;
+    return status | run_taken(files, quit, output);
+}
+
+/// Runs netlists that were read, with [HAL]TWOPASS. Sets `quit` when a `quit` in them ends the loading.
+int Shell::run_taken(std::vector<HalFile>& files, bool& quit, Output& output) {
+    int status = 0;
+    const auto over = [&] { return quit || (status != 0 && !options.keep_going && !options.check); };
+    const bool two_pass = !state_->session.ini.get("HAL", "TWOPASS").value_or("").empty();
+    if (!two_pass) {
+        for (HalFile& file : files) {
+            status |= file.script ? state_->run_script(file.name, file.arguments, Pass::both, output) : run_text(file.name, std::move(file.text), output);
+            if (over()) break;
+        }
+        return status;
+    }
+    const bool scripts = std::any_of(files.begin(), files.end(), [](const HalFile& file) { return file.script; });
+    for (const Pass pass : scripts ? std::vector{Pass::loads, Pass::rest} : std::vector{Pass::both}) {
+        for (auto file = files.begin(); file != files.end() && !over();) {
+            if (file->script) {
+                status |= state_->run_script(file->name, file->arguments, pass, output);
+                ++file;
+                continue;
+            }
+            Script script(*this, *state_, output);
+            std::vector<std::uint32_t> sources;
+            for (; file != files.end() && !file->script; ++file) sources.push_back(state_->session.sources.add(file->name, file->text));
+            status |= script.run_two_pass(sources, pass);
+            quit = quit || script.quit_seen();
+        }
+    }
+    return status;
+}
+
 int Shell::run_ini(const std::string& path, Output& output) {
     if (read_ini(path, output) != 0) return 1;
     const Ini& ini = state_->session.ini;
-    const std::string full = resolve_path(path, options.directory);
     // As LinuxCNC does, everything named in the file is relative to its folder.
-    const Borrowed in_folder(options.directory, folder_of(canonical_path(full)));
-
-    int status = 0;
-    std::vector<std::pair<std::string, std::string>> texts;  // name, text
-    std::string at;                                          // of a file named by a relative path
-    const auto take_files = [&](const char* key) {
-        for (const std::string& entry : ini.all("HAL", key)) {
-            const std::string file = entry.substr(0, entry.find(' '));
-            std::string text, problem = "it is a Tcl script";
-            const bool script = file.ends_with(".tcl");
-            if (!script && read_netlist(file, options.directory, at, text, problem)) {
-                // Messages name it as the INI file was named.
-                const std::string beside = resolve_path(file, options.directory);
-                texts.emplace_back(at == beside ? resolve_path(file, folder_of(path)) : at, std::move(text));
-                continue;
-            }
-            if (options.check) state_->session.absences().note_missing_text(file);
-            status = script ? cannot_read(*this, output, file, problem, "unsupported-file",
-                                          "rewrite it as a .hal file; loops become ranges: pid.[0..5].command")
-                            : cannot_read(*this, output, file, problem, "unreadable-file",
-                                          "named by [HAL]" + std::string(key) + " in " + path +
-                                              "; HALLIB_PATH and HALLIB_DIR are further search paths");
-        }
-    };
+    const Borrowed in_folder(options.directory, folder_of(canonical_path(resolve_path(path, options.directory))));
     if (options.check) note_programs(state_->session, ini);
-    take_files("HALFILE");
-    const std::size_t before_display = texts.size();
-    if (options.check) take_files("POSTGUI_HALFILE");  // for `hal check` only: no user interface runs here
+    std::vector<HalFile> files, after_display;
+    int status = take_files(path, "HALFILE", files, output);
+    if (options.check) status |= take_files(path, "POSTGUI_HALFILE", after_display, output);  // for `hal check` only: no user interface runs here
     if (status != 0 && !options.keep_going) return status;
     std::string commands;
     for (const std::string& command : ini.all("HAL", "HALCMD")) commands += command + "\n";
-
-    const bool two_pass = !ini.get("HAL", "TWOPASS").value_or("").empty();
-    if (two_pass) {
-        Script script(*this, *state_, output);
-        std::vector<std::uint32_t> sources;
-        for (auto& [name, text] : std::span(texts).first(before_display)) sources.push_back(state_->session.sources.add(name, std::move(text)));
-        status |= script.run_two_pass(sources);
-        if (script.quit_seen()) return status;
-    } else {
-        for (auto& [name, text] : std::span(texts).first(before_display)) {
-            status |= run_text(name, std::move(text), output);
-            if (status != 0 && !options.keep_going && !options.check) return status;
-        }
-    }
-    if (status != 0 && !options.keep_going && !options.check) return status;
+    bool quit = false;
+    status |= run_taken(files, quit, output);
+    if (quit || (status != 0 && !options.keep_going && !options.check)) return status;
     if (!commands.empty()) status |= run_text(path + " [HAL]HALCMD", std::move(commands), output);
-    for (auto& [name, text] : std::span(texts).subspan(before_display)) status |= run_text(name, std::move(text), output);
+    for (HalFile& file : after_display) status |= run_text(file.name, std::move(file.text), output);
     return status;
 }
 

@@ -20,6 +20,7 @@ namespace hal {
 class Ini;
 class Session;
 struct Command;
+struct HalFile;
 
 /// Where the text of commands goes.
 class Output {
@@ -65,6 +66,12 @@ struct ShellOptions {
     std::string directory = {};  ///< what relative paths of source, save, loadusr are relative to; empty: the process's own
 };
 
+/// Which commands of a netlist run: LinuxCNC's TWOPASS does the loads of all files before anything else.
+enum class Pass { both, loads, rest };
+
+/// Runs a netlist that is a script of another language: the file, its arguments, which of its commands. Returns the exit status.
+using ScriptRunner = std::function<int(const std::string& path, const std::vector<std::string>& arguments, Pass, Output&)>;
+
 class Shell {
 public:
     /// The session must outlive it.
@@ -91,6 +98,10 @@ public:
     int run_file(const std::string& path, Output& output);
     /// Reads an .ini file for [SECTION]KEY only (`-i`).
     int read_ini(const std::string& path, Output& output);
+    /// Runs the files of [HAL]HALFILE, with TWOPASS, of the INI file at `path`, which was read.
+    int run_halfiles(const std::string& path, Output& output);
+    /// Sets what runs the Tcl files among them; without it they are errors.
+    void run_scripts_with(ScriptRunner runner);
 
     /// True between `begin` and `commit` or `abort`; the edits are kept in this shell and invisible to others.
     bool collecting() const;
@@ -124,6 +135,8 @@ public:
 
 private:
     int run_ini(const std::string& path, Output& output);
+    int take_files(const std::string& path, const char* key, std::vector<HalFile>& files, Output& output);
+    int run_taken(std::vector<HalFile>& files, bool& quit, Output& output);
     std::unique_ptr<State> state_;
 };
 

@@ -23,6 +23,7 @@ struct Shell::State {
     std::function<std::optional<std::string>(const std::string&)> variable = {};
     /// Lines of `show latency` about signals between machines, shared by all shells of the session and read with its lock held.
     std::shared_ptr<std::vector<std::string>> latencies = std::make_shared<std::vector<std::string>>();
+    ScriptRunner run_script = {};
     std::optional<Ini> ini = {};           ///< what [SECTION]KEY means to this shell, when it is not the session's INI file
 };
 

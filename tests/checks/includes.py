@@ -21,11 +21,12 @@ ROWS = {
     "runtime/commands": ["runtime/machine"],
     "runtime/control": ["runtime/commands"],
     "runtime/cells": ["runtime/control", "components/dds/links"],
-    "tools": ["tools/inspect", "tools/trace", "tools/comp", "tools/bus", "tools/panel"],  # the table of subcommands
+    "tools": ["tools/inspect", "tools/linuxcnc", "tools/trace", "tools/comp", "tools/bus", "tools/panel"],  # the table of subcommands
     "tools/cli": ["runtime/control"],
     "tools/run": ["tools/record", "runtime/cells"],
     "tools/record": ["tools/cli", "drivers/link", "components/recording/mcap"],
     "tools/inspect": ["tools/run", "tools/scope"],
+    "tools/linuxcnc": ["tools/run", "tools/comp"],
     "tools/scope": ["tools/cli"],
     "tools/trace": ["tools/cli"],
     "tools/doc": ["tools/cli"],

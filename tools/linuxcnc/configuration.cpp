@@ -1,0 +1,224 @@
+// SPDX-License-Identifier: MIT
+#include "linuxcnc/configuration.hpp"
+
+#include <cstdlib>
+#include <filesystem>
+#include <fmt/core.h>
+#include <iterator>
+#include <sstream>
+#include <unistd.h>
+
+#include "cli/output.hpp"
+#include "commands/files.hpp"
+#include "text/characters.hpp"
+#include "text/diagnostic.hpp"
+#include "text/numbers.hpp"
+
+namespace hal::tools {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+Words words_of(const std::string& text) {
+    std::istringstream in(text);
+    return {std::istream_iterator<std::string>(in), {}};
+}
+
+bool executable(const std::string& file) { return ::access(file.c_str(), X_OK) == 0 && !fs::is_directory(file); }
+
+constexpr std::string_view include_word = "#INCLUDE";
+
+bool is_include(std::string_view line) {
+    return line.starts_with(include_word) && line.size() > include_word.size() && is_blank(line[include_word.size()]);
+}
+
+/// The text of an INI file with the text of its includes in their place. That all can be read, Ini::read has found.
+std::string with_includes(const std::string& path, bool& any) {
+    std::string text, whole;
+    if (!read_text_file(path, text, whole)) return {};
+    whole.clear();
+    std::istringstream lines(text);
+    for (std::string line; std::getline(lines, line);) {
+        const std::string_view content = trimmed(line);
+        if (!is_include(content)) {
+            whole += line + "\n";
+            continue;
+        }
+        any = true;
+        whole += with_includes(resolve_path(std::string(trimmed(content.substr(include_word.size()))), folder_of(path)), any);
+    }
+    return whole;
+}
+
+/// LinuxCNC's programs do not read includes: they get a file without them, beside the INI file because relative paths start there.
+bool expand(Configuration& configuration, const Options& options) {
+    bool any = false;
+    const std::string text = with_includes(configuration.file, any);
+    if (!any) return true;
+    const std::string file = configuration.file + ".expanded";
+    if (const std::string problem = write_file(file, text); !problem.empty())
+        return fail(options,
+                    fmt::format("{} has #INCLUDE, so a file with the included text is needed beside it: {}", configuration.given, problem)),
+               false;
+    configuration.file = file;
+    configuration.expanded = true;
+    return true;
+}
+
+class Reader {
+public:
+    Reader(const LinuxcncOptions& options, Configuration& to) : options_(options), to_(to) {}
+
+    bool read() {
+        if (!version()) return false;
+        to_.task = program("TASK", "TASK", "milltask");
+        to_.io = program("EMCIO", "EMCIO", "io");
+        to_.halui = program("HAL", "HALUI", "");
+        to_.display = program("DISPLAY", "DISPLAY", "");
+        to_.planner = words_of(options_.planner.empty() ? value("TRAJ", "TPMOD", "tpmod") : options_.planner);
+        to_.homing = words_of(options_.homing.empty() ? value("EMCMOT", "HOMEMOD", "homemod") : options_.homing);
+        to_.nml = value("LINUXCNC", "NML_FILE", value("EMC", "NML_FILE", to_.home + "/share/linuxcnc/linuxcnc.nml"));
+        to_.nml = resolve_path(to_.nml, to_.folder);
+        to_.shutdown = value("HAL", "SHUTDOWN", "");
+        for (const std::string& line : to_.ini.all("APPLICATIONS", "APP")) to_.applications.push_back(with_home(words_of(line)));
+        if (to_.display.empty())
+            return complain(
+                       "[DISPLAY]DISPLAY is missing: the machine runs as long as its display does; write DISPLAY = axis, linuxcncrsh, "
+                       "./my-ui.py or dummy"),
+                   false;
+        return delay() && programs();
+    }
+
+private:
+    bool version() {
+        const auto version = to_.ini.get("EMC", "VERSION");
+        if (version == "1.1") return true;
+        complain(fmt::format("[EMC]VERSION is {}, not 1.1: the file is from an older LinuxCNC; type: update_ini {}",
+                             version ? *version : "missing", to_.given));
+        return false;
+    }
+
+    bool delay() {
+        const std::string text = value("APPLICATIONS", "DELAY", "0");
+        const auto seconds = parse_real(text);
+        if (!seconds || !(*seconds >= 0 && *seconds <= 3600))
+            return complain(fmt::format("[APPLICATIONS]DELAY is {}, not a time of 0..3600 seconds", text)), false;
+        to_.applications_delay_ns = static_cast<std::int64_t>(*seconds * 1e9);
+        return true;
+    }
+
+    /// The programs of LinuxCNC, and the display.
+    bool programs() {
+        for (const std::string& name : {std::string("linuxcncsvr"), to_.io[0], to_.task[0]})
+            if (find_program(to_, name).empty())
+                return fail(options_, fmt::format("'{}' is not installed; type: sudo apt-get install linuxcnc-uspace", name)), false;
+        if (!to_.halui.empty() && find_program(to_, to_.halui[0]).empty()) return missing("[HAL]HALUI", to_.halui[0]);
+        if (to_.display[0] != "dummy" && find_program(to_, to_.display[0]).empty()) return missing("[DISPLAY]DISPLAY", to_.display[0]);
+        for (const Words& application : to_.applications)
+            if (!application.empty() && find_program(to_, application[0]).empty()) return missing("[APPLICATIONS]APP", application[0]);
+        return true;
+    }
+
+    bool missing(const char* key, const std::string& program) {
+        const std::string beside = resolve_path(program, to_.folder);
+        std::string why = "it is not in PATH";
+        if (fs::exists(beside) && program.find('/') == program.npos)
+            why = fmt::format("it is not in PATH; for the file beside the INI file write ./{}", program);
+        else if (fs::exists(beside)) why = fmt::format("it is not executable; type: chmod +x {}", beside);
+        else if (program.find('/') != program.npos) why = "No such file or directory";
+        complain(fmt::format("{} is '{}', which cannot be started: {}", key, program, why));
+        return false;
+    }
+
+    Words program(const char* section, const char* key, const char* otherwise) {
+        return with_home(words_of(value(section, key, otherwise)));
+    }
+    static Words with_home(Words words) {
+        if (!words.empty() && words[0].starts_with('~')) words[0] = resolve_path(words[0], "");
+        return words;
+    }
+    std::string value(const char* section, const char* key, const std::string& otherwise) {
+        const auto found = to_.ini.get(section, key);
+        return found && !found->empty() ? *found : otherwise;
+    }
+    void complain(const std::string& sentence) { fail(options_, fmt::format("{}: {}", to_.given, sentence)); }
+
+    const LinuxcncOptions& options_;
+    Configuration& to_;
+};
+
+void set_variable(const char* name, const std::string& value, bool replace = true) { ::setenv(name, value.c_str(), replace ? 1 : 0); }
+
+std::string with_rest(const std::string& first, const char* variable) {
+    const char* const rest = std::getenv(variable);
+    return rest && *rest ? first + ":" + rest : first;
+}
+
+}  // namespace
+
+std::string find_program(const Configuration& configuration, const std::string& program) {
+    if (program.find('/') != program.npos) {
+        const std::string file = resolve_path(program, configuration.folder);
+        return executable(file) ? file : "";
+    }
+    std::istringstream folders(with_rest(configuration.folder + "/bin:" + configuration.home + "/bin", "PATH"));
+    for (std::string folder; std::getline(folders, folder, ':');)
+        if (std::string file = (folder.empty() ? "." : folder) + "/" + program; executable(file)) return file;
+    // Its Tcl programs are not in PATH: tklinuxcnc.
+    const std::string script = configuration.home + "/lib/tcltk/linuxcnc/" + program + ".tcl";
+    return executable(script) ? script : "";
+}
+
+std::optional<Configuration> read_configuration(const LinuxcncOptions& options) {
+    Configuration configuration;
+    configuration.given = options.words.empty() ? "" : options.words[0];
+    if (options.words.size() != 1 || !configuration.given.ends_with(".ini")) {
+        const std::string extra = options.words.size() > 1 ? options.words[1] : configuration.given;
+        fail(options, options.words.size() > 1 ? fmt::format("unexpected argument '{}'; arguments of the display go behind --", extra)
+                                               : fmt::format("'{}' is not an INI file; type: hal linuxcnc FILE.ini", extra));
+        return std::nullopt;
+    }
+    const char* const home = std::getenv("LINUXCNC_HOME");
+    configuration.home = home && *home ? home : "/usr";
+    configuration.file = canonical_path(configuration.given);
+    configuration.folder = folder_of(configuration.file);
+    if (configuration.given.find('/') != std::string::npos) configuration.given = configuration.file;  // the working folder changes
+    Sources sources;
+    Diagnostics diagnostics;
+    configuration.ini = Ini::read(sources, configuration.given, diagnostics);
+    write_all(STDERR_FILENO, render(diagnostics, sources, colours(STDERR_FILENO)));
+    if (diagnostics.failed() || !Reader(options, configuration).read() || !expand(configuration, options)) return std::nullopt;
+    return configuration;
+}
+
+void remove_expanded(const Configuration& configuration) {
+    if (configuration.expanded) ::unlink(configuration.file.c_str());
+}
+
+void export_configuration(const Configuration& configuration, const LinuxcncOptions& options) {
+    const std::string& home = configuration.home;
+    const std::string tcl = home + "/lib/tcltk/linuxcnc", hallib = home + "/share/linuxcnc/hallib";
+    set_variable("INI_FILE_NAME", configuration.file);
+    set_variable("CONFIG_DIR", configuration.folder);
+    set_variable("NMLFILE", configuration.nml);
+    set_variable("HAL_RTMOD_DIR", home + "/lib/linuxcnc/modules", false);
+    set_variable("HALLIB_DIR", hallib);
+    set_variable("HALLIB_PATH", (options.halfiles.empty() ? "" : canonical_path(options.halfiles) + ":") + ".:" + hallib);
+    set_variable("HALCMD", options.keep_going ? "halcmd -k" : "halcmd");
+    set_variable("REALTIME", "true");  // programs run it with `start` or `stop`; the machine does both itself
+    set_variable("LINUXCNC_HOME", home);
+    set_variable("LINUXCNC_TCL_DIR", tcl);
+    set_variable("LINUXCNC_LANG_DIR", tcl + "/msgs");
+    set_variable("LINUXCNC_EMCSH", "wish");
+    set_variable("LINUXCNC_HELP_DIR", home + "/share/doc/linuxcnc");
+    set_variable("LINUXCNC_NCFILES_DIR", home + "/share/linuxcnc/ncfiles");
+    set_variable("TRAJ_COORDINATES", configuration.ini.get("TRAJ", "COORDINATES").value_or(""));
+    set_variable("KINS_KINEMATICS", configuration.ini.get("KINS", "KINEMATICS").value_or(""));
+    set_variable("PYTHONPATH", with_rest(home + "/lib/python", "PYTHONPATH"));
+    std::error_code unknown;
+    const std::string own = fs::read_symlink("/proc/self/exe", unknown).parent_path().string();
+    set_variable("PATH", with_rest(fmt::format("{}/bin:{}:{}/bin", configuration.folder, own, home), "PATH"));
+}
+
+}  // namespace hal::tools

@@ -1,0 +1,240 @@
+// SPDX-License-Identifier: MIT
+#include "linuxcnc/launch.hpp"
+
+#include <atomic>
+#include <chrono>
+#include <csignal>
+#include <cstring>
+#include <filesystem>
+#include <fmt/format.h>
+#include <thread>
+#include <unistd.h>
+
+#include "cli/output.hpp"
+#include "commands/files.hpp"
+#include "linuxcnc/tcl.hpp"
+#include "machine/programs.hpp"
+#include "run/fault_lines.hpp"
+#include "run/report.hpp"
+
+namespace hal::tools {
+
+namespace {
+
+using namespace std::chrono_literals;
+
+/// "ended with exit status 3", "was terminated by SIGKILL".
+std::string how_it_ended(int status) {
+    if (status == 0) return "ended";
+    if (status <= 128) return fmt::format("ended with exit status {}", status);
+    const char* const name = ::sigabbrev_np(status - 128);
+    return name ? fmt::format("was terminated by SIG{}", name) : fmt::format("was terminated by signal {}", status - 128);
+}
+
+Words with_ini(const Words& program, const std::string& ini) {
+    Words words = program;
+    words.insert(words.end(), {"-ini", ini});
+    return words;
+}
+
+}  // namespace
+
+Launch::Launch(const LinuxcncOptions& options, const Configuration& configuration, HostedMachine& machine, MachineLock& lock)
+    : options_(options), configuration_(configuration), machine_(machine), lock_(lock) {
+    machine_.shell.run_scripts_with(
+        [this](const std::string& path, const Words& arguments, Pass pass, Output&) { return run_netlist_in_tcl(path, arguments, pass); });
+}
+
+int Launch::run() {
+    const Configuration& c = configuration_;
+    const bool started = check() && start_server() && start_component("[EMCIO]EMCIO", "iocontrol", c.io) &&
+                         (c.halui.empty() || start_component("[HAL]HALUI", "halui", c.halui)) && load_module(c.planner) &&
+                         load_module(c.homing) && load_netlists() && start_task() && start_applications() && start_display();
+    if (started) {
+        const FaultLines faults(machine_.session);
+        watch();
+        end();
+    } else {
+        if (machine_.stop.requested()) status_ = 0;
+        end();
+    }
+    if (const int signal = machine_.stop.signal(); signal != 0 && signal != SIGINT)
+        print(fmt::format("ended by SIG{}\n", ::sigabbrev_np(signal)));
+    return status_;
+}
+
+bool Launch::step(const std::string& sentence) {
+    if (options_.verbose) print(sentence + "\n");
+    return !machine_.stop.requested();
+}
+
+bool Launch::command(const Words& words, const std::string& source) {
+    return machine_.shell.execute(words, output_, source) == 0 && !machine_.stop.requested();
+}
+
+bool Launch::check() {
+    if (machine_.shell.read_ini(configuration_.given, output_) != 0) return false;
+    const std::string script = configuration_.home + "/share/linuxcnc/hallib/check_config.tcl";
+    if (!std::filesystem::exists(script) || find_program(configuration_, "tclsh").empty()) return step("check the configuration: left out");
+    if (!step("check the configuration")) return false;
+    const pid_t pid = start("check_config.tcl", {"tclsh", script, configuration_.file});
+    const auto status = pid == 0 ? std::optional(1) : wait_for(pid, -1);
+    return status == 0;
+}
+
+bool Launch::start_server() {
+    if (!step("start linuxcncsvr")) return false;
+    const pid_t pid = start("linuxcncsvr", {"linuxcncsvr", "-ini", configuration_.file});
+    if (pid == 0) return false;
+    server_.pid = pid;
+    const auto status = wait_for(pid, 10'000'000'000);  // it ends once its successor has the buffers ready
+    if (machine_.stop.requested()) return false;
+    if (!status) return server_.daemon = false, true;
+    server_.pid = 0;
+    if (*status != 0)
+        return fail(options_, fmt::format("linuxcncsvr {}: another one may be using its TCP port or NML buffers", how_it_ended(*status))),
+               false;
+    for (const Child& child : children())
+        if (child.name == "linuxcncsvr" && !child.ended) server_.pid = child.pid;
+    if (server_.pid == 0) return fail(options_, "linuxcncsvr has ended; the NML buffers need it"), false;
+    lock_.note_server(server_.pid);
+    return true;
+}
+
+bool Launch::start_component(const char* key, const char* component, const Words& program) {
+    if (!step(fmt::format("start {}", program[0]))) return false;
+    Words words{"loadusr", "-Wn", component};
+    for (const std::string& word : with_ini(program, configuration_.file)) words.push_back(word);
+    if (!command(words, fmt::format("{} {}", configuration_.given, key))) return false;
+    components_.emplace_back(component, program[0]);
+    return true;
+}
+
+bool Launch::load_module(const Words& module) {
+    if (!step(fmt::format("load {}", module[0]))) return false;
+    Words words{"loadrt"};
+    words.insert(words.end(), module.begin(), module.end());
+    return command(words, configuration_.given);
+}
+
+bool Launch::load_netlists() {
+    if (!step("load the netlists of [HAL]HALFILE")) return false;
+    const int status = machine_.shell.run_halfiles(configuration_.given, output_);
+    return (status == 0 || options_.keep_going) && !machine_.stop.requested();
+}
+
+int Launch::run_netlist_in_tcl(const std::string& path, const Words& arguments, Pass pass) {
+    std::string problem;
+    const TclScript script{path, arguments, configuration_.file, &configuration_.ini, pass};
+    const int status = run_tcl(script, [this, &path](const Words& words) {
+        TextOutput text;
+        const int done = machine_.shell.execute(words, text, "<" + std::filesystem::path(path).filename().string() + ">");
+        return TclAnswer{done, std::move(text.out_text), std::move(text.err_text)};
+    }, machine_.stop.fd(), problem);
+    if (status < 0) return fail(options_, fmt::format("'{}' cannot be run: {}", path, problem));
+    if (status != 0 && !machine_.stop.requested()) fail(options_, fmt::format("'{}' {}", path, how_it_ended(status)));
+    return status == 0 ? 0 : 1;
+}
+
+bool Launch::start_task() {
+    // Task waits for motion's threads, which start only after it: so another thread waits for task.
+    if (!step(fmt::format("start {}", configuration_.task[0]))) return false;
+    Shell sibling(machine_.shell, machine_.shell.options);
+    std::atomic<bool> waited{false};
+    int task = 1;
+    Words words{"loadusr", "-Wn", "inihal"};
+    for (const std::string& word : with_ini(configuration_.task, configuration_.file)) words.push_back(word);
+    std::thread waiting([&] {
+        ProcessOutput output;
+        task = sibling.execute(words, output, configuration_.given + " [TASK]TASK");
+        waited = true;
+    });
+    std::string commands;
+    for (const std::string& line : configuration_.ini.all("HAL", "HALCMD")) commands += line + "\n";
+    bool good =
+        commands.empty() || machine_.shell.run_text(configuration_.given + " [HAL]HALCMD", commands, output_) == 0 || options_.keep_going;
+    good = good && step("start the threads");
+    if (good) machine_.start_threads();
+    while (!waited) {
+        if (!good || machine_.stop.requested()) sibling.cancel();
+        std::this_thread::sleep_for(5ms);
+    }
+    waiting.join();
+    if (task == 0) components_.emplace_back("inihal", configuration_.task[0]);
+    return good && task == 0 && !machine_.stop.requested();
+}
+
+bool Launch::start_applications() {
+    if (configuration_.applications.empty()) return true;
+    if (machine_.stop.wait_ns(configuration_.applications_delay_ns)) return false;
+    for (const Words& words : configuration_.applications) {
+        if (words.empty()) continue;
+        if (!step(fmt::format("start {}", words[0]))) return false;
+        const pid_t pid = start("[APPLICATIONS]APP", words);
+        if (pid == 0) return false;
+        applications_.push_back({words[0], pid});
+    }
+    return true;
+}
+
+bool Launch::start_display() {
+    Words words = configuration_.display;
+    display_.name = words[0];
+    if (!step(fmt::format("start the display {}", words[0]))) return false;
+    if (!configuration_.ini.all("HAL", "POSTGUI_HALFILE").empty() && (words[0] == "linuxcncrsh" || words[0] == "dummy"))
+        write_all(STDERR_FILENO, fmt::format("{}: note: [HAL]POSTGUI_HALFILE is loaded by the display, and '{}' does not load it\n",
+                                             options_.program, words[0]));
+    if (words[0] == "dummy") {
+        print("press Enter to end the machine\n");
+        return true;
+    }
+    const std::string program = find_program(configuration_, words[0]);
+    const Words arguments(words.begin() + 1, words.end());
+    words.resize(1);
+    if (program.ends_with(".tcl") && words[0].find('/') == std::string::npos) words[0] = program;
+    const bool server = words[0] == "linuxcncrsh";  // its own options come first
+    if (server) {
+        words.insert(words.end(), arguments.begin(), arguments.end());
+        words.insert(words.end(), options_.arguments.begin(), options_.arguments.end());
+        words.emplace_back("--");
+    }
+    words.insert(words.end(), {"-ini", configuration_.file});
+    if (!server) {
+        words.insert(words.end(), arguments.begin(), arguments.end());
+        words.insert(words.end(), options_.arguments.begin(), options_.arguments.end());
+    }
+    display_.pid = start("[DISPLAY]DISPLAY", words, true);
+    return display_.pid != 0;
+}
+
+void Launch::watch() {
+    std::string found;
+    for (std::chrono::steady_clock::time_point since{};;) {
+        if (machine_.stop.requested()) return void(status_ = 0);
+        if (display_.pid != 0) {
+            if (const auto status = ended(display_.pid)) {
+                // What ends all its programs, such as Ctrl-C in the terminal, is about to arrive here too.
+                if (*status > 128 && machine_.stop.wait_ns(200'000'000)) return void(status_ = 0);
+                status_ = *status;
+                died_ = *status > 128;
+                if (*status != 0) fail(options_, fmt::format("the display '{}' {}", display_.name, how_it_ended(*status)));
+                return;
+            }
+        } else if (line_typed()) {
+            return void(status_ = 0);
+        }
+        if (found.empty()) {
+            found = death();
+            since = std::chrono::steady_clock::now();
+        } else if (std::chrono::steady_clock::now() - since > 200ms) {
+            stop_threads();
+            died_ = true;
+            status_ = 1;
+            fail(options_, found + "; the outputs have their safe values, the machine ends");
+            return;
+        }
+        machine_.stop.wait_ns(20'000'000);
+    }
+}
+
+}  // namespace hal::tools

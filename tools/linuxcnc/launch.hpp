@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: MIT
+// One run of a configuration: starts everything in LinuxCNC's order, waits for the end, ends everything in the reverse order.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "linuxcnc/configuration.hpp"
+#include "linuxcnc/leftovers.hpp"
+#include "run/hosted_machine.hpp"
+
+namespace hal::tools {
+
+class Launch {
+public:
+    Launch(const LinuxcncOptions&, const Configuration&, HostedMachine&, MachineLock&);
+    /// Returns the exit status, after end().
+    int run();
+
+private:
+    struct Program {
+        std::string name;
+        pid_t pid = 0;
+        bool daemon = false;  ///< not a child that the machine has started, but adopted
+    };
+
+    // The steps, in order. Each returns false after printing why it failed, or when the end was requested.
+    bool check();
+    bool start_server();
+    bool start_component(const char* key, const char* component, const Words& program);
+    bool load_module(const Words& module);
+    bool load_netlists();
+    bool start_task();
+    bool start_applications();
+    bool start_display();
+    /// Waits for the first of: the display ends, a program dies, the end is requested. Sets status_ and, for a death, died_.
+    void watch();
+    void end();
+
+    bool step(const std::string& sentence);  ///< prints it with -v; false when the end was requested
+    bool command(const Words& words, const std::string& source);
+    int run_netlist_in_tcl(const std::string& path, const Words& arguments, Pass);
+    /// Starts a program that is not a component. Returns 0 after printing why it failed.
+    pid_t start(const std::string& key, const Words& words, bool terminal = false);
+    /// The exit status, or 128 + signal, of a program that was started by start(); none: it runs.
+    std::optional<int> ended(pid_t pid);
+    std::optional<int> wait_for(pid_t pid, std::int64_t ns);
+    /// Returns the sentence about a death among the programs that the machine needs, or "".
+    std::string death();
+    std::string death_of(const std::string& component, const std::string& program);
+    bool server_runs();
+    bool line_typed();
+    void end_program(Program& program);
+    void end_component(const std::string& name);
+    void end_orphans();
+    void stop_threads();
+
+    const LinuxcncOptions& options_;
+    const Configuration& configuration_;
+    HostedMachine& machine_;
+    MachineLock& lock_;
+    ProcessOutput output_;
+    Program server_{"linuxcncsvr", 0, true}, display_{};
+    std::vector<Program> applications_;
+    std::vector<std::pair<std::string, std::string>> components_;  ///< name and program of those that must not die
+    int status_ = 1;
+    bool died_ = false;
+};
+
+}  // namespace hal::tools

@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: MIT
+// The programs of a run: started, watched, ended.
+#include <chrono>
+#include <csignal>
+#include <fmt/format.h>
+#include <poll.h>
+#include <unistd.h>
+
+#include "cli/output.hpp"
+#include "commands/files.hpp"
+#include "linuxcnc/launch.hpp"
+#include "machine/programs.hpp"
+#include "text/diagnostic.hpp"
+
+namespace hal::tools {
+
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr std::int64_t end_timeout_ns = 5'000'000'000;  // from SIGTERM to SIGKILL
+
+}  // namespace
+
+pid_t Launch::start(const std::string& key, const Words& words, bool terminal) {
+    ProcessStart how;
+    how.arguments = words;
+    how.directory = configuration_.folder;
+    how.keep_stdin = terminal;
+    std::string problem;
+    const auto lock = machine_.session.lock();
+    const pid_t pid = machine_.session.programs().start(how, true, problem);
+    if (pid == 0) fail(options_, fmt::format("{}: '{}' cannot be started: {}", key, words[0], problem));
+    return pid;
+}
+
+std::optional<int> Launch::ended(pid_t pid) {
+    const auto lock = machine_.session.lock();
+    const auto* const entry = machine_.session.programs().find(pid);
+    if (entry && !entry->ended) return std::nullopt;
+    return entry ? entry->status : 0;
+}
+
+std::optional<int> Launch::wait_for(pid_t pid, std::int64_t ns) {
+    const auto until = std::chrono::steady_clock::now() + std::chrono::nanoseconds(ns);
+    for (;;) {
+        if (const auto status = ended(pid)) {
+            const auto lock = machine_.session.lock();
+            machine_.session.programs().collect(pid);
+            return status;
+        }
+        if ((ns >= 0 && std::chrono::steady_clock::now() >= until) || machine_.stop.requested()) return std::nullopt;
+        machine_.stop.wait_ns(5'000'000);
+    }
+}
+
+bool Launch::server_runs() {
+    if (!server_.daemon) return !ended(server_.pid);
+    return ::kill(server_.pid, 0) == 0 && !reap(server_.pid);
+}
+
+std::string Launch::death_of(const std::string& component, const std::string& program) {
+    const auto lock = machine_.session.lock();
+    const auto* const entry = machine_.session.programs().find(component);
+    if (entry && !entry->dead()) return {};
+    const std::string who = component == program ? fmt::format("'{}'", program) : fmt::format("'{}' (component {})", program, component);
+    return who + " died" + (entry ? " " + entry->end_report : "");
+}
+
+std::string Launch::death() {
+    for (const auto& [component, program] : components_)
+        if (std::string found = death_of(component, program); !found.empty()) return found;
+    return server_runs() ? "" : "'linuxcncsvr' died";
+}
+
+bool Launch::line_typed() {
+    pollfd input{STDIN_FILENO, POLLIN, 0};
+    char c = 0;
+    while (::poll(&input, 1, 0) > 0)
+        if (::read(STDIN_FILENO, &c, 1) <= 0 || c == '\n') return true;
+    return false;
+}
+
+void Launch::stop_threads() {
+    const auto lock = machine_.session.lock();
+    Diagnostics diagnostics;
+    if (!machine_.session.threads().stop(&diagnostics))
+        write_all(STDERR_FILENO, render(diagnostics, machine_.session.sources, colours(STDERR_FILENO)));
+}
+
+/// SIGTERM, and SIGKILL when that has no effect in time.
+void Launch::end_program(Program& program) {
+    if (program.pid == 0) return;
+    const auto gone = [&] { return program.daemon ? ::kill(program.pid, 0) != 0 || reap(program.pid) : ended(program.pid).has_value(); };
+    for (const int number : {SIGTERM, SIGKILL}) {
+        if (gone()) break;
+        ::kill(program.pid, number);
+        ::kill(program.pid, SIGCONT);
+        for (std::int64_t waited = 0; waited < end_timeout_ns && !gone(); waited += 5'000'000) ::usleep(5000);
+    }
+    program.pid = 0;
+}
+
+void Launch::end_component(const std::string& name) {
+    auto lock = machine_.session.lock();
+    Programs& programs = machine_.session.programs();
+    const auto* const entry = programs.find(name);
+    if (!entry) return;
+    const std::uint64_t number = entry->number;
+    for (int attempt = 0; attempt < 2; ++attempt) {
+        auto* there = programs.find_number(number);
+        if (!there) return;
+        if (attempt == 0) programs.terminate(*there);
+        else if (there->child && !there->ended) ::kill(there->pid, SIGKILL);
+        const auto until = std::chrono::steady_clock::now() + std::chrono::nanoseconds(end_timeout_ns);
+        while ((there = programs.find_number(number)) && there->child && !there->ended && std::chrono::steady_clock::now() < until)
+            programs.wait(lock, 50ms);
+    }
+}
+
+/// Programs that others have started, and that have outlived them: helpers of the display.
+void Launch::end_orphans() {
+    const auto ours = [&](pid_t pid) {
+        const auto lock = machine_.session.lock();
+        return machine_.session.programs().find(pid) != nullptr;
+    };
+    for (const int number : {SIGTERM, SIGKILL}) {
+        bool any = true;
+        if (number == SIGTERM)
+            for (const Child& child : children())
+                if (!ours(child.pid)) ::kill(child.pid, number);
+        for (int waited = 0; any && waited < (number == SIGTERM ? 200 : 100); ++waited) {
+            any = false;
+            for (const Child& child : children()) {
+                if (ours(child.pid) || reap(child.pid)) continue;
+                any = true;
+                if (number == SIGKILL) ::kill(child.pid, number);
+            }
+            if (any) ::usleep(10'000);
+        }
+        if (!any) return;
+    }
+}
+
+void Launch::end() {
+    machine_.shell.cancel(false);
+    if (died_) stop_threads();
+    step("end the display");
+    end_program(display_);
+    for (Program& application : applications_) end_program(application);
+    step(fmt::format("end {}", configuration_.task[0]));
+    end_component("inihal");
+    step("end linuxcncsvr");
+    end_program(server_);
+    if (!configuration_.shutdown.empty()) {
+        step(fmt::format("run {}", configuration_.shutdown));
+        std::string path, text, problem;
+        if (read_netlist(configuration_.shutdown, configuration_.folder, path, text, problem))
+            machine_.shell.run_text(path, std::move(text), output_);
+        else fail(options_, fmt::format("[HAL]SHUTDOWN is '{}', which cannot be read: {}", configuration_.shutdown, problem));
+    }
+    step("stop the threads");
+    stop_threads();
+    step("unload everything");
+    machine_.shell.execute(Words{"unload", "all"}, output_, "<linuxcnc>");
+    {
+        auto lock = machine_.session.lock();
+        const auto until = std::chrono::steady_clock::now() + std::chrono::nanoseconds(end_timeout_ns);
+        while (!machine_.session.programs().idle() && std::chrono::steady_clock::now() < until)
+            machine_.session.programs().wait(lock, 50ms);
+    }
+    machine_.shut_down();
+    end_orphans();
+}
+
+}  // namespace hal::tools

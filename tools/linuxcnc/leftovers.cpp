@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: MIT
+#include "linuxcnc/leftovers.hpp"
+
+#include <cerrno>
+#include <csignal>
+#include <cstdlib>
+#include <cstring>
+#include <fcntl.h>
+#include <filesystem>
+#include <fmt/core.h>
+#include <fstream>
+#include <iterator>
+#include <sstream>
+#include <sys/file.h>
+#include <sys/ipc.h>
+#include <sys/prctl.h>
+#include <sys/sem.h>
+#include <sys/shm.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "cli/output.hpp"
+#include "text/numbers.hpp"
+
+namespace hal::tools {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Name, state and parent of a process, from /proc; pid 0: it has ended.
+struct Process {
+    pid_t pid = 0, parent = 0;
+    std::string name;
+    char state = 0;
+};
+
+std::vector<Process> processes() {
+    std::vector<Process> all;
+    std::error_code none;
+    for (const auto& entry : fs::directory_iterator("/proc", none)) {
+        const auto number = parse_natural(entry.path().filename().string());
+        std::ifstream file(entry.path() / "stat");
+        const std::string text(std::istreambuf_iterator<char>(file), {});
+        const auto begin = text.find('('), end = text.rfind(')');  // a name may have blanks and brackets
+        if (!number || end == text.npos || end + 2 >= text.size()) continue;
+        Process process{static_cast<pid_t>(*number), 0, text.substr(begin + 1, end - begin - 1), text[end + 2]};
+        std::istringstream(text.substr(end + 3)) >> process.parent;
+        all.push_back(std::move(process));
+    }
+    return all;
+}
+
+/// LinuxCNC's launcher writes nothing into its lock file: whether it runs, its processes show.
+std::string running_of_linuxcnc() {
+    for (const Process& process : processes())
+        if (process.name == "linuxcncsvr" || process.name == "milltask" || process.name == "rtapi_app")
+            if (process.state != 'Z') return fmt::format("{}, process {}", process.name, process.pid);
+    return {};
+}
+
+constexpr const char* one_machine = "another LinuxCNC machine is running ({}), and NML allows one per computer; end it first";
+
+}  // namespace
+
+MachineLock::MachineLock() : path_((fs::temp_directory_path() / "linuxcnc.lock").string()) {
+    constexpr int how = O_RDWR | O_CLOEXEC | O_NOFOLLOW;
+    file_ = ::open(path_.c_str(), how | O_CREAT | O_EXCL, 0644);
+    const bool was_there = file_ < 0 && errno == EEXIST;
+    if (was_there) file_ = ::open(path_.c_str(), how);
+    if (file_ < 0) {
+        problem_ = fmt::format("cannot open the lock file {}: {}; if no LinuxCNC is running, remove it", path_, std::strerror(errno));
+        return;
+    }
+    char noted[64] = {};
+    const bool free = ::flock(file_, LOCK_EX | LOCK_NB) == 0;
+    const ssize_t length = ::pread(file_, noted, sizeof noted - 1, 0);
+    if (!free) problem_ = fmt::format(one_machine, fmt::format("process {}", std::atoi(noted)));
+    else if (was_there && length > 0) take_over(noted);
+    else if (const std::string other = was_there ? running_of_linuxcnc() : ""; !other.empty()) problem_ = fmt::format(one_machine, other);
+    if (problem_.empty()) note_server(0);
+    if (problem_.empty()) return;
+    ::close(file_);
+    file_ = -1;
+}
+
+void MachineLock::note_server(pid_t pid) {
+    const std::string text = pid != 0 ? fmt::format("{}\n{}\n", ::getpid(), pid) : fmt::format("{}\n", ::getpid());
+    if (::ftruncate(file_, 0) == 0 && ::pwrite(file_, text.data(), text.size(), 0) < 0 && pid == 0) problem_ = std::strerror(errno);
+}
+
+/// The launcher that wrote the file was killed. Ends the server it has noted.
+void MachineLock::take_over(const std::string& noted) {
+    pid_t launcher = 0, server = 0;
+    std::istringstream(noted) >> launcher >> server;
+    for (const Process& process : processes())
+        if (server > 0 && process.pid == server && process.name == "linuxcncsvr") ::kill(server, SIGTERM);
+}
+
+MachineLock::~MachineLock() {
+    if (file_ < 0) return;
+    ::unlink(path_.c_str());
+    ::close(file_);
+}
+
+void remove_segments(const Configuration& configuration) {
+    std::vector<key_t> keys;
+    const auto motion = parse_natural(configuration.ini.get("EMCMOT", "SHMEM_KEY").value_or("100"));
+    if (motion) keys.push_back(static_cast<key_t>(*motion));
+    std::ifstream file(configuration.nml);
+    for (std::string line; std::getline(file, line);) {  // B NAME SHMEM HOST SIZE 0 0 NUMBER PROCESSES KEY …
+        std::istringstream in(line);
+        const std::vector<std::string> words{std::istream_iterator<std::string>(in), {}};
+        if (words.size() < 10 || words[0] != "B" || words[2] != "SHMEM") continue;
+        if (const auto key = parse_natural(words[9])) keys.push_back(static_cast<key_t>(*key));
+    }
+    for (const key_t key : keys) {
+        shmid_ds segment{};
+        const int id = ::shmget(key, 0, 0);
+        if (id >= 0 && ::shmctl(id, IPC_STAT, &segment) == 0 && segment.shm_nattch == 0 && segment.shm_perm.uid == ::geteuid())
+            ::shmctl(id, IPC_RMID, nullptr);
+        if (id >= 0 && segment.shm_nattch != 0) continue;
+        semid_ds semaphores{};
+        const int set = key == static_cast<key_t>(motion.value_or(0)) ? -1 : ::semget(key, 0, 0);
+        if (set >= 0 && ::semctl(set, 0, IPC_STAT, &semaphores) == 0 && semaphores.sem_perm.uid == ::geteuid()) ::semctl(set, 0, IPC_RMID);
+    }
+}
+
+void adopt_orphans() { ::prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0); }
+
+std::vector<Child> children() {
+    std::vector<Child> all;
+    for (const Process& process : processes())
+        if (process.parent == ::getpid()) all.push_back({process.pid, process.name, process.state == 'Z'});
+    return all;
+}
+
+bool reap(pid_t pid) {
+    siginfo_t ended{};
+    return ::waitid(P_PID, static_cast<id_t>(pid), &ended, WEXITED | WNOHANG) == 0 && ended.si_pid == pid;
+}
+
+}  // namespace hal::tools

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: MIT
+#include "linuxcnc/linuxcnc.hpp"
+
+#include <unistd.h>
+
+#include "cli/output.hpp"
+#include "comp/toolchain.hpp"
+#include "linuxcnc/configuration.hpp"
+#include "linuxcnc/launch.hpp"
+#include "linuxcnc/leftovers.hpp"
+
+namespace hal::tools {
+
+namespace {
+
+/// $LINUXCNCVERSION, which the installation knows.
+void export_version(const Configuration& configuration) {
+    const std::string program = find_program(configuration, "linuxcnc_var");
+    std::string text;
+    if (program.empty() || run_program({program, "LINUXCNCVERSION"}, text) != 0) return;
+    while (text.ends_with('\n')) text.pop_back();
+    ::setenv("LINUXCNCVERSION", text.c_str(), 1);
+}
+
+int run_locked(const LinuxcncOptions& options, const Configuration& configuration) {
+    MachineLock lock;
+    if (!lock.problem().empty()) return fail(options, lock.problem());
+    if (::chdir(configuration.folder.c_str()) != 0) return fail(options, "cannot enter " + configuration.folder);
+    export_configuration(configuration, options);
+    export_version(configuration);
+    adopt_orphans();
+    int status = 1;
+    {
+        const std::string path = ::getenv("PATH");
+        HostedMachine machine(options, own_name(options), false);
+        ::setenv("PATH", path.c_str(), 1);  // a wrapper in the configuration's bin/ has precedence
+        if (!machine.serve(true)) return 1;
+        status = Launch(options, configuration, machine, lock).run();
+    }
+    remove_segments(configuration);
+    return status;
+}
+
+}  // namespace
+
+int run_linuxcnc(const LinuxcncOptions& options) {
+    const auto configuration = read_configuration(options);
+    if (!configuration) return 1;
+    const int status = run_locked(options, *configuration);
+    remove_expanded(*configuration);
+    return status;
+}
+
+}  // namespace hal::tools

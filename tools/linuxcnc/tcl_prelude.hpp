@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: MIT
+// What tclsh executes before a netlist. The variables halcyon::requests, answers, pass and commands are set before it.
+#pragma once
+
+namespace hal::tools {
+
+constexpr const char* tcl_prelude = R"tcl(
+package provide Hal 1.0
+fconfigure $halcyon::requests -translation binary -buffering full
+fconfigure $halcyon::answers -translation binary
+
+# A request is its size and a line feed, then the words separated by NUL; an answer is the status, the size and a line feed, then the text.
+proc halcyon::request {words} {
+    set bytes [encoding convertto utf-8 [join $words \0]]
+    puts -nonewline $halcyon::requests "[string length $bytes]\n$bytes"
+    flush $halcyon::requests
+    if {[gets $halcyon::answers head] < 0} {exit 1}
+    lassign $head status size
+    return [::list $status [encoding convertfrom utf-8 [read $halcyon::answers $size]]]
+}
+
+proc hal {args} {
+    if {[llength $args] == 0} {return -code error {wrong # args: should be "hal COMMAND ..."}}
+    if {$args eq "--commands"} {return $halcyon::commands}
+    set loads [expr {[lindex $args 0] in {loadrt loadusr}}]
+    if {$halcyon::pass ne "both" && $loads != ($halcyon::pass eq "loads")} return
+    lassign [halcyon::request $args] status text
+    if {$status != 0} {return -code error $text}
+    return $text
+}
+
+foreach halcyon::name $halcyon::commands {
+    if {[info commands ::$halcyon::name] eq ""} {interp alias {} $halcyon::name {} hal $halcyon::name}
+}
+
+proc halcyon::run {file} {
+    if {![catch {uplevel #0 [::list source $file]} message options]} return
+    set lines [split [dict get $options -errorinfo] \n]
+    set last [lindex [lsearch -all -glob $lines {    (file "*" line *)}] end]
+    if {$last eq ""} {set last end}
+    puts stderr [join [lrange $lines 0 $last] \n]
+    exit 1
+}
+
+proc halcyon::converse {prompts} {
+    set text ""
+    while 1 {
+        if {$prompts} {
+            puts -nonewline [expr {$text eq "" ? "haltcl: " : "haltcl+: "}]
+            flush stdout
+        }
+        if {[gets stdin line] < 0} return
+        append text $line \n
+        if {![info complete $text]} continue
+        if {[catch {uplevel #0 $text} result]} {puts stderr $result} elseif {$result ne ""} {puts $result}
+        set text ""
+    }
+}
+)tcl";
+
+}  // namespace hal::tools
