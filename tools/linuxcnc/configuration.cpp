@@ -213,6 +213,7 @@ void export_configuration(const Configuration& configuration, const LinuxcncOpti
     set_variable("LINUXCNC_EMCSH", "wish");
     set_variable("LINUXCNC_HELP_DIR", home + "/share/doc/linuxcnc");
     set_variable("LINUXCNC_NCFILES_DIR", home + "/share/linuxcnc/ncfiles");
+    set_variable("PYOPENGL_PLATFORM", "x11", false);
     set_variable("TRAJ_COORDINATES", configuration.ini.get("TRAJ", "COORDINATES").value_or(""));
     set_variable("KINS_KINEMATICS", configuration.ini.get("KINS", "KINEMATICS").value_or(""));
     set_variable("PYTHONPATH", with_rest(home + "/lib/python", "PYTHONPATH"));

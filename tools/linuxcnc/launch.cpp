@@ -94,8 +94,10 @@ bool Launch::start_server() {
     if (*status != 0)
         return fail(options_, fmt::format("linuxcncsvr {}: another one may be using its TCP port or NML buffers", how_it_ended(*status))),
                false;
-    for (const Child& child : children())
-        if (child.name == "linuxcncsvr" && !child.ended) server_.pid = child.pid;
+    for (const Child& child : children()) {
+        if (child.ended) reap(child.pid);  // between the two, it became a child of this process
+        else if (child.name == "linuxcncsvr") server_.pid = child.pid;
+    }
     if (server_.pid == 0) return fail(options_, "linuxcncsvr has ended; the NML buffers need it"), false;
     lock_.note_server(server_.pid);
     return true;

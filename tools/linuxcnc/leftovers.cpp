@@ -41,12 +41,16 @@ std::vector<Process> processes() {
     std::error_code none;
     for (const auto& entry : fs::directory_iterator("/proc", none)) {
         const auto number = parse_natural(entry.path().filename().string());
-        std::ifstream file(entry.path() / "stat");
-        const std::string text(std::istreambuf_iterator<char>(file), {});
+        if (!number) continue;
+        char content[1024];  // not a stream: reading of a process that has just ended fails, which a stream throws
+        const int file = ::open((entry.path() / "stat").c_str(), O_RDONLY | O_CLOEXEC);
+        const ssize_t length = file < 0 ? 0 : ::read(file, content, sizeof content);
+        if (file >= 0) ::close(file);
+        const std::string_view text(content, length > 0 ? static_cast<std::size_t>(length) : 0);
         const auto begin = text.find('('), end = text.rfind(')');  // a name may have blanks and brackets
-        if (!number || end == text.npos || end + 2 >= text.size()) continue;
-        Process process{static_cast<pid_t>(*number), 0, text.substr(begin + 1, end - begin - 1), text[end + 2]};
-        std::istringstream(text.substr(end + 3)) >> process.parent;
+        if (end == text.npos || end + 2 >= text.size()) continue;
+        Process process{static_cast<pid_t>(*number), 0, std::string(text.substr(begin + 1, end - begin - 1)), text[end + 2]};
+        std::istringstream(std::string(text.substr(end + 3))) >> process.parent;
         all.push_back(std::move(process));
     }
     return all;
