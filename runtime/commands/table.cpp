@@ -14,7 +14,7 @@ constexpr unsigned load = 1, config = 2, params = 4, run = 8;  // bits of Lock
 
 constexpr CommandRow rows[] = {
     // --- components
-    {"loadrt", "", "[--native] [--linuxcnc] COMPONENT [ARGUMENT=VALUE]...", "load a component, or add instances of it",
+    {"loadrt", "", "[--native|--linuxcnc] COMPONENT [ARGUMENT=VALUE]...", "load a component, or add instances of it",
      "names=a,b names the instances, count=N creates N numbered ones (at most 200000); some components take num_chan=N and\n"
      "personality=N,N. `hal doc COMPONENT` lists the other arguments. Loading a component again adds instances.\n"
      "If no component has that name, a compiled module of LinuxCNC is loaded, from the folder in HAL_RTMOD_DIR or\n"

@@ -157,6 +157,29 @@ bool make_instances(Elaboration& on, const Token& name, Origin origin, const Loa
     return construct(on.model, on.edit, *component, request, on.sources, on.diagnostics);
 }
 
+/// Takes --native or --linuxcnc from the front of the arguments. Returns false after reporting.
+bool take_origin(Elaboration& on, Args& args, Origin& origin) {
+    Span option{};
+    while (!args.empty() && (args[0].text == "--native" || args[0].text == "--linuxcnc")) {
+        const Origin wanted = args[0].text == "--native" ? Origin::native : Origin::linuxcnc;
+        if (origin != Origin::any && origin != wanted) {
+            Diagnostic d{Severity::error,
+                         "wrong-arguments",
+                         "--native and --linuxcnc are both given: a component is taken from one place",
+                         {{args[0].span, "and the other"}, {option, "one option"}},
+                         {"loadrt --native NAME loads Halcyon's component, loadrt --linuxcnc NAME LinuxCNC's module"}};
+            on.diagnostics.add(std::move(d));
+            return false;
+        }
+        origin = wanted;
+        option = args[0].span;
+        args = args.subspan(1);
+    }
+    if (!args.empty()) return true;
+    on.diagnostics.error("wrong-arguments", option, "the name of a component is missing after the option", "", "loadrt --linuxcnc NAME");
+    return false;
+}
+
 /// `hal check` does not run a module: it may access hardware. So neither its arguments nor what names its pins is checked.
 bool is_unchecked(Elaboration& on, const Token& name, Origin origin) {
     Diagnostics ignored;
@@ -167,18 +190,17 @@ bool is_unchecked(Elaboration& on, const Token& name, Origin origin) {
 /// Returns true after reporting that a loaded module uses symbols of this one.
 bool is_used(Elaboration& on, const LoadedComponent& component, Span at) {
     if (!is_module(component)) return false;
-    std::string users;
-    std::string first;
+    std::string users, commands;
     for (std::size_t i = 0;; ++i) {
         const std::string user = user_of_module(*component.plugin, i);
         if (user.empty()) break;
         if (!on.model.find_component(user)) continue;  // unloaded in the same transaction
-        if (first.empty()) first = user;
         users += (users.empty() ? "" : ", ") + user;
+        commands += (commands.empty() ? "unloadrt " : ", then unloadrt ") + user;
     }
     if (users.empty()) return false;
-    on.diagnostics.error("reload-conflict", at, quoted(component.name) + " cannot be unloaded: its code is used by " + users, "",
-                         "unload that first: unloadrt " + first);
+    on.diagnostics.error("module-in-use", at, quoted(component.name) + " cannot be unloaded: its code is used by " + users, "",
+                         "unload what uses it first: " + commands);
     return true;
 }
 
@@ -196,16 +218,7 @@ LoadedComponent* loaded_component(Elaboration& on, const Token& name) {
 
 void edits::loadrt(Elaboration& on, Args args) {
     Origin origin = Origin::any;
-    if (args[0].text == "--native" || args[0].text == "--linuxcnc") {
-        origin = args[0].text == "--native" ? Origin::native : Origin::linuxcnc;
-        const Span option = args[0].span;
-        args = args.subspan(1);
-        if (args.empty()) {
-            on.diagnostics.error("wrong-arguments", option, "the name of a component is missing after the option", "",
-                                 "loadrt --linuxcnc NAME");
-            return;
-        }
-    }
+    if (!take_origin(on, args, origin)) return;
     std::string text;
     for (const Token& token : args.subspan(1)) text += (text.empty() ? "" : " ") + written(token.text);
     if (args[0].text == "threads" && origin != Origin::linuxcnc) return load_threads(on, args[0], args.subspan(1), text);

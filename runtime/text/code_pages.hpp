@@ -207,6 +207,11 @@ inline constexpr CodePage code_pages[] = {
      "lines is malformed, missing, or refers to an unknown name.\n\n"
      "Formulas have + - * / ^, brackets, pi, sin cos tan asin acos atan atan2 sqrt exp log abs tanh min max. `hal doc ekf` has an "
      "example."},
+    {"module-in-use",
+     "A LinuxCNC module cannot be unloaded while another loaded module calls its code: motmod uses a trajectory planner, a homing and a "
+     "kinematics module, the drivers of Mesa cards use hostmot2.\n\n"
+     "The help line shows what to type. `unload all` unloads all components, those that use others first; between `begin` and `commit` the "
+     "order does not matter."},
     {"name-taken",
      "The name is already in use. Names are unique among pins and signals, among aliases, functions, instances and threads each, and "
      "among components and programs.\n\n"
@@ -321,8 +326,7 @@ inline constexpr CodePage code_pages[] = {
      "changed; the old version continues to run.\n\n"
      "First remove the pin from its signal (`unlinkp PIN`) or the function from its thread (`delf FUNCTION THREAD`); between `begin` "
      "and `commit` this and the reload take effect together.\n\n"
-     "A LinuxCNC module cannot be reloaded, and not be unloaded while another loaded module calls its code: motmod uses a trajectory "
-     "planner, a homing and a kinematics module, the drivers of Mesa cards use hostmot2. Unload that module first."},
+     "A LinuxCNC module cannot be reloaded: unload it, then load it again."},
     {"reload-dropped",
      "A parameter or an input whose value had been set is missing in the new version of the component, or has a different type. The "
      "reload took effect, and the value is lost.\n\n"

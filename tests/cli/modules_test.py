@@ -158,6 +158,18 @@ getp follow.position
         self.assertEqual("2\n", self.good("sim", "--quiet", self.write("m.hal", "loadrt --linuxcnc sum2\ngetp gain.0.gain\n")))
         self.build("gain")
         self.assertIn("unknown component 'gain'", self.error("loadrt --native gain\n"))
+        self.assertEqual("0\n", self.good("sim", "--quiet", self.write("m.hal", "loadrt --native sum2\ngetp sum2.0.in0\n")))
+
+    def test_a_component_is_taken_from_one_place(self):
+        self.assertEqual("""m.hal:1:17: error: --native and --linuxcnc are both given: a component is taken from one place [wrong-arguments]
+    1 | loadrt --native --linuxcnc gain
+      |        -------- ^^^^^^^^^^ and the other
+      |        one option
+      = help: loadrt --native NAME loads Halcyon's component, loadrt --linuxcnc NAME LinuxCNC's module
+""", self.error("loadrt --native --linuxcnc gain\n").split("\n\n")[0] + "\n")
+        for options in ("--linuxcnc", "--native --native"):
+            self.assertIn("the name of a component is missing after the option [wrong-arguments]", self.error(f"loadrt {options}\n"))
+        self.assertIn("loadrt [--native|--linuxcnc] COMPONENT", self.good("sim", "--quiet", self.write("m.hal", "help loadrt\n")))
 
     def test_doc_describes_a_module_without_running_it(self):
         self.build("gain")
@@ -258,11 +270,16 @@ getp follow.position
 
     def test_a_module_in_use_stays(self):
         self.build("planner", "follow")
-        self.assertEqual("""m.hal:3:10: error: 'planner' cannot be unloaded: its code is used by follow [reload-conflict]
-    3 | unloadrt planner
+        self.build("second", source="user")
+        both = "loadrt planner\nloadrt follow\nloadrt second\nunloadrt planner\n"
+        self.assertEqual("""m.hal:4:10: error: 'planner' cannot be unloaded: its code is used by follow, second [module-in-use]
+    4 | unloadrt planner
       |          ^^^^^^^
-      = help: unload that first: unloadrt follow
-""", self.error("loadrt planner\nloadrt follow\nunloadrt planner\n").split("\n\n")[0] + "\n")
+      = help: unload what uses it first: unloadrt follow, then unloadrt second
+""", self.error(both).split("\n\n")[0] + "\n")
+        done = self.sim("loadrt planner\nloadrt follow\nbegin\nunloadrt follow\nunloadrt planner\ncommit\nshow comp\n")
+        self.assertEqual((0, ""), (done.returncode, done.stderr))
+        self.assertNotIn("planner", done.stdout)
 
     def test_a_module_is_loaded_once_and_not_reloaded(self):
         self.build("gain")
