@@ -17,6 +17,7 @@ ROWS = {
     "runtime/model": ["runtime/base", "runtime/plan"],
     "runtime/execute": ["runtime/plan", "runtime/base"],
     "runtime/modules": ["runtime/abi"],
+    "runtime/programs": ["runtime/abi", "runtime/modules", "runtime/sdk"],
     "runtime/machine": ["runtime/execute", "runtime/model", "runtime/netlist", "runtime/modules"],
     "runtime/commands": ["runtime/machine"],
     "runtime/control": ["runtime/commands"],

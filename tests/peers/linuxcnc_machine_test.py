@@ -1,0 +1,83 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""linuxcnc_machine_test.py HAL: `hal linuxcnc` with LinuxCNC's own programs, as the Debian package linuxcnc-uspace installs them, unmodified.
+77: the package is not installed."""
+import csv
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import unittest
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+os.environ["HAL_BIN"] = sys.argv[1]
+sys.path.insert(0, str(HERE.parent / "cli"))
+from harness import HAL, SANITIZED, Case, wait_until  # noqa: E402
+
+MACHINE = HERE.parents[1] / "halfiles/linuxcnc-ethernet"
+
+
+class Machine(Case):
+    def setUp(self):
+        super().setUp()
+        self.environment["PATH"] = f"{HAL.parent}:{self.environment['PATH']}"
+        self.environment["PATH_FOLDER"] = str(self.folder)
+        self.environment["HAL_RTMOD_DIR"] = "/usr/lib/linuxcnc/modules"
+
+    def launch(self, *words):
+        return subprocess.Popen([HAL, "linuxcnc", MACHINE / "cnc.ini", *words], cwd=self.folder, env=self.environment, stdin=subprocess.DEVNULL,
+                                stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+    def test_g_code_moves_five_axes_over_ethernet(self):
+        short = self.folder / "short.ngc"
+        short.write_text("G21 G90\nT1 M6\nG0 X10 Y-5 A20\nG1 F3000 X0 C30\nG2 X10 Y5 I5 J5\nG0 X0 Y0 Z-4\nM2\n")
+        machine = self.launch("--", str(short))
+        self.addCleanup(machine.kill)
+        out, error = machine.communicate(timeout=120)
+        self.assertEqual(0, machine.returncode, out + error)
+        self.assertIn("homed; running short.ngc\n", out)
+        self.assertIn("tool panel: insert tool 1\n", out)
+        self.assertRegex(out, r"short.ngc took \d+\.\d s\n")
+        with open(self.folder / "path.csv", newline="", encoding="utf-8") as file:
+            rows = list(csv.DictReader(file))
+        at = {end: [[float(row[f"joint.{joint}.motor-pos-{end}"] or "nan") for row in rows] for joint in range(5)] for end in ("cmd", "fb")}
+        for joint, reached in enumerate((10, 7, -4, 20, 30)):
+            extreme = min if reached < 0 else max
+            self.assertAlmostEqual(reached, extreme(at["cmd"][joint]), delta=0.5)
+        for joint in range(5):  # what was driven is what was commanded, two cycles before
+            errors = [abs(a - b) for a, b in zip(at["cmd"][joint], at["fb"][joint][2:])]
+            self.assertLess(max(errors), 2.0)  # FERROR
+            self.assertGreater(max(at["fb"][joint]) - min(at["fb"][joint]), 3.5)
+        self.assertEqual("", subprocess.run(["pgrep", "-x", "milltask|io|halui|linuxcncsvr"], capture_output=True, text=True).stdout)
+
+    def test_the_e_stop_ends_the_motion(self):
+        long = self.folder / "long.ngc"
+        long.write_text("G21 G90\nG1 F600 X90\nM2\n")
+        machine = self.launch("--", str(long))
+        self.addCleanup(machine.kill)
+        wait_until(lambda: self.value("x-active") == "TRUE" and float(self.value("x-position") or 0) > 3, "the axis moves")
+        self.shell("setp", "io-node.in-00", "FALSE")
+        out, error = machine.communicate(timeout=60)
+        self.assertEqual(1, machine.returncode, out + error)
+        self.assertIn("run_program: the machine went off", error)
+        self.assertIn("the display './run_program.py' ended with exit status 1", error)
+
+    def test_a_killed_task_stops_the_machine(self):
+        machine = self.launch("--", str(MACHINE / "program.ngc"))
+        self.addCleanup(machine.kill)
+        wait_until(lambda: self.value("x-active") == "TRUE", "the machine is on")
+        pid = next(line.split()[3] for line in self.shell("show", "comp").stdout.splitlines() if re.search(r" inihal +\d", line))
+        os.kill(int(pid), signal.SIGKILL)
+        out, error = machine.communicate(timeout=60)
+        self.assertEqual(1, machine.returncode, out + error)
+        self.assertIn("'milltask' was terminated by SIGKILL; the outputs have their safe values, the machine ends\n", error.replace("inihal ", ""))
+
+
+if __name__ == "__main__":
+    if not shutil.which("milltask") or SANITIZED:
+        print("LinuxCNC is not installed: sudo apt-get install linuxcnc-uspace")
+        sys.exit(77)
+    unittest.main(argv=sys.argv[:1] + sys.argv[2:])
