@@ -51,6 +51,7 @@ int Launch::run() {
                          (c.halui.empty() || start_component("[HAL]HALUI", "halui", c.halui)) && load_module(c.planner) &&
                          load_module(c.homing) && load_netlists() && start_task() && start_applications() && start_display();
     if (started) {
+        if (const auto running = servers(); !running.empty()) lock_.note_server(running.front());
         const FaultLines faults(machine_.session);
         watch();
         end();
@@ -86,20 +87,11 @@ bool Launch::start_server() {
     if (!step("start linuxcncsvr")) return false;
     const pid_t pid = start("linuxcncsvr", {"linuxcncsvr", "-ini", configuration_.file});
     if (pid == 0) return false;
-    server_.pid = pid;
-    const auto status = wait_for(pid, 10'000'000'000);  // it ends once its successor has the buffers ready
+    const auto status = wait_for(pid, 10'000'000'000);  // it ends once its successor, adopted by this process, has the buffers ready
     if (machine_.stop.requested()) return false;
-    if (!status) return server_.daemon = false, true;
-    server_.pid = 0;
-    if (*status != 0)
-        return fail(options_, fmt::format("linuxcncsvr {}: another one may be using its TCP port or NML buffers", how_it_ended(*status))),
-               false;
-    for (const Child& child : children()) {
-        if (child.ended) reap(child.pid);  // between the two, it became a child of this process
-        else if (child.name == "linuxcncsvr") server_.pid = child.pid;
-    }
-    if (server_.pid == 0) return fail(options_, "linuxcncsvr has ended; the NML buffers need it"), false;
-    lock_.note_server(server_.pid);
+    if (status && *status != 0)
+        return fail(options_, fmt::format("linuxcncsvr {}: another one may be using its TCP port or NML buffers", how_it_ended(*status))), false;
+    if (servers().empty()) return fail(options_, "linuxcncsvr has ended; the NML buffers need it"), false;
     return true;
 }
 
@@ -218,7 +210,6 @@ void Launch::watch() {
                 // What ends all its programs, such as Ctrl-C in the terminal, is about to arrive here too.
                 if (*status > 128 && machine_.stop.wait_ns(200'000'000)) return void(status_ = 0);
                 status_ = *status;
-                died_ = *status > 128;
                 if (*status != 0) fail(options_, fmt::format("the display '{}' {}", display_.name, how_it_ended(*status)));
                 return;
             }
@@ -229,10 +220,10 @@ void Launch::watch() {
             found = death();
             since = std::chrono::steady_clock::now();
         } else if (std::chrono::steady_clock::now() - since > 200ms) {
-            stop_threads();
-            died_ = true;
+            const bool task = runs("inihal");
+            if (!task) stop_threads();
             status_ = 1;
-            fail(options_, found + "; the outputs have their safe values, the machine ends");
+            fail(options_, found + (task ? "; the machine ends" : "; the outputs have their safe values, the machine ends"));
             return;
         }
         machine_.stop.wait_ns(20'000'000);

@@ -2,6 +2,7 @@
 // One run of a configuration: starts everything in LinuxCNC's order, waits for the end, ends everything in the reverse order.
 #pragma once
 
+#include <chrono>
 #include <optional>
 #include <string>
 
@@ -21,7 +22,6 @@ private:
     struct Program {
         std::string name;
         pid_t pid = 0;
-        bool daemon = false;  ///< not a child that the machine has started, but adopted
     };
 
     // The steps, in order. Each returns false after printing why it failed, or when the end was requested.
@@ -33,7 +33,7 @@ private:
     bool start_task();
     bool start_applications();
     bool start_display();
-    /// Waits for the first of: the display ends, a program dies, the end is requested. Sets status_ and, for a death, died_.
+    /// Waits for the first of: the display ends, a program dies, the end is requested. Sets status_.
     void watch();
     void end();
 
@@ -48,9 +48,13 @@ private:
     /// Returns the sentence about a death among the programs that the machine needs, or "".
     std::string death();
     std::string death_of(const std::string& component, const std::string& program);
-    bool server_runs();
+    /// The processes of linuxcncsvr. It makes itself a daemon, which this process adopts.
+    std::vector<pid_t> servers();
+    /// Returns true when the program of that component runs.
+    bool runs(const std::string& component);
     bool line_typed();
     void end_program(Program& program);
+    void end_server();
     void end_component(const std::string& name);
     void end_orphans();
     void stop_threads();
@@ -60,11 +64,11 @@ private:
     HostedMachine& machine_;
     MachineLock& lock_;
     ProcessOutput output_;
-    Program server_{"linuxcncsvr", 0, true}, display_{};
+    Program display_{};
     std::vector<Program> applications_;
     std::vector<std::pair<std::string, std::string>> components_;  ///< name and program of those that must not die
     int status_ = 1;
-    bool died_ = false;
+    std::chrono::steady_clock::time_point looked_{};  ///< when death() last looked for linuxcncsvr
 };
 
 }  // namespace hal::tools

@@ -54,9 +54,21 @@ std::optional<int> Launch::wait_for(pid_t pid, std::int64_t ns) {
     }
 }
 
-bool Launch::server_runs() {
-    if (!server_.daemon) return !ended(server_.pid);
-    return ::kill(server_.pid, 0) == 0 && !reap(server_.pid);
+std::vector<pid_t> Launch::servers() {
+    std::vector<pid_t> all;
+    const auto lock = machine_.session.lock();
+    for (const Child& child : children()) {
+        if (child.name != "linuxcncsvr") continue;
+        const auto* const entry = machine_.session.programs().find(child.pid);  // then the machine reaps it
+        if (entry ? !entry->ended : !child.ended || !reap(child.pid)) all.push_back(child.pid);
+    }
+    return all;
+}
+
+bool Launch::runs(const std::string& component) {
+    const auto lock = machine_.session.lock();
+    const auto* const entry = machine_.session.programs().find(component);
+    return entry && !entry->dead();
 }
 
 std::string Launch::death_of(const std::string& component, const std::string& program) {
@@ -70,7 +82,10 @@ std::string Launch::death_of(const std::string& component, const std::string& pr
 std::string Launch::death() {
     for (const auto& [component, program] : components_)
         if (std::string found = death_of(component, program); !found.empty()) return found;
-    return server_runs() ? "" : "'linuxcncsvr' died";
+    const auto now = std::chrono::steady_clock::now();
+    if (now - looked_ < 500ms) return {};  // reading all of /proc is not for every 20 ms
+    looked_ = now;
+    return servers().empty() ? "'linuxcncsvr' died" : "";
 }
 
 bool Launch::line_typed() {
@@ -91,7 +106,7 @@ void Launch::stop_threads() {
 /// SIGTERM, and SIGKILL when that has no effect in time.
 void Launch::end_program(Program& program) {
     if (program.pid == 0) return;
-    const auto gone = [&] { return program.daemon ? ::kill(program.pid, 0) != 0 || reap(program.pid) : ended(program.pid).has_value(); };
+    const auto gone = [&] { return ended(program.pid).has_value(); };
     for (const int number : {SIGTERM, SIGKILL}) {
         if (gone()) break;
         ::kill(program.pid, number);
@@ -99,6 +114,13 @@ void Launch::end_program(Program& program) {
         for (std::int64_t waited = 0; waited < end_timeout_ns && !gone(); waited += 5'000'000) ::usleep(5000);
     }
     program.pid = 0;
+}
+
+void Launch::end_server() {
+    for (const int number : {SIGTERM, SIGKILL}) {
+        for (const pid_t pid : servers()) ::kill(pid, number);
+        for (std::int64_t waited = 0; waited < end_timeout_ns && !servers().empty(); waited += 5'000'000) ::usleep(5000);
+    }
 }
 
 void Launch::end_component(const std::string& name) {
@@ -144,14 +166,14 @@ void Launch::end_orphans() {
 
 void Launch::end() {
     machine_.shell.cancel(false);
-    if (died_) stop_threads();
+    if (!runs("inihal")) stop_threads();  // nobody commands motion
     step("end the display");
     end_program(display_);
     for (Program& application : applications_) end_program(application);
     step(fmt::format("end {}", configuration_.task[0]));
     end_component("inihal");
     step("end linuxcncsvr");
-    end_program(server_);
+    end_server();
     if (!configuration_.shutdown.empty()) {
         step(fmt::format("run {}", configuration_.shutdown));
         std::string path, text, problem;
