@@ -81,7 +81,7 @@ public:
         to_.nml = value("LINUXCNC", "NML_FILE", value("EMC", "NML_FILE", to_.home + "/share/linuxcnc/linuxcnc.nml"));
         to_.nml = resolve_path(to_.nml, to_.folder);
         to_.shutdown = value("HAL", "SHUTDOWN", "");
-        for (const std::string& line : to_.ini.all("APPLICATIONS", "APP")) to_.applications.push_back(with_home(words_of(line)));
+        for (const std::string& line : to_.ini.all("APPLICATIONS", "APP")) to_.applications.push_back(application(words_of(line)));
         if (to_.display.empty())
             return complain(
                        "[DISPLAY]DISPLAY is missing: the machine runs as long as its display does; write DISPLAY = axis, linuxcncrsh, "
@@ -136,6 +136,12 @@ private:
     }
     static Words with_home(Words words) {
         if (!words.empty() && words[0].starts_with('~')) words[0] = resolve_path(words[0], "");
+        return words;
+    }
+    /// Also a file beside the INI file, without ./ before its name.
+    Words application(Words words) {
+        if (words.empty() || words[0].find('/') != std::string::npos) return with_home(std::move(words));
+        if (find_program(to_, words[0]).empty() && executable(to_.folder + "/" + words[0])) words[0] = "./" + words[0];
         return words;
     }
     std::string value(const char* section, const char* key, const std::string& otherwise) {

@@ -90,7 +90,8 @@ bool Launch::start_server() {
     const auto status = wait_for(pid, 10'000'000'000);  // it ends once its successor, adopted by this process, has the buffers ready
     if (machine_.stop.requested()) return false;
     if (status && *status != 0)
-        return fail(options_, fmt::format("linuxcncsvr {}: another one may be using its TCP port or NML buffers", how_it_ended(*status))), false;
+        return fail(options_, fmt::format("linuxcncsvr {}: another one may be using its TCP port or NML buffers", how_it_ended(*status))),
+               false;
     if (servers().empty()) return fail(options_, "linuxcncsvr has ended; the NML buffers need it"), false;
     return true;
 }

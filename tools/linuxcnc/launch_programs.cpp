@@ -106,7 +106,12 @@ void Launch::stop_threads() {
 /// SIGTERM, and SIGKILL when that has no effect in time.
 void Launch::end_program(Program& program) {
     if (program.pid == 0) return;
-    const auto gone = [&] { return ended(program.pid).has_value(); };
+    const auto gone = [&] {
+        if (!ended(program.pid)) return false;
+        const auto lock = machine_.session.lock();
+        machine_.session.programs().collect(program.pid);
+        return true;
+    };
     for (const int number : {SIGTERM, SIGKILL}) {
         if (gone()) break;
         ::kill(program.pid, number);

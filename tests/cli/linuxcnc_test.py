@@ -1,0 +1,394 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""hal linuxcnc: the order in which everything starts and ends, its environment, netlists in Tcl, and what goes wrong. LinuxCNC is not needed: linuxcnc/
+has programs that stand in for its own."""
+import os
+import shutil
+import signal
+import unittest
+from pathlib import Path
+
+from harness import HAL, SERVO, TIMEOUT, Case, wait_until
+
+STANDIN = Path(__file__).parent / "linuxcnc/standin.py"
+MODULE = HAL.parent.parent / "python"
+PROGRAMS = ("linuxcncsvr", "io", "halui", "milltask", "linuxcncrsh", "note")
+
+INI = """[EMC]
+VERSION = 1.1
+[DISPLAY]
+DISPLAY = ./ui
+[TASK]
+TASK = milltask
+[EMCIO]
+EMCIO = io
+[TRAJ]
+TPMOD = sum2 names=planner
+COORDINATES = X Y Z
+[EMCMOT]
+HOMEMOD = mult2 names=homing
+SERVO_PERIOD = 1000000
+[KINS]
+KINEMATICS = trivkins
+JOINTS = 3
+"""
+HALFILE = """loadrt threads name1=servo period1=[EMCMOT]SERVO_PERIOD
+loadrt sum2 names=adder
+addf adder servo
+setp adder.in0 2
+"""
+PLAIN = "[HAL]\nHALFILE = machine.hal\n"
+
+
+@unittest.skipUnless(list(MODULE.glob("hal/_core*.so")), "Python's module hal is not built")
+class Linuxcnc(Case):
+    def setUp(self):
+        super().setUp()
+        self.home = self.folder / "installed"
+        (self.home / "bin").mkdir(parents=True)
+        for name in PROGRAMS:
+            shutil.copy(STANDIN, self.home / "bin" / name)
+            (self.home / "bin" / name).chmod(0o755)
+        self.log = self.folder / "log"
+        self.environment |= {"LINUXCNC_HOME": str(self.home), "STANDIN_LOG": str(self.log), "TMPDIR": str(self.folder)}
+        self.write("machine.hal", HALFILE)
+        self.display("exit 0")
+
+    def tearDown(self):
+        """Nothing may be left, however a run ended."""
+        mark = f"STANDIN_LOG={self.log}".encode()
+
+        def left():
+            names = []
+            for process in Path("/proc").glob("[0-9]*"):
+                try:
+                    if mark in (process / "environ").read_bytes().split(b"\0") and process.name != str(os.getpid()):
+                        names.append((process / "comm").read_text().strip())
+                except OSError:
+                    pass  # it has ended
+            return names
+        remaining = left()
+        self.assertEqual([], remaining)
+        self.assertFalse((self.folder / "linuxcnc.lock").exists())
+        self.assertEqual([], list(self.folder.glob("*.expanded")) + list(self.folder.glob("halcyon/*.sock")))
+
+    def display(self, script, name="ui"):
+        path = Path(self.write(name, f"#!/bin/sh\n{script}\n"))
+        path.chmod(0o755)
+
+    def ini(self, rest=PLAIN, text=INI):
+        return self.write("machine.ini", text + rest)
+
+    def linuxcnc(self, *words, status=0, **how):
+        """Runs a machine to its end; standard output and error without the name of the folder."""
+        done = self.run_program("linuxcnc", *words, **how)
+        self.assertEqual(status, done.returncode, done.stdout + done.stderr)
+        return done.stdout.replace(str(self.folder), "CONFIG"), done.stderr.replace(str(self.folder), "CONFIG")
+
+    def runs(self, *words):
+        """Starts a machine and waits until its display runs."""
+        machine = self.start("linuxcnc", *words, loaded=False)
+        wait_until(lambda: machine.poll() is not None or (self.folder / "shown").exists(), "the display runs")
+        self.assertIsNone(machine.poll())
+        return machine
+
+    def logged(self):
+        return self.log.read_text().splitlines()
+
+    # --- in order ------------------------------------------------------------------------------------------------------
+
+    def test_everything_starts_and_ends_in_linuxcncs_order(self):
+        self.write("machine.hal", HALFILE + "loadusr -w note netlist\n")
+        self.write("end.hal", "loadusr -w note shutdown\n")
+        self.display("note ui $*; note adder is `halcmd getp adder.out`; sleep 0.2; note adder is `halcmd getp adder.out`")
+        ini = self.ini(PLAIN + "HALUI = halui\nSHUTDOWN = end.hal\nHALCMD = setp adder.in1 5\n[APPLICATIONS]\nAPP = note application\nDELAY = 0.01\n")
+        text = (Path(ini).read_text()).replace("./ui", "./ui a")
+        out, err = self.linuxcnc("-v", self.write("machine.ini", text), "--", "b")
+        self.assertEqual(("check the configuration: left out\nstart linuxcncsvr\nstart io\nstart halui\nload sum2\nload mult2\n"
+                          "load the netlists of [HAL]HALFILE\nstart milltask\nstart the threads\nstart note\nstart the display ./ui\n"
+                          "end the display\nend milltask\nend linuxcncsvr\nrun end.hal\nstop the threads\nunload everything\n", ""), (out, err))
+        log = self.logged()
+        log.remove("note application")  # beside the display
+        first = log.index("note adder is 0") if "note adder is 0" in log else log.index("note adder is 7")
+        del log[first]
+        self.assertEqual(["linuxcncsvr -ini CONFIG/machine.ini", "io -ini CONFIG/machine.ini", "halui -ini CONFIG/machine.ini", "note netlist",
+                          "milltask -ini CONFIG/machine.ini", "note ui -ini CONFIG/machine.ini a b", "note adder is 7",
+                          "milltask ends", "linuxcncsvr ends", "note shutdown"], log[:10])
+        self.assertEqual({"halui ends", "io ends"}, set(log[10:]))
+
+    def test_the_environment_is_linuxcncs(self):
+        names = ("INI_FILE_NAME CONFIG_DIR NMLFILE HALLIB_DIR HALLIB_PATH HALCMD REALTIME LINUXCNC_HOME LINUXCNC_TCL_DIR LINUXCNC_LANG_DIR LINUXCNC_HELP_DIR "
+                 "LINUXCNC_NCFILES_DIR TRAJ_COORDINATES KINS_KINEMATICS HALCYON_INSTANCE")
+        self.environment["STANDIN_SHOW"] = names
+        self.linuxcnc("-H", self.folder, "--name", "mill", self.ini())
+        log = self.log.read_text().replace(str(self.folder), "CONFIG").splitlines()
+        begin = log.index("io -ini CONFIG/machine.ini") + 1
+        self.assertEqual("""  INI_FILE_NAME=CONFIG/machine.ini
+  CONFIG_DIR=CONFIG
+  NMLFILE=CONFIG/installed/share/linuxcnc/linuxcnc.nml
+  HALLIB_DIR=CONFIG/installed/share/linuxcnc/hallib
+  HALLIB_PATH=CONFIG:.:CONFIG/installed/share/linuxcnc/hallib
+  HALCMD=halcmd
+  REALTIME=true
+  LINUXCNC_HOME=CONFIG/installed
+  LINUXCNC_TCL_DIR=CONFIG/installed/lib/tcltk/linuxcnc
+  LINUXCNC_LANG_DIR=CONFIG/installed/lib/tcltk/linuxcnc/msgs
+  LINUXCNC_HELP_DIR=CONFIG/installed/share/doc/linuxcnc
+  LINUXCNC_NCFILES_DIR=CONFIG/installed/share/linuxcnc/ncfiles
+  TRAJ_COORDINATES=X Y Z
+  KINS_KINEMATICS=trivkins
+  HALCYON_INSTANCE=mill""", "\n".join(log[begin:begin + 15]))
+
+    def test_programs_find_halcmd_and_a_wrapper_beside_the_ini_file_comes_first(self):
+        self.display("note `halcmd getp adder.in0`; note `command -v halcmd`")
+        self.linuxcnc(self.ini())
+        self.assertIn(f"note {HAL.parent}/halcmd", self.logged())
+        self.assertIn("note 2", self.logged())
+        (self.folder / "bin").mkdir()
+        self.display("echo wrapped", "bin/halcmd")
+        self.linuxcnc(self.ini())
+        self.assertIn("note wrapped", self.logged())
+
+    def test_arguments_of_linuxcncrsh_come_before_the_ini_file(self):
+        _, err = self.linuxcnc(self.ini(PLAIN + "POSTGUI_HALFILE = later.hal\n", INI.replace("./ui", "linuxcncrsh -p 5008")))
+        self.assertIn("linuxcncrsh -p 5008 -- -ini CONFIG/machine.ini", self.logged())
+        self.assertEqual("hal linuxcnc: note: [HAL]POSTGUI_HALFILE is loaded by the display, and 'linuxcncrsh' does not load it\n", err)
+
+    def test_a_dummy_display_waits_for_a_line(self):
+        out, err = self.linuxcnc(self.ini(text=INI.replace("./ui", "dummy")), given="\n")
+        self.assertEqual(("press Enter to end the machine\n", ""), (out, err))
+
+    def test_twopass_loads_before_everything_else(self):
+        self.write("first.hal", "addf late servo\nsetp late.in0 4\n")
+        self.write("second.hal", HALFILE + "loadrt sum2 names=late\n")
+        self.display("note `halcmd getp late.in0`")
+        self.linuxcnc(self.ini("[HAL]\nTWOPASS = ON\nHALFILE = first.hal\nHALFILE = second.hal\n"))
+        self.assertIn("note 4", self.logged())
+
+    def test_includes_are_expanded_for_linuxcncs_programs(self):
+        self.write("more.inc", PLAIN + "#INCLUDE last.inc\n")
+        self.write("last.inc", "HALCMD = setp adder.in1 3\n")
+        self.display("note `halcmd getp adder.in1`; cp $2 seen")
+        self.linuxcnc(self.ini("#INCLUDE more.inc\n"))
+        self.assertIn("io -ini CONFIG/machine.ini.expanded", self.logged())
+        self.assertIn("note 3", self.logged())
+        self.assertEqual(INI + PLAIN + "HALCMD = setp adder.in1 3\n", (self.folder / "seen").read_text())
+
+    # --- Tcl -----------------------------------------------------------------------------------------------------------
+
+    @unittest.skipUnless(shutil.which("tclsh"), "tclsh is not installed")
+    def test_a_netlist_in_tcl_has_the_commands_and_the_ini_file(self):
+        self.write("machine.tcl", """package require Hal
+loadrt threads name1=servo period1=$::EMCMOT(SERVO_PERIOD)
+foreach name {a b} { loadrt sum2 names=$name; addf $name servo; setp $name.in0 [expr {$::KINS(JOINTS) * 2}] }
+net {total} a.out => b.in1
+puts "[hal getp a.in0] <$argv> $argc <$::TRAJ(COORDINATES)> [lindex [hal list pin b.out] 0] [catch {setp none 1} text]"
+puts [lindex [split $text \\n] 0]
+""")
+        self.display("note `halcmd getp b.in0` `halcmd gets total`")
+        out, err = self.linuxcnc(self.ini("[HAL]\nHALFILE = machine.tcl one two\n"))
+        self.assertEqual(("6 <one two> 2 <{X Y Z}> b.out 1\n<machine.tcl>:1:6: error: unknown pin 'none' [no-such-pin]\n", ""), (out, err))
+        self.assertTrue(any(line.startswith("note 6 ") for line in self.logged()), self.logged())
+
+    @unittest.skipUnless(shutil.which("tclsh"), "tclsh is not installed")
+    def test_an_error_in_tcl_ends_the_start(self):
+        self.write("machine.tcl", "proc connect {} {\n    net x elsewhere.y\n}\n\nconnect\n")
+        out, err = self.linuxcnc(self.ini("[HAL]\nHALFILE = machine.tcl\n"), status=1)
+        self.assertEqual("", out)
+        self.assertEqual("""<machine.tcl>:1:7: error: unknown pin 'elsewhere.y' [no-such-pin]
+    1 | net x elsewhere.y
+      |       ^^^^^^^^^^^
+
+1 error; nothing was changed
+    while executing
+"net x elsewhere.y"
+    (procedure "connect" line 2)
+    invoked from within
+"connect"
+    (file "CONFIG/machine.tcl" line 5)
+hal linuxcnc: 'CONFIG/machine.tcl' ended with exit status 1
+""", err)
+        self.assertEqual(["linuxcncsvr ends", "io ends"], self.logged()[-2:])
+
+    @unittest.skipUnless(shutil.which("tclsh"), "tclsh is not installed")
+    def test_twopass_runs_the_loads_of_tcl_first_too(self):
+        self.write("first.tcl", "setp late.in0 4\nputs \"[hal getp late.in0].\"\n")
+        self.write("second.hal", HALFILE + "loadrt sum2 names=late\n")
+        out, err = self.linuxcnc(self.ini("[HAL]\nTWOPASS = ON\nHALFILE = first.tcl\nHALFILE = second.hal\n"))
+        self.assertEqual((".\n4.\n", ""), (out, err))
+
+    @unittest.skipUnless(shutil.which("tclsh"), "tclsh is not installed")
+    def test_haltcl_works_on_a_running_machine(self):
+        self.display("haltcl -i $2 later.tcl x; echo 'setp adder.in1 9; hal getp adder.in1' | haltcl; haltcl -i none.ini; haltcl -q")
+        self.write("later.tcl", "puts \"$argv $::EMC(VERSION) [hal getp adder.in0]\"\n")
+        out, err = self.linuxcnc(self.ini(), status=1)
+        self.assertEqual("x 1.1 2\n9\n", out)
+        self.assertEqual("error: cannot read 'none.ini': No such file or directory [unreadable-file]\nhaltcl: unknown option '-q'; see: haltcl -h\n"
+                         "hal linuxcnc: the display './ui' ended with exit status 1\n", err)
+
+    def test_without_tclsh_a_message_names_the_package(self):
+        self.write("machine.tcl", "")
+        (self.folder / "few").mkdir()
+        for name in ("sh", "env", "python3", "sleep"):
+            (self.folder / "few" / name).symlink_to(shutil.which(name))
+        _, err = self.linuxcnc(self.ini("[HAL]\nHALFILE = machine.tcl\n"), status=1, environment={"PATH": str(self.folder / "few")})
+        self.assertEqual("hal linuxcnc: 'CONFIG/machine.tcl' cannot be run: tclsh is not installed; type: sudo apt-get install tcl\n", err)
+
+    # --- what ends it --------------------------------------------------------------------------------------------------
+
+    def test_the_status_of_the_display_is_that_of_the_run(self):
+        self.display("exit 3")
+        _, err = self.linuxcnc(self.ini(), status=3)
+        self.assertEqual("hal linuxcnc: the display './ui' ended with exit status 3\n", err)
+
+    def test_a_display_that_dies_ends_everything_in_order(self):
+        self.display("kill -SEGV $$")
+        _, err = self.linuxcnc(self.ini(), status=128 + signal.SIGSEGV)
+        self.assertEqual("hal linuxcnc: the display './ui' was terminated by SIGSEGV\n", err)
+        self.assertEqual(["milltask ends", "linuxcncsvr ends", "io ends"], self.logged()[-3:])
+
+    def test_a_helper_of_the_display_ends_with_it(self):
+        self.display("sleep 1000 & exit 0")
+        self.linuxcnc(self.ini())
+
+    def test_a_display_that_ignores_sigterm_is_killed(self):
+        self.display("trap '' TERM; touch shown; while :; do sleep 1; done")
+        machine = self.runs(self.ini())
+        self.assertEqual(("ended by SIGTERM\n", ""), self.end(machine))
+        self.assertEqual(0, machine.returncode)
+
+    def pid(self, component):
+        line = next(line for line in self.shell("show", "comp", component).stdout.splitlines() if f" {component} " in line)
+        return int(line.split()[3])
+
+    def dies(self, pid):
+        """Standard error of the machine after a program of it was killed."""
+        machine = self.runs(self.ini(PLAIN + "HALUI = halui\nSHUTDOWN = end.hal\n"))
+        os.kill(pid(), signal.SIGKILL)
+        out, err = machine.communicate(timeout=TIMEOUT)
+        self.assertEqual((1, ""), (machine.returncode, "".join(line for line in out.splitlines(True) if "threads" in line)))
+        return err
+
+    def test_when_task_is_killed_the_outputs_are_safe_before_anything_else_ends(self):
+        self.write("machine.hal", HALFILE + "net count adder.out => adder.in1\n")  # counts cycles
+        self.write("end.hal", "loadusr -w ./count\n")
+        self.display("note `halcmd gets count`; sleep 0.05; note `halcmd gets count`", "count")
+        self.display("touch shown; exec sleep 1000")
+        err = self.dies(lambda: self.pid("inihal"))
+        self.assertRegex(err, r"\Ahal linuxcnc: 'milltask' \(component inihal\) died since [\d:]+ \(SIGKILL\); the outputs have their safe values, the machine ends\n\Z")
+        log = self.logged()
+        self.assertEqual(log[-3], log[-4])  # the threads have stopped
+        self.assertEqual({"io ends", "halui ends"}, set(log[-2:]))
+
+    def test_when_another_program_is_killed_task_ends_in_order(self):
+        self.write("end.hal", "")
+        self.display("touch shown; exec sleep 1000")
+        err = self.dies(lambda: self.pid("halui"))
+        self.assertRegex(err, r"\Ahal linuxcnc: 'halui' died since [\d:]+ \(SIGKILL\); the machine ends\n\Z")
+        self.assertEqual(["milltask ends", "linuxcncsvr ends", "io ends"], self.logged()[-3:])
+
+    def test_when_the_nml_server_is_killed_everything_ends(self):
+        self.write("end.hal", "")
+        self.display("touch shown; exec sleep 1000")
+        err = self.dies(lambda: int((self.folder / "linuxcnc.lock").read_text().split()[1]))
+        self.assertEqual("hal linuxcnc: 'linuxcncsvr' died; the machine ends\n", err)
+
+    def test_ctrl_c_and_sigterm_end_everything(self):
+        self.display("touch shown; exec sleep 1000")
+        for number, expected in ((signal.SIGINT, ""), (signal.SIGTERM, "ended by SIGTERM\n")):
+            machine = self.runs(self.ini())
+            self.assertEqual((expected, ""), self.end(machine, number))
+            self.assertEqual(0, machine.returncode)
+            self.assertEqual(["milltask ends", "linuxcncsvr ends", "io ends"], self.logged()[-3:])
+            (self.folder / "shown").unlink()
+
+    def test_ctrl_c_while_a_program_is_starting(self):
+        for program in ("io", "milltask"):
+            self.environment["STANDIN_SLOW"] = program
+            self.log.unlink(missing_ok=True)
+            machine = self.start("linuxcnc", self.ini(), loaded=False)
+            wait_until(lambda: self.log.exists() and f"{program} waits" in self.logged(), "the program waits")
+            _, err = self.end(machine, signal.SIGINT)
+            self.assertIn("interrupted", err)
+            self.assertEqual(0, machine.returncode)
+            self.assertIn(f"{program} ends", self.logged())
+
+    # --- what does not start -------------------------------------------------------------------------------------------
+
+    def test_a_program_that_does_not_start_ends_those_that_have(self):
+        self.environment["STANDIN_FAILS"] = "linuxcncsvr"
+        self.assertEqual("linuxcncsvr: cannot do that\nhal linuxcnc: linuxcncsvr ended with exit status 4: another one may be using its TCP port or NML buffers\n",
+                         self.linuxcnc(self.ini(), status=1)[1])
+        self.environment["STANDIN_FAILS"] = "io"
+        self.assertEqual("""io: cannot do that
+CONFIG/machine.ini [EMCIO]EMCIO:1:23: error: 'io' ended before a component 'iocontrol' was ready [program-ended]
+    1 | loadusr -Wn iocontrol io -ini CONFIG/machine.ini
+      |                       ^^
+      = help: a program registers over the control socket; omit -W if it does not
+""", self.linuxcnc(self.ini(), status=1)[1])
+        self.environment["STANDIN_FAILS"] = "milltask"
+        self.assertEqual("""milltask: cannot do that
+CONFIG/machine.ini [TASK]TASK:1:20: error: 'milltask' ended before a component 'inihal' was ready [program-ended]
+    1 | loadusr -Wn inihal milltask -ini CONFIG/machine.ini
+      |                    ^^^^^^^^
+      = help: a program registers over the control socket; omit -W if it does not
+""", self.linuxcnc(self.ini(), status=1)[1])
+        self.assertEqual(["milltask -ini CONFIG/machine.ini", "linuxcncsvr ends", "io ends"], self.logged()[-3:])
+
+    def test_a_package_or_program_that_is_missing(self):
+        (self.home / "bin/linuxcncsvr").unlink()
+        self.assertEqual("hal linuxcnc: 'linuxcncsvr' is not installed; type: sudo apt-get install linuxcnc-uspace\n",
+                         self.linuxcnc(self.ini(), status=1, environment={"PATH": "/nowhere"})[1])
+        shutil.copy(STANDIN, self.home / "bin/linuxcncsvr")
+        ini = self.ini(text=INI.replace("./ui", "ui"))
+        self.assertEqual("hal linuxcnc: CONFIG/machine.ini: [DISPLAY]DISPLAY is 'ui', which cannot be started: it is not in PATH; for the file beside the INI file "
+                         "write ./ui\n", self.linuxcnc(ini, status=1)[1])
+        (self.folder / "ui").chmod(0o644)
+        self.assertEqual("hal linuxcnc: CONFIG/machine.ini: [DISPLAY]DISPLAY is './ui', which cannot be started: it is not executable; type: chmod +x CONFIG/./ui\n",
+                         self.linuxcnc(self.ini(), status=1)[1])
+
+    def test_bad_ini_files(self):
+        version = "hal linuxcnc: CONFIG/machine.ini: [EMC]VERSION is {}, not 1.1: the file is from an older LinuxCNC; type: update_ini CONFIG/machine.ini\n"
+        self.assertEqual(version.format("missing"), self.linuxcnc(self.ini(text=INI.replace("VERSION", "#")), status=1)[1])
+        self.assertEqual(version.format("1.0"), self.linuxcnc(self.ini(text=INI.replace("1.1", "1.0")), status=1)[1])
+        self.assertEqual("hal linuxcnc: CONFIG/machine.ini: [DISPLAY]DISPLAY is missing: the machine runs as long as its display does; write DISPLAY = axis, "
+                         "linuxcncrsh, ./my-ui.py or dummy\n", self.linuxcnc(self.ini(text=INI.replace("DISPLAY =", "#")), status=1)[1])
+        self.assertEqual("hal linuxcnc: CONFIG/machine.ini: [APPLICATIONS]DELAY is soon, not a time of 0..3600 seconds\n",
+                         self.linuxcnc(self.ini("[APPLICATIONS]\nDELAY = soon\n"), status=1)[1])
+        self.assertEqual("error: cannot read 'none.ini': No such file or directory [unreadable-file]\n", self.linuxcnc("none.ini", status=1)[1])
+        self.assertEqual("hal linuxcnc: 'machine.hal' is not an INI file; type: hal linuxcnc FILE.ini\n", self.linuxcnc("machine.hal", status=1)[1])
+        self.assertFalse(self.log.exists())
+
+    def test_bad_netlists_end_the_start(self):
+        self.assertEqual("error: 'none.hal' cannot be read: No such file or directory [unreadable-file]\n      = help: named by [HAL]HALFILE in CONFIG/machine.ini; "
+                         "HALLIB_PATH and HALLIB_DIR are further search paths\n", self.linuxcnc(self.ini("[HAL]\nHALFILE = none.hal\n"), status=1)[1])
+        self.write("machine.hal", HALFILE + "setp adder.in1 [JOINT_9]SCALE\n")
+        self.assertEqual("""CONFIG/machine.hal:5:16: error: unknown key '[JOINT_9]SCALE': not in the INI file [unset-ini-key]
+    5 | setp adder.in1 [JOINT_9]SCALE
+      |                ^^^^^^^^^^^^^^
+
+1 error; nothing was changed
+""", self.linuxcnc(self.ini(), status=1)[1])
+        self.assertEqual(["linuxcncsvr ends", "io ends"], self.logged()[-2:])
+
+    def test_one_machine_per_computer(self):
+        self.display("touch shown; exec sleep 1000")
+        machine = self.runs(self.ini())
+        self.assertEqual(f"hal linuxcnc: another LinuxCNC machine is running (process {machine.pid}), and NML allows one per computer; end it first\n",
+                         self.linuxcnc("--name", "other", self.ini(), status=1)[1])
+        self.end(machine)
+        machine = self.start("run", self.write("alone.hal", SERVO + "start\n"))
+        self.assertIn("'default' is already running", self.linuxcnc(self.ini(), status=1)[1])
+        self.end(machine)
+
+    def test_a_launcher_that_was_killed_leaves_nothing_to_the_next(self):
+        self.display("touch shown; exec sleep 1000")
+        machine = self.runs(self.ini())
+        machine.kill()
+        machine.wait(TIMEOUT)  # the server still has its standard output
+        self.display("exit 0")
+        self.assertEqual(("", ""), self.linuxcnc(self.ini()))
+
+
+if __name__ == "__main__":
+    unittest.main()
