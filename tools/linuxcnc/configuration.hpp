@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What an INI file and the installation of LinuxCNC say about a machine: its programs, modules, netlists and folders.
+// What an INI file and the installation of LinuxCNC determine of a machine: its programs, modules, netlists and folders.
 #pragma once
 
 #include <cstdint>
