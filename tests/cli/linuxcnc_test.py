@@ -212,10 +212,10 @@ hal linuxcnc: 'CONFIG/machine.tcl' ended with exit status 1
 
     @unittest.skipUnless(shutil.which("tclsh"), "tclsh is not installed")
     def test_twopass_runs_the_loads_of_tcl_first_too(self):
-        self.write("first.tcl", "setp late.in0 4\nputs \"[hal getp late.in0].\"\n")
+        self.write("first.tcl", "setp late.in0 4\nputs \"[tp::passnumber] [hal getp late.in0].\"\n")
         self.write("second.hal", HALFILE + "loadrt sum2 names=late\n")
         out, err = self.linuxcnc(self.ini("[HAL]\nTWOPASS = ON\nHALFILE = first.tcl\nHALFILE = second.hal\n"))
-        self.assertEqual((".\n4.\n", ""), (out, err))
+        self.assertEqual(("0 .\n1 4.\n", ""), (out, err))
 
     @unittest.skipUnless(shutil.which("tclsh"), "tclsh is not installed")
     def test_haltcl_works_on_a_running_machine(self):

@@ -32,6 +32,11 @@ proc hal {args} {
     if {!$looks} {return -code error $text}
 }
 
+if {$halcyon::pass ne "both"} {
+    namespace eval tp {}
+    proc tp::passnumber {} {expr {$halcyon::pass eq "rest"}}
+}
+
 foreach halcyon::name $halcyon::commands {
     if {[info commands ::$halcyon::name] eq ""} {interp alias {} $halcyon::name {} hal $halcyon::name}
 }
