@@ -142,8 +142,11 @@ if(HALCYON_RT_GUARD AND NOT HALCYON_RTSAN_ARCHIVE)
     message(FATAL_ERROR "HALCYON_RT_GUARD needs clang 19's real-time sanitizer; type: apt install libclang-rt-19-dev")
 endif()
 if(HALCYON_RTSAN_ARCHIVE)
+    add_library(halcyon_guard STATIC "${PROJECT_SOURCE_DIR}/runtime/guard/module_calls.cpp")
+    target_compile_features(halcyon_guard PRIVATE cxx_std_20)
     add_library(halcyon_rtsan INTERFACE)
-    target_link_libraries(halcyon_rtsan INTERFACE "$<LINK_LIBRARY:WHOLE_ARCHIVE,${HALCYON_RTSAN_ARCHIVE}>" ${CMAKE_DL_LIBS} pthread rt m)
+    target_link_libraries(halcyon_rtsan INTERFACE "$<LINK_LIBRARY:WHOLE_ARCHIVE,halcyon_guard>"
+                          "$<LINK_LIBRARY:WHOLE_ARCHIVE,${HALCYON_RTSAN_ARCHIVE}>" ${CMAKE_DL_LIBS} pthread rt m)
 endif()
 
 # halcyon_folder(NAME DEPENDENCY... [ALONE SOURCE...]): the library halcyon_NAME from all sources in runtime/NAME; ALONE as in halcyon_unity().

@@ -13,6 +13,8 @@
 #include "execute/crash_table.hpp"
 #include "machine/crash.hpp"
 
+extern "C" [[gnu::weak]] void __rtsan_realtime_enter();  // a program with the real-time guard
+
 namespace hal {
 namespace {
 
@@ -82,6 +84,18 @@ void on_signal(int signal) {
     raise(signal);  // SA_RESETHAND put the default action back
 }
 
+// A function called exit(), or the real-time guard did because of what the function did.
+void on_exit_of_process() {
+    Core* const core = Core::current();
+    if (!core || !core->in_function() || reported.exchange(true)) return;
+    make_all_safe();
+    print("hal: ");
+    name_function(core, core->current_function());
+    print(__rtsan_realtime_enter ? " made the call that the real-time guard prints above, at cycle " : " called exit() at cycle ");
+    print(core->cycle_number());
+    print("; outputs were set to their safe values; the process ends\n");
+}
+
 // A noexcept function let an exception out. The cycle goes on without the thread's functions.
 [[noreturn]] void on_terminate() {
     if (Core* const core = Core::current(); core && core->in_function()) {
@@ -114,6 +128,7 @@ CycleNames names_of(const CycleNow& now) {
 void watch_for_crashes(SessionState* state) {
     static const bool installed = [] {
         std::set_terminate(on_terminate);
+        std::atexit(on_exit_of_process);
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
         // for the program's own thread, which runs the cycles of a virtual clock; the executor's threads have one each
         alignas(16) static char room[1 << 15];

@@ -10,6 +10,8 @@
 
 char* hal_shmem_base = nullptr;
 
+extern "C" [[gnu::weak, gnu::visibility("default")]] void halcyon_guard_module_function(bool runs);  // guard/module_calls.cpp
+
 namespace hal::modules {
 namespace {
 
@@ -62,7 +64,13 @@ void call_with_parameters(void* self, const hal_cycle* cycle) {
     call(self, cycle);
     module.sync_parameters();
 }
-// Which of the two applies is known once all parameters are declared.
+// In a program with the real-time guard; a weak symbol, so that nothing depends on it.
+void call_under_guard(void* self, const hal_cycle* cycle) {
+    halcyon_guard_module_function(true);
+    (static_cast<const Function*>(self)->module->parameters.empty() ? call : call_with_parameters)(self, cycle);
+    halcyon_guard_module_function(false);
+}
+// Which of the first two applies is known once all parameters are declared.
 void call_first(void* self, const hal_cycle* cycle) {
     (static_cast<const Function*>(self)->module->parameters.empty() ? call : call_with_parameters)(self, cycle);
 }
@@ -170,7 +178,7 @@ int hal_export_funct(const char* name, void (*code)(void*, long), void* arg, int
         void* const memory = host->allocate(host, sizeof(Function), alignof(Function));
         if (!memory) return -ENOMEM;
         Function* const function = new (memory) Function{code, arg, &module};
-        const hal_function_decl decl{sizeof decl, 0, name, "", call_first, function, function, nullptr};
+        const hal_function_decl decl{sizeof decl, 0, name, "", halcyon_guard_module_function ? call_under_guard : call_first, function, function, nullptr};
         return host->function(host, &decl) ? 0 : -EINVAL;
     });
 }

@@ -18,6 +18,7 @@ ROWS = {
     "runtime/execute": ["runtime/plan", "runtime/base"],
     "runtime/modules": ["runtime/abi"],
     "runtime/programs": ["runtime/abi", "runtime/modules", "runtime/sdk"],
+    "runtime/guard": [],
     "runtime/machine": ["runtime/execute", "runtime/model", "runtime/netlist", "runtime/modules"],
     "runtime/commands": ["runtime/machine"],
     "runtime/control": ["runtime/commands"],

@@ -12,6 +12,7 @@ from pathlib import Path
 import harness
 
 SOURCES = Path(__file__).resolve().parent / "modules"
+GUARDED = harness.HAL.parent / "rt-guard" / "hal"  # the program with the real-time guard
 CC = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
 THREAD = "loadrt threads name1=t period1=1000000\n"
 
@@ -257,6 +258,22 @@ getp follow.position
         done = self.sim(THREAD + "loadrt troubled fault=cycle\naddf troubled t\nstart\nadvance 5 cycles\n")
         self.assertEqual(-signal.SIGSEGV, done.returncode)
         self.assertIn("hal: troubled: function 'troubled' crashed (segmentation fault) at cycle 2; outputs were set to their safe values; the process ends", done.stderr)
+
+    def test_a_function_that_ends_the_process_is_named(self):
+        self.build("blocker")
+        done = self.sim(THREAD + "loadrt blocker fault=exit\naddf blocker.update t\nstart\nadvance 5 cycles\n")
+        self.assertEqual((3, "hal: blocker: function 'blocker.update' called exit() at cycle 2; outputs were set to their safe values; the process ends\n"), (done.returncode, done.stderr))
+
+    @unittest.skipUnless(GUARDED.exists(), "no clang 19: no real-time guard")
+    def test_the_real_time_guard_names_a_function_that_allocates_or_blocks(self):
+        self.build("blocker")
+        for call in ("malloc", "usleep", "write", "fprintf"):
+            with self.subTest(call):
+                netlist = self.write("m.hal", THREAD + f"loadrt blocker fault={call}\naddf blocker.update t\nstart\nadvance 5 cycles\n")
+                done = subprocess.run([str(GUARDED), "sim", "--quiet", netlist], cwd=self.folder, env=self.environment, capture_output=True, text=True, timeout=harness.TIMEOUT)
+                self.assertEqual(1, done.returncode, done.stderr)
+                self.assertRegex(done.stderr, f"Real-time violation: .*`{call}`")
+                self.assertIn("hal: blocker: function 'blocker.update' made the call that the real-time guard prints above, at cycle 2; outputs were set to their safe values; the process ends\n", done.stderr)
 
     def test_a_missing_symbol_names_the_module_that_has_it(self):
         self.build("planner", "follow")
