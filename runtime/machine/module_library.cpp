@@ -65,18 +65,6 @@ std::string find_module(std::string_view name) {
     return {};
 }
 
-bool is_module_of_linuxcnc(std::string_view name) {
-    constexpr std::string_view beginnings[] = {"hm2_", "mesa_"};
-    constexpr std::string_view names[] = {
-        "5axiskins", "classicladder_rt", "corexy_by_hal", "genhexkins", "genserkins",  "gentrivkins", "hal_bb_gpio",
-        "hal_gm",    "hal_parport",      "hal_pi_gpio",   "hal_ppmc",   "hal_speaker", "homecomp",    "homemod",
-        "hostmot2",  "lineardeltakins",  "matrixkins",    "maxkins",    "motmod",      "pentakins",   "pumakins",
-        "rosekins",  "rotarydeltakins",  "rotatekins",    "scarakins",  "scope_rt",    "setsserial",  "tpcomp",
-        "tpmod",     "tripodkins",       "trivkins",      "userkins"};
-    return std::any_of(std::begin(beginnings), std::end(beginnings), [&](std::string_view one) { return name.starts_with(one); }) ||
-           std::find(std::begin(names), std::end(names), name) != std::end(names);
-}
-
 std::optional<Plugin> open_module(const std::string& name, Span at, Diagnostics& diagnostics) {
     const std::string path = module_folder() + "/" + name + ".so";
     const auto bad = [&](const std::string& why, const std::string& help) {

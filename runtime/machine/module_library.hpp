@@ -20,8 +20,6 @@ std::optional<Plugin> open_component(const Plugins& plugins, std::string_view na
 std::string module_folder();
 /// Returns the name of the module's file without its folder and `.so` (`-` and `_` are the same); an empty string if the folder has no such file.
 std::string find_module(std::string_view name);
-/// Whether LinuxCNC 2.9 has a module of that name, installed or not. Only names that are not components of ours.
-bool is_module_of_linuxcnc(std::string_view name);
 /// Reads the module's file; its code is not mapped before its instance is created. Nothing after reporting bad-plugin.
 std::optional<Plugin> open_module(const std::string& name, Span at, Diagnostics& diagnostics);
 /// Returns the name of a loaded module that uses symbols of this one; empty: none. `component` is a module's.

@@ -12,21 +12,13 @@
 #include <optional>
 #include <sstream>
 
+#include "modules/elf_value.hpp"
 #include "paths.hpp"
 
 namespace hal {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// The structure at `offset` of `content`, if all of it is there.
-template <class T>
-std::optional<T> at(std::string_view content, std::uint64_t offset) {
-    T value;
-    if (offset > content.size() || content.size() - offset < sizeof value) return {};
-    std::memcpy(&value, content.data() + offset, sizeof value);
-    return value;
-}
 
 std::string grouped_bytes(std::uint64_t there, std::uint64_t needed) {
     return "the file is cut short: " + std::to_string(there) + " of " + std::to_string(needed) + " bytes";

@@ -151,8 +151,12 @@ std::optional<Plugin> open_component(const Plugins& plugins, std::string_view na
                               "sudo apt-get install " + package + ", then build again; ./hal does that by itself");
             return {};
         }
-        if (origin == Origin::any && is_module_of_linuxcnc(name)) return report_missing_module(name, at, diagnostics), std::nullopt;
-        diagnostics.error("no-such-component", at, "unknown component '" + std::string(name) + "'", did_you_mean(name, plugins.available()), "hal doc lists all components");
+        const std::string similar = did_you_mean(name, plugins.available());
+        std::error_code none;
+        const bool may_be_linuxcncs = origin == Origin::any && similar.empty() && !fs::is_directory(module_folder(), none);
+        diagnostics.error("no-such-component", at, "unknown component '" + std::string(name) + "'", similar,
+                          std::string("hal doc lists all components") +
+                              (may_be_linuxcncs ? "; if it is a module of LinuxCNC, which is not installed: sudo apt-get install linuxcnc-uspace" : ""));
         return {};
     }
     const auto bad = [&](const PluginProblem& problem) {

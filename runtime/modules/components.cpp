@@ -178,7 +178,8 @@ int hal_export_funct(const char* name, void (*code)(void*, long), void* arg, int
         void* const memory = host->allocate(host, sizeof(Function), alignof(Function));
         if (!memory) return -ENOMEM;
         Function* const function = new (memory) Function{code, arg, &module};
-        const hal_function_decl decl{sizeof decl, 0, name, "", halcyon_guard_module_function ? call_under_guard : call_first, function, function, nullptr};
+        const hal_function_decl decl{sizeof decl, 0,        name,   "", halcyon_guard_module_function ? call_under_guard : call_first,
+                                     function,    function, nullptr};
         return host->function(host, &decl) ? 0 : -EINVAL;
     });
 }
@@ -196,11 +197,19 @@ int hal_create_thread(const char* name, unsigned long period_ns, int) {
     });
 }
 
-// The runtime takes a module's functions out of the threads, at a cycle boundary, before it is unloaded: the others go on.
-int hal_stop_threads() { return 0; }
+// The runtime has taken a module's functions out of the threads, at a cycle boundary, before rtapi_app_exit() runs. So what a module
+// wants there is done: nothing of it runs. Functions of others go on, because their outputs may be what keeps the machine safe.
+int hal_stop_threads() {
+    if (Module::unloading()) return 0;
+    if (!in_cycle) fail("hal_stop_threads", "all threads", "only while a module is unloaded; the user types stop");
+    return -EPERM;
+}
 int hal_del_funct_from_thread(const char* function, const char*) {
-    for (const Module* const module : Module::all_running())
-        if (function && module->functions.contains(function)) return 0;
-    return -EINVAL;
+    const Module* const module = Module::unloading();
+    if (!module) {
+        if (!in_cycle) fail("hal_del_funct_from_thread", function, "only while a module is unloaded; the user types delf");
+        return -EPERM;
+    }
+    return function && module->functions.contains(function) ? 0 : -EINVAL;
 }
 }

@@ -12,6 +12,8 @@
 #include <string_view>
 #include <vector>
 
+#include "modules/elf_value.hpp"
+
 namespace hal::modules {
 namespace {
 
@@ -27,14 +29,6 @@ constexpr unsigned this_machine = EM_RISCV;
 constexpr unsigned this_machine = EM_NONE;
 #endif
 constexpr bool is_64_bit = sizeof(void*) == 8;
-
-template <class T>
-std::optional<T> at(std::string_view content, std::uint64_t offset) {
-    T value;
-    if (offset > content.size() || content.size() - offset < sizeof value) return {};
-    std::memcpy(&value, content.data() + offset, sizeof value);
-    return value;
-}
 
 std::string text_at(std::string_view table, std::uint64_t offset) {
     if (offset >= table.size()) return {};

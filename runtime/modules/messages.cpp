@@ -10,6 +10,7 @@
 #include <pthread.h>
 #include <unistd.h>
 
+#include "modules/format.hpp"
 #include "modules/module.hpp"
 
 namespace hal::modules {
@@ -109,7 +110,7 @@ void queue_message(int level, const char* format, va_list arguments) noexcept {
         }
     } while (!next_line.compare_exchange_weak(mine, mine + 1, std::memory_order_relaxed));
     line->level = level;
-    std::vsnprintf(line->text, sizeof line->text, format, arguments);
+    format_text(line->text, sizeof line->text, format, arguments);
     line->turn.store(mine + 1, std::memory_order_release);
 }
 
@@ -187,12 +188,12 @@ void rtapi_print_msg(int level, const char* format, ...) {
 }
 
 int rtapi_vsnprintf(char* to, unsigned long size, const char* format, va_list arguments) {
-    return std::vsnprintf(to, size, format, arguments);
+    return in_cycle ? format_text(to, size, format, arguments) : std::vsnprintf(to, size, format, arguments);
 }
 int rtapi_snprintf(char* to, unsigned long size, const char* format, ...) {
     va_list arguments;
     va_start(arguments, format);
-    const int length = std::vsnprintf(to, size, format, arguments);
+    const int length = rtapi_vsnprintf(to, size, format, arguments);
     va_end(arguments);
     return length;
 }

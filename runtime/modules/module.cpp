@@ -16,6 +16,7 @@ thread_local bool in_cycle __attribute__((tls_model("initial-exec"))) = false;
 namespace {
 
 Module* constructing = nullptr;
+thread_local Module* exiting = nullptr;
 std::vector<Module*> running_modules;  // in the order of loading
 
 constexpr const char* info = "rtapi_info_";
@@ -98,6 +99,7 @@ Module::Module(std::string folder, std::string name, ElfFile file)
 }
 
 Module* Module::current() { return constructing; }
+Module* Module::unloading() { return exiting; }
 const std::vector<Module*>& Module::all_running() { return running_modules; }
 
 namespace {
@@ -123,6 +125,41 @@ std::string definers_of(const std::string& symbol, const std::string& folder, st
 
 }  // namespace
 
+namespace {
+
+bool is_of_linuxcnc(std::string_view symbol) {
+    return symbol.starts_with("hal_") || symbol.starts_with("halpr_") || symbol.starts_with("rtapi_") || symbol.starts_with("_rtapi_");
+}
+
+/// What LinuxCNC 2.9 defines beside what this library does: no module of its package uses it.
+bool is_of_this_interface(std::string_view symbol) {
+    constexpr std::string_view beginnings[] = {"hal_port_",  "halpr_find_", "hal_pin_port_new", "rtapi_task_",
+                                               "rtapi_sem_", "rtapi_fifo_", "rtapi_prio_"};
+    constexpr std::string_view names[] = {"hal_add_funct_to_thread",
+                                          "hal_start_threads",
+                                          "hal_link",
+                                          "hal_unlink",
+                                          "hal_signal_new",
+                                          "hal_signal_delete",
+                                          "hal_pin_alias",
+                                          "hal_param_set",
+                                          "hal_param_bit_set",
+                                          "hal_param_float_set",
+                                          "hal_param_s32_set",
+                                          "hal_param_u32_set",
+                                          "hal_set_constructor",
+                                          "hal_stream_attach",
+                                          "rtapi_wait",
+                                          "rtapi_clock_set_period",
+                                          "rtapi_init",
+                                          "rtapi_exit",
+                                          "rtapi_is_realtime"};
+    return std::any_of(std::begin(beginnings), std::end(beginnings), [&](std::string_view one) { return symbol.starts_with(one); }) ||
+           std::find(std::begin(names), std::end(names), symbol) != std::end(names);
+}
+
+}  // namespace
+
 void Module::find_neighbours() {
     uses_.clear();
     for (Module* const other : running_modules)
@@ -137,13 +174,24 @@ void Module::explain_loading(std::string problem) const {
     for (const std::string& symbol : file_.undefined())
         if (!dlsym(RTLD_DEFAULT, symbol.c_str())) missing.push_back(symbol);
     if (missing.empty() || problem.find("undefined symbol") == problem.npos) return host_->fail(host_, problem.c_str());
+    // one of another version of the interface explains the others
+    std::stable_partition(missing.begin(), missing.end(),
+                          [](const std::string& s) { return is_of_linuxcnc(s) && !is_of_this_interface(s); });
     std::string first;
     const std::string owners = definers_of(missing[0], folder_, first);
     const std::string text =
         "it uses " + missing[0] +
         (missing.size() == 1 ? ", which" : " and " + std::to_string(missing.size() - 1) + " more missing symbols; " + missing[0]) +
-        (owners.empty() ? " is defined neither by this runtime nor by a module in " + folder_ : " is defined by " + owners);
-    const std::string help = owners.empty() ? "check that it was built for LinuxCNC 2.9" : "load that first: loadrt " + first;
+        (!owners.empty()                    ? " is defined by " + owners
+         : is_of_this_interface(missing[0]) ? " is a function of LinuxCNC 2.9 that this runtime does not have"
+         : is_of_linuxcnc(missing[0]) ? " is not in the interface of LinuxCNC 2.9: the module is built for another version, such as 2.10"
+                                      : " is defined neither by this runtime nor by a module in " + folder_);
+    const std::string help =
+        !owners.empty() ? "load that first: loadrt " + first
+        : is_of_this_interface(missing[0])
+            ? "docs/linuxcnc-compatibility.md lists what is not supported; hal compile builds a component from its source"
+        : is_of_linuxcnc(missing[0]) ? "use the module of LinuxCNC 2.9 (linuxcnc-uspace), or build this one again with 2.9's halcompile"
+                                     : "check that it was built for LinuxCNC 2.9";
     const hal_rejection rejection{sizeof rejection, HAL_SUBJECT_INSTANCE, "", 0, 0, "", text.c_str(), help.c_str()};
     host_->reject(host_, &rejection);
 }
@@ -209,7 +257,9 @@ void Module::destroy() {
     running_ = false;
     std::erase(running_modules, this);
     const auto exit = reinterpret_cast<void (*)()>(dlsym(library_, "rtapi_app_exit"));
+    exiting = this;
     const int signal = run_guarded_from_crashes([](void* e) { reinterpret_cast<void (*)()>(e)(); }, reinterpret_cast<void*>(exit));
+    exiting = nullptr;
     if (signal != 0) {
         broken_ = true;
         rtapi_print_msg(1, "%s: rtapi_app_exit crashed (%s)\n", name_.c_str(), crash_text(signal));

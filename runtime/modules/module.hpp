@@ -55,6 +55,8 @@ public:
     /// The module that create() is running for; nullptr: none.
     static Module* current();
     static const std::vector<Module*>& all_running();
+    /// The module whose rtapi_app_exit() runs: its functions are in no thread any more; nullptr: none.
+    static Module* unloading();
     const hal_host* host() const { return host_; }
     const hal_modules& extension() const { return *extension_; }
     /// Copies parameters whose value has changed, in both directions. [realtime]

@@ -21,7 +21,9 @@ void* hal_malloc(long bytes);
 char* hal_comp_name(int comp);
 int hal_export_funct(const char* name, void (*code)(void*, long), void* arg, int uses_fp, int reentrant, int comp);
 int hal_create_thread(const char* name, unsigned long period_ns, int uses_fp);
+// Returns 0 in rtapi_app_exit(): the caller's functions are in no thread then; other functions go on. Elsewhere -EPERM: nothing stops. [any]
 int hal_stop_threads();
+// Returns 0 in rtapi_app_exit() for a function of the caller's, which is in no thread then; elsewhere -EPERM. [any]
 int hal_del_funct_from_thread(const char* function, const char* thread);
 
 // pins and parameters: [setup]. Types: bit 1, float 2, s32 3, u32 4, port 5. Directions: in 16, out 32, io 48, ro 64, rw 192

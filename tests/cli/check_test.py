@@ -68,7 +68,7 @@ class Check(Case):
         self.write("a.hal", "loadrt motmod\nloadrt pid names=pid.x\nnet c joint.0.pos-cmd => pid.x.command\naddf pid.x.do-pid-calcs servo-thread\n")
         self.write("b.hal", "net d joint.0.pos-fb pid.x.feedback\nsetp pid.x.Pgain 1\n")
         said = self.bad("check", "a.hal", "b.hal")
-        self.assertEqual(["a.hal:1:8: error: 'motmod' is a module of LinuxCNC, which is not installed: /nowhere does not exist [no-such-component]"], self.errors(said), said)
+        self.assertEqual(["a.hal:1:8: error: unknown component 'motmod' [no-such-component]"], self.errors(said), said)
         self.assertIn("= help: 2 lines depend on it; they were not checked", said)
         self.assertIn("b.hal:1:1: warning: 1 line depends on component 'motmod', which is missing; it was not checked [unchecked-lines]", said)
 

@@ -153,6 +153,22 @@ getp follow.position
         withheld = [int(line.split()[1]) for line in lines if "not printed (limit 100 per second)" in line]
         self.assertEqual(1000, sum(withheld) + sum("message" in line and "troubled" in line for line in lines))
 
+    def test_threads_are_not_stopped_by_a_module(self):
+        self.build("stopper")
+        done = self.sim(THREAD + "loadrt stopper\naddf stopper t\nstart\nadvance 3 cycles\ngetp stopper.result\nunloadrt stopper\nadvance 2 cycles\ngetp t.threadbeat\n")
+        self.assertEqual((0, "-1\n5\n"), (done.returncode, done.stdout), done.stderr)
+        self.assertEqual(["hal_stop_threads: 'all threads': only while a module is unloaded; the user types stop",
+                          "hal_del_funct_from_thread: 'stopper': only while a module is unloaded; the user types delf", "stopper: 0 0 -22"], done.stderr.splitlines())
+
+    def test_messages_of_a_cycle_are_formatted_without_the_c_library(self):
+        self.build("speaker")
+        for program in [p for p in (harness.HAL, GUARDED) if p.exists()]:
+            netlist = self.write("m.hal", THREAD + "loadrt speaker\naddf speaker t\nstart\nadvance 1 cycles\n")
+            done = subprocess.run([str(program), "sim", "--quiet", netlist], cwd=self.folder, env=self.environment, capture_output=True, text=True, timeout=harness.TIMEOUT)
+            self.assertEqual(("", 0), (done.stdout, done.returncode), done.stderr)
+            self.assertEqual(["speaker: 7 -0x00ff text    3.25 1e+10", "speaker: 0.1" + "000000000000000055511151231257827021181583404541015625" + "0" * 445, f"speaker: {7:990}|", "speaker: %1$d", "speaker: a=0003 6"],
+                             [line for line in done.stderr.splitlines()])
+
     def test_ours_is_loaded_first_unless_told_otherwise(self):
         self.build("sum2", source="gain")
         self.assertEqual("0\n", self.good("sim", "--quiet", self.write("m.hal", "loadrt sum2\ngetp sum2.0.in0\n")))
@@ -187,11 +203,13 @@ getp follow.position
 
     def test_a_missing_folder_names_the_package(self):
         self.environment["HAL_RTMOD_DIR"] = "/nowhere"
-        self.assertEqual("""m.hal:1:8: error: 'motmod' is a module of LinuxCNC, which is not installed: /nowhere does not exist [no-such-component]
+        self.assertEqual("""m.hal:1:8: error: unknown component 'motmod' [no-such-component]
     1 | loadrt motmod
       |        ^^^^^^
-      = help: sudo apt-get install linuxcnc-uspace
+      = help: hal doc lists all components; if it is a module of LinuxCNC, which is not installed: sudo apt-get install linuxcnc-uspace
 """, self.error("loadrt motmod\n").split("\n\n")[0] + "\n")
+        self.assertIn("'motmod' is a module of LinuxCNC, which is not installed: /nowhere does not exist [no-such-component]", self.error("loadrt --linuxcnc motmod\n"))
+        self.assertNotIn("LinuxCNC", self.error("loadrt adn2\n"))  # and2 is meant
 
     def test_a_missing_module(self):
         self.assertIn(f"m.hal:1:19: error: LinuxCNC module 'and2' does not exist in {self.modules} [no-such-component]", self.error("loadrt --linuxcnc and2\n"))
@@ -284,6 +302,27 @@ getp follow.position
 """, self.error("loadrt follow\n").split("\n\n")[0] + "\n")
         (self.modules / "planner.so").unlink()
         self.assertIn("it uses planner_next, which is defined neither by this runtime nor by a module in", self.error("loadrt follow\n"))
+
+    def test_a_module_of_another_version_of_linuxcnc(self):
+        for symbol, why, what in (("hal_init_funct_to_thread", "is not in the interface of LinuxCNC 2.9: the module is built for another version, such as 2.10",
+                                   "use the module of LinuxCNC 2.9 (linuxcnc-uspace), or build this one again with 2.9's halcompile"),
+                                  ("hal_port_read", "is a function of LinuxCNC 2.9 that this runtime does not have",
+                                   "docs/linuxcnc-compatibility.md lists what is not supported; hal compile builds a component from its source")):
+            (self.folder / "other.c").write_text(f"int {symbol}(void), a_neighbour(void);\nint rtapi_app_main(void) {{ return {symbol}() + a_neighbour(); }}\nvoid rtapi_app_exit(void) {{}}\n")
+            subprocess.run([CC, "-shared", "-fPIC", "-o", str(self.modules / "other.so"), str(self.folder / "other.c")], check=True)
+            with self.subTest(symbol):
+                error = self.error("loadrt other\n")
+                if "init" in symbol:
+                    self.assertIn(f"cannot make 'other': it uses {symbol} and 1 more missing symbols; {symbol} {why} [construct-failed]", error)
+                    self.assertIn(f"= help: {what}\n", error)
+                else:
+                    self.assertIn("a_neighbour", error)
+            (self.folder / "other.c").write_text(f"int {symbol}(void);\nint rtapi_app_main(void) {{ return {symbol}(); }}\nvoid rtapi_app_exit(void) {{}}\n")
+            subprocess.run([CC, "-shared", "-fPIC", "-o", str(self.modules / "other.so"), str(self.folder / "other.c")], check=True)
+            with self.subTest(symbol + " alone"):
+                error = self.error("loadrt other\n")
+                self.assertIn(f"it uses {symbol}, which {why} [construct-failed]", error)
+                self.assertIn(f"= help: {what}\n", error)
 
     def test_a_module_in_use_stays(self):
         self.build("planner", "follow")
