@@ -290,7 +290,7 @@ hal linuxcnc: 'CONFIG/machine.tcl' ended with exit status 1
         self.display("note `halcmd gets count`; sleep 0.05; note `halcmd gets count`", "count")
         self.display("touch shown; exec sleep 1000")
         err = self.dies(lambda: self.pid("inihal"))
-        self.assertRegex(err, r"\Ahal linuxcnc: 'milltask' \(component inihal\) died since [\d:]+ \(SIGKILL\); the outputs have their safe values, the machine ends\n\Z")
+        self.assertRegex(err, r"\Ahal linuxcnc: 'milltask' \(component inihal\) died at [\d:]+ \(SIGKILL\); the outputs have their safe values, the machine ends\n\Z")
         log = self.logged()
         self.assertEqual(log[-3], log[-4])  # the threads have stopped
         self.assertEqual({"io ends", "halui ends"}, set(log[-2:]))
@@ -299,7 +299,7 @@ hal linuxcnc: 'CONFIG/machine.tcl' ended with exit status 1
         self.write("end.hal", "")
         self.display("touch shown; exec sleep 1000")
         err = self.dies(lambda: self.pid("halui"))
-        self.assertRegex(err, r"\Ahal linuxcnc: 'halui' died since [\d:]+ \(SIGKILL\); the machine ends\n\Z")
+        self.assertRegex(err, r"\Ahal linuxcnc: 'halui' died at [\d:]+ \(SIGKILL\); the machine ends\n\Z")
         self.assertEqual(["milltask ends", "linuxcncsvr ends", "io ends"], self.logged()[-3:])
 
     def test_when_the_nml_server_is_killed_everything_ends(self):

@@ -76,7 +76,9 @@ std::string Launch::death_of(const std::string& component, const std::string& pr
     const auto* const entry = machine_.session.programs().find(component);
     if (entry && !entry->dead()) return {};
     const std::string who = component == program ? fmt::format("'{}'", program) : fmt::format("'{}' (component {})", program, component);
-    return who + " died" + (entry ? " " + entry->end_report : "");
+    std::string when = entry ? entry->end_report : "";  // "since 12:34:56 (SIGKILL)"
+    if (when.starts_with("since ")) when.replace(0, 5, "at");
+    return when.empty() ? who + " died" : who + " died " + when;
 }
 
 std::string Launch::death() {
