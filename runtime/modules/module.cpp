@@ -233,6 +233,8 @@ bool Module::run_main() {
     } call{main, 0};
     const int signal = run_guarded_from_crashes([](void* c) { static_cast<Call*>(c)->result = static_cast<Call*>(c)->main(); }, &call);
     std::string printed = captured();
+    for (char& c : printed)  // hostmot2 prints the bytes of a board's name, which end the text when they are 0
+        if (static_cast<unsigned char>(c) < ' ' && c != '\n' && c != '\t') c = '?';
     while (printed.ends_with('\n')) printed.pop_back();
     for (std::size_t at; (at = printed.find('\n')) != printed.npos;) printed.replace(at, 1, "; ");
     if (signal != 0) {

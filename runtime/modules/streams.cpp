@@ -134,7 +134,7 @@ int hal_stream_read(halcyon_stream* stream, halcyon_stream_value* to, unsigned* 
 
 int hal_stream_write(halcyon_stream* stream, halcyon_stream_value* from) {
     Header& of = header(stream);
-    const std::uint32_t number = of.number++;
+    const std::uint32_t number = ++of.number;  // of the first record 1, as halsampler expects it; lost ones count
     if (!hal_stream_writable(stream)) {
         of.overruns.fetch_add(1, std::memory_order_relaxed);
         return -ENOSPC;

@@ -169,6 +169,33 @@ getp follow.position
             self.assertEqual(["speaker: 7 -0x00ff text    3.25 1e+10", "speaker: 0.1" + "000000000000000055511151231257827021181583404541015625" + "0" * 445, f"speaker: {7:990}|", "speaker: %1$d", "speaker: a=0003 6"],
                              [line for line in done.stderr.splitlines()])
 
+    def test_records_of_a_stream_come_out_in_order_and_lost_ones_are_counted(self):
+        self.build("stream")
+        names = ("written", "got", "real", "bit", "s32", "u32", "number", "depth", "overruns", "underruns")
+        show = "".join(f"getp stream.{name}\n" for name in names)
+        # two cycles of writing, then five: a stream of depth 4 holds 3 records; then reading; then both; then an empty stream
+        done = self.sim(THREAD + "loadrt stream\naddf stream t\nstart\nsetp stream.write TRUE\nadvance 2 cycles\n" + show + "advance 3 cycles\n" + show
+                        + "setp stream.write FALSE\nsetp stream.read TRUE\nadvance 2 cycles\n" + show + "setp stream.write TRUE\nadvance 3 cycles\n" + show
+                        + "setp stream.write FALSE\nadvance 2 cycles\n" + show)
+        self.assertEqual((0, ""), (done.returncode, done.stderr))
+        words = done.stdout.split()
+        self.assertEqual([["0", "0", "0", "FALSE", "0", "0", "0", "2", "0", "0"],
+                          ["-28", "0", "0", "FALSE", "0", "0", "0", "3", "2", "0"],
+                          ["-28", "0", "1", "FALSE", "-2", "4000000002", "2", "1", "2", "0"],
+                          ["0", "0", "4.5", "TRUE", "-9", "4000000009", "7", "1", "2", "0"],
+                          ["0", "-28", "5", "FALSE", "-10", "4000000010", "8", "0", "2", "1"]], [words[i:i + len(names)] for i in range(0, len(words), len(names))])
+
+    def test_firmware_is_read_from_its_folder_only(self):
+        self.build("firmware")
+        for name, number in (("no-such-firmware.bin", -2), ("../hostname", -22)):
+            error = self.error(f"loadrt firmware file={name}\n")
+            self.assertIn(f"firmware: {name}: {number} (rtapi_app_main: ", error)
+        files = sorted(path for path in Path("/lib/firmware").rglob("*") if path.is_file()) if Path("/lib/firmware").is_dir() else []
+        for path in files[:1]:
+            data = path.read_bytes()
+            done = self.sim(f"loadrt firmware file={path.relative_to('/lib/firmware')}\n")
+            self.assertEqual((0, f"firmware: {len(data)} bytes, sum {sum(data)}\n"), (done.returncode, done.stdout + done.stderr))
+
     def test_ours_is_loaded_first_unless_told_otherwise(self):
         self.build("sum2", source="gain")
         self.assertEqual("0\n", self.good("sim", "--quiet", self.write("m.hal", "loadrt sum2\ngetp sum2.0.in0\n")))

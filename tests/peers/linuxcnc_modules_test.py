@@ -32,6 +32,10 @@ DECLINE = {"hal_bb_gpio": "cannot open /dev/mem", "hal_gm": "access to PCI cards
            "hm2_rpspi": "Unsupported Platform", "hm2_spi": "No such file or directory (-2)", "mesa_pktgyro_test": "can not be loaded using the 'count' parameter",
            "setsserial": "Unable to find sserial remote",
            "mesa_uart": "can not be loaded using the 'count' parameter"}
+# What hostmot2 prints about hm2_test's patterns 0 to 14. It accepts 12.
+PATTERNS = ("invalid cookie", "invalid config name", "invalid IDROM type 0", "invalid IDROM type 4660", "invalid IDROM PortWidth 0", "invalid IDROM PortWidth 29",
+            "IDROM IOPorts is 0", "IDROM IOWidth is 99", "IDROM IOPorts is 2", "IDROM ClockLow is 12345", "IDROM ClockHigh is 0", "pin 0 primary tag is 0",
+            "registered", "invalid IDROM PortWidth 24, this board has", "IDROM IOPorts is 0")
 CRASH = {"boss_plc": "rtapi_app_main crashed (segmentation fault)"}  # in LinuxCNC too
 MOTION = """loadrt trivkins
 loadrt tpmod
@@ -138,6 +142,33 @@ show thread
         self.assertNotEqual("", self.value("servo-thread.threadbeat"))
         self.assertEqual(0, self.shell("unloadrt", "tpmod").returncode)
         self.assertEqual("", subprocess.run(["ipcs", "-m"], capture_output=True, text=True).stdout.replace("\n", "").partition("0x00000064")[1])
+
+    def test_7_the_patterns_of_hm2_test(self):
+        for number, piece in enumerate(PATTERNS):
+            with self.subTest(pattern=number):
+                done = self.sim(f"loadrt hostmot2 debug_idrom=1 debug_pin_descriptors=1 debug_module_descriptors=1\nloadrt hm2_test test_pattern={number}\n")
+                self.assertRegex(done.stderr, r"hm2/hm2_test\.0: " + piece)
+
+    def test_streams_of_sampler_and_streamer_by_the_package_s_programs(self):
+        self.write("m.hal", """loadrt threads name1=t period1=1000000
+loadrt --linuxcnc sampler cfg=fb depth=1000
+loadrt --linuxcnc streamer cfg=fs depth=100
+loadrt sum2 names=sum
+net s sum.out => sum.in0 sampler.0.pin.0
+setp sum.in1 1
+addf sum t
+addf sampler.0 t
+addf streamer.0 t
+start
+""")
+        machine = self.start("run", "m.hal", loaded=False)
+        wait_until(lambda: machine.poll() is not None or self.value("sampler.0.curr-depth") not in ("", "0"), "samples")
+        sampled = subprocess.run(["halsampler", "-c", "0", "-n", "3", "-t"], capture_output=True, text=True, timeout=60)
+        self.assertEqual((0, ["0 1.000000 0", "1 2.000000 0", "2 3.000000 0"]), (sampled.returncode, [line.rstrip() for line in sampled.stdout.splitlines()]), sampled.stderr)
+        played = subprocess.run(["halstreamer", "-c", "0"], input="1.5 7\n2.5 8\n", capture_output=True, text=True, timeout=60)
+        self.assertEqual(0, played.returncode, played.stderr)
+        wait_until(lambda: self.value("streamer.0.pin.1") == "8", "the last record")
+        self.assertEqual("2.5", self.value("streamer.0.pin.0"))
 
     def test_7_the_drivers_of_mesa_cards(self):
         self.assertNotIn("hm2_eth.", self.good_sim("loadrt hostmot2\nloadrt hm2_eth\nlist pin\nlist comp\n"))
