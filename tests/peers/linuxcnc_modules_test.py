@@ -32,10 +32,10 @@ DECLINE = {"hal_bb_gpio": "cannot open /dev/mem", "hal_gm": "access to PCI cards
            "hm2_rpspi": "Unsupported Platform", "hm2_spi": "No such file or directory (-2)", "mesa_pktgyro_test": "can not be loaded using the 'count' parameter",
            "setsserial": "Unable to find sserial remote",
            "mesa_uart": "can not be loaded using the 'count' parameter"}
-# What hostmot2 prints about hm2_test's patterns 0 to 14. It accepts 12.
+# What hostmot2 prints about hm2_test's patterns 0 to 14..
 PATTERNS = ("invalid cookie", "invalid config name", "invalid IDROM type 0", "invalid IDROM type 4660", "invalid IDROM PortWidth 0", "invalid IDROM PortWidth 29",
             "IDROM IOPorts is 0", "IDROM IOWidth is 99", "IDROM IOPorts is 2", "IDROM ClockLow is 12345", "IDROM ClockHigh is 0", "pin 0 primary tag is 0",
-            "registered", "invalid IDROM PortWidth 24, this board has", "IDROM IOPorts is 0")
+            "hm2_set_pin_source: invalid pin number 0", "invalid IDROM PortWidth 24, this board has", "IDROM IOPorts is 0")
 CRASH = {"boss_plc": "rtapi_app_main crashed (segmentation fault)"}  # in LinuxCNC too
 MOTION = """loadrt trivkins
 loadrt tpmod
