@@ -29,7 +29,11 @@ static void end(const char *name, const char *instead) {
 
 __attribute__((constructor)) static void check(void) {
     Dl_info data, here;
-    if (dladdr(&hal_data, &data) == 0 || dladdr(&halcyon_here, &here) == 0 || strcmp(data.dli_fname, here.dli_fname) == 0) return;
+    if (dladdr(&halcyon_here, &here) == 0) return;
+    for (size_t i = 0;; ++i) {
+        if (i == 2) return;
+        if (dladdr(i == 0 ? &hal_data : &hal_shmem_base, &data) != 0 && strcmp(data.dli_fname, here.dli_fname) != 0) break;
+    }
     const char *const slash = strrchr(data.dli_fname, '/'), *const name = slash ? slash + 1 : data.dli_fname;
     for (size_t i = 0; i < sizeof replaced / sizeof *replaced; ++i)
         if (strcmp(name, replaced[i].name) == 0) end(name, replaced[i].instead);
@@ -40,6 +44,16 @@ __attribute__((constructor)) static void check(void) {
 #define WALKER(function)                                                                                        \
     void *function(void);                                                                                       \
     void *function(void) { return end(#function, "Python's and Tcl's hal of Halcyon, which loadusr and hal linuxcnc find first"), NULL; }
+WALKER(hal_get_lock)
+WALKER(hal_port_alloc)
+WALKER(hal_port_buffer_size)
+WALKER(hal_set_lock)
+WALKER(list_add_after)
+WALKER(list_add_before)
+WALKER(list_init_entry)
+WALKER(list_next)
+WALKER(list_prev)
+WALKER(list_remove_entry)
 WALKER(halpr_find_comp_by_id)
 WALKER(halpr_find_comp_by_name)
 WALKER(halpr_find_funct_by_name)

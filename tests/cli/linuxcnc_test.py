@@ -1,117 +1,16 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""hal linuxcnc: the order in which everything starts and ends, its environment, netlists in Tcl, and what goes wrong. LinuxCNC is not needed: linuxcnc/
-has programs that stand in for its own."""
+"""hal linuxcnc: the order in which everything starts and ends, its environment, and what goes wrong."""
 import os
-import re
-import shutil
 import signal
-import sys
 import unittest
 from pathlib import Path
 
-from harness import HAL, SERVO, TIMEOUT, Case, wait_until
-
-STANDIN = Path(__file__).parent / "linuxcnc/standin.py"
-MODULE = HAL.parent.parent / "python"
-PROGRAMS = ("linuxcncsvr", "io", "halui", "milltask", "linuxcncrsh", "note")
-
-INI = """[EMC]
-VERSION = 1.1
-[DISPLAY]
-DISPLAY = ./ui
-[TASK]
-TASK = milltask
-[EMCIO]
-EMCIO = io
-[TRAJ]
-TPMOD = sum2 names=planner
-COORDINATES = X Y Z
-[EMCMOT]
-HOMEMOD = mult2 names=homing
-SERVO_PERIOD = 1000000
-[KINS]
-KINEMATICS = trivkins
-JOINTS = 3
-"""
-HALFILE = """loadrt threads name1=servo period1=[EMCMOT]SERVO_PERIOD
-loadrt sum2 names=adder
-addf adder servo
-setp adder.in0 2
-"""
-PLAIN = "[HAL]\nHALFILE = machine.hal\n"
+from harness import HAL, SERVO, TIMEOUT, wait_until
+from linuxcnc_case import HALFILE, INI, LinuxcncCase, PLAIN, prompt
 
 
-def prompt(err):
-    """Standard error without what `loadusr` reports on a busy host: that it waits."""
-    return re.sub(r"(?m)^loadusr: waiting for .*\n", "", err)
-
-
-@unittest.skipUnless(list(MODULE.glob("hal/_core*.so")), "Python's module hal is not built")
-class Linuxcnc(Case):
-    def setUp(self):
-        super().setUp()
-        self.home = self.folder / "installed"
-        (self.home / "bin").mkdir(parents=True)
-        for name in PROGRAMS:
-            self.install(name)
-        self.log = self.folder / "log"
-        self.environment |= {"LINUXCNC_HOME": str(self.home), "STANDIN_LOG": str(self.log), "TMPDIR": str(self.folder)}
-        self.write("machine.hal", HALFILE)
-        self.display("exit 0")
-
-    def tearDown(self):
-        """Nothing may be left, however a run ended."""
-        mark = f"STANDIN_LOG={self.log}".encode()
-
-        def left():
-            names = []
-            for process in Path("/proc").glob("[0-9]*"):
-                try:
-                    if mark in (process / "environ").read_bytes().split(b"\0") and process.name != str(os.getpid()):
-                        names.append((process / "comm").read_text().strip())
-                except OSError:
-                    pass  # it has ended
-            return names
-        remaining = left()
-        self.assertEqual([], remaining)
-        self.assertFalse((self.folder / "linuxcnc.lock").exists())
-        self.assertEqual([], list(self.folder.glob("*.expanded")) + list(self.folder.glob("halcyon/*.sock")))
-
-    def install(self, name):
-        path = self.home / "bin" / name
-        path.write_text(STANDIN.read_text().replace("/usr/bin/env python3", sys.executable, 1))
-        path.chmod(0o755)
-
-    def display(self, script, name="ui"):
-        path = Path(self.write(name, f"#!/bin/sh\n{script}\n"))
-        path.chmod(0o755)
-
-    def ini(self, rest=PLAIN, text=INI):
-        return self.write("machine.ini", text + rest)
-
-    def linuxcnc(self, *words, status=0, **how):
-        """Runs a machine to its end; standard output and error without the name of the folder."""
-        done = self.run_program("linuxcnc", *words, **how)
-        self.assertEqual(status, done.returncode, done.stdout + done.stderr)
-        return done.stdout.replace(str(self.folder), "CONFIG"), prompt(done.stderr).replace(str(self.folder), "CONFIG")
-
-    def end(self, machine, number=signal.SIGTERM):
-        out, err = super().end(machine, number)
-        return out, prompt(err)
-
-    def runs(self, *words):
-        """Starts a machine and waits until its display runs."""
-        machine = self.start("linuxcnc", *words, loaded=False)
-        wait_until(lambda: machine.poll() is not None or (self.folder / "shown").exists(), "the display runs")
-        self.assertIsNone(machine.poll())
-        return machine
-
-    def logged(self):
-        return self.log.read_text().splitlines()
-
-    # --- in order ------------------------------------------------------------------------------------------------------
-
+class Linuxcnc(LinuxcncCase):
     def test_everything_starts_and_ends_in_linuxcncs_order(self):
         self.write("machine.hal", HALFILE + "loadusr -w note netlist\n")
         self.write("end.hal", "loadusr -w note shutdown\n")
@@ -172,84 +71,6 @@ class Linuxcnc(Case):
     def test_a_dummy_display_waits_for_a_line(self):
         out, err = self.linuxcnc(self.ini(text=INI.replace("./ui", "dummy")), given="\n")
         self.assertEqual(("press Enter to end the machine\n", ""), (out, err))
-
-    def test_twopass_loads_before_everything_else(self):
-        self.write("first.hal", "addf late servo\nsetp late.in0 4\n")
-        self.write("second.hal", HALFILE + "loadrt sum2 names=late\n")
-        self.display("note `halcmd getp late.in0`")
-        self.linuxcnc(self.ini("[HAL]\nTWOPASS = ON\nHALFILE = first.hal\nHALFILE = second.hal\n"))
-        self.assertIn("note 4", self.logged())
-
-    def test_includes_are_expanded_for_linuxcncs_programs(self):
-        self.write("more.inc", PLAIN + "#INCLUDE last.inc\n")
-        self.write("last.inc", "HALCMD = setp adder.in1 3\n")
-        self.display("note `halcmd getp adder.in1`; cp $2 seen")
-        self.linuxcnc(self.ini("#INCLUDE more.inc\n"))
-        self.assertIn("io -ini CONFIG/machine.ini.expanded", self.logged())
-        self.assertIn("note 3", self.logged())
-        self.assertEqual(INI + PLAIN + "HALCMD = setp adder.in1 3\n", (self.folder / "seen").read_text())
-
-    # --- Tcl -----------------------------------------------------------------------------------------------------------
-
-    @unittest.skipUnless(shutil.which("tclsh"), "tclsh is not installed")
-    def test_a_netlist_in_tcl_has_the_commands_and_the_ini_file(self):
-        self.write("machine.tcl", """package require Hal
-loadrt threads name1=servo period1=$::EMCMOT(SERVO_PERIOD)
-foreach name {a b} { loadrt sum2 names=$name; addf $name servo; setp $name.in0 [expr {$::KINS(JOINTS) * 2}] }
-net {total} a.out => b.in1
-puts "[hal getp a.in0] <$argv> $argc <$::TRAJ(COORDINATES)> [lindex [hal list pin b.out] 0] [catch {setp none 1} text]"
-puts [lindex [split $text \\n] 0]
-""")
-        self.display("note `halcmd getp b.in0` `halcmd gets total`")
-        out, err = self.linuxcnc(self.ini("[HAL]\nHALFILE = machine.tcl one two\n"))
-        self.assertEqual(("6 <one two> 2 <{X Y Z}> b.out 1\n<machine.tcl>:1:6: error: unknown pin 'none' [no-such-pin]\n", ""), (out, err))
-        self.assertTrue(any(line.startswith("note 6 ") for line in self.logged()), self.logged())
-
-    @unittest.skipUnless(shutil.which("tclsh"), "tclsh is not installed")
-    def test_an_error_in_tcl_ends_the_start(self):
-        self.write("machine.tcl", "proc connect {} {\n    net x elsewhere.y\n}\n\nconnect\n")
-        out, err = self.linuxcnc(self.ini("[HAL]\nHALFILE = machine.tcl\n"), status=1)
-        self.assertEqual("", out)
-        self.assertEqual("""<machine.tcl>:1:7: error: unknown pin 'elsewhere.y' [no-such-pin]
-    1 | net x elsewhere.y
-      |       ^^^^^^^^^^^
-
-1 error; nothing was changed
-    while executing
-"net x elsewhere.y"
-    (procedure "connect" line 2)
-    invoked from within
-"connect"
-    (file "CONFIG/machine.tcl" line 5)
-hal linuxcnc: 'CONFIG/machine.tcl' ended with exit status 1
-""", err)
-        self.assertEqual(["linuxcncsvr ends", "io ends"], self.logged()[-2:])
-
-    @unittest.skipUnless(shutil.which("tclsh"), "tclsh is not installed")
-    def test_twopass_runs_the_loads_of_tcl_first_too(self):
-        self.write("first.tcl", "setp late.in0 4\nputs \"[tp::passnumber] [hal getp late.in0].\"\n")
-        self.write("second.hal", HALFILE + "loadrt sum2 names=late\n")
-        out, err = self.linuxcnc(self.ini("[HAL]\nTWOPASS = ON\nHALFILE = first.tcl\nHALFILE = second.hal\n"))
-        self.assertEqual(("0 .\n1 4.\n", ""), (out, err))
-
-    @unittest.skipUnless(shutil.which("tclsh"), "tclsh is not installed")
-    def test_haltcl_works_on_a_running_machine(self):
-        self.display("haltcl -i $2 later.tcl x; echo 'setp adder.in1 9; hal getp adder.in1' | haltcl; haltcl -i none.ini; haltcl -q")
-        self.write("later.tcl", "puts \"$argv $::EMC(VERSION) [hal getp adder.in0]\"\n")
-        out, err = self.linuxcnc(self.ini(), status=1)
-        self.assertEqual("x 1.1 2\n9\n", out)
-        self.assertEqual("error: cannot read 'none.ini': No such file or directory [unreadable-file]\nhaltcl: unknown option '-q'; see: haltcl -h\n"
-                         "hal linuxcnc: the display './ui' ended with exit status 1\n", err)
-
-    def test_without_tclsh_a_message_names_the_package(self):
-        self.write("machine.tcl", "")
-        (self.folder / "few").mkdir()
-        for name in ("sh", "env", "python3", "sleep"):
-            (self.folder / "few" / name).symlink_to(shutil.which(name))
-        _, err = self.linuxcnc(self.ini("[HAL]\nHALFILE = machine.tcl\n"), status=1, environment={"PATH": str(self.folder / "few")})
-        self.assertEqual("hal linuxcnc: 'CONFIG/machine.tcl' cannot be run: tclsh is not installed; type: sudo apt-get install tcl\n", err)
-
-    # --- what ends it --------------------------------------------------------------------------------------------------
 
     def test_the_status_of_the_display_is_that_of_the_run(self):
         self.display("exit 3")
@@ -373,18 +194,6 @@ CONFIG/machine.ini [TASK]TASK:1:20: error: 'milltask' ended before a component '
         self.assertEqual("error: cannot read 'none.ini': No such file or directory [unreadable-file]\n", self.linuxcnc("none.ini", status=1)[1])
         self.assertEqual("hal linuxcnc: 'machine.hal' is not an INI file; type: hal linuxcnc FILE.ini\n", self.linuxcnc("machine.hal", status=1)[1])
         self.assertFalse(self.log.exists())
-
-    def test_bad_netlists_end_the_start(self):
-        self.assertEqual("error: 'none.hal' cannot be read: No such file or directory [unreadable-file]\n      = help: named by [HAL]HALFILE in CONFIG/machine.ini; "
-                         "HALLIB_PATH and HALLIB_DIR are further search paths\n", self.linuxcnc(self.ini("[HAL]\nHALFILE = none.hal\n"), status=1)[1])
-        self.write("machine.hal", HALFILE + "setp adder.in1 [JOINT_9]SCALE\n")
-        self.assertEqual("""CONFIG/machine.hal:5:16: error: unknown key '[JOINT_9]SCALE': not in the INI file [unset-ini-key]
-    5 | setp adder.in1 [JOINT_9]SCALE
-      |                ^^^^^^^^^^^^^^
-
-1 error; nothing was changed
-""", self.linuxcnc(self.ini(), status=1)[1])
-        self.assertEqual(["linuxcncsvr ends", "io ends"], self.logged()[-2:])
 
     def test_one_machine_per_computer(self):
         self.display("touch shown; exec sleep 1000")
