@@ -7,6 +7,7 @@
 #include <getopt.h>
 #include <vector>
 
+#include "classic_views.hpp"
 #include "cli/output.hpp"
 #include "commands.hpp"
 #include "comp/halcompile.hpp"
@@ -187,8 +188,9 @@ int lcec_conf(int argc, char** argv) {
     return run_command_line(words, line.data());
 }
 
-constexpr Classic table[] = {{"halcmd", halcmd},         {"halcompile", halcompile},   {"halrun", halrun},
-                             {"halsampler", halsampler}, {"halstreamer", halstreamer}, {"haltcl", haltcl}, {"lcec_conf", lcec_conf}};
+constexpr Classic table[] = {{"halcmd", halcmd},         {"halcompile", halcompile}, {"halmeter", halmeter}, {"halrun", halrun},
+                             {"halsampler", halsampler}, {"halscope", halscope},     {"halshow", halshow},   {"halstreamer", halstreamer},
+                             {"haltcl", haltcl},         {"lcec_conf", lcec_conf}};
 
 }  // namespace
 

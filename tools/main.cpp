@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The program `hal`; under the names halcmd, halcompile, halrun, halsampler and halstreamer it behaves like LinuxCNC's programs.
+// The program `hal`; under the names of classic.cpp (halcmd, halrun, …) it behaves like LinuxCNC's programs.
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>

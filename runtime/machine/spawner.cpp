@@ -50,27 +50,19 @@ std::vector<std::string> python_folders(const std::filesystem::path& programs) {
     return {std::string(paths::build_python), std::string(paths::install_python)};
 }
 
-/// Where liblinuxcnchal.so.0 is (runtime/programs), by which LinuxCNC's programs connect to us: before LinuxCNC's own.
-std::vector<std::string> linuxcnc_folders(const std::filesystem::path& programs) {
-    for (const auto& folder : {programs / "../lib/halcyon/linuxcnc", programs / paths::libraries_from_programs / "halcyon/linuxcnc"}) {
-        std::error_code none;
-        if (std::filesystem::exists(folder / "liblinuxcnchal.so.0", none)) return {std::filesystem::canonical(folder, none).string()};
-    }
-    return {};
-}
-
 /// The environment of a child: ours, plus which instance started it, so that `hal shell` in it talks to that one; our own
 /// programs and Python module are found; and it ends when the machine is lost, unless the user wants otherwise.
 std::vector<std::string> environment_of(const std::string& instance) {
     std::error_code ignored;
     const auto program = std::filesystem::read_symlink("/proc/self/exe", ignored);
     const char* const lost = std::getenv("HALCYON_LOST");
+    const std::string linuxcnc = linuxcnc_folder();
     const std::pair<std::string, std::string> ours[] = {
         {"HALCYON_INSTANCE=", instance},
         {"HALCYON_LOST=", lost && *lost ? lost : "end"},
         {"HALCYON_PARENT=", std::to_string(getpid())},
-        {"PATH=", with_folders("PATH", {program.parent_path().string(), user_folder("bin")})},
-        {"LD_LIBRARY_PATH=", with_folders("LD_LIBRARY_PATH", linuxcnc_folders(program.parent_path()))},
+        {"PATH=", with_folders("PATH", {linuxcnc.empty() ? linuxcnc : linuxcnc + "/bin", program.parent_path().string(), user_folder("bin")})},
+        {"LD_LIBRARY_PATH=", with_folders("LD_LIBRARY_PATH", {linuxcnc})},
         {"PYTHONPATH=", with_folders("PYTHONPATH", python_folders(program.parent_path()))}};
     std::vector<std::string> all;
     for (char** entry = environ; *entry; ++entry)
@@ -108,6 +100,14 @@ std::vector<char*> pointers(std::vector<std::string>& texts) {
 }
 
 }  // namespace
+
+std::string linuxcnc_folder() {
+    std::error_code none;
+    const auto programs = std::filesystem::read_symlink("/proc/self/exe", none).parent_path();
+    for (const auto& folder : {programs / "../lib/halcyon/linuxcnc", programs / paths::libraries_from_programs / "halcyon/linuxcnc"})
+        if (std::filesystem::exists(folder / "liblinuxcnchal.so.0", none)) return std::filesystem::canonical(folder, none).string();
+    return {};
+}
 
 struct Spawner::Job {
     const char* file;
@@ -242,7 +242,8 @@ pid_t Spawner::start(const ProcessStart& start, const std::string& instance, std
 
 unsigned long long start_time(pid_t pid) {
     std::ifstream file("/proc/" + std::to_string(pid) + "/stat");
-    std::string text(std::istreambuf_iterator<char>(file), {});
+    std::string text;
+    std::getline(file, text, '\0');  // an iterator would throw when the process ends in between
     const auto behind_name = text.rfind(')');  // a name may have blanks and brackets
     if (behind_name == std::string::npos) return 0;
     std::size_t at = behind_name + 1;

@@ -21,6 +21,20 @@ class Halcmd(Case):
         self.assertEqual("-4\n", self.halcmd("getp", "adder.in0").stdout)
         self.assertEqual(1, self.halcmd("getp", "nothing").returncode)
 
+    def test_windows_are_views_of_ours(self):
+        def run(*words):
+            done = self.run_program(*words[1:], name=words[0])
+            return done.returncode, done.stdout + done.stderr
+        self.assertEqual(0, run("halmeter", "-s", "-g", "10", "20", "pin", "adder.in0")[0])
+        self.assertIn("2", run("halmeter", "pin", "adder.in0")[1])
+        self.assertEqual((1, "halmeter: which value? Type: halmeter pin NAME; hal shell show pin lists the pins\n"), run("halmeter"))
+        self.assertEqual((1, "halmeter: unexpected argument 'b'; usage: halmeter [pin|sig|param] NAME\n"), run("halmeter", "pin", "a", "b"))
+        self.assertEqual(run("hal", "scope", "adder.in0"), run("halscope", "adder.in0"))  # which needs a terminal or a file
+        self.assertEqual((1, "halscope: option '-i' is not supported; type: hal scope NAME…, or hal panel\n"), run("halscope", "-i", "x"))
+        self.assertEqual((1, "halshow: unexpected argument 'x.halshow'; type: hal panel, or hal watch NAME…\n"), run("halshow", "x.halshow"))
+        found = self.run_program("loadusr", "-w", "sh", "-c", "command -v halmeter; command -v halcmd", name="halcmd").stdout
+        self.assertRegex(found, r"\A.*/halcyon/linuxcnc/bin/halmeter\n.*/halcyon/linuxcnc/bin/halcmd\n\Z")
+
     def test_arguments_keep_their_boundaries(self):
         failed = self.halcmd("loadusr", "-w", "sh", "-c", "exit 7")
         self.assertEqual(1, failed.returncode)

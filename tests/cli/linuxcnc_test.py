@@ -56,7 +56,7 @@ class Linuxcnc(LinuxcncCase):
     def test_programs_find_halcmd_and_a_wrapper_beside_the_ini_file_comes_first(self):
         self.display("note `halcmd getp adder.in0`; note `command -v halcmd`")
         self.linuxcnc(self.ini())
-        self.assertIn(f"note {HAL.parent}/halcmd", self.logged())
+        self.assertIn(f"note {HAL.parent.parent}/lib/halcyon/linuxcnc/bin/halcmd", self.logged())
         self.assertIn("note 2", self.logged())
         (self.folder / "bin").mkdir()
         self.display("echo wrapped", "bin/halcmd")

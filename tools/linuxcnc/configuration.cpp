@@ -10,6 +10,7 @@
 
 #include "cli/output.hpp"
 #include "commands/files.hpp"
+#include "machine/spawner.hpp"
 #include "text/characters.hpp"
 #include "text/diagnostic.hpp"
 #include "text/numbers.hpp"
@@ -225,7 +226,7 @@ void export_configuration(const Configuration& configuration, const LinuxcncOpti
     set_variable("PYTHONPATH", with_rest(home + "/lib/python", "PYTHONPATH"));
     std::error_code unknown;
     const std::string own = fs::read_symlink("/proc/self/exe", unknown).parent_path().string();
-    set_variable("PATH", with_rest(fmt::format("{}/bin:{}:{}/bin", configuration.folder, own, home), "PATH"));
+    set_variable("PATH", with_rest(fmt::format("{}/bin:{}/bin:{}:{}/bin", configuration.folder, linuxcnc_folder(), own, home), "PATH"));
 }
 
 }  // namespace hal::tools

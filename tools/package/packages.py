@@ -20,7 +20,7 @@ PACKAGES = {
         "depends": OWN,
         "fields": {"Conflicts": "linuxcnc-uspace, linuxcnc", "Architecture": "all"},
         "summary": "LinuxCNC's command names for Halcyon",
-        "text": "halrun, halcmd, halcompile, halsampler, halstreamer, haltcl and lcec_conf as names of\nthe program hal.",
+        "text": "halrun, halcmd, halcompile, halmeter, halsampler, halscope, halshow, halstreamer,\nhaltcl and lcec_conf as names of the program hal. Programs that a machine starts\nfind them without this package.",
     },
     "halcyon-vision": {"depends": OWN, "lintian": [PLUGINS], "summary": "cameras and markers for Halcyon", "text": "The components that use OpenCV."},
     "halcyon-dds": {"depends": OWN, "lintian": [PLUGINS], "summary": "distribution over DDS for Halcyon", "text": "The components that use Fast DDS: signals as topics, also for ROS 2, and\nmachines of several computers."},
@@ -43,7 +43,7 @@ PACKAGES = {
 }
 
 DOC = "usr/share/doc/Halcyon/"
-ALIASES = "(halrun|halcmd|halcompile|halsampler|halstreamer|haltcl|lcec_conf)"
+ALIASES = "(halrun|halcmd|halcompile|halmeter|halsampler|halscope|halshow|halstreamer|haltcl|lcec_conf)"
 GROUPS = ("vision", "dds", "estimation")  # components that are packages of their own
 
 # (pattern of a path in the installation, package, new path or None for the same); the first match counts. Package None: left out.
