@@ -75,6 +75,12 @@ std::string canonical_path(const std::string& path) {
     return problem ? path : found.string();
 }
 
+std::string absolute_path(const std::string& path) {
+    std::error_code problem;
+    const auto found = std::filesystem::absolute(path, problem);
+    return problem ? path : found.lexically_normal().string();
+}
+
 std::string folder_of(const std::string& path) {
     const auto slash = path.rfind('/');
     return slash == path.npos ? "" : slash == 0 ? "/" : path.substr(0, slash);

@@ -20,6 +20,8 @@ bool read_netlist(const std::string& name, const std::string& directory, std::st
 std::string resolve_path(const std::string& path, const std::string& directory);
 /// The one name of the file, whatever way leads to it; `path` itself when it does not exist.
 std::string canonical_path(const std::string& path);
+/// The path from the root, without `.` and `..`. A link stays one: what an INI file names is beside the link, as in LinuxCNC.
+std::string absolute_path(const std::string& path);
 /// "a/b.hal" gives "a", "b.hal" gives "".
 std::string folder_of(const std::string& path);
 

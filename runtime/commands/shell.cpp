@@ -219,7 +219,7 @@ int Shell::take_files(const std::string& path, const char* key, std::vector<HalF
 }
 
 int Shell::run_halfiles(const std::string& path, Output& output) {
-    const Borrowed in_folder(options.directory, folder_of(canonical_path(resolve_path(path, options.directory))));
+    const Borrowed in_folder(options.directory, folder_of(absolute_path(resolve_path(path, options.directory))));
     std::vector<HalFile> files;
     const int status = take_files(path, "HALFILE", files, output);
     if (status != 0 && !options.keep_going) return status;
@@ -261,7 +261,7 @@ int Shell::run_ini(const std::string& path, Output& output) {
     if (read_ini(path, output) != 0) return 1;
     const Ini& ini = state_->session.ini;
     // As LinuxCNC does, everything named in the file is relative to its folder.
-    const Borrowed in_folder(options.directory, folder_of(canonical_path(resolve_path(path, options.directory))));
+    const Borrowed in_folder(options.directory, folder_of(absolute_path(resolve_path(path, options.directory))));
     if (options.check) note_programs(state_->session, ini);
     std::vector<HalFile> files, after_display;
     int status = take_files(path, "HALFILE", files, output);

@@ -63,6 +63,13 @@ class Linuxcnc(LinuxcncCase):
         self.linuxcnc(self.ini())
         self.assertIn("note wrapped", self.logged())
 
+    def test_an_ini_file_that_is_a_link_names_files_beside_the_link(self):
+        real = self.folder / "shared"
+        real.mkdir()
+        Path(self.ini()).rename(real / "machine.ini")
+        (self.folder / "linked.ini").symlink_to(real / "machine.ini")
+        self.assertEqual("", self.linuxcnc("linked.ini")[1])
+
     def test_arguments_of_linuxcncrsh_come_before_the_ini_file(self):
         _, err = self.linuxcnc(self.ini(PLAIN + "POSTGUI_HALFILE = later.hal\n", INI.replace("./ui", "linuxcncrsh -p 5008")))
         self.assertIn("linuxcncrsh -p 5008 -- -ini CONFIG/machine.ini", self.logged())

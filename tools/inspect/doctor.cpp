@@ -252,11 +252,13 @@ const char* word(Verdict verdict) {
     return words[static_cast<std::size_t>(verdict)];
 }
 
-std::string described(const Finding& finding, bool colour) {
+/// `as` is an earlier finding with the same advice, or nullptr.
+std::string described(const Finding& finding, const Finding* as, bool colour) {
     static constexpr const char* codes[] = {"\033[32m", "\033[33m", "\033[31m"};
     const std::string verdict = colour ? fmt::format("{}{}\033[0m", codes[static_cast<std::size_t>(finding.verdict)], word(finding.verdict))
                                        : word(finding.verdict);
     std::string text = fmt::format("{}  {:15} {}\n", verdict, finding.subject, finding.sentence);
+    if (as) return text + fmt::format("      {:15}   try: the same as for {}\n", "", as->subject);
     if (!finding.remedy.empty()) text += fmt::format("      {:15}   try: {}\n", "", finding.advice());
     if (!finding.other.empty()) text += fmt::format("      {:15}   or:  {}\n", "", finding.other);
     return text;
@@ -268,8 +270,10 @@ int run_doctor(const DoctorOptions& options) {
     const bool colour = colours(STDOUT_FILENO);
     nlohmann::ordered_json report;
     std::vector<Remedy> remedies;
+    std::vector<Finding> findings;
+    findings.reserve(std::size(checks));
     for (const auto& check : checks) {
-        const Finding finding = check();
+        const Finding& finding = findings.emplace_back(check());
         const Remedy remedy{finding.remedy, finding.then};
         if (finding.remedy.starts_with("sudo ") && std::find(remedies.begin(), remedies.end(), remedy) == remedies.end()) remedies.push_back(remedy);
         if (options.json)
@@ -278,7 +282,12 @@ int run_doctor(const DoctorOptions& options) {
                                           {"sentence", finding.sentence},
                                           {"remedy", finding.advice()},
                                           {"other", finding.other}});
-        else if (!print(described(finding, colour))) return 1;
+        else {
+            const auto as = std::find_if(findings.begin(), findings.end() - 1, [&](const Finding& before) {
+                return !finding.remedy.empty() && before.advice() == finding.advice() && (finding.other.empty() || before.other == finding.other);
+            });
+            if (!print(described(finding, as != findings.end() - 1 ? &*as : nullptr, colour))) return 1;
+        }
     }
     if (options.fix) return carry_out(options, remedies);
     constexpr std::int64_t period_ns = 1'000'000, spin_ns = 200'000;

@@ -188,7 +188,7 @@ std::optional<Configuration> read_configuration(const LinuxcncOptions& options) 
     }
     const char* const home = std::getenv("LINUXCNC_HOME");
     configuration.home = home && *home ? home : "/usr";
-    configuration.file = canonical_path(configuration.given);
+    configuration.file = absolute_path(configuration.given);
     configuration.folder = folder_of(configuration.file);
     if (configuration.given.find('/') != std::string::npos) configuration.given = configuration.file;  // the working folder changes
     Sources sources;
