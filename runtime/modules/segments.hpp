@@ -7,6 +7,9 @@ namespace hal::modules {
 /// True in a function that a real-time thread runs: nothing may be declared, allocated or printed directly.
 extern thread_local bool in_cycle __attribute__((tls_model("initial-exec")));
 
+/// True in the process whose threads run modules, false in a program.
+extern const bool runs_modules;
+
 /// Detaches the segments that a component id holds.
 void release_segments(int comp) noexcept;
 

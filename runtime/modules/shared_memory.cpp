@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: MIT
 // Shared memory by key: System V segments of mode 0600, which LinuxCNC's programs open by the same keys.
 #include <cerrno>
+#include <cstdio>
 #include <cstring>
 #include <iterator>
 #include <sys/ipc.h>
 #include <sys/shm.h>
+#include <unistd.h>
 
 #include "modules/rtapi_interface.hpp"
 #include "modules/segments.hpp"
@@ -25,6 +27,20 @@ void detach(Segment& segment) noexcept {
     shmdt(segment.address);
     if (shmctl(segment.id, IPC_STAT, &state) == 0 && state.shm_nattch == 0) shmctl(segment.id, IPC_RMID, nullptr);
     segment = {};
+}
+
+/// The living process, other than this one, that made the segment to run modules on it: a machine, or LinuxCNC itself. 0: none. The second
+/// would clear the memory of the first.
+pid_t other_machine(int id) noexcept {
+    shmid_ds state{};
+    if (shmctl(id, IPC_STAT, &state) != 0 || state.shm_cpid == getpid() || state.shm_nattch == 0) return 0;
+    char path[40], name[32] = "";
+    std::snprintf(path, sizeof path, "/proc/%ld/comm", static_cast<long>(state.shm_cpid));
+    std::FILE* const file = std::fopen(path, "re");
+    if (!file) return 0;
+    if (!std::fgets(name, sizeof name, file)) *name = '\0';
+    std::fclose(file);
+    return std::strncmp(name, "hal", 3) == 0 || std::strncmp(name, "rtapi", 5) == 0 ? state.shm_cpid : 0;
 }
 
 Segment* segment_of(int handle) {
@@ -58,6 +74,13 @@ int rtapi_shmem_new(int key, int comp, unsigned long size) {
         rtapi_print_msg(1, "shared memory with key 0x%x, %lu bytes: %s; ipcs -m lists the segments, ipcrm -M 0x%x removes this one\n",
                         static_cast<unsigned>(key), size, std::strerror(why), static_cast<unsigned>(key));
         return -why;
+    }
+    if (const pid_t other = runs_modules ? other_machine(id) : 0; other != 0) {
+        rtapi_print_msg(1,
+                        "shared memory with key 0x%x belongs to another machine, process %ld; end that one, or give each a key (motmod: "
+                        "key=, [EMCMOT]SHMEM_KEY)\n",
+                        static_cast<unsigned>(key), static_cast<long>(other));
+        return -EBUSY;
     }
     void* const address = shmat(id, nullptr, 0);
     if (address == reinterpret_cast<void*>(-1)) return -errno;

@@ -63,6 +63,17 @@ gets x
 """)
         self.assertEqual(("", "2\n19\n54\nTRUE\n4\n12\n0\n22\n"), (out.stderr, out.stdout))
 
+    def test_memory_by_key_belongs_to_one_machine(self):
+        self.build("planner", "follow")
+        loaded = "loadrt planner\nloadrt follow\n"
+        machine = self.start("run", self.write("first.hal", "loadrt threads name1=servo period1=1000000\n" + loaded + "start\n"))
+        done = self.sim(loaded)
+        self.assertEqual(1, done.returncode, done.stdout + done.stderr)
+        self.assertIn(f"shared memory with key 0x48414c99 belongs to another machine, process {machine.pid}; end that one, or give each a key "
+                      "(motmod: key=, [EMCMOT]SHMEM_KEY)", done.stderr)
+        self.end(machine)
+        self.assertEqual(0, self.sim(loaded).returncode)
+
     def test_names_go_to_the_module(self):
         self.build("gain")
         out = self.sim(THREAD + 'loadrt gain names="left"\naddf left t\nsetp left.in 3\nstart\nadvance 1 cycles\ngetp left.out\n')
