@@ -11,8 +11,10 @@ target_compile_definitions(linuxcnchal PRIVATE HALCYON_PROGRAM=1 HALCYON_LINUXCN
 target_link_libraries(linuxcnchal PRIVATE halcyon_abi Threads::Threads ${CMAKE_DL_LIBS})
 target_compile_features(linuxcnchal PRIVATE c_std_11 cxx_std_20)
 # The programs have no sanitizer's runtime.
-target_compile_options(linuxcnchal PRIVATE "$<$<BOOL:${HALCYON_SANITIZE}>:-fno-sanitize=all>")
-target_link_options(linuxcnchal PRIVATE "$<$<BOOL:${HALCYON_SANITIZE}>:-fno-sanitize=all>")
+if(HALCYON_SANITIZE)
+    target_compile_options(linuxcnchal PRIVATE -fno-sanitize=all)
+    target_link_options(linuxcnchal PRIVATE -fno-sanitize=all)
+endif()
 # Bsymbolic only for functions: a program's copies of hal_data and hal_shmem_base are the ones that count.
 target_link_options(linuxcnchal PRIVATE "LINKER:--version-script=${map}" "LINKER:-Bsymbolic-functions" "LINKER:-z,defs")
 set_target_properties(linuxcnchal PROPERTIES C_VISIBILITY_PRESET default CXX_VISIBILITY_PRESET default LINK_DEPENDS "${map}" UNITY_BUILD OFF
