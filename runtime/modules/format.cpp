@@ -22,7 +22,7 @@ struct Output {
     std::size_t size, length = 0;
 
     void put(std::string_view text) noexcept {
-        if (length < size) std::memcpy(to + length, text.data(), std::min(text.size(), size - length));
+        if (length < size && !text.empty()) std::memcpy(to + length, text.data(), std::min(text.size(), size - length));
         length += text.size();
     }
     void fill(char c, std::ptrdiff_t count) noexcept {
