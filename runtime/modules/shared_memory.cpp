@@ -40,7 +40,8 @@ pid_t other_machine(int id) noexcept {
     if (!file) return 0;
     if (!std::fgets(name, sizeof name, file)) *name = '\0';
     std::fclose(file);
-    return std::strncmp(name, "hal", 3) == 0 || std::strncmp(name, "rtapi", 5) == 0 ? state.shm_cpid : 0;
+    const bool machine = std::strcmp(name, "hal\n") == 0 || std::strcmp(name, "halrun\n") == 0 || std::strncmp(name, "rtapi", 5) == 0;
+    return machine ? state.shm_cpid : 0;
 }
 
 Segment* segment_of(int handle) {

@@ -26,9 +26,10 @@ static int run(const char *const *words) {
         done = answer && strstr(answer, "\"status\":0");
         const char *const text = answer && !done ? strstr(answer, "\"err\":\"") : NULL;
         if (text) reason = strndup(text + 7, strcspn(text + 7, "\\\""));
+        else if (!answer && halcyon_rejection) reason = strdup(halcyon_rejection);
     }
     halcyon_unlock(before);
-    if (!done) rtapi_print_msg(RTAPI_MSG_ERR, "%s: %s failed: %s\n", halcyon_program_name(), words[0], reason ? reason : "no machine");
+    if (!done) rtapi_print_msg(RTAPI_MSG_ERR, "%s: %s failed: %s\n", halcyon_program_name(), words[0], reason ? reason : "the program is not connected; hal_init() connects it");
     free(reason);
     return done ? 0 : -EINVAL;
 }
@@ -72,7 +73,7 @@ static const char *member(const char *object, const char *key) {
 /* Asks for a value by name. `data` leads to a copy, which the next call of the same thread overwrites. */
 static int value_of(const char *kind, const char *name, int *type, union data **data, const char *key, bool *flag) {
     static _Thread_local union data copy;
-    if (!name || !type || !data) return -EINVAL;
+    if (!name || strlen(name) > HAL_NAME_LEN || !type || !data) return -EINVAL;
     const locale_t before = halcyon_lock();
     int result = -EINVAL;
     if (halcyon_connection >= 0) {

@@ -44,10 +44,6 @@ __attribute__((constructor)) static void check(void) {
 #define WALKER(function)                                                                                        \
     void *function(void);                                                                                       \
     void *function(void) { return end(#function, "Python's and Tcl's hal of Halcyon, which loadusr and hal linuxcnc find first"), NULL; }
-WALKER(hal_get_lock)
-WALKER(hal_port_alloc)
-WALKER(hal_port_buffer_size)
-WALKER(hal_set_lock)
 WALKER(list_add_after)
 WALKER(list_add_before)
 WALKER(list_init_entry)
@@ -65,3 +61,15 @@ WALKER(halpr_find_pin_by_owner)
 WALKER(halpr_find_pin_by_sig)
 WALKER(halpr_find_sig_by_name)
 WALKER(halpr_find_thread_by_name)
+
+/* Functions that are rarely used and that a machine of ours does not offer to programs. */
+#define MISSING(function)                                                                                                             \
+    int function(void);                                                                                                               \
+    int function(void) {                                                                                                              \
+        fprintf(stderr, "%s: a machine of Halcyon does not have this function of LinuxCNC's; see docs/linuxcnc-compatibility.md\n", #function); \
+        _exit(1);                                                                                                                     \
+    }
+MISSING(hal_get_lock)
+MISSING(hal_port_alloc)
+MISSING(hal_port_buffer_size)
+MISSING(hal_set_lock)

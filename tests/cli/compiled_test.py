@@ -48,14 +48,6 @@ class Compiled(Case):
         name, prefix = ("gauge", "gauge") if kind == "c" else ("scale2", "scale2.0")
         return self.start("run", self.write("m.hal", NETLIST.replace("NAME", name).replace("PREFIX", prefix).replace("COUNTS", counts))), name, prefix
 
-    def say(self, *words):
-        done = self.shell(*words)
-        self.assertEqual((0, ""), (done.returncode, done.stderr), done.stdout)
-        return done.stdout
-
-    def comes(self, name, value):
-        wait_until(lambda: self.value(name) == value, f"{name} is {value}")
-
     def life(self, kind):
         machine, name, prefix = self.machine(kind)
         self.comes("adder.out", "60")

@@ -120,6 +120,16 @@ class Case(unittest.TestCase):
     def shell(self, *words, instance="default"):
         return self.run_program("shell", "--name", instance, *words)
 
+    def say(self, *words):
+        """As shell, but the command must succeed without a message; its standard output."""
+        done = self.shell(*words)
+        self.assertEqual((0, ""), (done.returncode, done.stderr), done.stdout)
+        return done.stdout
+
+    def comes(self, name, value):
+        """Waits until a pin has the value."""
+        wait_until(lambda: self.value(name) == value, f"{name} is {value}")
+
     def value(self, name, instance="default"):
         return self.shell("getp", name, instance=instance).stdout.strip()
 

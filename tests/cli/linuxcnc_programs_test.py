@@ -39,14 +39,6 @@ class LinuxcncPrograms(harness.Case):
     def machine(self, text=NETLIST):
         return self.start("run", self.write("m.hal", text))
 
-    def say(self, *words):
-        done = self.shell(*words)
-        self.assertEqual((0, ""), (done.returncode, done.stderr), done.stdout)
-        return done.stdout
-
-    def comes(self, name, value):
-        wait_until(lambda: self.value(name) == value, f"{name} is {value}")
-
     # --- what works ------------------------------------------------------------------------------------------------------
 
     def test_loads_and_stores_are_pins_of_the_machine(self):
@@ -130,10 +122,10 @@ class LinuxcncPrograms(harness.Case):
         self.build("gauge")
         machine = self.machine()
         self.say("loadusr", "-Wn", "gauge", "gauge")
+        pid = next(line.split()[3] for line in self.say("show", "comp").splitlines() if " gauge " in line)
         machine.send_signal(signal.SIGKILL)
         machine.wait()
-        wait_until(lambda: subprocess.run(["pgrep", "-f", f"{self.programs}/gauge"], capture_output=True).returncode != 0 or
-                   subprocess.run(["pgrep", "-x", "gauge"], capture_output=True).returncode != 0, "the program ends with it")
+        wait_until(lambda: not Path("/proc", pid).exists(), "the program ends with it")
 
 
 if __name__ == "__main__":

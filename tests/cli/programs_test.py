@@ -41,14 +41,6 @@ class Programs(Case):
         super().setUp()
         self.environment["HALCYON_PLUGIN_PATH"] = PLUGINS
 
-    def say(self, *words):
-        done = self.shell(*words)
-        self.assertEqual((0, ""), (done.returncode, done.stderr), done.stdout)
-        return done.stdout
-
-    def comes(self, name, value):
-        wait_until(lambda: self.value(name) == value, f"{name} is {value}")
-
     def machine(self):
         return self.start("run", self.write("m.hal", NETLIST))
 

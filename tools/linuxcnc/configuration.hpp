@@ -41,7 +41,7 @@ void export_configuration(const Configuration&, const LinuxcncOptions&);
 /// Removes what read_configuration() wrote.
 void remove_expanded(const Configuration&);
 
-/// Returns where the program is: a path, or the first file in PATH; empty when there is none.
+/// Returns where the program is: a path, or the first file in PATH; empty when it is missing.
 std::string find_program(const Configuration&, const std::string& program);
 
 }  // namespace hal::tools

@@ -174,12 +174,12 @@ void Launch::end_orphans() {
 void Launch::end() {
     machine_.shell.cancel(false);
     if (!runs("inihal")) stop_threads();  // nobody commands motion
-    step("end the display");
+    if (display_.pid != 0) step("end the display");
     end_program(display_);
     for (Program& application : applications_) end_program(application);
-    step(fmt::format("end {}", configuration_.task[0]));
+    if (runs("inihal")) step(fmt::format("end {}", configuration_.task[0]));
     end_component("inihal");
-    step("end linuxcncsvr");
+    if (!servers().empty()) step("end linuxcncsvr");
     end_server();
     if (!configuration_.shutdown.empty()) {
         step(fmt::format("run {}", configuration_.shutdown));
