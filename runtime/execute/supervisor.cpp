@@ -113,7 +113,7 @@ void Supervisor::add(Core& core, pthread_t thread, int tid, int priority, int cp
         looked_ns_ = monotonic_ns();
         sigset_t all, before;  // signals are for the program's own thread; a crash is this one's
         sigfillset(&all);
-        for (const int crash : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT}) sigdelset(&all, crash);
+        for (const int crash : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGSYS, SIGTRAP}) sigdelset(&all, crash);
         pthread_sigmask(SIG_SETMASK, &all, &before);
         const int failed = pthread_create(&thread_, nullptr, [](void* self) -> void* {
             static_cast<Supervisor*>(self)->work();

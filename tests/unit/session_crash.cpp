@@ -58,15 +58,24 @@ TEST_P(Crash, makes_outputs_safe_names_the_function_and_dies_by_its_signal) {
     const Result result = run(clock, netlist(death.dies));
     ASSERT_TRUE(WIFSIGNALED(result.status)) << result.status << " " << result.said;
     EXPECT_EQ(WTERMSIG(result.status), death.signal) << result.said;
-    const std::string report = std::regex_replace(result.said, std::regex("at cycle [0-9]+;"), "at cycle N;");
+    std::string report = std::regex_replace(result.said, std::regex("at cycle [0-9]+;"), "at cycle N;");
+#if defined(HALCYON_EMULATED)
+    report = std::regex_replace(report, std::regex("qemu: uncaught target signal [^\n]*\n"), "");  // the emulator's own last word
+#endif
     EXPECT_EQ(report, std::string("emergency function called\nhal: test-faulty: function 'f.run' crashed (") + death.words +
                           ") at cycle N; outputs were set to their safe values; the process ends\n");
 }
 
+#if defined(__aarch64__)
+constexpr Death trap{"4", SIGTRAP, "trap"};  // what __builtin_trap() is there
+#else
+constexpr Death trap{"4", SIGILL, "illegal instruction"};
+#endif
+
 INSTANTIATE_TEST_SUITE_P(In, Crash,
                          testing::Combine(testing::Values("real", "virtual"),
                                           testing::Values(Death{"1", SIGSEGV, "segmentation fault"}, Death{"2", SIGABRT, "abort"}, Death{"3", SIGSEGV, "segmentation fault"},
-                                                          Death{"4", SIGILL, "illegal instruction"}, Death{"5", SIGFPE, "integer division by zero or overflow"})),
+                                                          trap, Death{"5", SIGFPE, "integer division by zero or overflow"})),
                          [](const auto& death) { return std::string(std::get<0>(death.param)) + std::get<1>(death.param).dies; });
 
 TEST(A_process_without_a_fault, ends_quietly) {
