@@ -67,7 +67,7 @@ std::string Interface::open_device() {
             return "interface " + setup_.name + " exists, but is not a TAP interface; use another name, for example hal%d";
         if (is_denied(error) && there) return "interface " + setup_.name + " belongs to another user; " + by_hand();
         if (is_denied(error))
-            return "interface " + setup_.name + " needs the capability CAP_NET_ADMIN; grant it with: " + grant_command(true) + "; or " +
+            return "interface " + setup_.name + " needs the capability CAP_NET_ADMIN; grant it with: " + grant_command(privilege::net_admin) + "; or " +
                    by_hand();
         return "cannot create interface " + setup_.name + ": " + link::reason(error);
     }

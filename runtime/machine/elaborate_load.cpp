@@ -219,6 +219,8 @@ LoadedComponent* loaded_component(Elaboration& on, const Token& name) {
 void edits::loadrt(Elaboration& on, Args args) {
     Origin origin = Origin::any;
     if (!take_origin(on, args, origin)) return;
+    if (const LoadedComponent* const loaded = on.model.find_component(args[0].text); origin == Origin::any && (!loaded || is_module(*loaded)))
+        origin = usual_origin(args[0].text);
     std::string text;
     for (const Token& token : args.subspan(1)) text += (text.empty() ? "" : " ") + written(token.text);
     if (args[0].text == "threads" && origin != Origin::linuxcnc) return load_threads(on, args[0], args.subspan(1), text);

@@ -65,6 +65,11 @@ std::string find_module(std::string_view name) {
     return {};
 }
 
+Origin usual_origin(std::string_view name) {
+    const char* const wanted = std::getenv("HALCYON_MODULES");
+    return wanted && std::string_view(wanted) == "linuxcnc" && !find_module(name).empty() ? Origin::linuxcnc : Origin::any;
+}
+
 std::optional<Plugin> open_module(const std::string& name, Span at, Diagnostics& diagnostics) {
     const std::string path = module_folder() + "/" + name + ".so";
     const auto bad = [&](const std::string& why, const std::string& help) {

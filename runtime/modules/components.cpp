@@ -58,21 +58,24 @@ void call(void* self, const hal_cycle* cycle) {
     function->code(function->arg, static_cast<long>(cycle->period_ns));
     in_cycle = false;
 }
-void call_with_parameters(void* self, const hal_cycle* cycle) {
+// A module with parameters, or one that accesses I/O ports, which each thread must be permitted.
+void call_with_more(void* self, const hal_cycle* cycle) {
     Module& module = *static_cast<const Function*>(self)->module;
+    if (module.accesses_ports) permit_ports();  // without the permission the access is a crash, which names the function
     module.sync_parameters();
     call(self, cycle);
     module.sync_parameters();
 }
+// Which of the first two applies is known once the module is loaded.
+void call_first(void* self, const hal_cycle* cycle) {
+    const Module& module = *static_cast<const Function*>(self)->module;
+    (module.parameters.empty() && !module.accesses_ports ? call : call_with_more)(self, cycle);
+}
 // In a program with the real-time guard; a weak symbol, so that nothing depends on it.
 void call_under_guard(void* self, const hal_cycle* cycle) {
     halcyon_guard_module_function(true);
-    (static_cast<const Function*>(self)->module->parameters.empty() ? call : call_with_parameters)(self, cycle);
+    call_first(self, cycle);
     halcyon_guard_module_function(false);
-}
-// Which of the first two applies is known once all parameters are declared.
-void call_first(void* self, const hal_cycle* cycle) {
-    (static_cast<const Function*>(self)->module->parameters.empty() ? call : call_with_parameters)(self, cycle);
 }
 
 }  // namespace

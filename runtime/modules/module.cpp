@@ -134,8 +134,8 @@ bool is_of_linuxcnc(std::string_view symbol) {
 
 /// What LinuxCNC 2.9 defines beside what this library does: no module of its package uses it.
 bool is_of_this_interface(std::string_view symbol) {
-    constexpr std::string_view beginnings[] = {"hal_port_",  "halpr_find_", "hal_pin_port_new", "rtapi_task_",
-                                               "rtapi_sem_", "rtapi_fifo_", "rtapi_prio_"};
+    constexpr std::string_view beginnings[] = {"hal_port_wait_", "halpr_find_", "rtapi_task_", "rtapi_sem_",
+                                               "rtapi_fifo_",    "rtapi_prio_"};
     constexpr std::string_view names[] = {"hal_add_funct_to_thread",
                                           "hal_start_threads",
                                           "hal_link",
@@ -212,6 +212,8 @@ bool Module::create(const hal_host* host, const hal_modules& extension) {
     if (!library_) explain_loading(dlerror());
     else good = take_arguments() && extension.arguments_known(host) && run_main();
     constructing = nullptr;
+    for (const char* const call : {"ioperm", "iopl"})
+        if (good && std::find(file_.undefined().begin(), file_.undefined().end(), call) != file_.undefined().end()) accesses_ports = permit_ports() == 0;
     if (good) {
         sync_parameters();
         running_ = true;
@@ -260,6 +262,7 @@ void Module::destroy() {
     running_ = false;
     std::erase(running_modules, this);
     const auto exit = reinterpret_cast<void (*)()>(dlsym(library_, "rtapi_app_exit"));
+    if (accesses_ports) permit_ports();
     exiting = this;
     const int signal = run_guarded_from_crashes([](void* e) { reinterpret_cast<void (*)()>(e)(); }, reinterpret_cast<void*>(exit));
     exiting = nullptr;
@@ -274,8 +277,10 @@ void Module::destroy() {
 
 void Module::release() {
     release_components(*this);
+    release_ports(*this);
     parameters.clear();
     functions.clear();
+    accesses_ports = false;
     for (auto& names : names_) names.clear();
     if (library_ && !broken_) dlclose(library_);
     library_ = nullptr;

@@ -66,6 +66,8 @@ public:
     std::vector<Parameter*> parameters;  ///< in memory of the instance
     std::set<int> components;            ///< ids that it has from hal_init() and has not given back
     std::set<std::string> functions;
+    std::vector<int> ports;       ///< numbers of its port pins
+    bool accesses_ports = false;  ///< its functions need what permit_ports() gives
 
 private:
     void find_neighbours();
@@ -107,8 +109,13 @@ int guarded(Action action) noexcept {
 int run_guarded_from_crashes(void (*action)(void*), void* argument) noexcept;
 const char* crash_text(int signal) noexcept;
 
+/// io_ports.cpp: permits this thread to access I/O ports, once. Returns 0 or the errno. [any]
+int permit_ports() noexcept;
+
 /// components.cpp: forgets the ids of a module, and with the last module the memory of hal_malloc().
 void release_components(Module& module) noexcept;
+/// ports.cpp: forgets the port pins of a module.
+void release_ports(Module& module) noexcept;
 /// Sets up what the modules share, before the first one is mapped. Returns false when out of memory.
 bool prepare_memory() noexcept;
 

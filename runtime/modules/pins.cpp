@@ -10,10 +10,11 @@
 namespace hal::modules {
 
 int declaring(const char* function, const char* name, int comp);
+int new_port_pin(const char* name, int dir, void** slot, int comp);  // ports.cpp
 
 namespace {
 
-enum Type { bit = 1, real = 2, s32 = 3, u32 = 4 };
+enum Type { bit = 1, real = 2, s32 = 3, u32 = 4, port = 5 };
 enum Direction { in = 16, out = 32, io = 48, read_only = 64, read_write = 192 };
 
 bool type_of(int type, hal_type& to, std::uint32_t& width) {
@@ -22,7 +23,7 @@ bool type_of(int type, hal_type& to, std::uint32_t& width) {
     case real: to = HAL_TYPE_FLOAT, width = 8; return true;
     case s32: to = HAL_TYPE_S32, width = 4; return true;
     case u32: to = HAL_TYPE_U32, width = 4; return true;
-    default: return false;  // ports: no module of the package has one
+    default: return false;
     }
 }
 
@@ -32,6 +33,7 @@ int fail(const char* function, const char* name, const char* why) {
 }
 
 int new_pin(const char* name, int type, int dir, void** slot, int comp) {
+    if (type == port) return new_port_pin(name, dir, slot, comp);
     if (const int wrong = declaring("hal_pin_new", name, comp); wrong != 0) return wrong;
     Module& module = *Module::current();
     hal_pin_decl decl{};

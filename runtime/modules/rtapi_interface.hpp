@@ -41,6 +41,19 @@ HALCYON_BOTH_FORMS(s32)
 HALCYON_BOTH_FORMS(u32)
 #undef HALCYON_BOTH_FORMS
 
+// ports, by the number that a port pin's pointer points to: pins are [setup], the rest [any]; one thread reads, one writes. A port without a
+// signal, or whose signal has no size yet, holds nothing.
+int hal_pin_port_new(const char* name, int dir, void** slot, int comp);
+int hal_pin_port_newf(int dir, void** slot, int comp, const char* format, ...);
+unsigned hal_port_buffer_size(int port);
+unsigned hal_port_readable(int port);
+unsigned hal_port_writable(int port);
+bool hal_port_peek(int port, char* to, unsigned count);
+bool hal_port_peek_commit(int port, unsigned count);
+bool hal_port_read(int port, char* to, unsigned count);
+bool hal_port_write(int port, const char* from, unsigned count);
+void hal_port_clear(int port);
+
 // streams: create, attach, detach and destroy are [setup], the rest [any]
 struct halcyon_stream {
     int comp, segment;
@@ -94,8 +107,32 @@ int rtapi_shmem_getptr(int segment, void** address);
 int rtapi_shmem_delete(int segment, int comp);
 
 // hardware and the system: [setup]
-struct halcyon_parport;
-struct halcyon_pci_driver;
+struct halcyon_parport {
+    unsigned short base, base_hi;
+    int fd;
+};
+struct halcyon_pci_id {  // 0xffffffff: any
+    std::uint32_t vendor, device, subvendor, subdevice, kind, kind_mask;
+};
+struct halcyon_pci_bar {
+    std::intptr_t start, end;
+    unsigned long flags;
+    void* mapped;
+};
+struct halcyon_pci_device {
+    char name[32], path[256];
+    std::uint16_t vendor, device, subvendor, subdevice;
+    std::uint32_t kind;  // class, subclass and programming interface
+    halcyon_pci_bar bars[6];
+    void* of_driver;
+};
+struct halcyon_pci_driver {
+    const char* name;
+    const halcyon_pci_id* ids;  // the last is all 0
+    int (*probe)(halcyon_pci_device* device, const halcyon_pci_id* id);
+    void (*remove)(halcyon_pci_device* device);
+    void* of_runtime;
+};
 struct halcyon_firmware {
     std::size_t size;
     const unsigned char* data;
@@ -104,9 +141,9 @@ int rtapi_parport_get(const char* name, halcyon_parport* port, unsigned short ba
 void rtapi_parport_release(halcyon_parport* port);
 int rtapi_pci_register_driver(halcyon_pci_driver* driver);
 void rtapi_pci_unregister_driver(halcyon_pci_driver* driver);
-int rtapi_pci_enable_device(void* device);
-int rtapi_pci_disable_device(void* device);
-void* rtapi_pci_ioremap_bar(void* device, int bar);
+int rtapi_pci_enable_device(halcyon_pci_device* device);
+int rtapi_pci_disable_device(halcyon_pci_device* device);
+void* rtapi_pci_ioremap_bar(halcyon_pci_device* device, int bar);
 void rtapi_iounmap(void* address);
 int rtapi_request_firmware(const halcyon_firmware** result, const char* name, void* device);
 void rtapi_release_firmware(const halcyon_firmware* firmware);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Time, texts, files and hardware. The process has its user's rights and no more: what LinuxCNC's set-uid host does as root, it tries
+// Time, texts and files. The process has its user's rights and no more: what LinuxCNC's set-uid host does as root, it tries
 // as that user or declines.
 #include <algorithm>
 #include <cerrno>
@@ -115,21 +115,4 @@ int rtapi_request_firmware(const halcyon_firmware** result, const char* name, vo
 }
 void rtapi_release_firmware(const halcyon_firmware* firmware) { delete reinterpret_cast<const Firmware*>(firmware); }
 
-// Modules access ports by machine code in real-time threads, which inherit the right to do so from a process that had it.
-int rtapi_parport_get(const char* name, halcyon_parport*, unsigned short base, unsigned short, unsigned) {
-    rtapi_print_msg(1, "%s: parallel port at 0x%x: access to I/O ports needs root, and this runtime never runs as root\n", name ? name : "",
-                    base);
-    return -ENODEV;
-}
-void rtapi_parport_release(halcyon_parport*) {}
-
-int rtapi_pci_register_driver(halcyon_pci_driver*) {
-    rtapi_print_msg(1, "access to PCI cards is not supported\n");
-    return -ENODEV;
-}
-void rtapi_pci_unregister_driver(halcyon_pci_driver*) {}
-int rtapi_pci_enable_device(void*) { return -ENODEV; }
-int rtapi_pci_disable_device(void*) { return -ENODEV; }
-void* rtapi_pci_ioremap_bar(void*, int) { return nullptr; }
-void rtapi_iounmap(void*) {}
 }

@@ -54,6 +54,7 @@ private:
 };
 
 void dispatch(const Options&, Report&);
+void modules(const Options&, Report&);
 void wakeup(const Options&, Report&);
 void load(const Options&, Report&);
 void shell(const Options&, Report&);

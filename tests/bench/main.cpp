@@ -29,6 +29,7 @@ struct Section {
 
 constexpr Section sections[] = {
     {"dispatch", "cost of a function in a thread of 1000, against a hand-written loop and LinuxCNC", dispatch},
+    {"modules", "cost of a function of LinuxCNC's compiled modules, here and in LinuxCNC", modules},
     {"wakeup", "how late threads wake, against cyclictest", wakeup},
     {"load", "100 to 100 000 nets, from text to running threads, against LinuxCNC", load, true},
     {"shell", "one-shot commands, a thousand setp, save, against halcmd", shell, true},

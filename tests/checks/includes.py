@@ -16,7 +16,7 @@ ROWS = {
     "runtime/plan": ["runtime/abi"],
     "runtime/model": ["runtime/base", "runtime/plan"],
     "runtime/execute": ["runtime/plan", "runtime/base"],
-    "runtime/modules": ["runtime/abi"],
+    "runtime/modules": ["runtime/abi", "runtime/sdk"],
     "runtime/programs": ["runtime/abi", "runtime/modules", "runtime/sdk"],
     "runtime/guard": [],
     "runtime/machine": ["runtime/execute", "runtime/model", "runtime/netlist", "runtime/modules"],

@@ -3,41 +3,19 @@
 """LinuxCNC's compiled modules: what a module may do, and what goes wrong with one. The modules are in modules/, compiled here; LinuxCNC is
 not needed (tests/peers/linuxcnc_modules_test.py runs its own)."""
 import re
-import shutil
 import signal
 import subprocess
 import unittest
 from pathlib import Path
 
 import harness
+from module_case import CC, THREAD, ModuleCase
 
-SOURCES = Path(__file__).resolve().parent / "modules"
 GUARDED = harness.HAL.parent / "rt-guard" / "hal"  # the program with the real-time guard
-CC = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
-THREAD = "loadrt threads name1=t period1=1000000\n"
 
 
 @unittest.skipUnless(CC, "no C compiler")
-class Modules(harness.Case):
-    def setUp(self):
-        super().setUp()
-        self.modules = self.folder / "rtlib"
-        self.modules.mkdir()
-        self.environment["HAL_RTMOD_DIR"] = str(self.modules)
-
-    def build(self, *names, source=None):
-        for name in names:
-            subprocess.run([CC, "-shared", "-fPIC", "-O1", "-o", str(self.modules / f"{name}.so"), str(SOURCES / f"{source or name}.c")], check=True)
-
-    def sim(self, text, *words, **how):
-        return self.run_program("sim", "--quiet", self.write("m.hal", text), *words, **how)
-
-    def error(self, text):
-        """The errors that `hal sim` prints for the netlist."""
-        done = self.sim(text)
-        self.assertEqual(1, done.returncode, done.stdout + done.stderr)
-        return done.stderr.replace(f"{self.folder}/m.hal", "m.hal")
-
+class Modules(ModuleCase):
     # --- what works ------------------------------------------------------------------------------------------------------
 
     def test_a_module_computes_with_pins_parameters_and_arguments(self):
@@ -215,6 +193,14 @@ getp follow.position
         self.assertIn("unknown component 'gain'", self.error("loadrt --native gain\n"))
         self.assertEqual("0\n", self.good("sim", "--quiet", self.write("m.hal", "loadrt --native sum2\ngetp sum2.0.in0\n")))
 
+    def test_linuxcncs_modules_come_first_where_the_environment_says_so(self):
+        self.build("sum2", source="gain")
+        self.environment["HALCYON_MODULES"] = "linuxcnc"
+        text = "loadrt sum2\ngetp gain.0.gain\nloadrt or2\ngetp or2.0.out\n"
+        self.assertEqual("2\nFALSE\n", self.good("sim", "--quiet", self.write("m.hal", text)))
+        self.assertEqual("0\n", self.good("sim", "--quiet", self.write("m.hal", "loadrt --native sum2\ngetp sum2.0.in0\n")))
+        self.assertEqual("0\n", self.good("sim", "--quiet", self.write("m.hal", "loadrt --native sum2 names=a\nloadrt sum2 names=b\ngetp b.in0\n")))
+
     def test_a_component_is_taken_from_one_place(self):
         self.assertEqual("""m.hal:1:17: error: --native and --linuxcnc are both given: a component is taken from one place [wrong-arguments]
     1 | loadrt --native --linuxcnc gain
@@ -344,7 +330,7 @@ getp follow.position
     def test_a_module_of_another_version_of_linuxcnc(self):
         for symbol, why, what in (("hal_init_funct_to_thread", "is not in the interface of LinuxCNC 2.9: the module is built for another version, such as 2.10",
                                    "use the module of LinuxCNC 2.9 (linuxcnc-uspace), or build this one again with 2.9's halcompile"),
-                                  ("hal_port_read", "is a function of LinuxCNC 2.9 that this runtime does not have",
+                                  ("halpr_find_pin_by_name", "is a function of LinuxCNC 2.9 that this runtime does not have",
                                    "docs/linuxcnc-compatibility.md lists what is not supported; hal compile builds a component from its source")):
             (self.folder / "other.c").write_text(f"int {symbol}(void), a_neighbour(void);\nint rtapi_app_main(void) {{ return {symbol}() + a_neighbour(); }}\nvoid rtapi_app_exit(void) {{}}\n")
             subprocess.run([CC, "-shared", "-fPIC", "-o", str(self.modules / "other.so"), str(self.folder / "other.c")], check=True)

@@ -15,6 +15,13 @@
 namespace hal {
 
 namespace privilege {
+inline constexpr std::uint64_t net_admin = 1U << 12, raw_io = 1U << 17;  // CAP_NET_ADMIN, CAP_SYS_RAWIO
+struct Extra {
+    std::uint64_t bit;
+    std::string_view name, option;
+};
+inline constexpr std::array extras{Extra{net_admin, "cap_net_admin", "NET_ADMIN"}, Extra{raw_io, "cap_sys_rawio", "SYS_RAWIO"}};
+
 /// Returns the permitted capabilities of this process as a bit set. Calls the kernel directly: with libcap, every component would depend
 /// on it.
 inline std::uint64_t permitted() {
@@ -52,17 +59,19 @@ inline std::string shell_word(const std::string& word) {
 
 }  // namespace privilege
 
-/// Returns the command that grants this program the capabilities of real-time threads and raw frames, and CAP_NET_ADMIN where `net_admin` is
-/// set or it already has that one: `sudo setcap ... /usr/local/bin/hal`. File capabilities are replaced as a whole, so it names all of
+/// Returns the command that grants this program the capabilities of real-time threads and raw frames, and those of privilege::extras that
+/// are in `more` or that it already has: `sudo setcap ... /usr/local/bin/hal`. File capabilities are replaced as a whole, so it names all of
 /// them. In a container that withholds them, returns what to add to the command that starts it. [setup]
-inline std::string grant_command(bool net_admin = false) {
-    if (privilege::withheld())
-        return std::string("--cap-add=SYS_NICE --cap-add=IPC_LOCK --cap-add=NET_RAW") + (net_admin ? " --cap-add=NET_ADMIN" : "") +
-               " in the command that starts this container, which withholds them";
-    constexpr unsigned cap_net_admin = 12;
-    const bool admin = net_admin || (geteuid() != 0 && ((privilege::permitted() >> cap_net_admin) & 1U) != 0);
-    return "sudo setcap cap_sys_nice,cap_ipc_lock,cap_net_raw" + std::string(admin ? ",cap_net_admin" : "") + "=ep " +
-           privilege::shell_word(privilege::program());
+inline std::string grant_command(std::uint64_t more = 0) {
+    const std::uint64_t wanted = more | (geteuid() != 0 ? privilege::permitted() : 0);
+    std::string names = "cap_sys_nice,cap_ipc_lock,cap_net_raw";
+    std::string options = "--cap-add=SYS_NICE --cap-add=IPC_LOCK --cap-add=NET_RAW";
+    for (const auto& [bit, name, option] : privilege::extras) {
+        if ((wanted & bit) != 0) names += "," + std::string(name);
+        if ((more & bit) != 0) options += " --cap-add=" + std::string(option);
+    }
+    if (privilege::withheld()) return options + " in the command that starts this container, which withholds them";
+    return "sudo setcap " + names + "=ep " + privilege::shell_word(privilege::program());
 }
 
 }  // namespace hal
