@@ -30,6 +30,13 @@ int permit_all() noexcept {
 #endif
 }
 
+std::string explanation(int why) {
+    if (why == ENODEV) return "this processor has no I/O ports";
+    if (why == ENOSYS) return "this kernel permits no program to access I/O ports (it is built without CONFIG_X86_IOPL_IOPERM)";
+    const std::string command = hal::grant_command(hal::privilege::raw_io);
+    return "access to I/O ports needs the capability CAP_SYS_RAWIO; " + std::string(hal::privilege::withheld() ? "" : "type: ") + command;
+}
+
 /// The kernel's parallel port: `name` is parport0 …
 struct KernelPort {
     std::string name;
@@ -71,11 +78,9 @@ int rtapi_parport_get(const char* name, halcyon_parport* port, unsigned short ba
     return guarded([&] {
         const char* const who = name ? name : "";
         *port = {base, base_hi, -1};
-        if (permit_ports() != 0) {
-            rtapi_print_msg(1, "%s: parallel port at 0x%x: access to I/O ports needs the capability CAP_SYS_RAWIO; %s%s\n", who, base,
-                            hal::privilege::withheld() ? "" : "type: ",
-                            hal::grant_command(hal::privilege::raw_io).c_str());
-            return -EPERM;
+        if (const int why = permit_ports()) {
+            rtapi_print_msg(1, "%s: parallel port at 0x%x: %s\n", who, base, explanation(why).c_str());
+            return -why;
         }
         if (Module* const module = Module::current()) module->accesses_ports = true;
         KernelPort known;

@@ -63,9 +63,11 @@ class Cards(ModuleCase):
             self.assertIn(int(self.value("port.status")), range(256, 512))
             self.end(machine)
         else:
-            self.assertRegex(done.stderr, r"port: parallel port at 0x378: access to I/O ports needs the capability CAP_SYS_RAWIO; (type: sudo setcap cap_sys_nice,cap_ipc_lock,cap_net_raw"
-                             r"(,cap_net_admin)?,cap_sys_rawio=ep \S+|--cap-add=SYS_NICE .*--cap-add=SYS_RAWIO in the command that starts this container, which withholds them) "
-                             r"\(rtapi_app_main: Operation not permitted \(-1\)\)")
+            self.assertRegex(done.stderr, r"port: parallel port at 0x378: (this processor has no I/O ports \(rtapi_app_main: No such device \(-19\)\)|this kernel permits no program "
+                             r"to access I/O ports \(it is built without CONFIG_X86_IOPL_IOPERM\) \(rtapi_app_main: Function not implemented \(-38\)\)|"
+                             r"access to I/O ports needs the capability CAP_SYS_RAWIO; (type: sudo setcap cap_sys_nice,cap_ipc_lock,cap_net_raw(,cap_net_admin)?,cap_sys_rawio=ep \S+|"
+                             r"--cap-add=SYS_NICE .*--cap-add=SYS_RAWIO in the command that starts this container, which withholds them) "
+                             r"\(rtapi_app_main: Operation not permitted \(-1\)\))")
 
     # --- pins of type port -----------------------------------------------------------------------------------------------
 
