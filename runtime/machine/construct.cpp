@@ -19,14 +19,27 @@ std::string dashed(std::string text) {
 
 void* allocate_for(Instance& instance, std::size_t bytes, std::size_t align) noexcept {
     if (bytes > std::min<std::uint64_t>(std::uint64_t{1} << 32, PTRDIFF_MAX - 4096) || align == 0 || align > 4096) return nullptr;
+    // What lies together is fetched into the caches together: blocks of growing size, aligned by hand.
+    constexpr std::size_t most = 64 * 1024;
+    const auto take = [&](Instance::Block& block) -> void* {
+        const auto begin = reinterpret_cast<std::uintptr_t>(block.memory.get());
+        const std::uintptr_t at = (begin + block.used + align - 1) / align * align;
+        if (at - begin + bytes > block.bytes) return nullptr;
+        block.used = at - begin + bytes;
+        return reinterpret_cast<void*>(at);
+    };
     try {
-        // space to align by hand: arrays of char are aligned for any ordinary type only
-        instance.allocations.push_back(std::make_unique<char[]>(bytes + align));
+        std::size_t next = 0;
+        if (!instance.blocks.empty()) {
+            if (void* const memory = take(instance.blocks.back())) return memory;
+            next = std::min(most, std::max<std::size_t>(256, 2 * instance.blocks.back().bytes));
+        }
+        const std::size_t size = std::max(next, bytes + align);
+        instance.blocks.push_back({std::make_unique<char[]>(size), size, 0});
+        return take(instance.blocks.back());
     } catch (const std::bad_alloc&) {
         return nullptr;
     }
-    const auto address = reinterpret_cast<std::uintptr_t>(instance.allocations.back().get());
-    return reinterpret_cast<void*>((address + align - 1) / align * align);
 }
 
 namespace {

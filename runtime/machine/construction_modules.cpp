@@ -39,8 +39,21 @@ bool take_alias(const hal_host* host, const char* name, const char* alias) {
     });
 }
 
+void note_memory(const hal_host* host, const void* begin, std::size_t bytes) {
+    Construction& c = construction_of(host);
+    guarded(c, false, [&] {
+        auto& further = c.instance.further;
+        constexpr std::uintptr_t gap = 64;
+        const auto at = reinterpret_cast<std::uintptr_t>(begin);
+        const std::uintptr_t end = further.empty() ? 0 : reinterpret_cast<std::uintptr_t>(further.back().begin) + further.back().bytes;
+        if (!further.empty() && at >= end && at - end < gap) further.back().bytes += at - end + bytes;
+        else further.push_back({begin, bytes});
+        return true;
+    });
+}
+
 }  // namespace
 
-const hal_modules modules_extension{sizeof modules_extension, component_of, arguments_known, take_thread, take_alias};
+const hal_modules modules_extension{sizeof modules_extension, component_of, arguments_known, take_thread, take_alias, note_memory};
 
 }  // namespace hal

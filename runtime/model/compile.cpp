@@ -239,6 +239,14 @@ private:
                 else set.push_back({instance->memory, bytes});
             }
         }
+        // what instances have beside their own memory: once each, in a row where it lies so
+        std::unordered_set<const Instance*> noted;
+        for (const LoadedFunction* function : thread.functions)
+            for (const Instance* instance : function->instances)
+                if (!excluded(function) && noted.insert(instance).second) {
+                    for (const Instance::Block& block : instance->blocks) set.push_back({block.memory.get(), block.used});
+                    set.insert(set.end(), instance->further.begin(), instance->further.end());
+                }
     }
 
     plan::Export& channel(Thread* from, Thread* to) {

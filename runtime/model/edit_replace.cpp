@@ -69,7 +69,8 @@ void swap_declarations(LoadedFunction& a, LoadedFunction& b) {
 void swap_contents(Instance& a, Instance& b) {
     std::swap(a.memory, b.memory);
     std::swap(a.storage, b.storage);
-    std::swap(a.allocations, b.allocations);
+    std::swap(a.blocks, b.blocks);
+    std::swap(a.further, b.further);
     std::swap(a.functions, b.functions);
     std::swap(a.emergency, b.emergency);
     std::swap(a.streams, b.streams);

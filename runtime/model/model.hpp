@@ -97,7 +97,12 @@ struct Instance {
     LoadedComponent* component = nullptr;
     void* memory = nullptr;
     std::shared_ptr<void> storage;   ///< the block several instances of one loadrt share
-    std::vector<std::unique_ptr<char[]>> allocations;
+    struct Block {
+        std::unique_ptr<char[]> memory;
+        std::size_t bytes = 0, used = 0;
+    };
+    std::vector<Block> blocks;       ///< what its constructor has allocated
+    std::vector<plan::Memory> further;  ///< memory of others that its functions use
     std::vector<std::unique_ptr<Pin>> pins;
     std::vector<LoadedFunction*> functions;
     std::vector<plan::Step> emergency;

@@ -31,6 +31,7 @@ struct Chunk {
     std::size_t bytes, used;
 };
 std::vector<Chunk> chunks;
+std::map<std::uintptr_t, std::size_t> blocks;  // what hal_malloc() gave: address and size
 
 bool add_chunk(std::size_t least) {
     const std::size_t bytes = (least + chunk_bytes - 1) / chunk_bytes * chunk_bytes;
@@ -46,35 +47,27 @@ int fail(const char* function, const char* name, const char* why) {
     return -EINVAL;
 }
 
-struct Function {
-    void (*code)(void*, long);
-    void* arg;
-    Module* module;
-};
-
-void call(void* self, const hal_cycle* cycle) {
-    const Function* const function = static_cast<const Function*>(self);
+void call(const Function& function, const hal_cycle& cycle) {
     in_cycle = true;
-    function->code(function->arg, static_cast<long>(cycle->period_ns));
+    function.code(function.arg, static_cast<long>(cycle.period_ns));
     in_cycle = false;
 }
-// A module with parameters, or one that accesses I/O ports, which each thread must be permitted.
-void call_with_more(void* self, const hal_cycle* cycle) {
-    Module& module = *static_cast<const Function*>(self)->module;
+[[gnu::noinline]] void call_with_more(Function& function, const hal_cycle& cycle) {
+    Module& module = *function.module;
     if (module.accesses_ports) permit_ports();  // without the permission the access is a crash, which names the function
-    module.sync_parameters();
-    call(self, cycle);
-    module.sync_parameters();
+    module.take_parameters(function);
+    call(function, cycle);
+    module.show_parameters(function);
 }
-// Which of the first two applies is known once the module is loaded.
-void call_first(void* self, const hal_cycle* cycle) {
-    const Module& module = *static_cast<const Function*>(self)->module;
-    (module.parameters.empty() && !module.accesses_ports ? call : call_with_more)(self, cycle);
+void call_function(void* self, const hal_cycle* cycle) {
+    Function& function = *static_cast<Function*>(self);
+    if (function.module->plain()) [[likely]] call(function, *cycle);
+    else call_with_more(function, *cycle);
 }
 // In a program with the real-time guard; a weak symbol, so that nothing depends on it.
 void call_under_guard(void* self, const hal_cycle* cycle) {
     halcyon_guard_module_function(true);
-    call_first(self, cycle);
+    call_function(self, cycle);
     halcyon_guard_module_function(false);
 }
 
@@ -97,7 +90,16 @@ void release_components(Module& module) noexcept {
     if (!Module::all_running().empty() || Module::current()) return;
     for (const Chunk& chunk : chunks) munmap(chunk.memory, chunk.bytes);
     chunks.clear();
+    blocks.clear();
     hal_shmem_base = nullptr;
+}
+
+std::uintptr_t end_of_block(const volatile void* address) noexcept {
+    const auto at = reinterpret_cast<std::uintptr_t>(address);
+    auto after = blocks.upper_bound(at);
+    if (after == blocks.begin()) return 0;
+    --after;
+    return at < after->first + after->second ? after->first + after->second : 0;
 }
 
 int declaring(const char* function, const char* name, int comp) {
@@ -161,6 +163,8 @@ void* hal_malloc(long bytes) {
         chunk.used = (chunk.used + 15) / 16 * 16;
         result = std::memset(chunk.memory + chunk.used, 0, wanted);  // touched now: no page fault in a cycle
         chunk.used += wanted;
+        blocks[reinterpret_cast<std::uintptr_t>(result)] = wanted;
+        if (const Module* const module = Module::current()) module->extension().memory(module->host(), result, wanted);
         return 0;
     });
     return result;
@@ -181,7 +185,8 @@ int hal_export_funct(const char* name, void (*code)(void*, long), void* arg, int
         void* const memory = host->allocate(host, sizeof(Function), alignof(Function));
         if (!memory) return -ENOMEM;
         Function* const function = new (memory) Function{code, arg, &module};
-        const hal_function_decl decl{sizeof decl, 0,        name,   "", halcyon_guard_module_function ? call_under_guard : call_first,
+        module.declared.push_back(function);
+        const hal_function_decl decl{sizeof decl, 0,        name,   "", halcyon_guard_module_function ? call_under_guard : call_function,
                                      function,    function, nullptr};
         return host->function(host, &decl) ? 0 : -EINVAL;
     });

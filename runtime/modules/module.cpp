@@ -11,7 +11,7 @@
 
 namespace hal::modules {
 
-thread_local bool in_cycle __attribute__((tls_model("initial-exec"))) = false;
+constinit thread_local bool in_cycle __attribute__((tls_model("initial-exec"))) = false;
 const bool runs_modules = true;
 
 namespace {
@@ -215,7 +215,9 @@ bool Module::create(const hal_host* host, const hal_modules& extension) {
     for (const char* const call : {"ioperm", "iopl"})
         if (good && std::find(file_.undefined().begin(), file_.undefined().end(), call) != file_.undefined().end()) accesses_ports = permit_ports() == 0;
     if (good) {
-        sync_parameters();
+        assign_parameters();
+        announce_memory();
+        plain_ = parameters.empty() && !accesses_ports;
         running_ = true;
         running_modules.push_back(this);
         start_printer();
@@ -252,6 +254,14 @@ bool Module::run_main() {
     return false;
 }
 
+void Module::announce_memory() {
+    for (const int id : components)
+        each_segment(id, [](void* self, const void* begin, unsigned long bytes) {
+            const Module& module = *static_cast<const Module*>(self);
+            module.extension_->memory(module.host_, begin, bytes);
+        }, this);
+}
+
 void Module::start() { print_captured(); }
 
 void Module::destroy() {
@@ -279,6 +289,8 @@ void Module::release() {
     release_components(*this);
     release_ports(*this);
     parameters.clear();
+    shared_.clear();
+    declared.clear();
     functions.clear();
     accesses_ports = false;
     for (auto& names : names_) names.clear();
@@ -287,21 +299,6 @@ void Module::release() {
     strings_.clear();
     host_ = nullptr;
     uses_.clear();
-}
-
-void Module::sync_parameters() noexcept {
-    for (Parameter* const p : parameters) {
-        hal_value outside{.raw = __atomic_load_n(&p->pin.slot->raw, __ATOMIC_RELAXED)}, inside{.raw = 0};
-        std::memcpy(&inside, const_cast<const void*>(p->value), p->width);
-        if (std::memcmp(&outside, &p->last, p->width) != 0) {
-            std::memcpy(const_cast<void*>(p->value), &outside, p->width);
-            p->last = hal_value{.raw = 0};
-            std::memcpy(&p->last, &outside, p->width);
-        } else if (std::memcmp(&inside, &p->last, p->width) != 0) {
-            __atomic_store_n(&p->pin.slot->raw, inside.raw, __ATOMIC_RELAXED);
-            p->last = inside;
-        }
-    }
 }
 
 }  // namespace hal::modules

@@ -27,6 +27,19 @@ struct Parameter {
     std::uint32_t width;
 };
 
+class Module;
+
+/// A function of a module, in memory of the instance.
+struct Function {
+    void (*code)(void*, long);
+    void* arg;
+    Module* module;
+    // Parameters that are copied before and after each call: those in the memory that `arg` points to. Those of no function are copied by
+    // all functions.
+    Parameter* const* own = nullptr;
+    std::size_t own_count = 0, calls = 0;
+};
+
 class Module {
     struct Shown {
         halcyon_module shown;  ///< first
@@ -59,11 +72,16 @@ public:
     static Module* unloading();
     const hal_host* host() const { return host_; }
     const hal_modules& extension() const { return *extension_; }
-    /// Copies parameters whose value has changed, in both directions. [realtime]
-    void sync_parameters() noexcept;
+    /// True when its functions are called without anything around them: it has no parameters and accesses no ports.
+    bool plain() const noexcept { return plain_; }
+    /// Before a call: copies parameters of the function that were set from outside. [realtime]
+    void take_parameters(const Function& function) noexcept;
+    /// After a call: copies parameters that the module has changed. [realtime]
+    void show_parameters(Function& function) noexcept;
     bool take_name(bool parameter, const std::string& name) { return names_[parameter].insert(name).second; }
 
-    std::vector<Parameter*> parameters;  ///< in memory of the instance
+    std::vector<Parameter*> parameters;   ///< in memory of the instance; in the end sorted by the address of their values
+    std::vector<Function*> declared;
     std::set<int> components;            ///< ids that it has from hal_init() and has not given back
     std::set<std::string> functions;
     std::vector<int> ports;       ///< numbers of its port pins
@@ -74,6 +92,8 @@ private:
     void explain_loading(std::string problem) const;
     bool take_arguments();
     bool run_main();
+    void assign_parameters();
+    void announce_memory();
     void release();
 
     std::string name_, path_, folder_, summary_, doc_;
@@ -87,10 +107,11 @@ private:
     std::set<const Module*> uses_;
     std::vector<std::unique_ptr<char[]>> strings_;  // values of text parameters
     std::set<std::string> names_[2];                // of pins and of parameters
+    std::vector<Parameter*> shared_;                // of no function
     void* library_ = nullptr;
     const hal_host* host_ = nullptr;
     const hal_modules* extension_ = nullptr;
-    bool running_ = false, broken_ = false;
+    bool running_ = false, broken_ = false, plain_ = false;
 };
 
 /// Runs an action for a module. An exception must not cross its C frames. Returns a negative errno for one.
@@ -116,6 +137,8 @@ int permit_ports() noexcept;
 void release_components(Module& module) noexcept;
 /// ports.cpp: forgets the port pins of a module.
 void release_ports(Module& module) noexcept;
+/// The block of hal_malloc() that contains the address: its end; 0: none.
+std::uintptr_t end_of_block(const volatile void* address) noexcept;
 /// Sets up what the modules share, before the first one is mapped. Returns false when out of memory.
 bool prepare_memory() noexcept;
 

@@ -50,6 +50,11 @@ Segment* segment_of(int handle) {
 
 }  // namespace
 
+void each_segment(int comp, void (*action)(void* self, const void* begin, unsigned long bytes), void* self) {
+    for (const Segment& segment : segments)
+        if (segment.users > 0 && segment.comp == comp) action(self, segment.address, segment.size);
+}
+
 void release_segments(int comp) noexcept {
     for (Segment& segment : segments)
         if (segment.users > 0 && segment.comp == comp) detach(segment);

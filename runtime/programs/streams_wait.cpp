@@ -7,7 +7,7 @@
 
 namespace hal::modules {
 
-thread_local bool in_cycle __attribute__((tls_model("initial-exec"))) = false;
+constinit thread_local bool in_cycle __attribute__((tls_model("initial-exec"))) = false;
 const bool runs_modules = false;
 
 }  // namespace hal::modules

@@ -29,6 +29,9 @@ typedef struct hal_modules {
     bool (*thread)(const hal_host *, const char *name, int64_t period_ns);
     /* Gives a pin or parameter that this instance has declared a second name; NULL removes it. Returns false if there is no such pin. */
     bool (*alias)(const hal_host *, const char *name, const char *alias);
+    /* Announces memory that the functions of this instance use and that allocate() has not given: a thread fetches it into the caches
+     * before its deadline. It may be unmapped once the instance is destroyed. */
+    void (*memory)(const hal_host *, const void *begin, size_t bytes);
 } hal_modules;
 
 #ifdef __cplusplus
