@@ -34,13 +34,18 @@ def wait(what, condition, seconds):
     sys.exit(f"run_program: {what}: not within {seconds} s; " + ("; ".join(messages()) or "LinuxCNC gives no reason"))
 
 
+def counts():
+    """Cycles of the servo thread so far, and how many of them it missed."""
+    return [int(subprocess.run(["hal", "shell", "getp", f"servo-thread.{pin}"], capture_output=True, text=True, check=True).stdout) for pin in ("threadbeat", "missed")]
+
+
 def main():
     arguments = [word for word in sys.argv[1:] if word.endswith(".ngc")]
     program = Path(arguments[0] if arguments else HERE / "program.ngc").resolve()
     OUT.mkdir(parents=True, exist_ok=True)
 
     # the nodes of the bus come first: a reset without them has no effect
-    for _ in range(100):
+    for _ in range(300):
         command.state(linuxcnc.STATE_ESTOP_RESET)
         time.sleep(0.1)
         status.poll()
@@ -59,6 +64,7 @@ def main():
     command.mode(linuxcnc.MODE_AUTO)
     command.wait_complete()
     command.program_open(str(program))
+    before = counts()
     begin = time.monotonic()
     command.auto(linuxcnc.AUTO_RUN, 0)
     wait("start of the program", lambda: status.interp_state != linuxcnc.INTERP_IDLE, 5)
@@ -72,7 +78,8 @@ def main():
         failed.append("hal record failed")
     if failed:
         sys.exit("run_program: " + "; ".join(failed))
-    print(f"{program.name} took {seconds:.1f} s", flush=True)
+    cycles, missed = (after - start for after, start in zip(counts(), before))
+    print(f"{program.name} took {seconds:.1f} s; of {cycles + missed} cycles of the servo thread {missed} were missed", flush=True)
     subprocess.run([sys.executable, HERE / "draw_path.py", OUT / "path.csv", OUT / "path.png"], check=True)
 
 

@@ -22,7 +22,7 @@ NOT_ALONE = {"ethercat-cnc/control.hal", "ethernet-cnc/clock.hal", "ethernet-cnc
              "ethernet-furuta/rig.hal", "ethernet-furuta/swing-up-wire.hal", "ethernet-furuta/upright.hal", "ethernet-furuta/wire.hal",
              # with an INI file, or part of another file
              "jitter/plain.hal", "jitter/random.hal", "jitter/scocan.hal", "jitter/tdma.hal", "jitter/wiring.hal",
-             "linuxcnc-ethernet/axes.hal", "linuxcnc-ethernet/machine.hal",
+             *(f"linuxcnc-ethernet/{name}.hal" for name in ("canopen", "ethercat", "machine", "memory", "slots", "wire")),
              "yair/pc.hal", "yair/pc-alone.hal", "yair/robot.hal", "yair/robot-alone.hal", "yair/yair.hal"}
 HIDDEN = f'for folder in "$1" "$2"; do mount -t tmpfs none "$folder" || exit 99; done; user=$3; shift 3; exec {RUNUSER} -u "$user" -- env "HOME=$HOME" "$@"'
 OVERLAY = 'mount -t overlay -o "lowerdir=$1,upperdir=$2/upper,workdir=$2/work" overlay "$1" || exit 99; cd "$1"; shift 2; eval "$@"'

@@ -80,7 +80,7 @@ class Cards(ModuleCase):
         self.assertEqual("hal_pin_port_new: 'bytes.both': invalid direction: a port has one writer and one reader\n" * 2, done.stderr)
         words = done.stdout.split()
         self.assertEqual([["TRUE", "0", "0", "0", "0", "0"]] * 2, [words[0:6], words[6:12]])
-        # 40 cycles: 200 bytes written, 160 read; from the 61st byte that wait on, the writer finds no room at times
+        # 40 cycles: 200 bytes written, 160 read; from the 61st byte that wait on, the writer finds no space at times
         written, read, waiting, room, size = (int(word) for word in words[13:18])
         self.assertEqual(("TRUE", 160, written - read, 64), (words[12], read, waiting, size))
         self.assertIn(waiting, range(40, 65))
