@@ -12,6 +12,7 @@
 #include <sched.h>
 #include <stdexcept>
 #include <sys/resource.h>
+#include <sys/prctl.h>
 #include <sys/syscall.h>
 #include <thread>
 #include <unistd.h>
@@ -129,6 +130,9 @@ void Runner::set_up() noexcept {
         }
     }
     granted.refused = wants && granted.policy == Granted::Policy::other;
+    // Without a real-time policy spinning is charged like work, and the kernel preempts the thread for it.
+    if (granted.policy == Granted::Policy::other && options.spin_ns < 0) wait_.spin_ns = 0;
+    prctl(PR_SET_TIMERSLACK, 1UL, 0UL, 0UL, 0UL);  // else the kernel may wake an ordinary thread 50 us late, to save power
     // a crash handler must run even when it is the stack that overflowed
     stack_t other{};
     other.ss_sp = signal_stack_.get();

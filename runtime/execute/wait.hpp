@@ -22,7 +22,7 @@ struct Wait {
     /// Wakes a thread that waits on `bell`. [any]
     static void ring(std::atomic<std::uint32_t>& bell) noexcept;
 
-    /// Returns the default spin window of a period: two fifths of the period, at most 150 us.
+    /// Returns the default spin window of a period, for a thread with a real-time policy: two fifths of the period, at most 150 us.
     static std::int64_t default_spin_ns(std::int64_t period_ns) noexcept;
 };
 

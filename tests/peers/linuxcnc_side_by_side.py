@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""linuxcnc_side_by_side.py HAL [USER]: the same machine and program under LinuxCNC's own launcher and under `hal linuxcnc`. Prints whether the motion
-controller gives the same positions in each servo cycle, the time until the display runs, and the memory. LinuxCNC rejects root: USER runs it.
-77: the package is not installed."""
+"""linuxcnc_side_by_side.py HAL [USER] [--load]: the same machine and program under LinuxCNC's own launcher and under `hal linuxcnc`. Prints whether the
+motion controller gives the same positions in each servo cycle, how regular its cycles are, the time until the display runs, and the memory. LinuxCNC
+rejects root: USER runs it. --load: with a busy process for each CPU. 77: the package is not installed."""
 import os
 import pwd
 import shutil
@@ -29,7 +29,7 @@ def memory():
 
 
 def run(words, user, environment):
-    """(positions of every cycle with motion, seconds until the display runs, MB)."""
+    """(positions of every cycle with motion, seconds until the display runs, MB, the periods of the servo thread in units of the clock it is measured with)."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name) / "machine"
         shutil.copytree(HERE, folder)
@@ -52,13 +52,23 @@ def run(words, user, environment):
         if any(row[0] == "overrun" for row in rows):
             sys.exit(f"{words[0]}: the sampler lost records; run it on a quiet machine")
         positions = [tuple(row[1:4]) for row in rows if len(row) >= 4]
+        periods = [int(row[4]) for row in rows[1:] if len(row) >= 5]
     moving = [position for before, position in zip(positions, positions[1:]) if position != before]
-    return moving, started, used
+    return moving, started, used, periods
+
+
+def regularity(periods):
+    """How far periods are from the middle one, which is taken for a millisecond."""
+    middle = sorted(periods)[len(periods) // 2]
+    away = sorted(abs(period / middle - 1) * 1000 for period in periods)
+    return (f"half of {len(away)} within {away[len(away) // 2]:.1f} us, 99 % within {away[len(away) * 99 // 100]:.0f} us, all within {away[-1]:.0f} us; "
+            f"{sum(period > 1.5 * middle for period in periods)} longer than 1.5 ms")
 
 
 def main():
     hal = Path(sys.argv[1]).resolve()
-    user = pwd.getpwnam(sys.argv[2]) if len(sys.argv) > 2 else None
+    names = [word for word in sys.argv[2:] if word != "--load"]
+    user = pwd.getpwnam(names[0]) if names else None
     if not shutil.which("milltask"):
         print("LinuxCNC is not installed: sudo apt-get install linuxcnc-uspace")
         sys.exit(77)
@@ -66,10 +76,17 @@ def main():
         print("LinuxCNC rejects root; name a user who runs it")
         sys.exit(77)
     plain = {**os.environ, "HOME": user.pw_dir if user else os.environ["HOME"]}
-    theirs, their_start, their_memory = run(["linuxcnc", "-r"], user, plain)
-    ours, our_start, our_memory = run([str(hal), "linuxcnc"], user, {**plain, "PATH": f"{hal.parent}:{plain['PATH']}"})
+    load = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(os.cpu_count() if "--load" in sys.argv else 0)]
+    try:
+        theirs, their_start, their_memory, their_periods = run(["linuxcnc", "-r"], user, plain)
+        ours, our_start, our_memory, our_periods = run([str(hal), "linuxcnc"], user, {**plain, "PATH": f"{hal.parent}:{plain['PATH']}"})
+    finally:
+        for process in load:
+            process.kill()
     differ = sum(a != b for a, b in zip(theirs, ours)) + abs(len(theirs) - len(ours))
     print(f"cycles with motion: LinuxCNC {len(theirs)}, Halcyon {len(ours)}; {differ} differ (6 decimals)")
+    print(f"periods, LinuxCNC: {regularity(their_periods)}")
+    print(f"periods, Halcyon:  {regularity(our_periods)}")
     print(f"until the display runs: LinuxCNC {their_start:.2f} s, Halcyon {our_start:.2f} s")
     print(f"memory of the machine's programs: LinuxCNC {their_memory:.0f} MB, Halcyon {our_memory:.0f} MB")
     sys.exit(0 if differ == 0 and theirs else 1)
