@@ -165,7 +165,7 @@ except hal.error as problem:
 
     def test_what_the_functions_return_and_raise_is_linuxcncs(self):
         self.machine()
-        self.assertEqual("False True False True False False False\nerror\nerror True\nerror True\nAttributeError True\nFalse\nmade\nb'bf' True\n", self.python(
+        self.assertEqual("False True False True False False False\nerror\nerror True\nerror True\nAttributeError True\nNameError True\nFalse\nmade\nb'bf' True\n", self.python(
             "import hal, os, sys\nsys.stderr = open(os.devnull, 'w')\nc = hal.component('x')\n"
             "print(hal.new_sig('level', hal.HAL_FLOAT), hal.new_sig('level', hal.HAL_FLOAT), hal.connect('adder.in0', 'level'), hal.connect('nothing', 'level'),\n"
             "      hal.set_s('level', 1), hal.disconnect('adder.in0'), hal.set_p('adder.in0', '2'))\n"
@@ -174,6 +174,7 @@ except hal.error as problem:
             "print('error', fails(lambda: c.newpin('a', hal.HAL_BIT, hal.HAL_RO), hal.error, ValueError))\n"
             "print('error', fails(lambda: c.newpin('a', 99, hal.HAL_IN), hal.error, ValueError))\n"
             "c.newpin('a', hal.HAL_BIT, hal.HAL_IN)\nprint('AttributeError', fails(lambda: c.getparam('a'), AttributeError, hal.error))\n"
+            "print('NameError', fails(lambda: hal.pin_has_writer('nothing'), NameError, hal.error))\n"
             "c.ready()\n"
             "try: c.newpin('b', hal.HAL_BIT, hal.HAL_IN); print('made too late')\nexcept hal.error as e: print(not str(e).startswith('Invalid argument: '))\n"
             "c.unready(); c.newpin('b', hal.HAL_BIT, hal.HAL_IN); c.ready(); print('made')\n"

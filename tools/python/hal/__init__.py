@@ -16,7 +16,7 @@ import sys
 
 from hal import _core
 from hal._base import *  # noqa: F403
-from hal._base import (_BY_DIR, _BY_NAME, _TYPES, _ask, _run, _value, _word, MSG_ERR, InvalidArgument, Type, error)
+from hal._base import (_BY_DIR, _BY_NAME, _TYPES, _ask, _run, _value, _word, MSG_ERR, InvalidArgument, Type, UnknownPin, error)
 from hal._component import Pin, component  # noqa: F401
 from hal._probe import probe  # noqa: F401
 from hal._stream import stream  # noqa: F401
@@ -69,7 +69,7 @@ def disconnect(pin):
 def pin_has_writer(name):
     about = _objects("pin", name)
     if about is None:
-        raise error(f"unknown pin '{name}'")
+        raise UnknownPin(f"unknown pin '{name}'")
     return "signal" in about and "writer" in _objects("sig", about["signal"])
 
 

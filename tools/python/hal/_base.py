@@ -15,6 +15,10 @@ class InvalidArgument(error, ValueError):
     __module__ = "hal"
 
 
+class UnknownPin(error, NameError):
+    __module__ = "hal"
+
+
 class WrongKind(error, AttributeError):
     __module__ = "hal"
 
