@@ -148,6 +148,7 @@ int sampler_or_streamer(int argc, char** argv, const char* program, const char* 
     O options;
     options.program = program;
     options.classic = true;
+    options.line.assign(argv, argv + argc);
     for (int letter; (letter = ::getopt(argc, argv, letters)) != -1;) {
         char* end = nullptr;
         const std::uint64_t number = ::optarg ? std::strtoull(::optarg, &end, 10) : 0;

@@ -2,12 +2,15 @@
 #include "inspect/stream.hpp"
 
 #include <algorithm>
+#include <cstdlib>
+#include <filesystem>
 #include <fmt/core.h>
 #include <nlohmann/json.hpp>
 #include <unistd.h>
 
 #include "base/types.hpp"
 #include "cli/output.hpp"
+#include "machine/spawner.hpp"
 
 namespace hal::tools {
 
@@ -15,6 +18,24 @@ namespace {
 
 bool number(const std::string& word) {
     return !word.empty() && std::all_of(word.begin(), word.end(), [](char c) { return c >= '0' && c <= '9'; });
+}
+
+/// Becomes LinuxCNC's program of the same name if the machine has LinuxCNC's compiled module, whose stream only that program reads.
+/// Returns if there is no such module, or no such program.
+void become_linuxcnc(const StreamOptions& options, const std::string& stream, Client& client) {
+    const auto pins = client.request({{"describe", "pin"}, {"patterns", nlohmann::json::array({stream + "."})}});
+    if (pins.value("objects", nlohmann::json::array()).empty()) return;
+    const char* const home = std::getenv("LINUXCNC_HOME");
+    const std::string program = (home && *home ? home : "/usr") + std::string("/bin/") + options.program;
+    std::error_code none;
+    if (std::filesystem::equivalent(program, "/proc/self/exe", none)) return;
+    const char* const libraries = std::getenv("LD_LIBRARY_PATH");
+    ::setenv("LD_LIBRARY_PATH", (linuxcnc_folder() + (libraries && *libraries ? ":" + std::string(libraries) : "")).c_str(), 1);
+    std::vector<std::string> line = options.line;
+    std::vector<char*> words;
+    for (std::string& word : line) words.push_back(word.data());
+    words.push_back(nullptr);
+    ::execv(program.c_str(), words.data());
 }
 
 }  // namespace
@@ -41,6 +62,7 @@ bool Stream::open(const StreamOptions& options, const char* component) {
     }
     const nlohmann::json about = client->request({{"stream", name}});
     if (!about.value("ok", false)) {
+        if (options.classic) become_linuxcnc(options, name, *client);
         fail(options, about.value("error", "no answer"));
         return false;
     }

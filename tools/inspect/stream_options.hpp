@@ -3,6 +3,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "cli/option_set.hpp"
 
@@ -13,6 +14,7 @@ struct StreamOptions : Options {
     std::string channel;            ///< when it is not among the words: a number or the name of an instance
     std::string name_as_component;  ///< halsampler -N
     bool classic = false;           ///< as halsampler or halstreamer: no channel among the words
+    std::vector<std::string> line;  ///< the whole command line, if classic
 };
 
 }  // namespace hal::tools
