@@ -168,6 +168,7 @@ Transaction& Script::transaction() {
 void Script::edit(const Command& command, const CommandRow& row) {
     lines_.push_back(command.span);
     if (!check_lock(row, command, locks(), session_.model(), pending_)) return;
+    if (state_.module_loads && command.name.text == "loadrt" && merge_load(command)) return;
     ++edits_;
     if ((row.flags & command_programs) && !shell_.options.check) {
         Context context{*this, shell_, session_, session_.programs(), output_, row, command, pending_, lock_, &transaction()};

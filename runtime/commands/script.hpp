@@ -56,6 +56,8 @@ private:
     void run_row(const std::vector<Command>& commands, std::size_t from, std::size_t to);
     void run_line(const Command& command);
     void edit(const Command& command, const CommandRow& row);
+    /// The first pass of TWOPASS: true when the command was merged into the shell's module_loads.
+    bool merge_load(const Command& command);
     void defer(const Command& command, const CommandRow& row);
     void act(const Command& command, const CommandRow& row);
     /// begin, commit, abort

@@ -5,6 +5,8 @@
 
 #include "commands/files.hpp"
 #include "commands/script.hpp"
+#include "machine/module_library.hpp"
+#include "text/numbers.hpp"
 
 namespace hal {
 namespace {
@@ -25,11 +27,39 @@ bool opts_out(std::string_view text) {
     return false;
 }
 
+/// Adds an argument of a further `loadrt` of the same module: numbers of instances are added, lists are joined.
+void merge_argument(Command& load, const Token& argument) {
+    const auto equals = argument.text.find('=');
+    const std::string key = argument.text.substr(0, equals + 1);
+    for (Token& there : load.args) {
+        if (equals == std::string::npos || !there.text.starts_with(key)) continue;
+        const auto first = parse_natural(there.text.substr(key.size())), second = parse_natural(argument.text.substr(key.size()));
+        if (first && second && (key == "count=" || key == "num_chan=")) there.text = key + std::to_string(*first + *second);
+        else if (there.text != argument.text) there.text += "," + argument.text.substr(key.size());
+        return;
+    }
+    load.args.push_back(argument);
+}
+
 }  // namespace
+
+bool Script::merge_load(const Command& command) {
+    const bool asked = command.args.size() > 1 && command.args[0].text == "--linuxcnc";
+    if (command.args.empty() || (!asked && usual_origin(command.args[0].text) != Origin::linuxcnc)) return false;
+    const auto name_of = [](const Command& load) { return load.args[load.args[0].text == "--linuxcnc" ? 1 : 0].text; };
+    text_is_kept_ = true;
+    for (Command& load : *state_.module_loads) {
+        if (name_of(load) != name_of(command)) continue;
+        for (std::size_t i = asked ? 2 : 1; i < command.args.size(); ++i) merge_argument(load, command.args[i]);
+        return true;
+    }
+    state_.module_loads->push_back(command);
+    return true;
+}
 
 int Script::run_two_pass(const std::vector<std::uint32_t>& texts, Pass pass) {
     // Loading is additive here, so that the loads of all files need not be merged into one line per component: doing
-    // them first, in order, gives the same instances. loadusr comes before that, as in LinuxCNC's first pass.
+    // them first, in order, gives the same instances, but for LinuxCNC's modules (merge_load). loadusr comes before that, as in LinuxCNC's first pass.
     std::vector<Command> programs, loads, rest;
     std::vector<std::size_t> whole;  // places in `rest` where a text that opted out runs as it is
     std::vector<std::uint32_t> opted_out;

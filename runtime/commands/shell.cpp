@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "machine/module_library.hpp"
 #include "machine/session.hpp"
 #include "commands/table.hpp"
 #include "commands/files.hpp"
@@ -240,7 +241,9 @@ int Shell::run_taken(std::vector<HalFile>& files, bool& quit, Output& output) {
         return status;
     }
     const bool scripts = std::any_of(files.begin(), files.end(), [](const HalFile& file) { return file.script; });
-    for (const Pass pass : scripts ? std::vector{Pass::loads, Pass::rest} : std::vector{Pass::both}) {
+    std::vector<Command> module_loads;
+    for (const Pass pass : scripts || prefers_modules() ? std::vector{Pass::loads, Pass::rest} : std::vector{Pass::both}) {
+        state_->module_loads = pass == Pass::loads ? &module_loads : nullptr;
         for (auto file = files.begin(); file != files.end() && !over();) {
             if (file->script) {
                 status |= state_->run_script(file->name, file->arguments, pass, output);
@@ -253,6 +256,8 @@ int Shell::run_taken(std::vector<HalFile>& files, bool& quit, Output& output) {
             status |= script.run_two_pass(sources, pass);
             quit = quit || script.quit_seen();
         }
+        state_->module_loads = nullptr;
+        if (pass == Pass::loads && !over()) status |= Script(*this, *state_, output).run(module_loads);
     }
     return status;
 }

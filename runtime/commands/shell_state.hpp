@@ -24,6 +24,8 @@ struct Shell::State {
     /// Lines of `show latency` about signals between machines, shared by all shells of the session and read with its lock held.
     std::shared_ptr<std::vector<std::string>> latencies = std::make_shared<std::vector<std::string>>();
     ScriptRunner run_script = {};
+    /// With TWOPASS, while the loads are gathered: one `loadrt` for each LinuxCNC module, which is loaded once; else nullptr.
+    std::vector<Command>* module_loads = nullptr;
     std::optional<Ini> ini = {};           ///< what [SECTION]KEY means to this shell, when it is not the session's INI file
 };
 

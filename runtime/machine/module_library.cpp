@@ -65,10 +65,12 @@ std::string find_module(std::string_view name) {
     return {};
 }
 
-Origin usual_origin(std::string_view name) {
+bool prefers_modules() {
     const char* const wanted = std::getenv("HALCYON_MODULES");
-    return wanted && std::string_view(wanted) == "linuxcnc" && !find_module(name).empty() ? Origin::linuxcnc : Origin::any;
+    return wanted && std::string_view(wanted) == "linuxcnc";
 }
+
+Origin usual_origin(std::string_view name) { return prefers_modules() && !find_module(name).empty() ? Origin::linuxcnc : Origin::any; }
 
 std::optional<Plugin> open_module(const std::string& name, Span at, Diagnostics& diagnostics) {
     const std::string path = module_folder() + "/" + name + ".so";

@@ -19,6 +19,9 @@ std::optional<Plugin> open_component(const Plugins& plugins, std::string_view na
 /// Where a `loadrt` without an option takes this component from: linuxcnc if HALCYON_MODULES contains "linuxcnc" and there is such a module, else any.
 Origin usual_origin(std::string_view name);
 
+/// True when HALCYON_MODULES is "linuxcnc".
+bool prefers_modules();
+
 /// $HAL_RTMOD_DIR, or where the package linuxcnc-uspace installs them.
 std::string module_folder();
 /// Returns the name of the module's file without its folder and `.so` (`-` and `_` are the same); an empty string if the folder has no such file.

@@ -42,6 +42,12 @@ puts [lindex [split $text \\n] 0]
         self.assertTrue(any(line.startswith("note 6 ") for line in self.logged()), self.logged())
 
     @unittest.skipUnless(shutil.which("tclsh"), "tclsh is not installed")
+    def test_tcl_loads_a_component_with_the_arguments_of_the_ini_file(self):
+        self.write("machine.tcl", "loadrt $::KINS(KINEMATICS)\nputs [list [hal list pin *.out]]\n")
+        out, err = self.linuxcnc(self.ini("[HAL]\nHALFILE = machine.tcl\n", INI.replace("trivkins", "sum2 names=a,b")))
+        self.assertEqual(("{a.out b.out homing.out planner.out }\n", ""), (out, err))
+
+    @unittest.skipUnless(shutil.which("tclsh"), "tclsh is not installed")
     def test_an_error_in_tcl_ends_the_start(self):
         self.write("machine.tcl", "proc connect {} {\n    net x elsewhere.y\n}\n\nconnect\n")
         out, err = self.linuxcnc(self.ini("[HAL]\nHALFILE = machine.tcl\n"), status=1)

@@ -171,6 +171,33 @@ start
         wait_until(lambda: self.value("streamer.0.pin.1") == "8", "the last record")
         self.assertEqual("2.5", self.value("streamer.0.pin.0"))
 
+    def test_our_halsampler_becomes_the_package_s_for_its_module(self):
+        self.write("m.hal", """loadrt threads name1=t period1=1000000
+loadrt --linuxcnc sampler cfg=f depth=1000
+loadrt sum2 names=sum
+net s sum.out => sum.in0 sampler.0.pin.0
+setp sum.in1 1
+addf sum t
+addf sampler.0 t
+start
+""")
+        machine = self.start("run", "m.hal", loaded=False)
+        wait_until(lambda: machine.poll() is not None or self.value("sampler.0.curr-depth") not in ("", "0"), "samples")
+        sampled = subprocess.run([HAL.parent / "halsampler", "-n", "3", "-t"], env=self.environment, capture_output=True, text=True, timeout=60)
+        self.assertEqual((0, ["0 1.000000", "1 2.000000", "2 3.000000"]), (sampled.returncode, [line.rstrip() for line in sampled.stdout.splitlines()]), sampled.stderr)
+        missing = subprocess.run([HAL.parent / "halsampler", "-c", "1"], env=self.environment, capture_output=True, text=True, timeout=60)
+        self.assertEqual(1, missing.returncode)
+        self.assertIn("unknown stream 'sampler.1'", missing.stderr)
+
+    def test_twopass_merges_the_loads_of_a_module(self):
+        self.environment["HALCYON_MODULES"] = "linuxcnc"
+        self.write("a.hal", "loadrt and2 names=first\nloadrt or2 count=1\n")
+        self.write("b.hal", "loadrt and2 names=second\nloadrt or2 count=2\nlist pin *.out\n")
+        machine = "[HAL]\n{}HALFILE = a.hal\nHALFILE = b.hal\n"
+        done = self.run_program("sim", "--quiet", self.write("m.ini", machine.format("TWOPASS = on\n")))
+        self.assertEqual((0, "first.out or2.0.out or2.1.out or2.2.out second.out"), (done.returncode, " ".join(sorted(done.stdout.split()))), done.stderr)
+        self.assertIn("which is loaded once", self.run_program("sim", "--quiet", self.write("m.ini", machine.format(""))).stderr)
+
     def test_7_the_drivers_of_mesa_cards(self):
         self.assertNotIn("hm2_eth.", self.good_sim("loadrt hostmot2\nloadrt hm2_eth\nlist pin\nlist comp\n"))
         done = self.sim("loadrt hostmot2\nloadrt hm2_eth board_ip=10.99.99.99\n")

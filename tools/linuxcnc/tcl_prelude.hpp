@@ -22,6 +22,8 @@ proc halcyon::request {words} {
 proc hal {args} {
     if {[llength $args] == 0} {return -code error {wrong # args: should be "hal COMMAND ..."}}
     if {$args eq "--commands"} {return $halcyon::commands}
+    # The list $::KINS(KINEMATICS) of one value, "trivkins coordinates=XYYZ", is the name and its arguments.
+    if {[lindex $args 0] eq "loadrt"} {set args [lreplace $args 1 1 {*}[join [lindex $args 1]]]}
     set loads [expr {[lindex $args 0] in {loadrt loadusr}}]
     # With the loads runs what only looks; what it looks for may be missing then.
     set looks [expr {!$loads && $halcyon::pass eq "loads"}]
