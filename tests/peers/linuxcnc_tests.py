@@ -112,18 +112,23 @@ def run(test, script):
         if status != 0:
             output = (here / "stderr").read_text(errors="replace").strip().splitlines()
             return f"status {status}: {output[-1] if output else ''}"
-        if (here / "checkresult").exists():
-            judge = subprocess.run([str(here / "checkresult"), str(here / "result")], cwd=here, env=environment, timeout=60,
-                                   stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
-            return True if judge.returncode == 0 else "checkresult: " + judge.stdout.decode(errors="replace").strip()[-200:]
-        if (here / "expected").exists():
-            wanted, got = ((here / name).read_text(errors="replace") for name in ("expected", "result"))
-            if wanted == got:
-                return True
-            lines = zip(wanted.splitlines(), got.splitlines())
-            first = next(((i, w, g) for i, (w, g) in enumerate(lines, 1) if w != g), None)
-            return f"line {first[0]} is '{first[2]}', expected '{first[1]}'" if first else "another number of lines"
-        return "no expected and no checkresult"
+        return judge(here, environment)
+
+
+def judge(here, environment):
+    """True, or why what the test has printed is wrong."""
+    if (here / "checkresult").exists():
+        judged = subprocess.run([str(here / "checkresult"), str(here / "result")], cwd=here, env=environment, timeout=60,
+                                stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+        return True if judged.returncode == 0 else "checkresult: " + judged.stdout.decode(errors="replace").strip()[-200:]
+    if (here / "expected").exists():
+        wanted, got = ((here / name).read_text(errors="replace") for name in ("expected", "result"))
+        if wanted == got:
+            return True
+        lines = zip(wanted.splitlines(), got.splitlines())
+        first = next(((i, w, g) for i, (w, g) in enumerate(lines, 1) if w != g), None)
+        return f"line {first[0]} is '{first[2]}', expected '{first[1]}'" if first else "another number of lines"
+    return "no expected and no checkresult"
 
 
 def main():
