@@ -19,7 +19,7 @@ static const struct { const char *name, *instead; } replaced[] = {
     {"halrmt", "hal shell, or the control protocol (docs/protocol.md)"},
     {"halmeter", "hal meter NAME"},
     {"halscope", "hal scope, or hal panel in a browser"},
-    {"classicladder", "a component of your own: hal new"},
+    {"classicladder", "classicladder --nogui FILE.clp, which loads a program for the module classicladder_rt"},
 };
 
 static void end(const char *name, const char *instead) {
@@ -27,7 +27,16 @@ static void end(const char *name, const char *instead) {
     _exit(1);
 }
 
-__attribute__((constructor)) static void check(void) {
+/* Without its window, classicladder only fills the module's memory with a program, and looks for no pin. */
+static int without_window(const char *name, int argc, char **argv) {
+    if (strcmp(name, "classicladder") != 0) return 0;
+    for (int i = 1; i < argc; ++i)
+        if (strcmp(argv[i], "--nogui") == 0) return 1;
+    return 0;
+}
+
+/* The C library gives constructors the arguments of main(). */
+__attribute__((constructor)) static void check(int argc, char **argv) {
     Dl_info data, here;
     if (dladdr(&halcyon_here, &here) == 0) return;
     for (size_t i = 0;; ++i) {
@@ -35,6 +44,7 @@ __attribute__((constructor)) static void check(void) {
         if (dladdr(i == 0 ? &hal_data : &hal_shmem_base, &data) != 0 && strcmp(data.dli_fname, here.dli_fname) != 0) break;
     }
     const char *const slash = strrchr(data.dli_fname, '/'), *const name = slash ? slash + 1 : data.dli_fname;
+    if (without_window(name, argc, argv)) return;
     for (size_t i = 0; i < sizeof replaced / sizeof *replaced; ++i)
         if (strcmp(name, replaced[i].name) == 0) end(name, replaced[i].instead);
     end(name, "hal shell, hal panel, or Python's hal module");

@@ -118,6 +118,13 @@ class LinuxcncPrograms(harness.Case):
             self.assertEqual((1, f"{name}: this program reads LinuxCNC's memory directly, which a machine of Halcyon does not have. "
                                  f"In its place: {instead}\n"), (done.returncode, done.stderr))
 
+    def test_classicladder_without_its_window_runs(self):
+        self.build("walker")
+        (self.programs / "walker").rename(self.programs / "classicladder")
+        for words, status in ((["x.clp"], 1), (["--nogui", "x.clp"], -signal.SIGSEGV)):  # the stand-in for it goes on, and reads that memory
+            done = subprocess.run([self.programs / "classicladder", *words], env={**self.environment, "LD_LIBRARY_PATH": str(LIBRARY)}, capture_output=True, text=True)
+            self.assertEqual((status, status == 1), (done.returncode, "In its place: classicladder --nogui FILE.clp" in done.stderr), done.stderr)
+
     def test_the_machine_is_killed(self):
         self.build("gauge")
         machine = self.machine()

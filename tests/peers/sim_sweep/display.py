@@ -7,7 +7,7 @@ import time
 
 import linuxcnc
 
-LIMIT = 20.0
+LIMIT = 60.0
 
 
 class Failed(Exception):
