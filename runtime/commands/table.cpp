@@ -18,7 +18,8 @@ constexpr CommandRow rows[] = {
      "names=a,b names the instances, count=N creates N numbered ones (at most 200000); some components take num_chan=N and\n"
      "personality=N,N. `hal doc COMPONENT` lists the other arguments. Loading a component again adds instances.\n"
      "If no component has that name, a compiled module of LinuxCNC is loaded, from the folder in HAL_RTMOD_DIR or\n"
-     "/usr/lib/linuxcnc/modules; --native loads components only, --linuxcnc modules only.",
+     "/usr/lib/linuxcnc/modules; --native loads components only, --linuxcnc modules only. With HALCYON_MODULES=linuxcnc in the environment of the\n"
+     "machine, modules come first.",
      edits::loadrt, load, command_plain},
     {"unloadrt", "", "COMPONENT|INSTANCE|all", "unload a component with all its instances, or one instance", "", edits::unload, load, command_traceless},
     {"unload", "", "COMPONENT|INSTANCE|all", "unload a component or an instance, or end a program started by loadusr", "", edits::unload, load, command_traceless | command_programs},

@@ -16,7 +16,7 @@ enum class Origin { any, native, linuxcnc };
 /// Plugins::open(), which is for any origin: a LinuxCNC module where there is no plugin.
 std::optional<Plugin> open_component(const Plugins& plugins, std::string_view name, Origin origin, Span at, Diagnostics& diagnostics);
 
-/// Where a `loadrt` without an option takes this component from: linuxcnc if HALCYON_MODULES contains "linuxcnc" and there is such a module, else any.
+/// Where a `loadrt` without an option takes this component from: linuxcnc if HALCYON_MODULES is "linuxcnc" and there is such a module, else any.
 Origin usual_origin(std::string_view name);
 
 /// True when HALCYON_MODULES is "linuxcnc".

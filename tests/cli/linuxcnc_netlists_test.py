@@ -2,10 +2,12 @@
 # SPDX-License-Identifier: MIT
 """hal linuxcnc: TWOPASS, includes, and netlists in Tcl."""
 import shutil
+import subprocess
 import unittest
 
 from harness import HAL
 from linuxcnc_case import HALFILE, INI, LinuxcncCase, PLAIN
+from module_case import CC, SOURCES
 
 
 class LinuxcncNetlists(LinuxcncCase):
@@ -15,6 +17,19 @@ class LinuxcncNetlists(LinuxcncCase):
         self.display("note `halcmd getp late.in0`")
         self.linuxcnc(self.ini("[HAL]\nTWOPASS = ON\nHALFILE = first.hal\nHALFILE = second.hal\n"))
         self.assertIn("note 4", self.logged())
+
+    @unittest.skipUnless(CC, "no C compiler")
+    def test_linuxcncs_modules_come_first_with_an_option(self):
+        modules = self.folder / "rtlib"
+        modules.mkdir()
+        subprocess.run([CC, "-shared", "-fPIC", "-O1", "-o", str(modules / "or2.so"), str(SOURCES / "gain.c")], check=True)
+        self.environment["HAL_RTMOD_DIR"] = str(modules)
+        self.write("machine.hal", HALFILE + "loadrt or2\n")
+        for words, name in (((), "or2.0.out"), (("--linuxcnc-modules",), "gain.0.gain")):
+            self.display(f"note {name} `halcmd getp {name}`")
+            self.linuxcnc(*words, self.ini(PLAIN))
+        self.assertIn("note or2.0.out FALSE", self.logged())
+        self.assertIn("note gain.0.gain 2", self.logged())
 
     def test_includes_are_expanded_for_linuxcncs_programs(self):
         self.write("more.inc", PLAIN + "#INCLUDE last.inc\n")

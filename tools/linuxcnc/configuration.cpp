@@ -209,6 +209,7 @@ void export_configuration(const Configuration& configuration, const LinuxcncOpti
     set_variable("INI_FILE_NAME", configuration.file);
     set_variable("CONFIG_DIR", configuration.folder);
     set_variable("NMLFILE", configuration.nml);
+    if (options.linuxcnc_modules) set_variable("HALCYON_MODULES", "linuxcnc");
     set_variable("HAL_RTMOD_DIR", home + "/lib/linuxcnc/modules", false);
     set_variable("HALLIB_DIR", hallib);
     set_variable("HALLIB_PATH", (options.halfiles.empty() ? "" : canonical_path(options.halfiles) + ":") + ".:" + hallib);
