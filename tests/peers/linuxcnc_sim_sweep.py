@@ -24,6 +24,7 @@ import linuxcnc_upstream
 HERE = pathlib.Path(__file__).resolve().parent / "sim_sweep"
 STEPS = ("started", "homed", "moved", "program")
 OF_DISPLAY = re.compile(r"\s*(POSTGUI_HALFILE|POSTGUI_HALCMD|PYVCP|GLADEVCP|EMBED_TAB_\w+|INTRO_GRAPHIC|APP|USER_COMMAND_FILE)\s*=", re.I)
+MACHINE = re.compile(r"^\s*DISPLAY\s*=|^#INCLUDE\s", re.M)  # the display may be in an included file; other INI files are settings of programs
 NO_WINDOW = ("sim_pin", "halshow", "halscope", "halmeter")  # loaded by netlists without a pin of their own
 
 
@@ -63,7 +64,7 @@ def copy_of(top, folder):
 def first_error(output):
     """The line that names the problem, of all that was printed."""
     lines = [line.strip() for line in output.splitlines() if line.strip()]
-    for pattern in (r"(fault: .*)", r"^sweep: not (.*)", r".*(\berror:.*)", r"(.*\b(?:error|cannot|failed|Traceback|No such|not found|[Mm]issing)\b.*)"):
+    for pattern in (r"(fault: .*hung-thread.*)", r"^sweep: not (.*)", r".*(\berror:.*)", r"(.*\b(?:error|cannot|failed|Traceback|No such|not found|[Mm]issing)\b.*)"):
         for line in lines:
             if (found := re.match(pattern, line)) and "Can not find -sec" not in line:
                 return found.group(1)[:220]
@@ -117,7 +118,7 @@ def main():
         common = linuxcnc_upstream.environment_of(theirs, pathlib.Path(folder, ".tools"))
         common["PYTHONPATH"] = f"{HERE}:{common.get('PYTHONPATH', '')}".rstrip(":")
         command = ["/usr/bin/linuxcnc", "-r"] if theirs else ["/usr/bin/env", "hal", "linuxcnc"]
-        files = sorted(file for file in (configs / "sim").rglob("*.ini") if re.search(r"^\s*DISPLAY\s*=", file.read_text(errors="replace"), re.M))
+        files = sorted(file for file in (configs / "sim").rglob("*.ini") if MACHINE.search(file.read_text(errors="replace")))
         for at, file in enumerate(files):
             name = str(file.relative_to(configs / "sim"))
             if len(words) > 1 and not any(wanted in name for wanted in words[1:]) or at % parts != part % parts:
