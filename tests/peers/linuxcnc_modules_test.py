@@ -27,7 +27,7 @@ WITH = {"debounce": "cfg=2", "lcd": "fmt_strings=%d", "message": 'names=m messag
         "streamer": "cfg=f depth=10", "stepgen": "step_type=0", "setsserial": 'cmd="nothing"', "watchdog": "num_inputs=1", "weighted_sum": "wsum_sizes=2", "gantry": "personality=2", "hm2_test": "test_pattern=12",
         "bitslice": "personality=8", "lincurve": "personality=4", "logic": "personality=0x104"}
 # Modules that do not run without their hardware or root, with a piece of the reason that the error must give; docs/linuxcnc-compatibility.md.
-PORTS = "access to I/O ports"  # needs a capability, or is not possible with this kernel
+PORTS = "I/O ports"  # their access needs a capability, or is not possible with this kernel
 DECLINE = {"hal_bb_gpio": "cannot open /dev/mem", "hal_gm": "no such card in /sys/bus/pci/devices", "hal_parport": PORTS, "hal_pi_gpio": "unrecognized Raspberry revision",
            "hal_ppmc": PORTS, "hal_speaker": "ioperm() failed", "hm2_7i43": PORTS, "hm2_7i90": PORTS, "hm2_pci": "no such card in /sys/bus/pci/devices",
            "hm2_rpspi": "Unsupported Platform", "hm2_spi": "No such file or directory (-2)", "mesa_pktgyro_test": "can not be loaded using the 'count' parameter",
