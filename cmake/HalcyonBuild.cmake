@@ -42,11 +42,11 @@ endif()
 # The environment of a program that loads plugins. The leak checker takes a plugin's thread-local memory for what it is not, and dies of it,
 # depending on where the heap put it. Fast DDS frees some of its memory by another size than it took.
 set(HALCYON_SANITIZER_OPTIONS "ASAN_OPTIONS=intercept_tls_get_addr=0:new_delete_type_mismatch=0")
-if(HALCYON_UNOPTIMISED AND NOT HALCYON_SANITIZE)
-    string(REPLACE "-O2" "-O0" CMAKE_CXX_FLAGS_RELEASE "${CMAKE_CXX_FLAGS_RELEASE}")
+if(HALCYON_LIGHTLY_OPTIMISED AND NOT HALCYON_SANITIZE)
+    string(REPLACE "-O2" "-O1" CMAKE_CXX_FLAGS_RELEASE "${CMAKE_CXX_FLAGS_RELEASE}")
 endif()
 set(HALCYON_TEST_OPTIONS -O0)  # for the tests' own sources: their assertions take longer to optimise than to run
-if(NOT HALCYON_SANITIZE AND NOT HALCYON_UNOPTIMISED)
+if(NOT HALCYON_SANITIZE AND NOT HALCYON_LIGHTLY_OPTIMISED)
     set(HALCYON_TOOL_OPTIONS "$<$<CONFIG:Release>:-Os>")  # for programs and their commands, which are not real time
 endif()
 

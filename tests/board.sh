@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # shellcheck shell=sh
-# `./hal board armhf|arm64`; read by the script `hal`, whose functions it uses. Compiles everything for such a board without optimisation, and
+# `./hal board armhf|arm64`; read by the script `hal`, whose functions it uses. Compiles everything for such a board, and
 # runs the unit tests and the netlist tests under qemu-user.
 case ${1-}:$# in
     armhf:1 | arm64:1) ;;
