@@ -176,7 +176,8 @@ bool load_csv(const std::string& path, Recording& to, std::string& problem, cons
     const auto  source = open_file(path, problem);
     std::string text, line;
     if (!source) return false;
-    if (source->size() > 4 * options.most_bytes || !source->read(0, static_cast<std::size_t>(source->size()), text)) {
+    constexpr std::uint64_t addressable = std::numeric_limits<std::size_t>::max() / 2;  // on 32 bit less than the limit
+    if (source->size() > std::min(4 * options.most_bytes, addressable) || !source->read(0, static_cast<std::size_t>(source->size()), text)) {
         problem = "'" + path + "' is too large, or cannot be read";
         return false;
     }

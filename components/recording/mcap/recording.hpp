@@ -45,7 +45,7 @@ struct Recording {
 
 /// Options of load().
 struct LoadOptions {
-    std::size_t                     most_bytes = std::size_t{1} << 30;
+    std::uint64_t                   most_bytes = std::uint64_t{1} << 30;
     std::int64_t                    begin_ns = INT64_MIN, end_ns = INT64_MAX;  ///< of Unix time; of the table's time for .csv
     std::map<std::string, hal_type> types = {};  ///< of columns of a .csv, which does not have them; others are FLOAT
 };
