@@ -6,7 +6,9 @@
 #include <poll.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <string>
 
@@ -30,7 +32,7 @@ struct Adapter {
     }
     void plug() {
         end = ::posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK);
-        ASSERT_GE(end, 0);
+        if (end < 0) return;
         ASSERT_EQ(::grantpt(end), 0);
         ASSERT_EQ(::unlockpt(end), 0);
         std::filesystem::create_symlink(::ptsname(end), folder / "next");
@@ -64,6 +66,7 @@ struct Adapter {
 TEST(Slcan, a_line_that_is_pulled_out_and_plugged_in_again_goes_on_without_old_frames) {
     Adapter adapter;
     adapter.plug();
+    if (adapter.end < 0) GTEST_SKIP() << "the system gives no pseudo-terminal: " << std::strerror(errno);  // qemu-user in a user namespace
     auto opened = open("slcan:" + adapter.device.string() + "?bitrate=500k");
     ASSERT_TRUE(opened) << opened.problem;
     auto& link = *opened.link;
@@ -88,6 +91,7 @@ TEST(Slcan, a_line_that_is_pulled_out_and_plugged_in_again_goes_on_without_old_f
     EXPECT_EQ(link.statistics().queued, 0U);
 
     adapter.plug();
+    ASSERT_GE(adapter.end, 0);
     ASSERT_TRUE(link.wait(20 * second));
     EXPECT_EQ(link.state(), State::active);
     EXPECT_EQ(link.statistics().restarts, 1U);
