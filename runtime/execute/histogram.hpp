@@ -25,7 +25,7 @@ public:
     static std::uint64_t edge(std::size_t bucket) noexcept {
         if (bucket < 8) return bucket;
         const auto octave = (bucket - 8) / 8;
-        return (8 + (bucket - 8) % 8) << octave;
+        return std::uint64_t{8 + (bucket - 8) % 8} << octave;
     }
     /// Returns the quantile `share` (0 to 1) of all samples, interpolated within its bucket.
     double quantile(double share) const noexcept {
