@@ -6,6 +6,7 @@
 #include <fcntl.h>
 #include <fstream>
 #include <linux/ppdev.h>
+#include <map>
 #include <string>
 #include <sys/ioctl.h>
 #include <unistd.h>
@@ -20,6 +21,7 @@ using namespace hal::modules;
 
 namespace {
 
+std::map<int, const Module*> claims;  // open files of the kernel's ports
 thread_local bool permitted __attribute__((tls_model("initial-exec"))) = false;
 
 int permit_all() noexcept {
@@ -70,6 +72,16 @@ int permit_ports() noexcept {
     return why;
 }
 
+void release_claims(const Module& module) noexcept {
+    for (auto claim = claims.begin(); claim != claims.end();) {
+        const auto here = claim++;
+        if (here->second != &module) continue;
+        ioctl(here->first, PPRELEASE);
+        close(here->first);
+        claims.erase(here);
+    }
+}
+
 }  // namespace hal::modules
 
 extern "C" {
@@ -100,6 +112,7 @@ int rtapi_parport_get(const char* name, halcyon_parport* port, unsigned short ba
             rtapi_parport_release(port);
             return -why;
         }
+        claims[port->fd] = Module::current();
         unsigned possible = ~0U;
         if (ioctl(port->fd, PPGETMODES, &possible) == 0 && (possible & modes) != modes)
             rtapi_print_msg(2, "%s: %s does not have all of the modes 0x%x\n", who, file.c_str(), modes);
@@ -113,6 +126,7 @@ void rtapi_parport_release(halcyon_parport* port) {
     if (!port || port->fd < 0) return;
     ioctl(port->fd, PPRELEASE);
     close(port->fd);
+    claims.erase(port->fd);
     port->fd = -1;
 }
 }

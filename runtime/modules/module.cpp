@@ -288,6 +288,8 @@ void Module::destroy() {
 void Module::release() {
     release_components(*this);
     release_ports(*this);
+    release_cards(*this);
+    release_claims(*this);
     parameters.clear();
     shared_.clear();
     declared.clear();

@@ -135,6 +135,11 @@ int permit_ports() noexcept;
 
 /// components.cpp: forgets the ids of a module, and with the last module the memory of hal_malloc().
 void release_components(Module& module) noexcept;
+/// Returns 0 if the component may declare something of that name, else a negative errno after printing why.
+int declaring(const char* function, const char* name, int comp);
+/// pci_cards.cpp, io_ports.cpp: gives back what a module has not, because it failed: its cards without their remove function, its claims.
+void release_cards(const Module& module) noexcept;
+void release_claims(const Module& module) noexcept;
 /// ports.cpp: forgets the port pins of a module.
 void release_ports(Module& module) noexcept;
 /// The block of hal_malloc() that contains the address: its end; 0: none.

@@ -26,6 +26,7 @@ constexpr unsigned long is_memory = 0x200;  // IORESOURCE_MEM of the kernel's fi
 /// A card that a driver has accepted. The device is what the driver sees.
 struct Card {
     halcyon_pci_driver* driver;
+    const Module* module;
     halcyon_pci_device device;
 };
 std::list<Card> cards;  // a driver keeps pointers to its devices
@@ -86,6 +87,21 @@ void unmap_bars(halcyon_pci_device& device) {
 
 }  // namespace
 
+namespace hal::modules {
+
+void release_cards(const Module& module) noexcept {
+    for (auto card = cards.begin(); card != cards.end();) {
+        if (card->module != &module) {
+            ++card;
+            continue;
+        }
+        unmap_bars(card->device);
+        card = cards.erase(card);
+    }
+}
+
+}  // namespace hal::modules
+
 extern "C" {
 
 // As in LinuxCNC, a driver without a card is an error, and a card that its driver declines is not.
@@ -103,7 +119,7 @@ int rtapi_pci_register_driver(halcyon_pci_driver* driver) {
             const halcyon_pci_id* const id = id_of(*driver, device);
             if (!id) continue;
             ++found;
-            Card& card = cards.emplace_back(Card{driver, device});
+            Card& card = cards.emplace_back(Card{driver, Module::current(), device});
             const int result = driver->probe(&card.device, id);
             if (result == 0) continue;
             rtapi_print_msg(1, "%s: the card at %s is not used: its driver declines it (%d)\n", driver->name ? driver->name : "", name.c_str(), result);

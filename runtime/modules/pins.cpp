@@ -9,7 +9,6 @@
 
 namespace hal::modules {
 
-int declaring(const char* function, const char* name, int comp);
 int new_port_pin(const char* name, int dir, void** slot, int comp);  // ports.cpp
 
 namespace {

@@ -12,8 +12,6 @@
 
 namespace hal::modules {
 
-int declaring(const char* function, const char* name, int comp);
-
 namespace {
 
 constexpr int port_type = 5, in = 16, out = 32;

@@ -40,6 +40,15 @@ class Cards(ModuleCase):
         self.assertEqual(((0, 0, 0, 0), (0xca4d, 7, 43, 0)), (self.registers(other), self.registers(second)))
         self.assertEqual(["1", "0\n"], [(folder / "enable").read_text()[:2].strip() if folder is first else (folder / "enable").read_text() for folder in (first, second)])
 
+    def test_a_failed_load_gives_its_card_back(self):
+        self.build("card")
+        self.add_card("0000:02:00.0", 0x3427, (0xca4d, 7, 42, 0))
+        self.write("maps.sh", "grep -c resource0 /proc/$PPID/maps >> counts\ntrue\n")
+        self.sim("loadrt card\nloadusr -w sh maps.sh\n")
+        done = self.sim("loadrt card fails=1\nloadusr -w sh maps.sh\nloadrt card\ngetp card.in\nloadusr -w sh maps.sh\n", "-k")
+        self.assertIn("rtapi_app_main: Input/output error (-5)", done.stderr)
+        self.assertEqual(["1", "0", "1"], (self.folder / "counts").read_text().split(), done.stderr)
+
     def test_a_card_that_is_missing_or_cannot_be_used_is_an_error(self):
         self.build("card")
         self.add_card("0000:01:00.0", 0x1, (0, 0, 0, 0), kind=0x20000)

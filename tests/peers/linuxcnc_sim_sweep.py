@@ -97,9 +97,7 @@ def run(ini, command, environment):
 
 def main():
     words = sys.argv[1:]
-    theirs = "--with" in words and words[words.index("--with") + 1:][:1] == ["linuxcnc"]
-    if theirs:
-        del words[words.index("--with"):words.index("--with") + 2]
+    theirs = linuxcnc_upstream.take_with(words)
     part, parts = 0, 1
     if "--part" in words:
         part, parts = (int(number) for number in words[words.index("--part") + 1].split("/"))

@@ -156,11 +156,17 @@ def copy_of(top, folder):
     return folder / top.name
 
 
-def main():
-    words = sys.argv[1:]
+def take_with(words):
+    """Removes `--with linuxcnc` from the words; True if it was there."""
     theirs = "--with" in words and words[words.index("--with") + 1:][:1] == ["linuxcnc"]
     if theirs:
         del words[words.index("--with"):words.index("--with") + 2]
+    return theirs
+
+
+def main():
+    words = sys.argv[1:]
+    theirs = take_with(words)
     if not words or words[0].startswith("-"):
         sys.exit(__doc__)
     if not shutil.which("milltask", path="/usr/bin"):

@@ -16,7 +16,8 @@ void rtapi_iounmap(void *);
 struct pins { volatile uint32_t *cycles, *in, *out; };
 static struct pins *pins;
 static volatile uint32_t *registers;
-static int comp, number_of_bar;
+static int comp, number_of_bar, fails;
+PARAMETER(fails, "i", "fail after the card was found, and give nothing back")
 PARAMETER(number_of_bar, "i", "the region of memory")
 
 static void update(void *unused, long period) {
@@ -56,6 +57,7 @@ int rtapi_app_main(void) {
     hal_pin_u32_newf(IN, &pins->out, comp, "card.out");
     hal_export_funct("card", update, 0, 0, 0, comp);
     const int result = rtapi_pci_register_driver(&driver);
+    if (fails) return -5;
     if (result != 0 || !registers) {
         if (result == 0) rtapi_pci_unregister_driver(&driver);
         hal_exit(comp);
