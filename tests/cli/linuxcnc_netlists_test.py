@@ -4,6 +4,7 @@
 import shutil
 import subprocess
 import unittest
+from pathlib import Path
 
 from harness import HAL
 from linuxcnc_case import HALFILE, INI, LinuxcncCase, PLAIN
@@ -39,6 +40,13 @@ class LinuxcncNetlists(LinuxcncCase):
         self.assertIn("io -ini CONFIG/machine.ini.expanded", self.logged())
         self.assertIn("note 3", self.logged())
         self.assertEqual(INI + PLAIN + "HALCMD = setp adder.in1 3\n", (self.folder / "seen").read_text())
+
+    def test_the_machine_on_a_wire_rejects_a_program_that_is_not_there(self):
+        bring_up = Path(__file__).resolve().parents[2] / "halfiles/linuxcnc-ethernet/bring-up"
+        done = subprocess.run([bring_up, "nothing.ngc"], cwd=self.folder, env={**self.environment, "HAL": str(HAL)}, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=60)
+        if done.returncode == 77:
+            self.skipTest(done.stderr.strip())
+        self.assertEqual((1, "bring-up: cannot read 'nothing.ngc'; write bring-up [PROGRAM.ngc]\n"), (done.returncode, done.stderr))
 
     # --- Tcl -----------------------------------------------------------------------------------------------------------
 
