@@ -24,7 +24,7 @@ def messages():
     return found
 
 
-def wait(what, condition, seconds):
+def wait(what, condition, seconds=float("inf")):
     end = time.monotonic() + seconds
     while time.monotonic() < end:
         status.poll()
@@ -68,7 +68,7 @@ def main():
     begin = time.monotonic()
     command.auto(linuxcnc.AUTO_RUN, 0)
     wait("start of the program", lambda: status.interp_state != linuxcnc.INTERP_IDLE, 5)
-    wait("end of the program", lambda: status.interp_state == linuxcnc.INTERP_IDLE or status.task_state != linuxcnc.STATE_ON, 300)
+    wait("end of the program", lambda: status.interp_state == linuxcnc.INTERP_IDLE or status.task_state != linuxcnc.STATE_ON)
     seconds = time.monotonic() - begin
     failed = messages()
     if status.task_state != linuxcnc.STATE_ON:

@@ -175,8 +175,14 @@ bool take_origin(Elaboration& on, Args& args, Origin& origin) {
         option = args[0].span;
         args = args.subspan(1);
     }
-    if (!args.empty()) return true;
-    on.diagnostics.error("wrong-arguments", option, "the name of a component is missing after the option", "", "loadrt --linuxcnc NAME");
+    if (args.empty()) {
+        on.diagnostics.error("wrong-arguments", option, "the name of a component is missing after the option", "", "loadrt --linuxcnc NAME");
+        return false;
+    }
+    const std::string preference = origin == Origin::any ? meaningless_preference() : "";
+    if (preference.empty()) return true;
+    on.diagnostics.error("wrong-arguments", args[0].span, "HALCYON_MODULES is " + quoted(preference) + " in the environment of the machine; its only value is 'linuxcnc'",
+                         "", "unset HALCYON_MODULES, or export HALCYON_MODULES=linuxcnc to load LinuxCNC's modules first; then start the machine again");
     return false;
 }
 

@@ -70,6 +70,11 @@ bool prefers_modules() {
     return wanted && std::string_view(wanted) == "linuxcnc";
 }
 
+std::string meaningless_preference() {
+    const char* const wanted = std::getenv("HALCYON_MODULES");
+    return wanted && !prefers_modules() ? wanted : "";
+}
+
 Origin usual_origin(std::string_view name) { return prefers_modules() && !find_module(name).empty() ? Origin::linuxcnc : Origin::any; }
 
 std::optional<Plugin> open_module(const std::string& name, Span at, Diagnostics& diagnostics) {

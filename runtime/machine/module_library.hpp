@@ -21,6 +21,8 @@ Origin usual_origin(std::string_view name);
 
 /// True when HALCYON_MODULES is "linuxcnc".
 bool prefers_modules();
+/// The value of HALCYON_MODULES if it is set to something that has no meaning; else an empty string.
+std::string meaningless_preference();
 
 /// $HAL_RTMOD_DIR, or where the package linuxcnc-uspace installs them.
 std::string module_folder();

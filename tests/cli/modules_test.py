@@ -201,6 +201,15 @@ getp follow.position
         self.assertEqual("0\n", self.good("sim", "--quiet", self.write("m.hal", "loadrt --native sum2\ngetp sum2.0.in0\n")))
         self.assertEqual("0\n", self.good("sim", "--quiet", self.write("m.hal", "loadrt --native sum2 names=a\nloadrt sum2 names=b\ngetp b.in0\n")))
 
+    def test_another_preference_is_an_error_and_not_ignored(self):
+        self.environment["HALCYON_MODULES"] = "linuxnc"
+        self.assertEqual("""m.hal:1:8: error: HALCYON_MODULES is 'linuxnc' in the environment of the machine; its only value is 'linuxcnc' [wrong-arguments]
+    1 | loadrt or2
+      |        ^^^
+      = help: unset HALCYON_MODULES, or export HALCYON_MODULES=linuxcnc to load LinuxCNC's modules first; then start the machine again
+""", self.error("loadrt or2\n").split("\n\n")[0] + "\n")
+        self.good("sim", "--quiet", self.write("m.hal", "loadrt --native or2\n"))
+
     def test_a_component_is_taken_from_one_place(self):
         self.assertEqual("""m.hal:1:17: error: --native and --linuxcnc are both given: a component is taken from one place [wrong-arguments]
     1 | loadrt --native --linuxcnc gain

@@ -25,6 +25,21 @@ TEST(WatchTable, has_value_extremes_and_rate_of_the_last_second) {
     EXPECT_EQ(lines[4], "nothing               -                       -              -              -");
 }
 
+TEST(WatchTable, the_unit_of_a_rate_has_one_more_second) {
+    const auto rate = [](const char* unit) {
+        WatchTable table({{"x", unit, false, false}});
+        table.feed(0, {0, 0});
+        table.feed(0, {500'000'000, 1});
+        return table.texts(0).rate;
+    };
+    EXPECT_EQ(rate("m"), "2 m/s");
+    EXPECT_EQ(rate("m/s"), "2 m/s^2");
+    EXPECT_EQ(rate("rad/s^2"), "2 rad/s^3");
+    EXPECT_EQ(rate("1/s^3"), "2 1/s^4");
+    EXPECT_EQ(rate("N/sample"), "2 N/sample/s");
+    EXPECT_EQ(rate(""), "2 /s");
+}
+
 TEST(WatchTable, reset_forgets_the_extremes_and_not_a_number_does_not_stay) {
     WatchTable table({{"x", "", false, false}});
     table.feed(0, {0, std::nan("")});

@@ -19,6 +19,16 @@ std::string shown(const Channel& channel, const Sample& sample) {
     return channel.stepped ? fmt::format("{:.0f}", sample.value) : fmt::format("{:.7g}", sample.value);
 }
 
+/// The unit of a change per second: m/s for m, m/s^2 for m/s, rad/s^3 for rad/s^2.
+std::string rate_unit(const Channel& channel) {
+    const std::string_view unit = channel.bit ? std::string_view("edges") : channel.unit;
+    const std::size_t slash = unit.rfind("/s");
+    if (slash != unit.npos && slash + 2 == unit.size()) return fmt::format("{}^2", unit);
+    if (slash != unit.npos && slash + 4 == unit.size() && unit[slash + 2] == '^' && unit.back() >= '2' && unit.back() <= '8')
+        return fmt::format("{}{}", unit.substr(0, unit.size() - 1), static_cast<char>(unit.back() + 1));
+    return fmt::format("{}/s", unit);
+}
+
 /// The end of a text, for names whose beginnings are the same.
 std::string end_of(const std::string& text, std::size_t width) {
     if (columns(text) <= width || width == 0) return text;
@@ -54,8 +64,7 @@ WatchTable::Texts WatchTable::texts(std::size_t channel) const {
     const auto seconds = static_cast<double>(row.last.time_ns - row.marks.front().sample.time_ns) * 1e-9;
     const double change =
         about.bit ? static_cast<double>(row.edges - row.marks.front().edges) : row.last.value - row.marks.front().sample.value;
-    const std::string rate =
-        seconds > 0 && std::isfinite(change) ? fmt::format("{:.4g} {}/s", change / seconds, about.bit ? "edges" : about.unit) : "-";
+    const std::string rate = seconds > 0 && std::isfinite(change) ? fmt::format("{:.4g} {}", change / seconds, rate_unit(about)) : "-";
     return {shown(about, row.last), shown(about, row.min), shown(about, row.max), rate};
 }
 
