@@ -11,7 +11,7 @@ from pathlib import Path
 import linuxcnc  # LinuxCNC's Python module
 
 HERE = Path(__file__).resolve().parent
-OUT = Path(os.environ.get("PATH_FOLDER", "/tmp/linuxcnc-ethernet"))
+OUT = Path(os.environ.get("PATH_FOLDER", HERE / "driven"))
 AXES = "xyzac"
 
 command, status, errors = linuxcnc.command(), linuxcnc.stat(), linuxcnc.error_channel()

@@ -53,6 +53,18 @@ class Linuxcnc(LinuxcncCase):
   KINS_KINEMATICS=trivkins
   HALCYON_INSTANCE=mill""", "\n".join(log[begin:begin + 15]))
 
+    def test_a_folder_that_cannot_be_written_to_says_what_to_do(self):
+        self.write("more.inc", "[TASK]\n")
+        (self.folder / "machine.ini.expanded").mkdir()  # an ordinary user's reason is a folder of root's
+        err = self.linuxcnc(self.ini(PLAIN + "#INCLUDE more.inc\n"), status=1)[1]
+        (self.folder / "machine.ini.expanded").rmdir()
+        self.assertEqual("hal linuxcnc: CONFIG/machine.ini has #INCLUDE, so a file with the included text is needed beside it: cannot write "
+                         "'CONFIG/machine.ini.expanded': Is a directory; copy the configuration, with the files that it names, to a folder that you can write to "
+                         "(LinuxCNC also keeps its parameters there), and run the copy\n", err)
+        self.environment["TMPDIR"] = str(self.folder / "none")
+        self.assertEqual("hal linuxcnc: cannot open the lock file CONFIG/none/linuxcnc.lock: No such file or directory; create its folder, which $TMPDIR names\n",
+                         self.linuxcnc(self.ini(), status=1)[1])
+
     def test_programs_find_halcmd_and_a_wrapper_beside_the_ini_file_comes_first(self):
         self.display("note `halcmd getp adder.in0`; note `command -v halcmd`")
         self.linuxcnc(self.ini())

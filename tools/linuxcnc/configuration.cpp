@@ -60,7 +60,9 @@ bool expand(Configuration& configuration, const Options& options) {
     const std::string file = configuration.file + ".expanded";
     if (const std::string problem = write_file(file, text); !problem.empty())
         return fail(options,
-                    fmt::format("{} has #INCLUDE, so a file with the included text is needed beside it: {}", configuration.given, problem)),
+                    fmt::format("{} has #INCLUDE, so a file with the included text is needed beside it: {}; copy the configuration, with the files that it names, to a "
+                                "folder that you can write to (LinuxCNC also keeps its parameters there), and run the copy",
+                                configuration.given, problem)),
                false;
     configuration.file = file;
     configuration.expanded = true;

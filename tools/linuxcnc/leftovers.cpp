@@ -66,15 +66,22 @@ std::string running_of_linuxcnc() {
 
 constexpr const char* one_machine = "another LinuxCNC machine is running ({}), and NML allows one per computer; end it first";
 
+/// $TMPDIR, or /tmp. Need not exist: opening the lock file then fails.
+std::string temporary_folder() {
+    const char* const named = std::getenv("TMPDIR");
+    return named && *named ? named : "/tmp";
+}
+
 }  // namespace
 
-MachineLock::MachineLock() : path_((fs::temp_directory_path() / "linuxcnc.lock").string()) {
+MachineLock::MachineLock() : path_(temporary_folder() + "/linuxcnc.lock") {
     constexpr int how = O_RDWR | O_CLOEXEC | O_NOFOLLOW;
     file_ = ::open(path_.c_str(), how | O_CREAT | O_EXCL, 0644);
     const bool was_there = file_ < 0 && errno == EEXIST;
     if (was_there) file_ = ::open(path_.c_str(), how);
     if (file_ < 0) {
-        problem_ = fmt::format("cannot open the lock file {}: {}; if no LinuxCNC is running, remove it", path_, std::strerror(errno));
+        problem_ = fmt::format("cannot open the lock file {}: {}; {}", path_, std::strerror(errno),
+                               errno == ENOENT ? "create its folder, which $TMPDIR names" : "if no LinuxCNC is running, remove it");
         return;
     }
     char noted[64] = {};
