@@ -184,6 +184,7 @@ struct Description {
     bool has_stamps = false;      ///< Options::stamps gives received frames the timestamp of the kernel or of the bus
     bool has_windows = false;     ///< send() within a Window works
     bool fd_on_request = false;   ///< Options::fd fails on a device without CAN FD: set it only when the user requests it
+    bool in_slots = false;        ///< frames leave in their time slots, however early they are sent
     std::string interface{};      ///< of the kernel, "can0"; empty: none
     std::string segment{};        ///< address of the Ethernet segment that carries the frames; empty: none
     std::string file{};           ///< of a capture; empty: none

@@ -138,6 +138,8 @@ class Stranger(Segment):
         self.begin()
         done = self.at("m", HAL, "tdma", "status", "--name", "test-m", env=self.environment)
         self.assertEqual(0, done.returncode, done.stdout)
+        # Every request of the boot left in its slot: none had to be repeated after a timeout of half a second.
+        self.assertLess(self.number("m", "frames-late"), 20)
         self.assertRegex(done.stdout, r"tdma\.0: running as master, cycle \d+; own clock [-+.\d]+ ppm")
         self.assertRegex(done.stdout, r"(?m)^x +online +\d+\.\d s +[1-9]\d* ")
         print(done.stdout, file=sys.stderr)

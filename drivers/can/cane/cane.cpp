@@ -49,6 +49,7 @@ Description describe_settings(const Settings& s) {
     if (s.slot) d.address += "?slot=" + std::to_string(*s.slot);
     d.transport = std::string("CAN in Ethernet frames, ") + (s.format == Format::packed ? "packed" : "one each");
     d.segment = s.segment;
+    d.in_slots = s.slot.has_value();
     const auto line = ethernet::describe(s.segment);
     d.simulated = line.simulated, d.in_memory = line.in_memory;
     d.has_bit_rate = false, d.has_stamps = true;

@@ -53,13 +53,14 @@ void Runner::note_foreign(const can::Frame& f, Time now) noexcept {
 }
 
 /// A request to a node is followed by the next when it was answered: one in a cycle, when only cycles look for answers. While the network
-/// boots and no set-point counts yet, a slow thread looks for them for up to a quarter of its period.
+/// boots and no set-point counts yet, a slow thread looks for them for up to a quarter of its period. Not in time slots: nothing leaves during
+/// the wait, and afterwards the slot of this cycle may have passed.
 void Runner::serve_boot(Time now, Time period) noexcept {
     constexpr Time slow = 2 * millisecond, longest_wait = millisecond;
     constexpr unsigned most_vain_waits = 5;
     const NetworkStatus& network = master_.status();
     if (period < slow || !active() || network.state != NetworkState::booting || network.booting == 0 || vain_waits_ >= most_vain_waits ||
-        link_->description().simulated)
+        link_->description().simulated || link_->description().in_slots)
         return;
     const Time begun = monotonic_ns();
     bool       any = false;
