@@ -99,6 +99,9 @@ class Chroot(unittest.TestCase):
         self.good("apt-get install -y --no-install-recommends $(apt-get -s install --no-install-recommends /packages/halcyon_*.deb /packages/halcyon-estimation_*.deb "
                   "| sed -n 's/^Inst \\([^ ]*\\) .*/\\1/p' | grep -v halcyon)")
         before = self.files()
+        install, run_it = self.page_commands("./hal package").splitlines()[1:]
+        self.good(install.replace("sudo apt install", "apt-get install -y --no-install-recommends").replace("./build/packages/", "/packages/"))
+        self.assertIn("servo-thread", self.good(run_it.replace("10s", "1s") + " 2>&1"))
         self.good("apt-get install -y --no-install-recommends " + " ".join(f"/packages/{name}_*.deb" for name in PARTS))
         self.good("useradd -m tester")
         # Removed again, everything but the accounts, their folders and /etc is as before.
@@ -156,12 +159,16 @@ class Chroot(unittest.TestCase):
         self.assertIn("first-order", self.of_user("hal doc lowpass").lower())
         self.assertIn("NAME", self.of_user("hal doc lqr"))
         self.assertEqual("hal-pid.9.gz", Path(self.good("ls /usr/share/man/man9/hal-pid.9.gz").strip()).name)
-        # The command of the service, as its user, with its sandbox left out.
-        self.good("cp -r /usr/share/halcyon/halfiles/furuta /etc/halcyon/pendulum && ln -s hang.hal /etc/halcyon/pendulum/machine.hal")
+        # A machine from boot as docs/packages.md describes; the command of the service, as its user, stands for systemd.
+        copy, link, enable, ask = self.page_commands("/etc/halcyon/pendulum").splitlines()
+        self.assertEqual("sudo systemctl enable --now halcyon@pendulum", enable)
+        for command in (copy, link, self.page_commands("/etc/halcyon/can/can0").splitlines()[0]):
+            self.good(command.replace("sudo ", ""))
+        self.assertEqual("BITRATE=500000\n", self.good("cat /etc/halcyon/can/can0; rm /etc/halcyon/can/can0"))
         self.good("install -d -o halcyon -g halcyon -m 0700 /run/halcyon/pendulum")
         report = self.good("cd /etc/halcyon/pendulum && su -s /bin/sh halcyon -c 'XDG_RUNTIME_DIR=/run/halcyon/pendulum; export XDG_RUNTIME_DIR; "
                            "hal run --no-picture --name pendulum machine.hal --for 10s 2>&1 & "
-                           "for i in $(seq 40); do sleep 0.2; hal shell --name pendulum -Q show timing && break; done; wait'")
+                           f"for i in $(seq 40); do sleep 0.2; {ask.removeprefix('sudo -u halcyon ')} && break; done; wait'")
         self.assertIn("Threads:", report)
         self.assertIn("servo-thread", report)
         self.good("rm -r /etc/halcyon/pendulum /run/halcyon")
