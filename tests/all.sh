@@ -58,7 +58,7 @@ run_tests() {
     tree=$1 log=$build/$1-tests.log
     shift
     say "testing build/$tree"
-    if ctest --test-dir "$build/$tree" --output-on-failure --no-tests=error -j "$(nproc)" --output-junit "$log.xml" "$@" >"$log" 2>&1 </dev/null; then
+    if ctest --test-dir "$build/$tree" --output-on-failure --no-tests=error -j "$((2 * $(nproc)))" --output-junit "$log.xml" "$@" >"$log" 2>&1 </dev/null; then
         sed -n '/tests passed/,/^Total Test time/p' "$log"
     else
         grep -vE '^ *(Start +[0-9]+:|[0-9]+/[0-9]+ .* (Passed|Skipped) )|\(Skipped\)$|\*\*\*Skipped ' "$log"

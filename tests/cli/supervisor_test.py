@@ -9,18 +9,8 @@ import subprocess
 import unittest
 from pathlib import Path
 
-from harness import HAL, PLUGINS, Case, wait_until
-
-MACHINE = """newthread servo 1000000 {options}
-newthread slow 10000000
-loadrt stall names=s file=events.txt
-loadrt sum2 names=adder,other
-addf s servo
-addf adder servo
-addf other slow
-setp adder.in0 2
-net level s.out => other.in0
-"""
+from harness import HAL, PLUGINS, wait_until
+from hung_case import MACHINE, HungCase
 
 PTRACE_SEIZE, PTRACE_INTERRUPT, PTRACE_DETACH = 0x4206, 0x4207, 17
 
@@ -43,57 +33,7 @@ class Debugger:
         self.libc.ptrace(PTRACE_DETACH, self.tid, None, None)
 
 
-class Supervisor(Case):
-    def machine(self, options="", *words):
-        machine = self.start("run", self.write("a.hal", MACHINE.format(options=options)), *words)
-        wait_until(lambda: self.value("s.out") == "5", "its functions run")
-        return machine
-
-    def events(self):
-        path = self.folder / "events.txt"
-        return [line.split()[0] for line in path.read_text().splitlines()] if path.exists() else []
-
-    def faults(self):
-        return self.shell("show", "fault").stdout
-
-    def hang(self, mode, ms=0):
-        if ms:
-            self.good("shell", "setp", "s.ms", ms)
-        self.good("shell", "setp", "s.mode", mode)
-        return wait_until(lambda: "hung-thread" in self.shell("--json", "show", "fault").stdout and self.faults(), "the fault is known")
-
-    def rejected(self, *words):
-        done = self.shell(*words)
-        self.assertEqual(1, done.returncode, f"{words}: {done.stdout}")
-        self.assertIn("[hung-thread]", done.stderr, words)
-        self.assertIn("thread 'servo' has not finished a cycle for ", done.stderr)
-        if words[0] != "unload":
-            self.assertIn("function 's' (stall) does not return", done.stderr)
-
-    def check_hung(self, machine, fault, why):
-        self.assertRegex(fault, r"servo: function 's' \(stall\) has not returned, no cycle ended for [\d.]+ ms, it " + why +
-                         r".* \(limit 100 ms\) at cycle [\d ]+; the thread's functions are stopped and its outputs were set to their safe values")
-        self.assertIn("safe", self.events())
-        self.assertEqual("-1", self.value("s.out"))
-        wait_until(lambda: self.shell("gets", "level").stdout == "-1\n", "the signal has its safe value")
-        wait_until(lambda: self.value("other.out") == "-1", "another thread sees the safe value")
-        beat = self.value("slow.threadbeat")
-        wait_until(lambda: self.value("slow.threadbeat") != beat, "the other thread goes on")
-        missed = int(self.value("servo.missed"))
-        wait_until(lambda: int(self.value("servo.missed")) > missed + 10, "missed periods count on")
-        timing = self.shell("show", "timing").stdout
-        self.assertRegex(timing, r"(?m)^servo .* hangs in 's' for ")
-        for words in (["setp", "adder.in0", "7"], ["stop"], ["start"], ["delthread", "servo"], ["unload", "s"], ["net", "x", "adder.out"]):
-            self.rejected(*words)
-        self.assertEqual("2", self.value("adder.in0"))
-        self.assertEqual(0, self.shell("setp", "other.in1", "3").returncode)
-        out, err = self.end(machine)
-        self.assertEqual(1, machine.returncode, out + err)
-        self.assertRegex(out, r"hangs in s for ")
-        report = re.search(r"(?m)^servo +1 ms +(\d+) +(\d+) ", out)
-        self.assertGreater(int(report[2]), 100, out)
-        self.assertIn("servo: function 's' (stall) has not returned", out)
-
+class Supervisor(HungCase):
     def test_blocked_function(self):
         machine = self.machine()
         self.check_hung(machine, self.hang(1), "waits in a system call")
@@ -101,15 +41,6 @@ class Supervisor(Case):
     def test_endless_loop(self):
         machine = self.machine("policy=other")
         self.check_hung(machine, self.hang(2), "(uses CPU time|gets no CPU time)")  # the latter is true on a busy host
-
-    def test_endless_loop_at_real_time_priority_frees_the_cpu(self):
-        machine = self.machine()
-        if "SCHED_FIFO" not in self.shell("show", "timing").stdout:
-            self.skipTest("no real-time scheduling here")
-        fault = self.hang(2)
-        self.assertIn("real-time priority was taken away", fault)
-        self.assertRegex(self.shell("show", "timing").stdout, r"(?m)^servo .*SCHED_OTHER \(hung")
-        self.check_hung(machine, fault, "uses CPU time")
 
     def test_function_that_returns_finds_its_thread_stopped(self):
         machine = self.machine()
