@@ -17,7 +17,8 @@ add_dependencies(installed halcyon_text halcyon_link halcyon_cia402 halcyon_can_
 
 # Pages, and the machines to start from, in the order of the tree, so that links between them are right.
 install(FILES LICENSE README.md CHANGELOG.md CONTRIBUTING.md SECURITY.md DESTINATION "${CMAKE_INSTALL_DOCDIR}")
-install(DIRECTORY docs halfiles DESTINATION "${CMAKE_INSTALL_DOCDIR}" USE_SOURCE_PERMISSIONS)
+install(DIRECTORY docs halfiles DESTINATION "${CMAKE_INSTALL_DOCDIR}" USE_SOURCE_PERMISSIONS
+    PATTERN "driven" EXCLUDE PATTERN "*.var*" EXCLUDE)  # what a machine has written beside its files
 install(DIRECTORY components drivers runtime tests tools DESTINATION "${CMAKE_INSTALL_DOCDIR}" FILES_MATCHING PATTERN "*.md")
 install(DIRECTORY tests/netlists/semantics DESTINATION "${CMAKE_INSTALL_DOCDIR}/tests/netlists")
 
