@@ -50,6 +50,7 @@ Description description_of(const Place& place) {
     Description d;
     d.address = "scocan:" + place.node + (place.slot == SlotFrame::any_slot ? "" : "?slot=" + std::to_string(place.slot));
     d.transport = "time slots on CAN (SCoCAN)";
+    d.in_slots = true;
     if (const auto exchange = slots_of(place.node)) {
         d.bit_rate = exchange->description.bit_rate;
         d.simulated = exchange->description.simulated;
