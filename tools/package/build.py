@@ -80,6 +80,8 @@ class Packages:
 
     def extra_files(self):
         for source, package, path, mode in EXTRA:
+            if not self.tree(package).exists():
+                continue  # nothing of it is in this build
             to = self.tree(package) / path
             to.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(HERE / "files" / source, to)
