@@ -230,6 +230,18 @@ bool Module::create(const hal_host* host, const hal_modules& extension) {
     return false;
 }
 
+namespace {
+
+std::string last_line(std::string text) {
+    while (text.ends_with('\n')) text.pop_back();
+    if (const auto at = text.rfind('\n'); at != text.npos) text.erase(0, at + 1);
+    for (char& c : text)  // hostmot2 prints the bytes of a board's name, which end the text when they are 0
+        if (static_cast<unsigned char>(c) < ' ' && c != '\t') c = '?';
+    return text;
+}
+
+}  // namespace
+
 bool Module::run_main() {
     const auto main = reinterpret_cast<int (*)()>(dlsym(library_, "rtapi_app_main"));
     struct Call {
@@ -237,20 +249,14 @@ bool Module::run_main() {
         int result;
     } call{main, 0};
     const int signal = run_guarded_from_crashes([](void* c) { static_cast<Call*>(c)->result = static_cast<Call*>(c)->main(); }, &call);
-    std::string printed = captured();
-    for (char& c : printed)  // hostmot2 prints the bytes of a board's name, which end the text when they are 0
-        if (static_cast<unsigned char>(c) < ' ' && c != '\n' && c != '\t') c = '?';
-    while (printed.ends_with('\n')) printed.pop_back();
-    for (std::size_t at; (at = printed.find('\n')) != printed.npos;) printed.replace(at, 1, "; ");
-    if (signal != 0) {
-        broken_ = true;  // its code stays mapped: who knows who has a pointer to it
-        host_->fail(host_,
-                    ("rtapi_app_main crashed (" + std::string(crash_text(signal)) + ")" + (printed.empty() ? "" : ": " + printed)).c_str());
-        return false;
-    }
-    if (call.result >= 0) return true;
-    const std::string why = std::string(std::strerror(-call.result)) + " (" + std::to_string(call.result) + ")";
-    host_->fail(host_, (printed.empty() ? "rtapi_app_main failed: " + why : printed + " (rtapi_app_main: " + why + ")").c_str());
+    if (signal == 0 && call.result >= 0) return true;
+    const std::string last = last_line(captured());
+    print_captured();  // all of it, in lines of its own: LinuxCNC's users search for these
+    const std::string why = signal != 0 ? std::string(crash_text(signal)) : std::string(std::strerror(-call.result)) + " (" + std::to_string(call.result) + ")";
+    if (signal != 0) broken_ = true;  // its code stays mapped: who knows who has a pointer to it
+    host_->fail(host_, (signal != 0    ? "rtapi_app_main crashed (" + why + ")" + (last.empty() ? "" : ": " + last)
+                        : last.empty() ? "rtapi_app_main failed: " + why
+                                       : last + " (rtapi_app_main: " + why + ")").c_str());
     return false;
 }
 

@@ -53,6 +53,8 @@ bool hal_port_peek_commit(int port, unsigned count);
 bool hal_port_read(int port, char* to, unsigned count);
 bool hal_port_write(int port, const char* from, unsigned count);
 void hal_port_clear(int port);
+void hal_port_wait_readable(volatile int** port, unsigned count, const volatile int* stop);  // of programs
+void hal_port_wait_writable(volatile int** port, unsigned count, const volatile int* stop);  // of programs
 
 // streams: create, attach, detach and destroy are [setup], the rest [any]
 struct halcyon_stream {

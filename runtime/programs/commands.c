@@ -8,8 +8,9 @@
 #include "linuxcnc/inside.h"
 #include "linuxcnc/program.h"
 
-/* Runs one command, given as its words up to NULL. A program connects with its first hal_init(). */
-static int run(const char *const *words) {
+/* Runs one command, given as its words up to NULL. A program connects with its first hal_init(). Sets number, if there is one, to that behind `key` in
+ * what the command prints. */
+static int run(const char *const *words, const char *key, unsigned *number) {
     const locale_t before = halcyon_lock();
     char *reason = NULL;
     bool done = false;
@@ -24,6 +25,8 @@ static int run(const char *const *words) {
         halcyon_add("}");
         const char *const answer = halcyon_ask();
         done = answer && strstr(answer, "\"status\":0");
+        const char *const found = done && key ? strstr(answer, key) : NULL;
+        if (found) *number = (unsigned)strtoul(found + strlen(key), NULL, 10);
         const char *const text = answer && !done ? strstr(answer, "\"err\":\"") : NULL;
         if (text) reason = strndup(text + 7, strcspn(text + 7, "\\\""));
         else if (!answer && halcyon_rejection) reason = strdup(halcyon_rejection);
@@ -33,7 +36,7 @@ static int run(const char *const *words) {
     free(reason);
     return done ? 0 : -EINVAL;
 }
-#define RUN(...) run((const char *const[]){__VA_ARGS__, NULL})
+#define RUN(...) run((const char *const[]){__VA_ARGS__, NULL}, NULL, NULL)
 
 int hal_signal_new(const char *name, hal_type_t type) {
     const char *const word = type == HAL_BIT ? "bit" : type == HAL_FLOAT ? "float" : type == HAL_S32 ? "s32" : type == HAL_U32 ? "u32" : NULL;
@@ -53,6 +56,19 @@ int hal_add_funct_to_thread(const char *function, const char *thread, int positi
 int hal_del_funct_from_thread(const char *function, const char *thread) { return RUN("delf", function, thread); }
 int hal_start_threads(void) { return RUN("start"); }
 int hal_stop_threads(void) { return RUN("stop"); }
+
+unsigned char hal_get_lock(void) {
+    unsigned lock = 0;
+    run((const char *const[]){"status", "lock", NULL}, "lock value ", &lock);
+    return (unsigned char)lock;
+}
+int hal_set_lock(unsigned char lock) {
+    static const struct { unsigned char value; const char *word; } levels[] = {{0, "none"}, {3, "tune"}, {255, "all"}};
+    for (size_t i = 0; i < sizeof levels / sizeof *levels; ++i)
+        if (levels[i].value == lock) return RUN("lock", levels[i].word);
+    rtapi_print_msg(RTAPI_MSG_ERR, "%s: hal_set_lock: a program sets 0 (none), 3 (tune) or 255 (all), not %u\n", halcyon_program_name(), lock);
+    return -EINVAL;
+}
 
 /* --- values by name -------------------------------------------------------------------------------------------------------- */
 
@@ -125,15 +141,14 @@ int hal_param_float_set(const char *name, double value) { return hal_param_set(n
 int hal_param_s32_set(const char *name, signed long value) { return hal_param_set(name, HAL_S32, &(int32_t){(int32_t)value}); }
 int hal_param_u32_set(const char *name, unsigned long value) { return hal_param_set(name, HAL_U32, &(uint32_t){(uint32_t)value}); }
 
-/* --- what a program of ours does not have --------------------------------------------------------------------------------------- */
+/* --- what a program does not have ------------------------------------------------------------------------------------------------ */
 
-/* Byte streams have another handle here (an int of 4 bytes): programs compiled by `hal compile` and Python have them. */
-int hal_pin_port_new(const char *name, hal_pdir_t dir, hal_port_t **pointer, int comp) {
-    (void)dir, (void)pointer, (void)comp;
-    rtapi_print_msg(RTAPI_MSG_ERR, "%s: pin '%s' is a port, which a compiled program of LinuxCNC's cannot have here; compile its source: hal compile\n",
-                    halcyon_program_name(), name ? name : "");
-    return -EINVAL;
+/* In LinuxCNC a piece of its memory, for halcmd's `sets`. */
+int hal_port_alloc(unsigned size) {
+    rtapi_print_msg(RTAPI_MSG_ERR, "%s: hal_port_alloc: a signal of type port gets its buffer by the command: sets SIGNAL %u\n", halcyon_program_name(), size);
+    return 0;
 }
+
 int rtapi_fifo_new(int key, int module, unsigned long size, char mode) { return (void)key, (void)module, (void)size, (void)mode, -ENOSYS; }
 int rtapi_fifo_delete(int fifo, int module) { return (void)fifo, (void)module, -ENOSYS; }
 int rtapi_fifo_read(int fifo, char *to, unsigned long size) { return (void)fifo, (void)to, (void)size, -ENOSYS; }

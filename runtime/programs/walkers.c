@@ -71,15 +71,3 @@ WALKER(halpr_find_pin_by_owner)
 WALKER(halpr_find_pin_by_sig)
 WALKER(halpr_find_sig_by_name)
 WALKER(halpr_find_thread_by_name)
-
-/* Functions that are rarely used and that a machine of ours does not offer to programs. */
-#define MISSING(function)                                                                                                             \
-    int function(void);                                                                                                               \
-    int function(void) {                                                                                                              \
-        fprintf(stderr, "%s: a machine of Halcyon does not have this function of LinuxCNC's; see docs/linuxcnc-compatibility.md\n", #function); \
-        _exit(1);                                                                                                                     \
-    }
-MISSING(hal_get_lock)
-MISSING(hal_port_alloc)
-MISSING(hal_port_buffer_size)
-MISSING(hal_set_lock)

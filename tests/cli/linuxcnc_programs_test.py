@@ -72,9 +72,8 @@ class LinuxcncPrograms(harness.Case):
         done = self.shell("loadusr", "-w", "wire")
         self.assertEqual(
             ("new 0\nlink 0 0\naddf 0 0\nstart 0\nset 0\nadder.out: float 5 1\nadder.in1: float 0 0\nx: float 5 1\n"
-             "adder.tmax: type 3 0\nadder.ou: EINVAL\nlink -22\nport -22\nunlink 0 delete 0\n",
-             "wire: linkps failed: wire:1:8: error: unknown pin 'nothing.out' [no-such-pin]\n"
-             "wire: pin 'wire.tx' is a port, which a compiled program of LinuxCNC's cannot have here; compile its source: hal compile\n"),
+             "adder.tmax: type 3 0\nadder.ou: EINVAL\nlink -22\nunlink 0 delete 0\n",
+             "wire: linkps failed: wire:1:8: error: unknown pin 'nothing.out' [no-such-pin]\n"),
             (done.stdout, done.stderr))
         self.assertEqual("15", self.value("gain.out"))
         self.end(machine)
@@ -85,6 +84,34 @@ class LinuxcncPrograms(harness.Case):
         machine = self.machine(NETLIST + "loadrt samples\naddf samples servo\nsetp samples.real 2.5\nsetp samples.whole -3\n")
         done = self.shell("loadusr", "-w", "reader")
         self.assertEqual(("other key -2, other types -22\n" + "2.5 -3, the next: 1\n" * 2, ""), (done.stdout, done.stderr))
+        self.end(machine)
+
+    def test_bytes_go_through_ports_in_order_to_and_from_a_module(self):
+        self.build("talker")
+        subprocess.run([CC, "-shared", "-fPIC", "-O1", "-o", str(self.programs / "bytes.so"), str(SOURCES / "modules/bytes.c")], check=True)
+        machine = self.machine("newthread servo 200000\nloadrt bytes\naddf bytes.read servo\naddf bytes.write servo\nnewsig up port\nsets up 200\n"
+                               "newsig down port\nsets down 200\nlinkps bytes.to up\nlinkps bytes.from down\n")
+        program = subprocess.Popen([self.programs / "talker"], env={**self.environment, "LD_LIBRARY_PATH": str(LIBRARY)},
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.addCleanup(program.kill)
+        self.assertEqual("id 4, unlinked 0 0 0 0 0\n", program.stdout.readline())
+        wait_until(lambda: "ready" in "".join(line for line in self.say("show", "comp").splitlines() if "talker" in line), "it is ready")
+        self.say("net", "up", "talker.from")
+        self.say("net", "down", "talker.to")
+        self.say("start")
+        wait_until(lambda: int(self.value("bytes.read")) >= 3900, "nearly all bytes have arrived")
+        wait_until(lambda: int(self.value("bytes.waiting")) < 4, "the rest has arrived")
+        wait_until(lambda: int(self.value("bytes.room")) < 5, "the program reads no longer")
+        program.terminate()
+        out, err = program.communicate(timeout=harness.TIMEOUT)
+        transmitted = int(out.split("transmitted ")[1].split()[0])
+        self.assertEqual(("wrong 0 0 0 0 0 0\nsize 200, received 1, transmitted %d\nstopped by 15, lock 0, other -22, allocated 0, set 0 3, reset 0 0\n" % transmitted,
+                          "talker: talker.both: port pin 'talker.both' must be in or out\n"
+                          "talker.to: port 'talker.to' is an output: use write\ntalker.from: port 'talker.from' is an input: use read or peek\n"
+                          "talker: hal_set_lock: a program sets 0 (none), 3 (tune) or 255 (all), not 8\n"
+                          "talker: hal_port_alloc: a signal of type port gets its buffer by the command: sets SIGNAL 10\n"), (out, err))
+        self.assertGreaterEqual(transmitted, 4000)
+        self.assertEqual(("TRUE", str(transmitted - transmitted % 4)), (self.value("bytes.good"), self.value("bytes.read")))
         self.end(machine)
 
     # --- what goes wrong --------------------------------------------------------------------------------------------------

@@ -281,11 +281,14 @@ getp follow.position
             with self.subTest(given):
                 self.assertIn(f"error: component 'gain': {why} [bad-argument]", self.error(f"loadrt gain {given}\n"))
 
-    def test_a_failed_main_leaves_nothing_and_its_messages_are_the_error(self):
+    def test_a_failed_main_leaves_nothing_and_its_messages_are_lines_before_the_error(self):
         self.build("gain", "troubled")
         done = self.run_program("sim", "--quiet", "-k", self.write("m.hal", "loadrt gain count=2 names=a\nshow comp\nloadrt troubled fault=fail\nloadrt gain\ngetp gain.0.gain\n"))
         self.assertIn("component 'gain' cannot make 'gain': count= and names= are mutually exclusive (rtapi_app_main: Invalid argument (-22)) [construct-failed]", done.stderr)
         self.assertIn("component 'troubled' cannot make 'troubled': troubled: no card (rtapi_app_main: No such device (-19)) [construct-failed]", done.stderr)
+        self.assertIn("\ntroubled: loading\ntroubled: no card\n", done.stderr)
+        self.assertEqual(1, done.stderr.count("troubled: loading"), done.stderr)
+        self.assertLess(done.stderr.index("\ntroubled: no card\n"), done.stderr.index("cannot make 'troubled'"))
         self.assertNotIn("never printed", done.stderr)
         self.assertTrue(done.stdout.endswith("2\n"), done.stdout)
 

@@ -12,6 +12,7 @@ struct pin {
     volatile void *value; /* of a parameter by pointer: the user's variable */
     hal_value last;       /* of such a parameter: what both had when they were last compared */
     hal_type type;
+    int number;           /* of a port of a program of LinuxCNC's */
     struct pin *next;
 };
 struct funct {
@@ -136,6 +137,14 @@ int hal_pin_new(const char *name, hal_type_t type, hal_pdir_t dir, void **pointe
     struct pin *const pin = new_pin(comp);
     if (!pin) return -ENOMEM;
     pin->pointer = (hal_value **)pointer;
+#ifdef HALCYON_LINUXCNC_PROGRAMS
+    if (type == HAL_PORT) { /* compiled for LinuxCNC 2.9: the pointer leads to a number */
+        pin->pointer = NULL;
+        const int result = declare(comp, pin, type, dir, (hal_value){.raw = 0}, name);
+        if (result == 0) pin->number = halcyon_number_of_port(&pin->pin), *pointer = &pin->number;
+        return result;
+    }
+#endif
     if (type == HAL_PORT) { /* the pointer leads to a handle, not to the slot */
         pin->pointer = &pin->handle;
         *pointer = &pin->handle;
@@ -174,9 +183,7 @@ BOTH_BY_POINTER(s32, HAL_S32)
 BOTH_BY_POINTER(u32, HAL_U32)
 BOTH_BY_POINTER(s64, HAL_S64)
 BOTH_BY_POINTER(u64, HAL_U64)
-#ifndef HALCYON_LINUXCNC_PROGRAMS /* compiled for LinuxCNC 2.9: another handle (runtime/programs/commands.c) */
 BY_POINTER(port, HAL_PORT)
-#endif
 
 /* A parameter by pointer lives twice: where the runtime reads and writes it, and in the user's variable, which has the width of
  * its type only. Whichever has changed since they were last compared is copied to the other, before and after each function. */

@@ -27,6 +27,7 @@ void halcyon_drop_marked_pins(void);
 void halcyon_drop_pins(void);
 void halcyon_detach_pins(void); /* lets the user's pointers lead to the pins' own slots */
 bool halcyon_step(const hal_host *of, hal_function_decl *decl);
+int halcyon_number_of_port(const hal_pin *pin); /* runtime/programs/ports.c: > 0 */
 
 /* plugin.c. Both report the failure of an instance's creation to the host and return false. */
 bool halcyon_fail(const char *format, ...) __attribute__((format(printf, 1, 2)));

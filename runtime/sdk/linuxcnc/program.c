@@ -22,14 +22,15 @@ static hal_host hosts[halcyon_most_programs]; /* `data` is the program */
 static pthread_mutex_t mutex = PTHREAD_MUTEX_INITIALIZER; /* of the programs and of the connection; never held while the program's code runs */
 
 static struct halcyon_program *program_of(int comp) {
-    return comp >= 1 && comp <= halcyon_most_programs && *halcyon_programs[comp - 1].name ? &halcyon_programs[comp - 1] : NULL;
+    const int place = comp - halcyon_first_id;
+    return place >= 0 && place < halcyon_most_programs && *halcyon_programs[place].name ? &halcyon_programs[place] : NULL;
 }
 const char *halcyon_program_name(void) {
     for (size_t i = 0; i < halcyon_most_programs; ++i)
         if (*halcyon_programs[i].name) return halcyon_programs[i].name;
     return HALCYON_COMPONENT;
 }
-const hal_host *halcyon_host_of(int comp) { return program_of(comp) ? &hosts[comp - 1] : NULL; }
+const hal_host *halcyon_host_of(int comp) { return program_of(comp) ? &hosts[comp - halcyon_first_id] : NULL; }
 
 /* --- the host ------------------------------------------------------------------------------------------------------------------- */
 
@@ -115,7 +116,7 @@ int hal_init(const char *name) {
         if (!*halcyon_programs[i].name) of = &halcyon_programs[i];
         else others = true, again = again || strcmp(halcyon_programs[i].name, name) == 0;
     }
-    const int id = of ? (int)(of - halcyon_programs) + 1 : -ENOMEM;
+    const int id = of ? (int)(of - halcyon_programs) + halcyon_first_id : -ENOMEM;
     if (!of || again) return halcyon_unlock(before), again ? -EEXIST : id;
     strcpy(of->name, name);
     const bool found = (others && !halcyon_connection_lost()) || halcyon_find_machine(), good = found && halcyon_announce(of, false, false);
@@ -125,8 +126,8 @@ int hal_init(const char *name) {
     if (!found) rtapi_print_msg(RTAPI_MSG_ERR, missing, name, halcyon_instance());
     else if (!good) report_rejection(name, "cannot register");
     if (!good) return -EINVAL;
-    hosts[id - 1] = (hal_host){sizeof(hal_host), of, take_pin, take_function, take_argument, allocate, take_failure, extension, NULL};
-    halcyon_current_host = &hosts[id - 1];
+    hosts[id - halcyon_first_id] = (hal_host){sizeof(hal_host), of, take_pin, take_function, take_argument, allocate, take_failure, extension, NULL};
+    halcyon_current_host = &hosts[id - halcyon_first_id];
     halcyon_catch_end_signals();
     return id;
 }
@@ -147,7 +148,7 @@ int hal_unready(int comp) { return set_ready(program_of(comp), false); }
 
 int hal_exit(int comp) {
     struct halcyon_program *const of = program_of(comp);
-    if (!of) return comp >= 1 && comp <= halcyon_most_programs ? 0 : -EINVAL;
+    if (!of) return comp >= halcyon_first_id && comp < halcyon_first_id + halcyon_most_programs ? 0 : -EINVAL;
     locale_t before = halcyon_lock();
     if (halcyon_connection >= 0) halcyon_exchange(of);
     halcyon_unregister(of);

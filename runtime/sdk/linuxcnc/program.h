@@ -31,8 +31,9 @@ struct halcyon_program {
     bool alive;         /* reported by the program since the last exchange */
     long long alive_ns; /* time of the last report to the machine */
 };
-/* Their ids are 1, 2, …. All under the lock. Most programs have one; LinuxCNC's task has one of its own and one of its interpreter. */
-enum { halcyon_most_programs = 16 };
+/* All under the lock. Most programs have one; LinuxCNC's task has one of its own and one of its interpreter. Their ids count from 4, because
+ * programs print them: in LinuxCNC 1 to 3 belong to the runtime. */
+enum { halcyon_most_programs = 16, halcyon_first_id = 4 };
 extern struct halcyon_program halcyon_programs[halcyon_most_programs];
 const char *halcyon_program_name(void); /* of the first, for messages about all of them */
 extern char halcyon_program_prefix[256]; /* of a .comp file's instance; "": names are whole */
@@ -67,6 +68,9 @@ void halcyon_add_string(const char *text);
 void halcyon_add_value(hal_type type, hal_value value);
 void halcyon_add_number(hal_type type, double value);
 void halcyon_drop_request(void);
+/* Reads, peeks (verb) or writes count bytes of a port, or asks for its state. Returns true when all were transferred; sets number to the value of
+ * the reply's key. Under the lock. */
+bool halcyon_use_port(const struct halcyon_link *port, const char *verb, char *to, const char *from, unsigned count, const char *key, unsigned *number);
 char *halcyon_ask(void); /* sends the request and returns the reply; NULL when it was rejected or the connection is lost */
 
 uint64_t halcyon_significant(hal_type type, uint64_t raw);         /* clears the bytes of a slot that the type does not use */

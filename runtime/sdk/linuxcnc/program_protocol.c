@@ -146,6 +146,26 @@ char *halcyon_ask(void) {
 
 void halcyon_drop_request(void) { request.length = 0; }
 
+bool halcyon_use_port(const struct halcyon_link *port, const char *verb, char *to, const char *from, unsigned count, const char *key, unsigned *number) {
+    if (halcyon_connection < 0) return false;
+    halcyon_add("{\"port\":\"%s.%s\"", port->prefix, port->name);
+    if (to) halcyon_add(",\"%s\":%u", verb, count);
+    if (from) halcyon_add(",\"write\":\"");
+    for (unsigned i = 0; from && i < count; ++i) halcyon_add("%02x", (unsigned char)from[i]);
+    halcyon_add(from ? "\"}" : "}");
+    const char *const answer = halcyon_ask();
+    if (!answer && halcyon_connection >= 0) rtapi_print_msg(RTAPI_MSG_ERR, "%s.%s: %s\n", port->prefix, port->name, halcyon_rejection);
+    const char *const bytes = answer ? strstr(answer, "\"bytes\":\"") : NULL;
+    const bool done = answer && strstr(answer, "\"done\":true");
+    for (unsigned i = 0; done && to && bytes && i < count; ++i) {
+        const char pair[3] = {bytes[9 + 2 * i], bytes[10 + 2 * i], '\0'};
+        to[i] = (char)strtoul(pair, NULL, 16);
+    }
+    const char *const at = answer && key ? strstr(answer, key) : NULL;
+    if (key) *number = at ? (unsigned)strtoul(at + strlen(key), NULL, 10) : 0;
+    return done;
+}
+
 /* --- the machine --------------------------------------------------------------------------------------------------------------- */
 
 const char *halcyon_instance(void) {

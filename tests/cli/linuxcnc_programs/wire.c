@@ -31,8 +31,6 @@ int main(void) {
     SHOW("adder.ou", hal_get_pin_value_by_name("adder.ou", &type, &data, &flag));
     fflush(stdout);
     printf("link %d\n", hal_link("nothing.out", "x"));
-    volatile int *port = NULL;
-    printf("port %d\n", hal_pin_port_new("wire.tx", HAL_OUT, &port, comp));
     printf("unlink %d delete %d\n", hal_unlink("gain.in"), hal_signal_delete("x"));
     return hal_exit(comp);
 }
