@@ -19,7 +19,10 @@
 extern "C" {
 void __rtsan_off();
 extern const char __executable_start, etext;  // the linker's
+void __rtsan_realtime_enter();
+void __rtsan_realtime_exit();
 [[gnu::visibility("default")]] void halcyon_guard_module_function(bool runs);
+[[gnu::visibility("default")]] void halcyon_guard_module_task(bool runs);
 }
 
 namespace {
@@ -50,6 +53,10 @@ F* find(F*& known, const char* name) {
 }  // namespace
 
 void halcyon_guard_module_function(bool runs) { in_module = runs; }
+void halcyon_guard_module_task(bool runs) {
+    in_module = runs;
+    runs ? __rtsan_realtime_enter() : __rtsan_realtime_exit();
+}
 
 #define STOPPED(result, name, parameters, arguments)                      \
     namespace {                                                           \

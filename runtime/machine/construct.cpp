@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <cstring>
 #include <set>
+#include <utility>
 
 #include "machine/construction.hpp"
 #include "machine/setup_call.hpp"
@@ -64,29 +65,19 @@ Span span_of(const GivenArgument& given, const Failure& why, const Sources& sour
     return {given.at.source, first + why.begin, first + why.end};
 }
 
-// Threads that a LinuxCNC module makes. They outlive it, as in LinuxCNC.
-bool add_threads(const Construction& c, Edit& edit, Span at, Diagnostics& diagnostics) {
-    for (const auto& [name, period_ns] : c.threads) {
-        NewThread thread;
-        thread.name = name;
-        thread.at = at;
-        thread.options.period_ns = period_ns;
-        fit_period(c.model, thread, diagnostics);
-        if (!edit.add_thread({thread.name, thread.at}, thread.options)) return false;
-    }
-    return true;
-}
-
 // One instance: memory, constructor, declarations into the model.
 bool construct_one(Edit& edit, LoadedComponent& component, const LoadRequest& request, Sources& sources, Diagnostics& diagnostics,
                    std::unique_ptr<Instance> instance, Construction& c) {
+    Instance& made = *instance;
     c.sources = &sources;
     c.diagnostics = &diagnostics;
+    c.edit = &edit;
+    c.owned = &instance;
     const hal_host host = host_for(c);
     c.texts.reserve(request.arguments.size());  // pointers into it are handed out
     const auto create = [&] {
-        const SetupCall call(instance->name, component.name, "its constructor");
-        return component.plugin->create(&host, instance->memory);
+        const SetupCall call(made.name, component.name, "its constructor");
+        return component.plugin->create(&host, made.memory);
     };
     if (!create()) {
         if (c.no_memory) throw std::bad_alloc();
@@ -101,11 +92,11 @@ bool construct_one(Edit& edit, LoadedComponent& component, const LoadRequest& re
         }
         if (is_misspelled(component, request, c.asked, diagnostics)) return false;
         diagnostics.error(Code::named(why.code).value_or(Code("construct-failed")), request.at,
-                          "component '" + component.name + "' cannot make '" + instance->name + "': " +
+                          "component '" + component.name + "' cannot make '" + made.name + "': " +
                               (why.empty() ? "it gave no reason" : why.text), "", why.help);
         return false;
     }
-    instance->constructed = true;
+    made.constructed = true;
     // whatever goes wrong from here, what was constructed is destroyed, until the model owns it
     struct Undo {
         std::unique_ptr<Instance>& instance;
@@ -114,16 +105,41 @@ bool construct_one(Edit& edit, LoadedComponent& component, const LoadRequest& re
     if (c.no_memory) throw std::bad_alloc();
     if (!c.failure.empty()) {
         diagnostics.error("construct-failed", request.at,
-                          "component '" + component.name + "' cannot make '" + instance->name + "': " + c.failure.text);
+                          "component '" + component.name + "' cannot make '" + made.name + "': " + c.failure.text);
         return false;
     }
+    if (!enter_declared(c)) return false;
+    for (const auto& [function, step] : c.extended) edit.extend_function(*function, step, made);
+    return true;
+}
+
+}  // namespace
+
+namespace {
+
+// Threads that a LinuxCNC module makes. They outlive it, as in LinuxCNC.
+bool add_threads(Construction& c) {
+    for (const auto& [name, period_ns] : std::exchange(c.threads, {})) {
+        NewThread thread;
+        thread.name = name;
+        thread.at = c.request.at;
+        thread.options.period_ns = period_ns;
+        fit_period(c.model, thread, *c.diagnostics);
+        if (!c.edit->add_thread({thread.name, thread.at}, thread.options)) return false;
+    }
+    return true;
+}
+
+}  // namespace
+
+bool enter_declared(Construction& c) {
+    Instance& instance = c.instance;
+    LoadedComponent& component = *instance.component;
     std::vector<std::unique_ptr<LoadedFunction>> own;
-    std::vector<std::pair<LoadedFunction*, plan::Step>> extended;
-    std::map<const void*, LoadedFunction*> by_identity;
-    for (const DeclaredFunction& decl : c.functions) {
+    for (const DeclaredFunction& decl : std::exchange(c.functions, {})) {
         LoadedFunction* function = decl.shared ? c.model.find_function(decl.full) : nullptr;
         if (function && function->shared && function->component == &component) {
-            extended.emplace_back(function, plan::Step{decl.step, decl.self});
+            c.extended.emplace_back(function, plan::Step{decl.step, decl.self});
         } else {
             auto made = std::make_unique<LoadedFunction>();
             function = made.get();
@@ -131,34 +147,31 @@ bool construct_one(Edit& edit, LoadedComponent& component, const LoadRequest& re
             function->doc = c.model.keep(decl.doc);
             function->steps.push_back({decl.step, decl.self});
             function->row = {decl.row, decl.step};
-            function->instances.push_back(instance.get());
+            function->instances.push_back(&instance);
             function->component = &component;
             function->shared = decl.shared;
             function->id = c.model.next_id++;
-            edit.add_time_pins(*function);
+            c.edit->add_time_pins(*function);
             own.push_back(std::move(made));
         }
-        by_identity[decl.identity] = function;
-        instance->functions.push_back(function);
+        c.by_identity[decl.identity] = function;
+        if (*c.owned) instance.functions.push_back(function);
     }
-    for (auto& [pin, identity] : c.pins) {
-        if (identity) pin->function = by_identity[identity];
-        if (pin->dir == HAL_DIR_OUT && (pin->flags & HAL_PIN_FINITE)) instance->finite.push_back(pin.get());
-        instance->pins.push_back(std::move(pin));
+    std::vector<std::unique_ptr<Pin>> later;
+    for (auto& [pin, identity] : std::exchange(c.pins, {})) {
+        if (identity) pin->function = c.by_identity[identity];
+        if (pin->dir == HAL_DIR_OUT && (pin->flags & HAL_PIN_FINITE)) instance.finite.push_back(pin.get());
+        (*c.owned ? instance.pins : later).push_back(std::move(pin));
     }
+    if (!*c.owned) return c.edit->add_declared(instance, std::move(later), std::move(own)) && add_threads(c);
     std::set<std::string_view> names;
-    for (const auto& pin : instance->pins)
+    for (const auto& pin : instance.pins)
         if (!names.insert(pin->name).second) {
-            diagnostics.error("construct-failed", request.at, "component '" + component.name + "' declares pin '" + pin->name + "' twice");
+            c.diagnostics->error("construct-failed", c.request.at, "component '" + component.name + "' declares pin '" + pin->name + "' twice");
             return false;
         }
-    Instance& made = *instance;
-    if (!edit.add_instance(component, instance, std::move(own))) return false;
-    for (const auto& [function, step] : extended) edit.extend_function(*function, step, made);
-    return add_threads(c, edit, request.at, diagnostics);
+    return c.edit->add_instance(component, *c.owned, std::move(own)) && add_threads(c);
 }
-
-}  // namespace
 
 namespace {
 

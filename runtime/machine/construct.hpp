@@ -15,6 +15,7 @@
 namespace hal {
 
 class Executor;
+struct Elaboration;
 
 /// A load argument as it was given.
 struct GivenArgument {
@@ -29,6 +30,7 @@ struct LoadRequest {
     Span count_at;
     std::vector<std::string> personalities;
     std::map<std::string, GivenArgument> arguments;
+    Elaboration* on = nullptr;                  ///< the command's; what a LinuxCNC module does beside its instance belongs to its transaction
 };
 
 /// The instances of a component once more, from another plugin and in a model beside: same names, arguments and personalities.

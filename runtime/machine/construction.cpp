@@ -130,6 +130,7 @@ void name_instance(const hal_host* host, const char* prefix, unsigned digits) {
 const void* extension_of(const hal_host*, const char* id) {
     if (std::strcmp(id, HAL_NAMING) == 0) return &naming_extension;
     if (std::strcmp(id, HAL_MODULES) == 0) return &modules_extension;
+    if (std::strcmp(id, HAL_MODULE_CALLS) == 0) return &module_calls_extension;
     return std::strcmp(id, HAL_TEXTS) == 0 ? &texts_extension : nullptr;
 }
 

@@ -6,7 +6,9 @@
 #include <cstdint>
 #include <deque>
 #include <memory>
+#include <map>
 #include <new>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -56,10 +58,20 @@ struct Construction {
         std::int64_t period_ns;
     };
     std::vector<NewThread> threads = {};    // that a LinuxCNC module makes
+    // What it has declared so far enters the model when the constructor returns, or before, when a LinuxCNC module uses it by name.
+    Edit* edit = nullptr;
+    std::unique_ptr<Instance>* owned = nullptr;  // empty: the model has it
+    std::map<const void*, LoadedFunction*> by_identity = {};
+    std::vector<std::pair<LoadedFunction*, plan::Step>> extended = {};
+    std::set<std::string> thread_names = {};
+    std::optional<unsigned> lock = {};      // that it has set
 };
 
 /// The interface for the constructor; its callbacks write to `construction`, which must outlive it. [setup]
 hal_host host_for(Construction& construction);
+
+/// Takes what the constructor has declared so far into the model. Returns false after reporting. construct.cpp
+bool enter_declared(Construction& construction);
 
 /// Returns false after reporting a given argument that the constructor has not asked for.
 bool all_known(const LoadedComponent& component, const LoadRequest& request, const std::set<std::string>& asked, Diagnostics& diagnostics);
@@ -83,6 +95,7 @@ Result guarded(Construction& c, Result otherwise, Action action) noexcept {
 
 extern const hal_naming naming_extension;  ///< names that LinuxCNC makes otherwise than COMPONENT.N
 extern const hal_modules modules_extension;  ///< what only LinuxCNC's modules do
+extern const hal_module_calls module_calls_extension;  ///< what they do to the machine
 extern const hal_texts texts_extension;    ///< finds files the component reads, and takes what it finds wrong in them
 
 }  // namespace hal

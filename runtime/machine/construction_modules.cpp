@@ -22,8 +22,8 @@ bool take_thread(const hal_host* host, const char* name, int64_t period_ns) {
     Construction& c = construction_of(host);
     return guarded(c, false, [&] {
         // it may have survived the module's last unloading
-        if (const Thread* const there = c.model.find_thread(name)) return there->options.period_ns == period_ns;
-        if (std::any_of(c.threads.begin(), c.threads.end(), [&](const auto& other) { return other.name == name; })) return false;
+        if (const Thread* const there = c.thread_names.contains(name) ? nullptr : c.model.find_thread(name)) return there->options.period_ns == period_ns;
+        if (!c.thread_names.insert(name).second) return false;
         c.threads.push_back({name, period_ns});
         return true;
     });

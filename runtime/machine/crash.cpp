@@ -12,6 +12,7 @@
 
 #include "execute/crash_table.hpp"
 #include "machine/crash.hpp"
+#include "machine/module_library.hpp"
 
 extern "C" [[gnu::weak]] void __rtsan_realtime_enter();  // a program with the real-time guard
 
@@ -75,6 +76,11 @@ void on_signal(int signal) {
         print(signal_text(signal));
         print(") at cycle ");
         print(core->cycle_number());
+    } else if (const char* const module = module_of_task()) {
+        print(module);
+        print(": a task of the module's own crashed (");
+        print(signal_text(signal));
+        print(")");
     } else {
         print("the program crashed outside of the cycle (");
         print(signal_text(signal));
@@ -87,12 +93,15 @@ void on_signal(int signal) {
 // A function called exit(), or the real-time guard did because of what the function did.
 void on_exit_of_process() {
     Core* const core = Core::current();
-    if (!core || !core->in_function() || reported.exchange(true)) return;
+    const bool in_function = core && core->in_function();
+    const char* const module = in_function ? nullptr : module_of_task();
+    if ((!in_function && !module) || reported.exchange(true)) return;
     make_all_safe();
     print("hal: ");
-    name_function(core, core->current_function());
-    print(__rtsan_realtime_enter ? " made the call that the real-time guard prints above, at cycle " : " called exit() at cycle ");
-    print(core->cycle_number());
+    if (in_function) name_function(core, core->current_function());
+    else print(module), print(": a task of the module's own");
+    print(__rtsan_realtime_enter ? " made the call that the real-time guard prints above" : " called exit()");
+    if (in_function) print(__rtsan_realtime_enter ? ", at cycle " : " at cycle "), print(core->cycle_number());
     print("; outputs were set to their safe values; the process ends\n");
 }
 

@@ -13,6 +13,8 @@
 
 namespace hal {
 
+class Transaction;
+
 /// Functions that `addf --auto` placed in a thread; put in order when the transaction is complete.
 struct AutoOrder {
     Thread* thread;
@@ -29,6 +31,7 @@ struct Elaboration {
     std::vector<AutoOrder>& auto_orders;
     const Usage& usage;  ///< of the command, for messages
     bool check_only = false;  ///< `hal check`: code that may access hardware does not run
+    Transaction* transaction = nullptr;  ///< whose edits these are
 };
 
 /// Carries out `addf --auto`.

@@ -60,6 +60,7 @@ bool names_itself(Elaboration& on, const Token& name, Origin origin) {
 /// Separates the arguments of loadrt that name or count instances from the others. Returns false after reporting.
 bool read_request(Elaboration& on, const Token& name, Origin origin, Args args, LoadRequest& request) {
     request.at = name.span;
+    request.on = &on;
     bool good = true;
     Span names_at;
     for (const Token& token : args) {

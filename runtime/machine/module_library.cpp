@@ -2,6 +2,7 @@
 #include "machine/module_library.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <cstdlib>
 #include <dlfcn.h>
 #include <filesystem>
@@ -21,6 +22,8 @@ struct Library {
 };
 
 // Never closed: modules are bound to it. RTLD_GLOBAL: they find its symbols in the global scope.
+std::atomic<const halcyon_modules*> opened{nullptr};  // for signal handlers
+
 Library open_library() {
     std::error_code none;
     const fs::path program = fs::read_symlink("/proc/self/exe", none).parent_path();
@@ -36,6 +39,7 @@ Library open_library() {
         const auto entry = reinterpret_cast<const halcyon_modules* (*)()>(dlsym(library, "halcyon_module_host"));
         if (!entry || entry()->size != sizeof(halcyon_modules))
             return {nullptr, file.string() + " belongs to another version of this program"};
+        opened = entry();
         return {entry(), ""};
     }
     return {nullptr, name + ", which runs LinuxCNC's modules, is missing beside this program"};
@@ -95,6 +99,11 @@ std::optional<Plugin> open_module(const std::string& name, Span at, Diagnostics&
     return Plugin{&module->component,
                   {const_cast<halcyon_module*>(module), [](void* m) { library().host->close(static_cast<const halcyon_module*>(m)); }},
                   path};
+}
+
+const char* module_of_task() noexcept {
+    const halcyon_modules* const host = opened.load();
+    return host ? host->module_of_task() : nullptr;
 }
 
 std::string user_of_module(const hal_component& component, std::size_t index) {

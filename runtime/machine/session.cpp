@@ -73,6 +73,9 @@ Transaction Session::begin() {
 }
 
 bool Session::in_transaction() const { return state_->open; }
+void Session::when_committed(std::function<void()> action) {
+    if (state_->open) state_->when_committed.push_back(std::move(action));
+}
 
 void Session::shut_down() {
     SessionState& s = *state_;

@@ -12,6 +12,7 @@
 // Every member of the session and of its parts is [setup] and is called with lock() held, unless it is marked otherwise.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -65,6 +66,8 @@ public:
     /// the edits made so far.
     Transaction begin();
     bool in_transaction() const;
+    /// As Transaction::when_committed(), for what is destroyed at the end of the open transaction. Forgotten when none is open.
+    void when_committed(std::function<void()> action);
     /// Rolls back an open transaction, stops the threads with safe outputs, and stops and destroys all instances. Idempotent.
     void shut_down();
 

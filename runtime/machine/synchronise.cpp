@@ -6,6 +6,7 @@
 #include "base/keep.hpp"
 #include "machine/construct.hpp"
 #include "machine/state.hpp"
+#include "model/modules.hpp"
 
 namespace hal {
 
@@ -168,8 +169,14 @@ bool SessionState::swap(const std::unordered_set<const LoadedFunction*>& without
     const std::vector<Core*> silent = executor->swap(offers, answer_timeout_ns);
     settle(compiled, silent);
     // every thread that answered has begun a cycle since the swap before, so nobody looks into that one's cells any more
-    if (silent.empty()) left_cells.clear();
+    // except for threads of modules' own, which do not answer: while there are any, all cells stay
+    const bool own_threads = has_own_threads(model);
+    if (silent.empty() && !own_threads) left_cells.clear();
     left_cells.insert(left_cells.end(), cells.begin(), cells.end());
+    if (own_threads) {
+        std::sort(left_cells.begin(), left_cells.end());
+        left_cells.erase(std::unique(left_cells.begin(), left_cells.end()), left_cells.end());
+    }
     for (const Core* const hangs : silent) silent_thread(hangs, diagnostics);
     return silent.empty();
 }

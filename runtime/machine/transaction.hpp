@@ -36,6 +36,7 @@ public:
     /// Queues an action that commit() carries out right after the edits have taken effect, in the order of these calls. A
     /// transaction that is rolled back forgets it. The action may begin a transaction of its own.
     void when_committed(std::function<void()> action);
+    Session& session() { return *session_; }
     /// It is rejected when a thread hangs at the commit: what is done then needs its answer.
     void needs_threads();
     /// Ends the transaction: checks, starts new instances, compiles, swaps and returns true; or reports and rolls back everything.

@@ -74,9 +74,10 @@ private:
         return pin.instance->functions.empty() && pin.instance->component && is_module(*pin.instance->component) ? module_functions_ : pin.instance->functions;
     }
 
-    // A loose pin whose functions are in two threads; what it is linked to cannot live with one of them.
+    // A loose pin whose functions are in two threads, or that threads of its component's own use; what it is linked to cannot live with one of them.
     bool spread(const Pin& pin) const {
         if (!is_loose(pin)) return false;
+        if (pin.instance->own_threads) return true;
         const Thread* first = nullptr;
         for (const LoadedFunction* function : users_of(pin)) {
             if (!function->thread || excluded(function)) continue;

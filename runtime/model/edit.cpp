@@ -96,45 +96,70 @@ bool Edit::add_instance(LoadedComponent& component, std::unique_ptr<Instance>& o
         diagnostics->add(std::move(d));
         return false;
     }
-    for (const auto& pin : made->pins)
-        if (!name_free(pin->name, made->loaded, "its pin") || (!pin->alias.empty() && !name_free(pin->alias, made->loaded, "a second name of its pin"))) return false;
-    for (const auto& function : functions)
-        if (model_.find_function(function->name))
-            return fail("name-taken", made->loaded, "function " + quoted(function->name) + " already exists", "its function",
-                        "choose another name for the new instance: names=…");
-    for (const auto& function : functions)
-        for (const auto& pin : function->pins)
-            if (!name_free(pin->name, made->loaded, "a pin of its function")) return false;
-
+    if (!names_free(*made, made->pins, functions)) return false;
     make_room(component.instances);
     make_room(component.functions, functions.size());
     make_room(added_instances_);
     const auto functions_before = component.functions.size();
     on_undo([this, made, functions_before] {
         LoadedComponent& of = *made->component;
-        while (of.functions.size() > functions_before) {
-            for (const auto& pin : of.functions.back()->pins) model_.pin.erase(pin->name);
-            model_.function.erase(of.functions.back()->name);
-            removed_.functions.push_back(std::move(of.functions.back()));
-            of.functions.pop_back();
-        }
+        withdraw_functions(of, functions_before);
         for (const auto& pin : made->pins) model_.leave(*pin);
         model_.instance.erase(made->name);
         removed_.instances.push_back(std::move(of.instances.back()));  // rolled back in reverse order, so it is the last
         of.instances.pop_back();
     });
     component.instances.push_back(std::move(owned));
-    std::move(functions.begin(), functions.end(), std::back_inserter(component.functions));
     added_instances_.push_back(made);
     if (component.process == 0) structural_ = true;  // no thread runs a program
     model_.instance.emplace(made->name, made);
     for (const auto& pin : made->pins) model_.enter(*pin);
-    for (auto function = component.functions.begin() + static_cast<std::ptrdiff_t>(functions_before); function != component.functions.end();
-         ++function) {
-        model_.function.emplace((*function)->name, function->get());
-        for (const auto& pin : (*function)->pins) model_.pin.emplace(pin->name, pin.get());
-    }
+    enter_functions(component, std::move(functions));
     return true;
+}
+
+bool Edit::names_free(const Instance& of, const std::vector<std::unique_ptr<Pin>>& pins, const std::vector<std::unique_ptr<LoadedFunction>>& functions) {
+    for (const auto& pin : pins)
+        if (!name_free(pin->name, of.loaded, "its pin") || (!pin->alias.empty() && !name_free(pin->alias, of.loaded, "a second name of its pin"))) return false;
+    for (const auto& function : functions)
+        if (model_.find_function(function->name))
+            return fail("name-taken", of.loaded, "function " + quoted(function->name) + " already exists", "its function",
+                        "choose another name for the new instance: names=…");
+    for (const auto& function : functions)
+        for (const auto& pin : function->pins)
+            if (!name_free(pin->name, of.loaded, "a pin of its function")) return false;
+    return true;
+}
+
+void Edit::enter_functions(LoadedComponent& component, std::vector<std::unique_ptr<LoadedFunction>> functions) {
+    for (auto& function : functions) {
+        LoadedFunction& made = *component.functions.emplace_back(std::move(function));
+        model_.function.emplace(made.name, &made);
+        for (const auto& pin : made.pins) model_.pin.emplace(pin->name, pin.get());
+    }
+}
+
+void Edit::withdraw_functions(LoadedComponent& of, std::size_t before) {
+    while (of.functions.size() > before) {
+        for (const auto& pin : of.functions.back()->pins) model_.pin.erase(pin->name);
+        model_.function.erase(of.functions.back()->name);
+        removed_.functions.push_back(std::move(of.functions.back()));
+        of.functions.pop_back();
+    }
+}
+
+bool Edit::add_declared(Instance& instance, std::vector<std::unique_ptr<Pin>> pins, std::vector<std::unique_ptr<LoadedFunction>> functions) {
+    LoadedComponent& component = *instance.component;
+    if (!names_free(instance, pins, functions)) return false;
+    make_room(component.functions, functions.size());
+    make_room(instance.functions, functions.size());
+    on_undo([this, &instance, &component, before = component.functions.size(), own = instance.functions.size()] {
+        withdraw_functions(component, before);
+        instance.functions.resize(own);
+    });
+    for (const auto& function : functions) instance.functions.push_back(function.get());
+    enter_functions(component, std::move(functions));
+    return add_pins(instance, std::move(pins), instance.loaded);
 }
 
 bool Edit::add_pins(Instance& instance, std::vector<std::unique_ptr<Pin>> pins, Span at) {

@@ -67,6 +67,8 @@ public:
     /// Leaves `instance` unchanged on failure.
     bool add_instance(LoadedComponent& component, std::unique_ptr<Instance>& instance,
                       std::vector<std::unique_ptr<LoadedFunction>> functions);
+    /// An instance that this edit has added gets further pins and functions. Reports names that are taken.
+    bool add_declared(Instance& instance, std::vector<std::unique_ptr<Pin>> pins, std::vector<std::unique_ptr<LoadedFunction>> functions);
     /// A program's component gets pins; they belong to no thread, so no plan changes. Reports names that are taken.
     bool add_pins(Instance& instance, std::vector<std::unique_ptr<Pin>> pins, Span at);
     /// Removes pins of a program's component that are in no signal.
@@ -136,6 +138,9 @@ public:
 private:
     bool fail(Code code, Span at, std::string message, std::string label = "", std::string help = "");
     bool name_free(std::string_view name, Span at, const char* what);
+    bool names_free(const Instance& of, const std::vector<std::unique_ptr<Pin>>& pins, const std::vector<std::unique_ptr<LoadedFunction>>& functions);
+    void enter_functions(LoadedComponent& component, std::vector<std::unique_ptr<LoadedFunction>> functions);
+    void withdraw_functions(LoadedComponent& of, std::size_t before);
     void keep_value(Pin& pin);
     // Memory may end at any line. So every edit first allocates the space that it needs, then registers its undo action, and only
     // then changes the model, without allocating; entries of an index come last, and undoing copes with missing ones.

@@ -109,6 +109,7 @@ struct Instance {
     std::vector<std::pair<std::string, hal_stream*>> streams;
     std::vector<Pin*> finite;        ///< its declared-finite outputs
     bool constructed = false, started = false;
+    bool own_threads = false;        ///< uses its pins in threads of its own, at any moment
     bool leads_clock = false;        ///< it disciplines the threads to an external clock reference
     Span loaded;
     std::size_t load = 0, number = 0;  ///< which of the component's loads made it, as which of that load's instances

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Components, their memory, functions and threads.
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <map>
@@ -24,6 +25,7 @@ struct Component {
 };
 std::map<int, Component> components;
 int last_id = 0;
+std::uint64_t clock_period = 0;  // that a module has set before there was a thread
 
 /// Memory of hal_malloc(): cleared, never moved, and kept until no module is left, because modules keep pointers into each other's.
 struct Chunk {
@@ -31,6 +33,7 @@ struct Chunk {
     std::size_t bytes, used;
 };
 std::vector<Chunk> chunks;
+bool memory_kept = false;
 std::map<std::uintptr_t, std::size_t> blocks;  // what hal_malloc() gave: address and size
 
 bool add_chunk(std::size_t least) {
@@ -49,6 +52,7 @@ int fail(const char* function, const char* name, const char* why) {
 
 void call(const Function& function, const hal_cycle& cycle) {
     in_cycle = true;
+    cycle_now = &cycle;
     function.code(function.arg, static_cast<long>(cycle.period_ns));
     in_cycle = false;
 }
@@ -56,6 +60,7 @@ void call(const Function& function, const hal_cycle& cycle) {
     Module& module = *function.module;
     if (module.accesses_ports) permit_ports();  // without the permission the access is a crash, which names the function
     module.take_parameters(function);
+    adjust_clock(module, cycle);
     call(function, cycle);
     module.show_parameters(function);
 }
@@ -87,12 +92,24 @@ void release_components(Module& module) noexcept {
         components.erase(id);
     }
     module.components.clear();
-    if (!Module::all_running().empty() || Module::current()) return;
+    if (!Module::all_running().empty() || Module::current() || memory_kept) return;
     for (const Chunk& chunk : chunks) munmap(chunk.memory, chunk.bytes);
     chunks.clear();
     blocks.clear();
+    clock_period = 0;
     hal_shmem_base = nullptr;
 }
+
+std::uint64_t clock_multiple(std::uint64_t period_ns) noexcept {
+    if (clock_period == 0) return period_ns;
+    return std::max<std::uint64_t>(1, (period_ns + clock_period / 2) / clock_period) * clock_period;
+}
+
+void keep_memory() noexcept { memory_kept = true; }
+
+int new_id() noexcept { return ++last_id; }
+
+bool is_id_of(const Module& module, int id) { return module.components.contains(id); }
 
 std::uintptr_t end_of_block(const volatile void* address) noexcept {
     const auto at = reinterpret_cast<std::uintptr_t>(address);
@@ -124,7 +141,7 @@ int hal_init(const char* name) {
         if (!name || !*name || std::strlen(name) > name_length) return fail("hal_init", name, "a name has 1 to 47 characters");
         for (const auto& [id, component] : components)
             if (component.name == name) return fail("hal_init", name, "duplicate component name");
-        const int id = ++last_id;
+        const int id = new_id();
         components[id] = {name, module, false};
         module->components.insert(id);
         return id;
@@ -142,6 +159,15 @@ int hal_set_unready(int comp) {
     const auto component = components.find(comp);
     if (component == components.end() || !component->second.ready || !Module::current()) return -EINVAL;
     component->second.ready = false;
+    return 0;
+}
+
+int hal_unready(int comp) { return hal_set_unready(comp); }
+
+// LinuxCNC keeps the function for a command of its host that its halcmd does not have; so it is never called.
+int hal_set_constructor(int comp, int (*make)(char*, char*)) {
+    const auto component = components.find(comp);
+    if (component == components.end() || !make) return fail("hal_set_constructor", hal_comp_name(comp), "unknown component, or no function");
     return 0;
 }
 
@@ -198,26 +224,20 @@ int hal_create_thread(const char* name, unsigned long period_ns, int) {
         if (!module) return fail("hal_create_thread", name, "only while a module is loaded");
         if (!name || !*name || std::strlen(name) > name_length) return fail("hal_create_thread", name, "a name has 1 to 47 characters");
         if (period_ns == 0) return fail("hal_create_thread", name, "the period is 0");
-        if (!module->extension().thread(module->host(), name, static_cast<std::int64_t>(period_ns)))
+        if (!module->extension().thread(module->host(), name, static_cast<std::int64_t>(clock_multiple(period_ns))))
             return fail("hal_create_thread", name, "the name is invalid or taken");
-        const int id = ++last_id;  // LinuxCNC has a component per thread; nothing refers to it
-        return id;
+        return new_id();  // LinuxCNC has a component per thread; nothing refers to it
     });
 }
 
-// The runtime has taken a module's functions out of the threads, at a cycle boundary, before rtapi_app_exit() runs. So what a module
-// wants there is done: nothing of it runs. Functions of others go on, because their outputs may be what keeps the machine safe.
-int hal_stop_threads() {
-    if (Module::unloading()) return 0;
-    if (!in_cycle) fail("hal_stop_threads", "all threads", "only while a module is unloaded; the user types stop");
-    return -EPERM;
-}
-int hal_del_funct_from_thread(const char* function, const char*) {
-    const Module* const module = Module::unloading();
-    if (!module) {
-        if (!in_cycle) fail("hal_del_funct_from_thread", function, "only while a module is unloaded; the user types delf");
-        return -EPERM;
-    }
-    return function && module->functions.contains(function) ? 0 : -EINVAL;
+long rtapi_clock_set_period(long ns) {
+    const Module* const module = Module::current();
+    const auto base = module ? module->calls().base_period(module->host()) : 0;
+    const long now = base > 0 ? static_cast<long>(base) : static_cast<long>(clock_period);
+    if (ns == 0 && module) return now;
+    if (!module) return fail("rtapi_clock_set_period", "clock", "only while a module is loaded"), -EPERM;
+    if (ns < 0 || now != 0) return fail("rtapi_clock_set_period", "clock", now != 0 ? "it runs already" : "the period is negative");
+    clock_period = static_cast<std::uint64_t>(ns);
+    return ns;
 }
 }

@@ -27,7 +27,10 @@ const halcyon_module* open(const char* folder, const char* name, halcyon_module_
     } catch (const std::exception& error) { return fail(error.what(), ""); }
 }
 
-void close(const halcyon_module* module) { delete &Module::of(*module); }
+void close(const halcyon_module* module) {
+    const Module& of = Module::of(*module);
+    if (!of.broken()) delete &of;  // else a task of it may still run
+}
 
 const char* user(const halcyon_module* module, std::size_t index) {
     const Module& used = Module::of(*module);
@@ -40,6 +43,6 @@ const char* user(const halcyon_module* module, std::size_t index) {
 }  // namespace hal::modules
 
 extern "C" const halcyon_modules* halcyon_module_host() {
-    static constexpr halcyon_modules host{sizeof host, hal::modules::open, hal::modules::close, hal::modules::user};
+    static constexpr halcyon_modules host{sizeof host, hal::modules::open, hal::modules::close, hal::modules::user, hal::modules::module_of_task};
     return &host;
 }

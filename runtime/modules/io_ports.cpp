@@ -2,6 +2,7 @@
 // I/O ports of the PC. Modules access them by machine code, which the kernel permits thread by thread, to those with CAP_SYS_RAWIO.
 #include <cerrno>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <fcntl.h>
 #include <fstream>
@@ -128,5 +129,23 @@ void rtapi_parport_release(halcyon_parport* port) {
     close(port->fd);
     claims.erase(port->fd);
     port->fd = -1;
+}
+
+// Without the permission the access is a crash, which names the function; the message says why.
+void rtapi_outb([[maybe_unused]] unsigned char byte, unsigned number) {
+    if (const int why = permit_ports(); why != 0) rtapi_print_msg(1, "rtapi_outb: port 0x%x: %s\n", number, in_cycle ? std::strerror(why) : explanation(why).c_str());
+#if defined(__x86_64__) || defined(__i386__)
+    outb(byte, static_cast<unsigned short>(number));
+#else
+    std::abort();
+#endif
+}
+unsigned char rtapi_inb(unsigned number) {
+    if (const int why = permit_ports(); why != 0) rtapi_print_msg(1, "rtapi_inb: port 0x%x: %s\n", number, in_cycle ? std::strerror(why) : explanation(why).c_str());
+#if defined(__x86_64__) || defined(__i386__)
+    return inb(static_cast<unsigned short>(number));
+#else
+    std::abort();
+#endif
 }
 }

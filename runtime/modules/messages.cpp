@@ -12,6 +12,7 @@
 
 #include "modules/format.hpp"
 #include "modules/module.hpp"
+#include "modules/tasks.hpp"
 
 namespace hal::modules {
 namespace {
@@ -94,6 +95,7 @@ void* print_until_stopped(void*) {
     const timespec pause{0, 10 * 1000 * 1000};
     while (printing.load(std::memory_order_acquire)) {
         print_lines();
+        report_silent_tasks();
         nanosleep(&pause, nullptr);
     }
     return nullptr;

@@ -12,19 +12,23 @@
 namespace hal::modules {
 
 constinit thread_local bool in_cycle __attribute__((tls_model("initial-exec"))) = false;
+constinit thread_local const hal_cycle* cycle_now __attribute__((tls_model("initial-exec"))) = nullptr;
 const bool runs_modules = true;
 
 namespace {
 
-Module* constructing = nullptr;
-thread_local Module* exiting = nullptr;
+// of the thread that loads or unloads
+constinit thread_local Module* constructing __attribute__((tls_model("initial-exec"))) = nullptr;
+constinit thread_local Module* exiting __attribute__((tls_model("initial-exec"))) = nullptr;
 std::vector<Module*> running_modules;  // in the order of loading
+std::set<std::string> broken_names;    // of modules whose code stays mapped, with the values of its variables
 
 constexpr const char* info = "rtapi_info_";
 
 bool create_instance(const hal_host* host, void* memory) {
     const auto* const extension = static_cast<const hal_modules*>(host->extension(host, HAL_MODULES));
-    if (!extension || extension->size < sizeof *extension) return host->fail(host, "this host cannot run LinuxCNC's modules"), false;
+    const auto* const calls = static_cast<const hal_module_calls*>(host->extension(host, HAL_MODULE_CALLS));
+    if (!extension || extension->size < sizeof *extension || !calls || calls->size < sizeof *calls) return host->fail(host, "this host cannot run LinuxCNC's modules"), false;
     // the description is the first member of what the module owns
     const auto* const description = reinterpret_cast<const halcyon_module*>(extension->component(host));
     return guarded([&] {
@@ -33,12 +37,13 @@ bool create_instance(const hal_host* host, void* memory) {
                 return host->fail(host, "it is still loaded: an unload in the same transaction takes effect at its end"), 0;
         Module& module = Module::of(*description);
         *static_cast<Module**>(memory) = &module;
-        return module.create(host, *extension) ? 1 : 0;
+        return module.create(host, *extension, *calls) ? 1 : 0;
     }) == 1;
 }
-bool start_instance(void* memory, const hal_host*) {
-    (*static_cast<Module**>(memory))->start();
-    return true;
+bool start_instance(void* memory, const hal_host* host) {
+    Module& module = **static_cast<Module**>(memory);
+    module.start();
+    return guarded([&] { return take_clock(module, host), 0; }) == 0;
 }
 void stop_instance(void*) {}
 void destroy_instance(void* memory) { (*static_cast<Module**>(memory))->destroy(); }
@@ -132,34 +137,35 @@ bool is_of_linuxcnc(std::string_view symbol) {
     return symbol.starts_with("hal_") || symbol.starts_with("halpr_") || symbol.starts_with("rtapi_") || symbol.starts_with("_rtapi_");
 }
 
-/// What LinuxCNC 2.9 defines beside what this library does: no module of its package uses it.
-bool is_of_this_interface(std::string_view symbol) {
-    constexpr std::string_view beginnings[] = {"hal_port_wait_", "halpr_find_", "rtapi_task_", "rtapi_sem_",
-                                               "rtapi_fifo_",    "rtapi_prio_"};
-    constexpr std::string_view names[] = {"hal_add_funct_to_thread",
-                                          "hal_start_threads",
-                                          "hal_link",
-                                          "hal_unlink",
-                                          "hal_signal_new",
-                                          "hal_signal_delete",
-                                          "hal_pin_alias",
-                                          "hal_param_set",
-                                          "hal_param_bit_set",
-                                          "hal_param_float_set",
-                                          "hal_param_s32_set",
-                                          "hal_param_u32_set",
-                                          "hal_set_constructor",
-                                          "hal_stream_attach",
-                                          "rtapi_wait",
-                                          "rtapi_clock_set_period",
-                                          "rtapi_init",
-                                          "rtapi_exit",
-                                          "rtapi_is_realtime"};
-    return std::any_of(std::begin(beginnings), std::end(beginnings), [&](std::string_view one) { return symbol.starts_with(one); }) ||
-           std::find(std::begin(names), std::end(names), symbol) != std::end(names);
+/// What LinuxCNC 2.9 defines beside what this library does: these read its memory.
+bool reads_its_memory(std::string_view symbol) { return symbol.starts_with("halpr_") || symbol == "hal_data"; }
+
+/// What its headers declare and nothing of it defines for modules.
+bool is_declared_only(std::string_view symbol) {
+    constexpr std::string_view beginnings[] = {"rtapi_sem_", "rtapi_fifo_", "rtapi_irq_", "rtapi_enable_interrupt", "rtapi_disable_interrupt",
+                                               "hal_thread_delete", "hal_port_wait_", "hal_stream_wait_"};
+    return std::any_of(std::begin(beginnings), std::end(beginnings), [&](std::string_view one) { return symbol.starts_with(one); });
 }
 
+bool is_of_this_interface(std::string_view symbol) { return reads_its_memory(symbol) || is_declared_only(symbol); }
+
 }  // namespace
+
+bool Module::imports(const char* symbol) const {
+    return std::find(file_.undefined().begin(), file_.undefined().end(), symbol) != file_.undefined().end();
+}
+
+void Module::note_broken() noexcept {
+    broken_ = true;
+    guarded([&] { return broken_names.insert(name_), 0; });
+}
+
+void Module::keep_for_good() noexcept {
+    static hal_value nowhere;
+    note_broken();
+    for (hal_value** const slot : slots) *slot = &nowhere;
+    keep_memory();
+}
 
 void Module::find_neighbours() {
     uses_.clear();
@@ -184,25 +190,28 @@ void Module::explain_loading(std::string problem) const {
         "it uses " + missing[0] +
         (missing.size() == 1 ? ", which" : " and " + std::to_string(missing.size() - 1) + " more missing symbols; " + missing[0]) +
         (!owners.empty()                    ? " is defined by " + owners
-         : is_of_this_interface(missing[0]) ? " is a function of LinuxCNC 2.9 that this runtime does not have"
+         : reads_its_memory(missing[0]) ? " reads LinuxCNC's memory directly, which a machine of Halcyon does not have"
+         : is_declared_only(missing[0]) ? " is declared in LinuxCNC's headers, but LinuxCNC 2.9 does not export it to modules either"
          : is_of_linuxcnc(missing[0]) ? " is not in the interface of LinuxCNC 2.9: the module is built for another version, such as 2.10"
                                       : " is defined neither by this runtime nor by a module in " + folder_);
     const std::string help =
         !owners.empty() ? "load that first: loadrt " + first
-        : is_of_this_interface(missing[0])
-            ? "docs/linuxcnc-compatibility.md lists what is not supported; hal compile builds a component from its source"
+        : reads_its_memory(missing[0]) ? "hal_get_pin_value_by_name and the like read values by name"
+        : is_declared_only(missing[0]) ? "a port or a stream passes data between a module and a program"
         : is_of_linuxcnc(missing[0]) ? "use the module of LinuxCNC 2.9 (linuxcnc-uspace), or build this one again with 2.9's halcompile"
                                      : "check that it was built for LinuxCNC 2.9";
     const hal_rejection rejection{sizeof rejection, HAL_SUBJECT_INSTANCE, "", 0, 0, "", text.c_str(), help.c_str()};
     host_->reject(host_, &rejection);
 }
 
-bool Module::create(const hal_host* host, const hal_modules& extension) {
-    if (broken_) return host->fail(host, "it crashed while it was loaded; end this machine and start it again before you load it"), false;
+bool Module::create(const hal_host* host, const hal_modules& extension, const hal_module_calls& calls) {
+    if (broken_names.contains(name_)) return host->fail(host, "it has crashed, or a task of it did not end; end this machine and start it again before you load it"), false;
     if (!prepare_memory()) return host->fail(host, "out of memory"), false;
     find_neighbours();
     host_ = host;
     extension_ = &extension;
+    calls_ = &calls;
+    machine_ = calls.machine(host);
     constructing = this;
     begin_capture();
     const halcyon_message_handler handler = rtapi_get_msg_handler();
@@ -212,12 +221,13 @@ bool Module::create(const hal_host* host, const hal_modules& extension) {
     if (!library_) explain_loading(dlerror());
     else good = take_arguments() && extension.arguments_known(host) && run_main();
     constructing = nullptr;
-    for (const char* const call : {"ioperm", "iopl"})
-        if (good && std::find(file_.undefined().begin(), file_.undefined().end(), call) != file_.undefined().end()) accesses_ports = permit_ports() == 0;
+    for (const char* const call : {"ioperm", "iopl", "rtapi_inb", "rtapi_outb"})
+        if (good && imports(call)) accesses_ports = permit_ports() == 0;
     if (good) {
         assign_parameters();
         announce_memory();
-        plain_ = parameters.empty() && !accesses_ports;
+        plain_ = parameters.empty() && !accesses_ports && !imports("rtapi_task_pll_set_correction");
+        settled_.store(true, std::memory_order_release);
         running_ = true;
         running_modules.push_back(this);
         start_printer();
@@ -227,6 +237,7 @@ bool Module::create(const hal_host* host, const hal_modules& extension) {
     rtapi_set_msg_handler(handler);
     rtapi_set_msg_level(level);
     release();
+    if (running_modules.empty()) stop_printer();
     return false;
 }
 
@@ -253,7 +264,7 @@ bool Module::run_main() {
     const std::string last = last_line(captured());
     print_captured();  // all of it, in lines of its own: LinuxCNC's users search for these
     const std::string why = signal != 0 ? std::string(crash_text(signal)) : std::string(std::strerror(-call.result)) + " (" + std::to_string(call.result) + ")";
-    if (signal != 0) broken_ = true;  // its code stays mapped: who knows who has a pointer to it
+    if (signal != 0) note_broken();  // its code stays mapped: who knows who has a pointer to it
     host_->fail(host_, (signal != 0    ? "rtapi_app_main crashed (" + why + ")" + (last.empty() ? "" : ": " + last)
                         : last.empty() ? "rtapi_app_main failed: " + why
                                        : last + " (rtapi_app_main: " + why + ")").c_str());
@@ -283,7 +294,7 @@ void Module::destroy() {
     const int signal = run_guarded_from_crashes([](void* e) { reinterpret_cast<void (*)()>(e)(); }, reinterpret_cast<void*>(exit));
     exiting = nullptr;
     if (signal != 0) {
-        broken_ = true;
+        note_broken();
         rtapi_print_msg(1, "%s: rtapi_app_exit crashed (%s)\n", name_.c_str(), crash_text(signal));
     }
     print_captured();
@@ -292,6 +303,9 @@ void Module::destroy() {
 }
 
 void Module::release() {
+    release_tasks(*this);
+    release_clock(*this);
+    settled_ = false;
     release_components(*this);
     release_ports(*this);
     release_cards(*this);
@@ -300,6 +314,8 @@ void Module::release() {
     shared_.clear();
     declared.clear();
     functions.clear();
+    parameter_names.clear();
+    slots.clear();
     accesses_ports = false;
     for (auto& names : names_) names.clear();
     if (library_ && !broken_) dlclose(library_);

@@ -3,7 +3,9 @@
 // session's lock; a module has static variables, so it is loaded once per process.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
+#include <initializer_list>
 #include <map>
 #include <memory>
 #include <new>
@@ -28,6 +30,9 @@ struct Parameter {
 };
 
 class Module;
+
+/// The cycle in which the thread runs a function of a module; valid while in_cycle, and not in a task of a module's own.
+extern constinit thread_local const hal_cycle* cycle_now __attribute__((tls_model("initial-exec")));
 
 /// A function of a module, in memory of the instance.
 struct Function {
@@ -55,10 +60,11 @@ public:
     static Module& of(const halcyon_module& description) { return *reinterpret_cast<const Shown&>(description).owner; }
     const std::string& name() const { return name_; }
     bool running() const { return running_; }
+    bool broken() const { return broken_; }
     bool uses(const Module& other) const { return uses_.contains(&other); }
 
     /// Maps the code, takes the arguments and runs rtapi_app_main(). Returns false after reporting; then nothing remains of it.
-    bool create(const hal_host* host, const hal_modules& extension);
+    bool create(const hal_host* host, const hal_modules& extension, const hal_module_calls& calls);
     /// Prints what the module has printed while it was created.
     void start();
     /// Runs rtapi_app_exit() and unmaps the code: that of modules that use this one first.
@@ -72,6 +78,8 @@ public:
     static Module* unloading();
     const hal_host* host() const { return host_; }
     const hal_modules& extension() const { return *extension_; }
+    const hal_module_calls& calls() const { return *calls_; }
+    void* machine() const { return machine_; }
     /// True when its functions are called without anything around them: it has no parameters and accesses no ports.
     bool plain() const noexcept { return plain_; }
     /// Before a call: copies parameters of the function that were set from outside. [realtime]
@@ -79,15 +87,25 @@ public:
     /// After a call: copies parameters that the module has changed. [realtime]
     void show_parameters(Function& function) noexcept;
     bool take_name(bool parameter, const std::string& name) { return names_[parameter].insert(name).second; }
+    bool has_pin(const std::string& name) const { return names_[false].contains(name); }
+    /// Whether its file uses the symbol.
+    bool imports(const char* symbol) const;
+    /// Between two cycles of a task of its own: copies all parameters both ways, once the module is loaded.
+    void exchange_parameters() noexcept;
+    /// A thread of it cannot be ended: its code and what its pointers lead to must stay.
+    void keep_for_good() noexcept;
 
     std::vector<Parameter*> parameters;   ///< in memory of the instance; in the end sorted by the address of their values
     std::vector<Function*> declared;
-    std::set<int> components;            ///< ids that it has from hal_init() and has not given back
+    std::set<int> components;            ///< ids that it has from hal_init() and rtapi_init() and has not given back
     std::set<std::string> functions;
+    std::map<std::string, Parameter*> parameter_names;
+    std::vector<hal_value**> slots;      ///< its pointers to values of pins
     std::vector<int> ports;       ///< numbers of its port pins
     bool accesses_ports = false;  ///< its functions need what permit_ports() gives
 
 private:
+    void note_broken() noexcept;
     void find_neighbours();
     void explain_loading(std::string problem) const;
     bool take_arguments();
@@ -111,6 +129,9 @@ private:
     void* library_ = nullptr;
     const hal_host* host_ = nullptr;
     const hal_modules* extension_ = nullptr;
+    const hal_module_calls* calls_ = nullptr;
+    void* machine_ = nullptr;
+    std::atomic<bool> settled_{false};  // all its parameters are known
     bool running_ = false, broken_ = false, plain_ = false;
 };
 
@@ -133,8 +154,27 @@ const char* crash_text(int signal) noexcept;
 /// io_ports.cpp: permits this thread to access I/O ports, once. Returns 0 or the errno. [any]
 int permit_ports() noexcept;
 
+/// tasks.cpp: ends the tasks of a module. A task that does not end is reported, and its module keeps what it needs.
+void release_tasks(Module& module) noexcept;
+/// The name of the module whose task the calling thread runs, or nullptr. [any]
+const char* module_of_task() noexcept;
+/// pll.cpp: a module that adjusts the clock of the threads takes it, if no other has it.
+void take_clock(Module& module, const hal_host* host);
+void release_clock(const Module& module) noexcept;
+/// Before a function of a module with the clock: what is to be added to each period. [realtime]
+void adjust_clock(const Module& module, const hal_cycle& cycle) noexcept;
+
 /// components.cpp: forgets the ids of a module, and with the last module the memory of hal_malloc().
 void release_components(Module& module) noexcept;
+/// machine_calls.cpp: carries out a command of the machine, given as its words up to a null pointer, in the transaction that loads the
+/// current module. Returns 0, or a negative errno after printing why.
+int give_command(const char* function, const char* command, std::initializer_list<const char*> words);
+/// The period as a multiple of what rtapi_clock_set_period() has set.
+std::uint64_t clock_multiple(std::uint64_t period_ns) noexcept;
+/// An id that no other has.
+int new_id() noexcept;
+/// True if the id is one that the module has from hal_init() or rtapi_init().
+bool is_id_of(const Module& module, int id);
 /// Returns 0 if the component may declare something of that name, else a negative errno after printing why.
 int declaring(const char* function, const char* name, int comp);
 /// pci_cards.cpp, io_ports.cpp: gives back what a module has not, because it failed: its cards without their remove function, its claims.
@@ -142,6 +182,8 @@ void release_cards(const Module& module) noexcept;
 void release_claims(const Module& module) noexcept;
 /// ports.cpp: forgets the port pins of a module.
 void release_ports(Module& module) noexcept;
+/// The memory of hal_malloc() stays, whoever is unloaded.
+void keep_memory() noexcept;
 /// The block of hal_malloc() that contains the address: its end; 0: none.
 std::uintptr_t end_of_block(const volatile void* address) noexcept;
 /// Sets up what the modules share, before the first one is mapped. Returns false when out of memory.

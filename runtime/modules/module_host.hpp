@@ -37,6 +37,8 @@ struct halcyon_modules {
     void (*close)(const halcyon_module* module);
     /// Returns the name of a running module that uses symbols of this one, or nullptr; `index` 0 is the first. [setup]
     const char* (*user)(const halcyon_module* module, std::size_t index);
+    /// Returns the name of the module whose task the calling thread runs, or nullptr. [any]
+    const char* (*module_of_task)() noexcept;
 };
 
 /// The symbol by which the runtime finds the interface.

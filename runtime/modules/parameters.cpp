@@ -77,6 +77,12 @@ void Module::take_parameters(const Function& function) noexcept {
     take_all(shared_.data(), shared_.size());
 }
 
+void Module::exchange_parameters() noexcept {
+    if (!settled_.load(std::memory_order_acquire)) return;
+    show_all(parameters.data(), parameters.size());
+    take_all(parameters.data(), parameters.size());
+}
+
 void Module::show_parameters(Function& function) noexcept {
     show_all(function.own, function.own_count);
     show_all(shared_.data(), shared_.size());

@@ -49,7 +49,9 @@ int new_pin(const char* name, int type, int dir, void** slot, int comp) {
     decl.name = name;
     decl.doc = decl.unit = "";
     decl.pointer = reinterpret_cast<hal_value**>(slot);
-    return host->pin(host, &decl, pin) ? 0 : -EINVAL;
+    if (!host->pin(host, &decl, pin)) return -EINVAL;
+    module.slots.push_back(decl.pointer);
+    return 0;
 }
 
 int new_parameter(const char* name, int type, int dir, void* value, int comp) {
@@ -74,6 +76,7 @@ int new_parameter(const char* name, int type, int dir, void* value, int comp) {
     decl.initial = parameter->last;
     if (!host->pin(host, &decl, &parameter->pin)) return -EINVAL;
     module.parameters.push_back(parameter);
+    module.parameter_names.emplace(name, parameter);
     return 0;
 }
 
@@ -130,7 +133,8 @@ int hal_param_alias(const char* name, const char* alias) {
     return guarded([&] {
         const Module* const module = Module::current();
         if (!name || !module) return -EINVAL;
-        return module->extension().alias(module->host(), name, alias) ? 0 : -EINVAL;
+        if (module->extension().alias(module->host(), name, alias)) return 0;
+        return give_command("hal_param_alias", alias ? "alias" : "unalias", {"param", name, alias});
     });
 }
 }

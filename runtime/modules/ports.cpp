@@ -19,13 +19,14 @@ constexpr int port_type = 5, in = 16, out = 32;
 struct PortPin {
     hal_pin pin;
     volatile int number;  ///< what the module's pointer points to
+    hal_port* own = nullptr;  ///< not a pin's: of hal_port_alloc()
 };
 std::array<std::atomic<PortPin*>, 256> pins{};  // number - 1; fixed, because threads read it
 
 hal_port* port_of(int number) noexcept {
     if (number < 1 || number > static_cast<int>(pins.size())) return nullptr;
     const PortPin* const pin = pins[static_cast<std::size_t>(number) - 1].load(std::memory_order_acquire);
-    return pin ? pin->pin.slot->port : nullptr;
+    return !pin ? nullptr : pin->own ? pin->own : pin->pin.slot->port;
 }
 std::uint32_t held_by(const hal_port& port) noexcept {
     return static_cast<std::uint32_t>(__atomic_load_n(&port.head, __ATOMIC_ACQUIRE) - __atomic_load_n(&port.tail, __ATOMIC_ACQUIRE));
@@ -36,6 +37,12 @@ int fail(const char* name, const char* why) {
     return -EINVAL;
 }
 
+std::size_t free_place() noexcept {
+    std::size_t free = 0;
+    while (free < pins.size() && pins[free].load(std::memory_order_relaxed)) ++free;
+    return free;
+}
+
 }  // namespace
 
 int new_port_pin(const char* name, int dir, void** slot, int comp) {
@@ -43,8 +50,7 @@ int new_port_pin(const char* name, int dir, void** slot, int comp) {
     Module& module = *Module::current();
     if (!slot) return fail(name, "no pointer");
     if (dir != in && dir != out) return fail(name, "invalid direction: a port has one writer and one reader");
-    std::size_t free = 0;
-    while (free < pins.size() && pins[free].load(std::memory_order_relaxed)) ++free;
+    const std::size_t free = free_place();
     if (free == pins.size()) return fail(name, "all modules together have at most 256 ports"), -ENOMEM;
     if (!module.take_name(false, name)) return fail(name, "duplicate pin name");
     const hal_host* const host = module.host();
@@ -63,6 +69,27 @@ int new_port_pin(const char* name, int dir, void** slot, int comp) {
     *slot = const_cast<int*>(&made->number);
     return 0;
 }
+
+namespace {
+
+/// A buffer that belongs to no signal: a number for hal_port_read() and the like of the same process. 0: none.
+int new_buffer(unsigned size) {
+    Module* const module = Module::current();
+    const std::size_t free = free_place();
+    const char* const why = !module ? "only while a module is loaded" : size == 0 ? "the size is 0" : free == pins.size() ? "all modules together have at most 256 ports" : nullptr;
+    if (why) return rtapi_print_msg(1, "hal_port_alloc: %s\n", why), 0;
+    const hal_host* const host = module->host();
+    void* const memory = host->allocate(host, sizeof(PortPin) + sizeof(hal_port), alignof(PortPin));
+    void* const data = host->allocate(host, size, 1);
+    if (!memory || !data) return 0;
+    PortPin* const made = new (memory) PortPin{{}, static_cast<int>(free) + 1};
+    made->own = new (static_cast<char*>(memory) + sizeof(PortPin)) hal_port{size, 0, 0, 0, static_cast<std::uint8_t*>(data)};
+    module->ports.push_back(static_cast<int>(free) + 1);
+    pins[free].store(made, std::memory_order_release);
+    return static_cast<int>(free) + 1;
+}
+
+}  // namespace
 
 void release_ports(Module& module) noexcept {
     for (const int number : module.ports) pins[static_cast<std::size_t>(number) - 1].store(nullptr, std::memory_order_release);
@@ -86,6 +113,12 @@ int hal_pin_port_newf(int dir, void** slot, int comp, const char* format, ...) {
     va_end(arguments);
     if (length < 0 || length > 47) return fail(name, "the name is longer than 47 characters"), -ENOMEM;
     return hal_pin_port_new(name, dir, slot, comp);
+}
+
+int hal_port_alloc(unsigned size) {
+    int number = 0;
+    guarded([&] { return number = new_buffer(size); });
+    return number;
 }
 
 unsigned hal_port_buffer_size(int number) {

@@ -16,15 +16,36 @@ extern char* hal_shmem_base;
 int hal_init(const char* name);
 int hal_ready(int comp);
 int hal_set_unready(int comp);
+int hal_unready(int comp);
+int hal_set_constructor(int comp, int (*make)(char* prefix, char* argument));
 int hal_exit(int comp);
 void* hal_malloc(long bytes);
 char* hal_comp_name(int comp);
 int hal_export_funct(const char* name, void (*code)(void*, long), void* arg, int uses_fp, int reentrant, int comp);
 int hal_create_thread(const char* name, unsigned long period_ns, int uses_fp);
-// Returns 0 in rtapi_app_exit(): the caller's functions are in no thread then; other functions go on. Elsewhere -EPERM: nothing stops. [any]
-int hal_stop_threads();
-// Returns 0 in rtapi_app_exit() for a function of the caller's, which is in no thread then; elsewhere -EPERM. [any]
+int hal_add_funct_to_thread(const char* function, const char* thread, int position);
+// In rtapi_app_exit() the caller's functions are in no thread: then 0 for these.
 int hal_del_funct_from_thread(const char* function, const char* thread);
+int hal_start_threads();
+// In rtapi_app_exit() 0 without an effect: the caller's functions are in no thread then; other functions go on.
+int hal_stop_threads();
+
+// signals, links, values and locks by name: [setup], in rtapi_app_main(); delete and unlink in rtapi_app_exit() as well
+int hal_signal_new(const char* name, int type);
+int hal_signal_delete(const char* name);
+int hal_link(const char* pin, const char* signal);
+int hal_unlink(const char* pin);
+int hal_pin_alias(const char* name, const char* alias);
+int hal_param_set(const char* name, int type, void* value);
+int hal_param_bit_set(const char* name, int value);
+int hal_param_float_set(const char* name, double value);
+int hal_param_s32_set(const char* name, long value);
+int hal_param_u32_set(const char* name, unsigned long value);
+int hal_get_pin_value_by_name(const char* name, int* type, void** data, bool* connected);
+int hal_get_signal_value_by_name(const char* name, int* type, void** data, bool* has_writers);
+int hal_get_param_value_by_name(const char* name, int* type, void** data);
+int hal_set_lock(unsigned char lock);
+unsigned char hal_get_lock();
 
 // pins and parameters: [setup]. Types: bit 1, float 2, s32 3, u32 4, port 5. Directions: in 16, out 32, io 48, ro 64, rw 192
 int hal_pin_new(const char* name, int type, int dir, void** slot, int comp);
@@ -53,6 +74,7 @@ bool hal_port_peek_commit(int port, unsigned count);
 bool hal_port_read(int port, char* to, unsigned count);
 bool hal_port_write(int port, const char* from, unsigned count);
 void hal_port_clear(int port);
+int hal_port_alloc(unsigned size);  // [setup] a buffer of the module's own
 void hal_port_wait_readable(volatile int** port, unsigned count, const volatile int* stop);  // of programs
 void hal_port_wait_writable(volatile int** port, unsigned count, const volatile int* stop);  // of programs
 
@@ -101,7 +123,28 @@ long long rtapi_get_time();
 long long rtapi_get_clocks();
 void rtapi_delay(long ns);
 long rtapi_delay_max();
-int rtapi_task_self();
+long rtapi_clock_set_period(long ns);  // [setup]
+int rtapi_is_realtime();
+int rtapi_is_kernelspace();
+long long rtapi_task_pll_get_reference();       // [realtime]
+int rtapi_task_pll_set_correction(long value);  // [realtime]
+
+// tasks of a module's own: new, start and delete are [setup]; the id is positive
+int rtapi_prio_highest();
+int rtapi_prio_lowest();
+int rtapi_prio_next_higher(int priority);
+int rtapi_prio_next_lower(int priority);
+int rtapi_task_new(void (*code)(void*), void* argument, int priority, int owner, unsigned long stack_bytes, int uses_fp);
+int rtapi_task_start(int task, unsigned long period_ns);
+int rtapi_task_delete(int task);
+int rtapi_task_pause(int task);   // [any]
+int rtapi_task_resume(int task);  // [any]
+int rtapi_task_self();            // [any] in a thread of the machine's 0; -EINVAL: in none
+void rtapi_wait();                // in a task
+
+// [setup]
+int rtapi_init(const char* name);
+int rtapi_exit(int module);
 
 // shared memory by key: [setup]
 int rtapi_shmem_new(int key, int comp, unsigned long size);
@@ -151,9 +194,14 @@ int rtapi_request_firmware(const halcyon_firmware** result, const char* name, vo
 void rtapi_release_firmware(const halcyon_firmware* firmware);
 int rtapi_spawn_as_root(pid_t* process, const char* path, const void* actions, const void* attributes, char* const argv[],
                         char* const envp[]);
+int rtapi_spawnp_as_root(pid_t* process, const char* file, const void* actions, const void* attributes, char* const argv[],
+                         char* const envp[]);
 int rtapi_open_as_root(const char* path, int flags);
 char** rtapi_argv_split(int flags, const char* text, int* count);
 void rtapi_argv_free(char** words);
+char* rtapi_kstrndup(const char* text, std::size_t most, int flags);
+void rtapi_outb(unsigned char byte, unsigned port);  // [any]
+unsigned char rtapi_inb(unsigned port);              // [any]
 long simple_strtol(const char* text, char** end, unsigned base);
 
 }  // extern "C"

@@ -53,7 +53,8 @@ void rtapi_delay(long ns) {
     const long long end = rtapi_get_time() + std::min(ns, longest_delay_ns);
     while (rtapi_get_time() < end) {}
 }
-int rtapi_task_self() { return in_cycle ? 0 : -EINVAL; }
+int rtapi_is_realtime() { return 1; }
+int rtapi_is_kernelspace() { return 0; }
 
 long simple_strtol(const char* text, char** end, unsigned base) { return std::strtol(text, end, static_cast<int>(base)); }
 
@@ -73,6 +74,23 @@ char** rtapi_argv_split(int, const char* text, int* count) {
     return words;
 }
 void rtapi_argv_free(char** words) { std::free(words); }
+char* rtapi_kstrndup(const char* text, std::size_t most, int) { return text ? strndup(text, most) : nullptr; }
+
+// LinuxCNC's needs neither before other calls; what an id holds is given back with it.
+int rtapi_init(const char*) {
+    return guarded([] {
+        Module* const module = Module::current();
+        if (!module) return rtapi_print_msg(1, "rtapi_init: only while a module is loaded\n"), -EPERM;
+        return *module->components.insert(new_id()).first;
+    });
+}
+int rtapi_exit(int id) {
+    Module* const module = Module::current() ? Module::current() : Module::unloading();
+    if (in_cycle || !module || !is_id_of(*module, id)) return -EINVAL;
+    module->components.erase(id);
+    release_segments(id);
+    return 0;
+}
 
 // Modules wait for the process they were given, whatever the result, so "no" is a process that fails.
 int rtapi_spawn_as_root(pid_t* process, const char* path, const void*, const void*, char* const argv[], char* const[]) {
@@ -85,6 +103,10 @@ int rtapi_spawn_as_root(pid_t* process, const char* path, const void*, const voi
     const int problem = posix_spawnp(&made, name, nullptr, nullptr, words, environ);
     if (process) *process = made;
     return -problem;
+}
+
+int rtapi_spawnp_as_root(pid_t* process, const char* file, const void* actions, const void* attributes, char* const argv[], char* const envp[]) {
+    return rtapi_spawn_as_root(process, file, actions, attributes, argv, envp);
 }
 
 int rtapi_open_as_root(const char* path, int flags) {

@@ -34,6 +34,34 @@ typedef struct hal_modules {
     void (*memory)(const hal_host *, const void *begin, size_t bytes);
 } hal_modules;
 
+/* Extension "hal.module-calls/1", offered while an instance is created: what LinuxCNC's modules do to the machine as a whole. All [setup]. */
+#define HAL_MODULE_CALLS "hal.module-calls/1"
+
+enum { HAL_MODULE_PIN, HAL_MODULE_PARAMETER, HAL_MODULE_SIGNAL };
+
+typedef struct hal_module_calls {
+    uint32_t size;
+    /* Carries out a command as part of the transaction that loads the instance: newsig, delsig, linkps, unlinkp, addf, delf, alias, unalias,
+     * setp, start, stop, or `lock` and its number. It sees what the instance has declared so far; start, stop and lock take effect with the
+     * transaction. Returns 0, or a negative errno (EPERM: locked) after writing why. Until create returns. */
+    int (*command)(const hal_host *, const char *const *words, size_t count, char *why, size_t room);
+    /* Reads a value as the transaction leaves it, and whether the pin is in a signal or the signal has a writer. Returns false if there is no
+     * such object. Until create returns. */
+    bool (*value)(const hal_host *, int kind, const char *name, hal_type *type, hal_value *value, bool *linked);
+    /* Returns the bits of the locks. Until create returns. */
+    unsigned (*locks)(const hal_host *);
+    /* Returns the period of the fastest thread, or 0. Until create returns. */
+    int64_t (*base_period)(const hal_host *);
+    /* States that the instance uses its pins in threads of its own. Returns false on a virtual clock, which these would not follow. Until create
+     * returns. */
+    bool (*own_threads)(const hal_host *);
+    /* Returns the machine, for afterwards(). Until create returns. */
+    void *(*machine)(const hal_host *);
+    /* Carries out delsig or unlinkp right after the transaction that is about to end, and `failed` if that is rejected. Returns false if there
+     * is nothing of that name. Until destroy returns. */
+    bool (*afterwards)(void *machine, const char *command, const char *name, void (*failed)(const char *why));
+} hal_module_calls;
+
 #ifdef __cplusplus
 }
 #endif

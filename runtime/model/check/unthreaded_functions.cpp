@@ -10,7 +10,7 @@ void check_unthreaded_functions(const Model& model, Diagnostics& diagnostics) {
         for (const auto& function : component->functions) {
             if (function->thread) continue;
             const bool linked = std::any_of(function->instances.begin(), function->instances.end(), [&](const Instance* instance) {
-                return std::any_of(instance->pins.begin(), instance->pins.end(),
+                return !instance->own_threads && std::any_of(instance->pins.begin(), instance->pins.end(),
                                    [&](const auto& pin) { return pin->signal && (!pin->function || pin->function == function.get()); });
             });
             if (!linked) continue;

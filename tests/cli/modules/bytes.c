@@ -5,11 +5,8 @@
 int hal_pin_port_newf(int dir, volatile int **slot, int comp, const char *format, ...);
 unsigned hal_port_readable(int port);
 unsigned hal_port_writable(int port);
-unsigned hal_port_buffer_size(int port);
 bool hal_port_peek(int port, char *to, unsigned count);
 bool hal_port_peek_commit(int port, unsigned count);
-bool hal_port_read(int port, char *to, unsigned count);
-bool hal_port_write(int port, const char *from, unsigned count);
 void hal_port_clear(int port);
 
 struct pins {

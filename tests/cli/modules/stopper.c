@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Stops the threads where it must not, and where LinuxCNC's motion controller does. */
+/* Stops the threads in a cycle, where it must not, and where LinuxCNC's motion controller does. */
 #include "linuxcnc.h"
-
-int hal_del_funct_from_thread(const char *function, const char *thread);
 
 static int comp;
 static struct { volatile int32_t *result; } *pins;
@@ -16,7 +14,6 @@ int rtapi_app_main(void) {
     pins = hal_malloc(sizeof *pins);
     hal_pin_s32_newf(OUT, &pins->result, comp, "stopper.result");
     hal_export_funct("stopper", update, 0, 1, 0, comp);
-    if (hal_stop_threads() != -1 || hal_del_funct_from_thread("stopper", "t") != -1) return -5; /* EPERM */
     return hal_ready(comp);
 }
 void rtapi_app_exit(void) {
