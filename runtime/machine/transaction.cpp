@@ -66,6 +66,7 @@ void Transaction::roll_back() {
     s.when_committed.clear();
     s.needs_threads = false;
     if (s.edit) s.withdraw();
+    s.when_committed.clear();  // what modules wanted while they were unloaded again
     s.open = false;
 }
 

@@ -131,7 +131,7 @@ void rtapi_parport_release(halcyon_parport* port) {
     port->fd = -1;
 }
 
-// Without the permission the access is a crash, which names the function; the message says why.
+// Without the permission the access is a crash, which names the function; the message has the reason.
 void rtapi_outb([[maybe_unused]] unsigned char byte, unsigned number) {
     if (const int why = permit_ports(); why != 0) rtapi_print_msg(1, "rtapi_outb: port 0x%x: %s\n", number, in_cycle ? std::strerror(why) : explanation(why).c_str());
 #if defined(__x86_64__) || defined(__i386__)

@@ -15,7 +15,7 @@ namespace {
 enum Type { bit = 1, real = 2, s32 = 3, u32 = 4, port = 5 };
 
 int fail(const char* function, const char* name, const char* why, int result = -EINVAL) {
-    if (in_cycle) return result;  // the result says it, in every cycle
+    if (in_cycle) return result;  // the result is enough, in every cycle
     rtapi_print_msg(1, "%s: '%s': %s\n", function, name ? name : "(null)", why);
     return result;
 }

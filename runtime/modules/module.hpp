@@ -182,7 +182,7 @@ void release_cards(const Module& module) noexcept;
 void release_claims(const Module& module) noexcept;
 /// ports.cpp: forgets the port pins of a module.
 void release_ports(Module& module) noexcept;
-/// The memory of hal_malloc() stays, whoever is unloaded.
+/// The memory of hal_malloc() stays, even when no module is left.
 void keep_memory() noexcept;
 /// The block of hal_malloc() that contains the address: its end; 0: none.
 std::uintptr_t end_of_block(const volatile void* address) noexcept;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The functions that LinuxCNC's compiled modules (2.9) call, declared from the documented interface: names, types and sizes. Own text;
+// The functions that LinuxCNC's compiled modules (2.9) may call, declared from the documented interface: names, types and sizes. Own text;
 // nothing here comes from LinuxCNC's headers. exports.map makes exactly these visible.
 #pragma once
 
@@ -124,7 +124,7 @@ long long rtapi_get_clocks();
 void rtapi_delay(long ns);
 long rtapi_delay_max();
 long rtapi_clock_set_period(long ns);  // [setup]
-int rtapi_is_realtime();
+int rtapi_is_realtime();  // [setup]
 int rtapi_is_kernelspace();
 long long rtapi_task_pll_get_reference();       // [realtime]
 int rtapi_task_pll_set_correction(long value);  // [realtime]

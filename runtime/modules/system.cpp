@@ -12,6 +12,7 @@
 #include <iterator>
 #include <spawn.h>
 #include <string>
+#include <sys/resource.h>
 #include <sys/utsname.h>
 #include <unistd.h>
 #include <vector>
@@ -53,7 +54,17 @@ void rtapi_delay(long ns) {
     const long long end = rtapi_get_time() + std::min(ns, longest_delay_ns);
     while (rtapi_get_time() < end) {}
 }
-int rtapi_is_realtime() { return 1; }
+int rtapi_is_realtime() {  // whether threads may have a real-time priority: CAP_SYS_NICE, bit 23, or a limit that allows it
+    static const bool known = [] {
+        rlimit limit{};
+        if (getrlimit(RLIMIT_RTPRIO, &limit) == 0 && limit.rlim_cur > 0) return true;
+        std::ifstream file("/proc/self/status");
+        for (std::string line; std::getline(file, line);)
+            if (line.starts_with("CapEff:")) return (std::strtoull(line.c_str() + 7, nullptr, 16) >> 23 & 1) != 0;
+        return false;
+    }();
+    return known;
+}
 int rtapi_is_kernelspace() { return 0; }
 
 long simple_strtol(const char* text, char** end, unsigned base) { return std::strtol(text, end, static_cast<int>(base)); }

@@ -62,7 +62,7 @@ Task* task_of(int id) noexcept {
 }
 
 int fail(const char* function, const char* why, int result = -EINVAL) {
-    if (!in_cycle) rtapi_print_msg(1, "%s: %s\n", function, why);  // in a cycle the result says it
+    if (!in_cycle) rtapi_print_msg(1, "%s: %s\n", function, why);  // in a cycle the result is enough
     return result;
 }
 

@@ -27,7 +27,7 @@ advance 2 cycles
 gets w
 getp wires.result
 getp wires.late
-getp wires.refused
+getp wires.denied
 getp wires.add
 getp sum.out
 getp sum.tmax
@@ -85,6 +85,11 @@ unlink 0 0, delete 0 -22, link -1, made 0
         self.build("wires")
         done = self.run_program("sim", "--quiet", "-k", self.write("m.hal", "loadrt sum2 names=sum\nbegin\nloadrt wires\nnet y nothing.out\ncommit\nlist sig\nlist thread\nloadrt wires\nadvance 2 cycles\ngets w\n"))
         self.assertEqual((1, ["6"]), (done.returncode, done.stdout.split()), done.stderr)
+
+    def test_a_load_that_is_rolled_back_deletes_nothing_later(self):
+        self.build("wires")
+        done = self.sim("loadrt sum2 names=sum\nnewsig w float\nadvance 1 cycles\nbegin\nloadrt wires\nabort\nnewsig z bit\nadvance 1 cycles\nlist sig\n")
+        self.assertEqual((0, ["w", "z"]), (done.returncode, done.stdout.split()), done.stderr)
 
     def test_a_module_meets_and_sets_locks(self):
         self.build("wires")

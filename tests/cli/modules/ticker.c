@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Has a task of its own, which counts in its own period, and does at the third period what fault= says. A function pauses and resumes it. */
+/* Has a task of its own, which counts in its own period, and does at the third period what fault= names. A function pauses and resumes it. */
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
@@ -28,7 +28,10 @@ static void body(void *arg) {
         *own->created = rtapi_task_new(body, 0, 1, comp, 0, 1);
         if (n == 3 && is("crash")) *(volatile int *)8 = 1;
         if (n == 3 && is("exit")) exit(3);
-        if (n == 3 && is("malloc")) free(malloc(10000));
+        if (n == 3 && is("malloc")) {
+            void *volatile memory = malloc(10000);
+            free(memory);
+        }
         if (n == 3 && is("silent")) for (volatile int i = 0;; ++i) {}
         if (n == 3 && is("return")) return;
         rtapi_wait();

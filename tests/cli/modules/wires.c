@@ -8,7 +8,7 @@ PARAMETER(mode, "s", "fail, lock, or nothing")
 static int comp;
 static struct {
     volatile double *in, *out, *late;
-    volatile int32_t *refused;
+    volatile int32_t *denied;
     volatile double gain;
 } *own;
 static int made;
@@ -18,7 +18,7 @@ static int make(char *prefix, char *argument) { return made += prefix && argumen
 static void update(void *arg, long period) {
     (void)arg, (void)period;
     *own->out = *own->in + own->gain;
-    *own->refused = hal_signal_new("never", FLOAT);
+    *own->denied = hal_signal_new("never", FLOAT);
 }
 static void last(void *arg, long period) { (void)arg, (void)period, *own->late = 2 * *own->out; }
 
@@ -33,7 +33,7 @@ int rtapi_app_main(void) {
     own->gain = 0.5;
     hal_pin_float_newf(IN, &own->in, comp, "wires.in");
     hal_pin_float_newf(OUT, &own->out, comp, "wires.out");
-    hal_pin_s32_newf(OUT, &own->refused, comp, "wires.refused");
+    hal_pin_s32_newf(OUT, &own->denied, comp, "wires.denied");
     hal_param_float_newf(RW, &own->gain, comp, "wires.gain");
     hal_export_funct("wires", update, 0, 1, 0, comp);
     hal_create_thread("wired", 1000000, 1);
@@ -73,7 +73,7 @@ int rtapi_app_main(void) {
     char text[5] = "";
     hal_port_read(port, text, 4);
     rtapi_print_msg(1, "port %d %d %d %s %u, none %d\n", port > 0, written, more, text, hal_port_buffer_size(port), hal_port_alloc(0));
-    rtapi_print_msg(1, "make %d %d, unready %d, realtime %d %d\n", hal_set_constructor(comp, make), hal_set_constructor(99, make), hal_unready(comp), rtapi_is_realtime() != 0, rtapi_is_kernelspace());
+    rtapi_print_msg(1, "make %d %d, unready %d, realtime %d %d\n", hal_set_constructor(comp, make), hal_set_constructor(99, make), hal_unready(comp), rtapi_is_realtime() == 0 || rtapi_is_realtime() == 1, rtapi_is_kernelspace());
     const int id = rtapi_init("wires"), exit = rtapi_exit(id), exit_again = rtapi_exit(id);
     rtapi_print_msg(1, "rtapi %d, exit %d %d\n", id > 0, exit, exit_again);
     if (strcmp(mode, "fail") == 0) return -5;
