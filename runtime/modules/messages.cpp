@@ -41,6 +41,7 @@ std::atomic<halcyon_message_handler> message_handler{nullptr};
 
 char capture[8192];
 std::size_t capture_length = 0;
+char first_error[line_length];  // of what is captured
 bool capturing = false;
 thread_local bool captures __attribute__((tls_model("initial-exec"))) = false;
 
@@ -122,9 +123,13 @@ void print_by_default(int level, const char* format, va_list arguments) {
     const int wanted = std::vsnprintf(text, sizeof text, format, arguments);
     const std::size_t length = wanted < 0 ? 0 : std::min<std::size_t>(static_cast<std::size_t>(wanted), sizeof text - 1);
     if (!captures) return write_text(level, text, length);
-    const std::size_t taken = std::min(length, sizeof capture - 1 - capture_length);
-    std::memcpy(capture + capture_length, text, taken);
-    capture_length += taken;
+    if (level == errors && !*first_error) std::memcpy(first_error, text, length + 1);
+    if (length > sizeof capture - 1 - capture_length) {  // then it prints earlier
+        write_text(errors, capture, capture_length);
+        capture_length = 0;
+    }
+    std::memcpy(capture + capture_length, text, length);
+    capture_length += length;
     capture[capture_length] = '\0';
 }
 
@@ -137,10 +142,10 @@ void print_message(int level, const char* format, va_list arguments) {
 
 void begin_capture() noexcept {
     capture_length = 0;
-    *capture = '\0';
+    *capture = *first_error = '\0';
     capturing = captures = true;
 }
-std::string captured() { return {capture, capture_length}; }
+std::string captured_cause() { return *first_error ? first_error : std::string(capture, capture_length); }
 void end_capture() noexcept {
     capture_length = 0;
     capturing = captures = false;

@@ -11,8 +11,8 @@ constexpr unsigned most_per_second = 100;
 
 /// Collects what the calling thread's module prints from now on. [setup]
 void begin_capture() noexcept;
-/// Returns what was collected. [setup]
-std::string captured();
+/// Returns the first message of level error that was collected; without one, everything. [setup]
+std::string captured_cause();
 /// Ends collecting and drops it. [setup]
 void end_capture() noexcept;
 /// Ends collecting and prints it. [setup]

@@ -243,9 +243,8 @@ bool Module::create(const hal_host* host, const hal_modules& extension, const ha
 
 namespace {
 
-std::string last_line(std::string text) {
-    while (text.ends_with('\n')) text.pop_back();
-    if (const auto at = text.rfind('\n'); at != text.npos) text.erase(0, at + 1);
+std::string one_line(std::string text) {
+    text.erase(std::min(text.find_first_of('\n'), text.size()));
     for (char& c : text)  // hostmot2 prints the bytes of a board's name, which end the text when they are 0
         if (static_cast<unsigned char>(c) < ' ' && c != '\t') c = '?';
     return text;
@@ -261,13 +260,13 @@ bool Module::run_main() {
     } call{main, 0};
     const int signal = run_guarded_from_crashes([](void* c) { static_cast<Call*>(c)->result = static_cast<Call*>(c)->main(); }, &call);
     if (signal == 0 && call.result >= 0) return true;
-    const std::string last = last_line(captured());
+    const std::string cause = one_line(captured_cause());
     print_captured();  // all of it, in lines of its own: LinuxCNC's users search for these
     const std::string why = signal != 0 ? std::string(crash_text(signal)) : std::string(std::strerror(-call.result)) + " (" + std::to_string(call.result) + ")";
     if (signal != 0) note_broken();  // its code stays mapped: who knows who has a pointer to it
-    host_->fail(host_, (signal != 0    ? "rtapi_app_main crashed (" + why + ")" + (last.empty() ? "" : ": " + last)
-                        : last.empty() ? "rtapi_app_main failed: " + why
-                                       : last + " (rtapi_app_main: " + why + ")").c_str());
+    host_->fail(host_, (signal != 0    ? "rtapi_app_main crashed (" + why + ")" + (cause.empty() ? "" : ": " + cause)
+                        : cause.empty() ? "rtapi_app_main failed: " + why
+                                        : cause + " (rtapi_app_main: " + why + ")").c_str());
     return false;
 }
 
@@ -298,8 +297,8 @@ void Module::destroy() {
         rtapi_print_msg(1, "%s: rtapi_app_exit crashed (%s)\n", name_.c_str(), crash_text(signal));
     }
     print_captured();
-    if (running_modules.empty()) stop_printer();
     release();
+    if (running_modules.empty()) stop_printer();
 }
 
 void Module::release() {

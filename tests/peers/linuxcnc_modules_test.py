@@ -30,7 +30,7 @@ WITH = {"debounce": "cfg=2", "lcd": "fmt_strings=%d", "message": 'names=m messag
 PORTS = "I/O ports"  # their access needs a capability, or is not possible with this kernel
 DECLINE = {"hal_bb_gpio": "cannot open /dev/mem", "hal_gm": "no such card in /sys/bus/pci/devices", "hal_parport": PORTS, "hal_pi_gpio": "unrecognized Raspberry revision",
            "hal_ppmc": PORTS, "hal_speaker": "ioperm() failed", "hm2_7i43": PORTS, "hm2_7i90": PORTS, "hm2_pci": "no such card in /sys/bus/pci/devices",
-           "hm2_rpspi": "Unsupported Platform", "hm2_spi": "No such file or directory (-2)", "mesa_pktgyro_test": "can not be loaded using the 'count' parameter",
+           "hm2_rpspi": "Cannot stat '/proc/device-tree/model'", "hm2_spi": "No such file or directory (-2)", "mesa_pktgyro_test": "can not be loaded using the 'count' parameter",
            "setsserial": "Unable to find sserial remote",
            "mesa_uart": "can not be loaded using the 'count' parameter"}
 # What hostmot2 prints about hm2_test's patterns 0 to 14..
