@@ -110,11 +110,12 @@ bool Edit::add_instance(LoadedComponent& component, std::unique_ptr<Instance>& o
         of.instances.pop_back();
     });
     component.instances.push_back(std::move(owned));
+    std::move(functions.begin(), functions.end(), std::back_inserter(component.functions));
     added_instances_.push_back(made);
     if (component.process == 0) structural_ = true;  // no thread runs a program
     model_.instance.emplace(made->name, made);
     for (const auto& pin : made->pins) model_.enter(*pin);
-    enter_functions(component, std::move(functions));
+    enter_functions(component, functions_before);
     return true;
 }
 
@@ -131,11 +132,10 @@ bool Edit::names_free(const Instance& of, const std::vector<std::unique_ptr<Pin>
     return true;
 }
 
-void Edit::enter_functions(LoadedComponent& component, std::vector<std::unique_ptr<LoadedFunction>> functions) {
-    for (auto& function : functions) {
-        LoadedFunction& made = *component.functions.emplace_back(std::move(function));
-        model_.function.emplace(made.name, &made);
-        for (const auto& pin : made.pins) model_.pin.emplace(pin->name, pin.get());
+void Edit::enter_functions(LoadedComponent& component, std::size_t before) {
+    for (std::size_t i = before; i < component.functions.size(); ++i) {
+        model_.function.emplace(component.functions[i]->name, component.functions[i].get());
+        for (const auto& pin : component.functions[i]->pins) model_.pin.emplace(pin->name, pin.get());
     }
 }
 
@@ -153,12 +153,14 @@ bool Edit::add_declared(Instance& instance, std::vector<std::unique_ptr<Pin>> pi
     if (!names_free(instance, pins, functions)) return false;
     make_room(component.functions, functions.size());
     make_room(instance.functions, functions.size());
-    on_undo([this, &instance, &component, before = component.functions.size(), own = instance.functions.size()] {
+    const std::size_t before = component.functions.size();
+    on_undo([this, &instance, &component, before, own = instance.functions.size()] {
         withdraw_functions(component, before);
         instance.functions.resize(own);
     });
     for (const auto& function : functions) instance.functions.push_back(function.get());
-    enter_functions(component, std::move(functions));
+    std::move(functions.begin(), functions.end(), std::back_inserter(component.functions));
+    enter_functions(component, before);
     return add_pins(instance, std::move(pins), instance.loaded);
 }
 

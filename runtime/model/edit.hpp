@@ -139,7 +139,7 @@ private:
     bool fail(Code code, Span at, std::string message, std::string label = "", std::string help = "");
     bool name_free(std::string_view name, Span at, const char* what);
     bool names_free(const Instance& of, const std::vector<std::unique_ptr<Pin>>& pins, const std::vector<std::unique_ptr<LoadedFunction>>& functions);
-    void enter_functions(LoadedComponent& component, std::vector<std::unique_ptr<LoadedFunction>> functions);
+    void enter_functions(LoadedComponent& component, std::size_t before);
     void withdraw_functions(LoadedComponent& of, std::size_t before);
     void keep_value(Pin& pin);
     // Memory may end at any line. So every edit first allocates the space that it needs, then registers its undo action, and only
