@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <string>
 
+#include "machine/linuxcnc_home.hpp"
 #include "modules/module_host.hpp"
 #include "paths.hpp"
 
@@ -50,7 +51,7 @@ const Library& library() {
 
 std::string module_folder() {
     const char* const folder = std::getenv("HAL_RTMOD_DIR");
-    return folder && *folder ? folder : "/usr/lib/linuxcnc/modules";
+    return folder && *folder ? folder : linuxcnc_home().modules();
 }
 
 std::string find_module(std::string_view name) {

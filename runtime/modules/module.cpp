@@ -132,8 +132,9 @@ bool is_of_linuxcnc(std::string_view symbol) {
     return symbol.starts_with("hal_") || symbol.starts_with("halpr_") || symbol.starts_with("rtapi_") || symbol.starts_with("_rtapi_");
 }
 
-/// What LinuxCNC 2.9 defines beside what this library does: no module of its package uses it.
+/// What LinuxCNC 2.9 and 2.10 define beside what this library does: no module of theirs uses it.
 bool is_of_this_interface(std::string_view symbol) {
+    if (only_in_2_10(symbol)) return true;
     constexpr std::string_view beginnings[] = {"hal_port_wait_", "halpr_find_", "rtapi_task_", "rtapi_sem_",
                                                "rtapi_fifo_",    "rtapi_prio_"};
     constexpr std::string_view names[] = {"hal_add_funct_to_thread",
@@ -184,17 +185,34 @@ void Module::explain_loading(std::string problem) const {
         "it uses " + missing[0] +
         (missing.size() == 1 ? ", which" : " and " + std::to_string(missing.size() - 1) + " more missing symbols; " + missing[0]) +
         (!owners.empty()                    ? " is defined by " + owners
-         : is_of_this_interface(missing[0]) ? " is a function of LinuxCNC 2.9 that this runtime does not have"
-         : is_of_linuxcnc(missing[0]) ? " is not in the interface of LinuxCNC 2.9: the module is built for another version, such as 2.10"
+         : is_of_this_interface(missing[0]) ? std::string(" is a function of LinuxCNC ") + version_text(interface_) + " that this runtime does not have"
+         : is_of_linuxcnc(missing[0]) ? " is not in the interface of LinuxCNC 2.9 or 2.10: the module is built for another version"
                                       : " is defined neither by this runtime nor by a module in " + folder_);
     const std::string help =
         !owners.empty() ? "load that first: loadrt " + first
         : is_of_this_interface(missing[0])
             ? "docs/linuxcnc-compatibility.md lists what is not supported; hal compile builds a component from its source"
-        : is_of_linuxcnc(missing[0]) ? "use the module of LinuxCNC 2.9 (linuxcnc-uspace), or build this one again with 2.9's halcompile"
-                                     : "check that it was built for LinuxCNC 2.9";
+        : is_of_linuxcnc(missing[0]) ? "use the module of LinuxCNC 2.9 (linuxcnc-uspace) or 2.10, or build this one again with the halcompile of one of these"
+                                     : "check that it was built for LinuxCNC 2.9 or 2.10";
     const hal_rejection rejection{sizeof rejection, HAL_SUBJECT_INSTANCE, "", 0, 0, "", text.c_str(), help.c_str()};
     host_->reject(host_, &rejection);
+}
+
+// Functions of the same name differ between the versions, and modules share variables with each other.
+bool Module::fits_the_others() {
+    interface_ = interface_of(file_, folder_);
+    if (interface_ == Interface::any) return true;
+    for (const Module* const other : running_modules) {
+        if (other->interface_ == Interface::any || other->interface_ == interface_) continue;
+        const std::string text = std::string("it is built for LinuxCNC ") + version_text(interface_) + ", and '" + other->name_ + "', which is loaded, for " +
+                                 version_text(other->interface_) + ": a machine runs the modules of one version";
+        const hal_rejection rejection{sizeof rejection, HAL_SUBJECT_INSTANCE, "", 0, 0, "", text.c_str(),
+                                      "take all modules from the folder of one LinuxCNC, which HAL_RTMOD_DIR names"};
+        host_->reject(host_, &rejection);
+        return false;
+    }
+    take_ports_by_pointer(interface_ == Interface::v2_10);
+    return true;
 }
 
 bool Module::create(const hal_host* host, const hal_modules& extension) {
@@ -203,6 +221,7 @@ bool Module::create(const hal_host* host, const hal_modules& extension) {
     find_neighbours();
     host_ = host;
     extension_ = &extension;
+    if (!fits_the_others()) return release(), false;
     constructing = this;
     begin_capture();
     const halcyon_message_handler handler = rtapi_get_msg_handler();

@@ -13,6 +13,7 @@
 
 #include "hal/modules.h"
 #include "modules/elf_file.hpp"
+#include "modules/interface.hpp"
 #include "modules/module_host.hpp"
 #include "modules/rtapi_interface.hpp"
 #include "modules/segments.hpp"
@@ -56,6 +57,7 @@ public:
     const std::string& name() const { return name_; }
     bool running() const { return running_; }
     bool uses(const Module& other) const { return uses_.contains(&other); }
+    Interface interface() const { return interface_; }
 
     /// Maps the code, takes the arguments and runs rtapi_app_main(). Returns false after reporting; then nothing remains of it.
     bool create(const hal_host* host, const hal_modules& extension);
@@ -89,6 +91,7 @@ public:
 
 private:
     void find_neighbours();
+    bool fits_the_others();
     void explain_loading(std::string problem) const;
     bool take_arguments();
     bool run_main();
@@ -111,6 +114,7 @@ private:
     void* library_ = nullptr;
     const hal_host* host_ = nullptr;
     const hal_modules* extension_ = nullptr;
+    Interface interface_ = Interface::any;
     bool running_ = false, broken_ = false, plain_ = false;
 };
 
@@ -137,10 +141,20 @@ int permit_ports() noexcept;
 void release_components(Module& module) noexcept;
 /// Returns 0 if the component may declare something of that name, else a negative errno after printing why.
 int declaring(const char* function, const char* name, int comp);
+/// pins.cpp: a pin or a parameter whose value is the runtime's; the pointer at `slot` leads to it. 0, or a negative errno after printing why.
+int new_slot(const char* function, bool parameter, const char* name, int type, int dir, void** slot, hal_value initial, int comp);
+/// Formats a name. 0, or a negative errno after printing that it is too long.
+int format_name(char (&name)[256], const char* function, const char* format, va_list arguments);
+/// What a name may have in the module that is being created: 47 characters, or 55 in LinuxCNC 2.10. [setup]
+std::size_t longest_name() noexcept;
+std::string too_long();
 /// pci_cards.cpp, io_ports.cpp: gives back what a module has not, because it failed: its cards without their remove function, its claims.
 void release_cards(const Module& module) noexcept;
 void release_claims(const Module& module) noexcept;
-/// ports.cpp: forgets the port pins of a module.
+/// ports.cpp: modules give a port by its number (2.9) or by a pointer to the number (2.10). No function of a module runs. [setup]
+void take_ports_by_pointer(bool pointer) noexcept;
+int new_port_pin(const char* name, int dir, void** slot, int comp);
+/// Forgets the port pins of a module.
 void release_ports(Module& module) noexcept;
 /// The block of hal_malloc() that contains the address: its end; 0: none.
 std::uintptr_t end_of_block(const volatile void* address) noexcept;

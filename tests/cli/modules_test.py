@@ -328,9 +328,9 @@ getp follow.position
         self.assertIn("it uses planner_next, which is defined neither by this runtime nor by a module in", self.error("loadrt follow\n"))
 
     def test_a_module_of_another_version_of_linuxcnc(self):
-        for symbol, why, what in (("hal_init_funct_to_thread", "is not in the interface of LinuxCNC 2.9: the module is built for another version, such as 2.10",
-                                   "use the module of LinuxCNC 2.9 (linuxcnc-uspace), or build this one again with 2.9's halcompile"),
-                                  ("halpr_find_pin_by_name", "is a function of LinuxCNC 2.9 that this runtime does not have",
+        for symbol, why, what in (("hal_init_future", "is not in the interface of LinuxCNC 2.9 or 2.10: the module is built for another version",
+                                   "use the module of LinuxCNC 2.9 (linuxcnc-uspace) or 2.10, or build this one again with the halcompile of one of these"),
+                                  ("halpr_find_pin_by_name", "is a function of LinuxCNC 2.9 or 2.10 that this runtime does not have",
                                    "docs/linuxcnc-compatibility.md lists what is not supported; hal compile builds a component from its source")):
             (self.folder / "other.c").write_text(f"int {symbol}(void), a_neighbour(void);\nint rtapi_app_main(void) {{ return {symbol}() + a_neighbour(); }}\nvoid rtapi_app_exit(void) {{}}\n")
             subprocess.run([CC, "-shared", "-fPIC", "-o", str(self.modules / "other.so"), str(self.folder / "other.c")], check=True)

@@ -30,7 +30,9 @@ private:
     bool start_component(const char* key, const char* component, const Words& program);
     bool load_module(const Words& module);
     bool load_netlists();
-    bool start_task();
+    bool start_threads();  ///< after the commands of [HAL]HALCMD
+    bool task_knows_motion();  ///< 2.10: waits until task has told motion the limits of the INI file
+    bool start_task();     ///< of 2.9, with the threads
     bool start_applications();
     bool start_display();
     /// Waits for the first of: the display ends, a program dies, the end is requested. Sets status_.
