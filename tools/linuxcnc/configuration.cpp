@@ -165,6 +165,13 @@ std::string with_rest(const std::string& first, const char* variable) {
     return rest && *rest ? first + ":" + rest : first;
 }
 
+/// The variable with the folder first, or as it is if it has the folder: then what is before the folder, such as our library, is to stay there.
+std::string with_folder(const std::string& folder, const char* variable) {
+    const char* const before = std::getenv(variable);
+    const std::string there = before ? before : "";
+    return (":" + there + ":").find(":" + folder + ":") == there.npos ? with_rest(folder, variable) : there;
+}
+
 }  // namespace
 
 std::string find_program(const Configuration& configuration, const std::string& program) {
@@ -226,10 +233,10 @@ void export_configuration(const Configuration& configuration, const LinuxcncOpti
     set_variable("PYOPENGL_PLATFORM", "x11", false);
     set_variable("TRAJ_COORDINATES", configuration.ini.get("TRAJ", "COORDINATES").value_or(""));
     set_variable("KINS_KINEMATICS", configuration.ini.get("KINS", "KINEMATICS").value_or(""));
-    set_variable("PYTHONPATH", with_rest(of.python, "PYTHONPATH"));
+    set_variable("PYTHONPATH", with_folder(of.python, "PYTHONPATH"));
     if (!of.libraries.empty()) {
         set_variable("EMC2_HOME", of.home);
-        set_variable("LD_LIBRARY_PATH", with_rest(of.libraries, "LD_LIBRARY_PATH"));
+        set_variable("LD_LIBRARY_PATH", with_folder(of.libraries, "LD_LIBRARY_PATH"));
         set_variable("TCLLIBPATH", of.tcl);
     }
     std::error_code unknown;

@@ -31,7 +31,7 @@ private:
     bool load_module(const Words& module);
     bool load_netlists();
     bool start_threads();  ///< after the commands of [HAL]HALCMD
-    bool task_knows_motion();  ///< 2.10: waits until task has told motion the limits of the INI file
+    bool task_knows_motion();  ///< 2.10: waits until task has given motion the limits of the INI file
     bool start_task();     ///< of 2.9, with the threads
     bool start_applications();
     bool start_display();
