@@ -110,7 +110,7 @@ std::string definers_of(const std::string& symbol, const std::string& folder, st
     std::vector<std::string> names;
     std::error_code none;
     for (const auto& entry : std::filesystem::directory_iterator(folder, none)) {
-        if (entry.path().extension() != ".so") continue;
+        if (entry.path().extension() != ".so" || entry.path().stem() == "hal_lib") continue;  // whose place this library takes
         const ElfFile file(entry.path().string());
         if (file.problem().empty() && file.defines(symbol)) names.push_back(entry.path().stem().string());
     }
