@@ -215,14 +215,13 @@ def main():
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         top = copy_of(pathlib.Path(words[0]).resolve(), pathlib.Path(folder))
         common = environment_of(theirs, pathlib.Path(folder, ".tools"), home)
+        own = pathlib.Path(folder, ".home")  # one for all, as upstream: a display may read task's tools before task has made the file
+        own.mkdir()
         files = sorted(file for name in linuxcnc_tests.SCRIPTS for file in top.rglob(name) if file.is_file())
         for file in files:
             here, name = file.parent, str(file.parent.relative_to(top))
             if len(words) > 1 and not any(part in name for part in words[1:]):
                 continue
-            own = pathlib.Path(folder, ".home")
-            shutil.rmtree(own, ignore_errors=True)
-            own.mkdir()
             environment = common | {"HOME": str(own), "XDG_RUNTIME_DIR": str(own), "TEST_DIR": str(here), "USER_MODULE_DIR": str(here),
                                     "TOPDIR": str(top.parent), "PATH": f"{here}:{common['PATH']}"}
             if theirs and home:
