@@ -3,15 +3,17 @@
 """What LinuxCNC 2.10 has beyond 2.9: its compiled modules, its programs, its order of starting, a source tree that was built in place. The modules and
 programs are of these tests, compiled here; LinuxCNC is not needed."""
 import subprocess
+import sys
 import unittest
 from pathlib import Path
 
-from harness import HAL, TIMEOUT, wait_until
+from harness import HAL, TIMEOUT
 from linuxcnc_case import HALFILE, INI, LinuxcncCase
 from module_case import CC, ModuleCase, THREAD
 
 PROGRAMS = Path(__file__).resolve().parent / "linuxcnc_programs"
 LIBRARY = HAL.parent.parent / "lib/halcyon/linuxcnc"
+PYTHON = HAL.parent.parent / "python"
 PORT = "net bytes handles.to => handles.from\nsets bytes 8\n"
 
 
@@ -104,6 +106,51 @@ Invalid argument
         self.comes("newer.in", "2.5")
         self.comes("newer.bit", "TRUE")
         self.end(machine)
+
+
+@unittest.skipUnless(CC and list(PYTHON.glob("hal/_core*.so")), "no C compiler, or Python's module hal is not built")
+class Python(ModuleCase):
+    def setUp(self):
+        super().setUp()
+        self.environment["PYTHONPATH"] = str(PYTHON)
+
+    def python(self, text):
+        done = subprocess.run([sys.executable, "-c", text], cwd=self.folder, env=self.environment, capture_output=True, text=True, timeout=TIMEOUT)
+        self.assertEqual(0, done.returncode, done.stderr)
+        return done.stdout
+
+    def test_it_reads_the_stream_of_a_module(self):
+        self.build("samples")
+        machine = self.start("run", self.write("m.hal", "newthread servo 1000000\nloadrt samples\naddf samples servo\nsetp samples.real 2.5\nsetp samples.whole -3\nstart\n"))
+        self.assertEqual("True b'fs' 1000 True (2.5, -3) 1\n", self.python("""import hal
+c = hal.component("reader")
+s = hal.stream(c, hal.sampler_base, "fs")
+while not s.readable: pass
+first = s.read(), s.sampleno
+while s.depth < 2: pass
+s.read()
+print(s.sampleno == first[1] + 1, s.element_types, s.maxdepth, s.writable, first[0], first[1] // first[1])
+for wrong in ((hal.sampler_base, "ss"), (hal.sampler_base + 1,)):
+    try: print(hal.stream(c, *wrong))
+    except hal.StreamError: pass
+"""))
+        self.end(machine)
+
+    def test_programs_of_a_linuxcnc_built_in_place_find_ours(self):
+        theirs = self.folder / "cnc/lib/python"
+        theirs.mkdir(parents=True)
+        (theirs / "hal.py").write_text("raise ImportError('needs the library of LinuxCNC')\n")
+        (theirs / "other.py").write_text("name = 'of LinuxCNC'\n")
+        own = self.folder / "own"
+        own.mkdir()
+        (own / "hal.py").write_text("name = 'of the user'\n")
+        text = f"import sys\nsys.path.insert(0, '{theirs}')\nimport hal, other\nprint(hal.HAL_BIT, other.name)\n"
+        self.environment["LINUXCNC_HOME"] = str(self.folder / "cnc")
+        self.assertEqual("1 of LinuxCNC\n", self.python(text))
+        self.assertEqual("of the user\n", self.python(f"import sys\nsys.path.insert(0, '{own}')\nimport hal\nprint(hal.name)\n"))
+        (own / "sitecustomize.py").write_text("import sys\nsys.of_the_user = 7\n")  # is not hidden by ours
+        self.environment["PYTHONPATH"] += f":{own}"
+        self.assertEqual("7 1\n", self.python("import sys, hal\nprint(sys.of_the_user, hal.HAL_BIT)\n"))
 
 
 class Machine(LinuxcncCase):

@@ -189,8 +189,8 @@ def missing_prerequisite(here, home):
     if not home or not wanted.exists():
         return ""
     has = (home / "src/config.h").read_text()
-    lacks = [name for name in wanted.read_text().split() if not re.search(rf"^#define HAVE_{name}", has, re.M)]
-    return f"LinuxCNC was built without {', '.join(lacks)}" if lacks else ""
+    missing = [name for name in wanted.read_text().split() if not re.search(rf"^#define HAVE_{name}", has, re.M)]
+    return f"LinuxCNC was built without {', '.join(missing)}" if missing else ""
 
 
 def take_with(words):
