@@ -140,17 +140,34 @@ for wrong in ((hal.sampler_base, "ss"), (hal.sampler_base + 1,)):
         theirs = self.folder / "cnc/lib/python"
         theirs.mkdir(parents=True)
         (theirs / "hal.py").write_text("raise ImportError('needs the library of LinuxCNC')\n")
+        (theirs / "_hal.so").write_text("not a library")
         (theirs / "other.py").write_text("name = 'of LinuxCNC'\n")
         own = self.folder / "own"
         own.mkdir()
         (own / "hal.py").write_text("name = 'of the user'\n")
-        text = f"import sys\nsys.path.insert(0, '{theirs}')\nimport hal, other\nprint(hal.HAL_BIT, other.name)\n"
+        text = f"import sys\nsys.path.insert(0, '{theirs}')\nimport _hal, hal, other\nprint(hal.HAL_BIT, other.name, _hal.component is hal.component)\n"
         self.environment["LINUXCNC_HOME"] = str(self.folder / "cnc")
-        self.assertEqual("1 of LinuxCNC\n", self.python(text))
+        self.assertEqual("1 of LinuxCNC True\n", self.python(text))
         self.assertEqual("of the user\n", self.python(f"import sys\nsys.path.insert(0, '{own}')\nimport hal\nprint(hal.name)\n"))
         (own / "sitecustomize.py").write_text("import sys\nsys.of_the_user = 7\n")  # is not hidden by ours
         self.environment["PYTHONPATH"] += f":{own}"
         self.assertEqual("7 1\n", self.python("import sys, hal\nprint(sys.of_the_user, hal.HAL_BIT)\n"))
+
+    def test_displays_derive_a_class_from_a_pin(self):
+        machine = self.start("run", self.write("m.hal", "newthread servo 1000000\nstart\n"))
+        self.assertEqual("x 2 32 4.5 x\n", self.python("""import _hal, hal
+class Shown(hal.Pin):
+    def __init__(self, *words):
+        hal.Pin.__init__(self, *words)
+        self._item_wrap(self._item)
+        self.shown = None
+c = hal.component("c")
+pin = Shown(_hal.component.newpin(c, "x", hal.HAL_FLOAT, hal.HAL_OUT))
+c.ready()
+pin.set(4.5)
+print(pin.name, pin.type, pin.dir, pin.value, _hal.component.getpin(c, "x").get_name())
+"""))
+        self.end(machine)
 
 
 class Machine(LinuxcncCase):

@@ -11,13 +11,15 @@ _HERE = os.path.dirname(os.path.abspath(__file__))
 class _Finder:
     @staticmethod
     def find_spec(name, path=None, target=None):
-        if name != "hal" or path is not None:
+        if name not in ("hal", "_hal") or path is not None:
             return None
         theirs = [os.path.realpath(home + "/lib/python") for home in (os.environ.get("LINUXCNC_HOME"), os.environ.get("EMC2_HOME")) if home]
         for folder in sys.path:
-            if os.path.exists(os.path.join(folder, "hal.py")) or os.path.exists(os.path.join(folder, "hal/__init__.py")):
+            if any(os.path.exists(os.path.join(folder, name + end)) for end in (".py", ".so", "/__init__.py")):
                 if os.path.realpath(folder) not in theirs:
                     return None
+                if name == "_hal":
+                    return importlib.util.spec_from_file_location("_hal", _HERE + "/_hal.py")
                 return importlib.util.spec_from_file_location("hal", _HERE + "/hal/__init__.py", submodule_search_locations=[_HERE + "/hal"])
         return None
 
