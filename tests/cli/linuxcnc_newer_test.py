@@ -179,16 +179,16 @@ class Machine(LinuxcncCase):
     def test_task_has_the_io_and_starts_before_the_netlists(self):
         self.version("2.10.0~pre1")
         (self.home / "bin/io").unlink()
-        for name in ("linuxcnc_check_ini", "bridge"):
-            self.display(f'echo "{name} $*" >> $STANDIN_LOG', f"installed/bin/{name}")
+        self.install("hal_bridge")
+        self.display('echo "linuxcnc_check_ini $*" >> $STANDIN_LOG', "installed/bin/linuxcnc_check_ini")
         self.write("machine.hal", HALFILE + "loadusr -w note netlist\n")
         self.display('note "$LINUXCNCVERSION" ui $*')
-        out, err = self.linuxcnc("-v", self.ini("[HAL]\nHALFILE = machine.hal\nHALUI = halui\nHALCMD = setp adder.in1 5\n"))
-        self.assertEqual(("check the configuration\nstart linuxcncsvr\nload sum2\nload mult2\nstart milltask\nstart halui\nload the netlists of [HAL]HALFILE\n"
+        out, err = self.linuxcnc("-v", self.ini("[HAL]\nHALFILE = machine.hal\nHALUI = halui\nHALBRIDGE = hal_bridge -d\nHALCMD = setp adder.in1 5\n"))
+        self.assertEqual(("check the configuration\nstart linuxcncsvr\nload sum2\nload mult2\nstart milltask\nstart halui\nstart hal_bridge\nload the netlists of [HAL]HALFILE\n"
                           "start the threads\nstart the display ./ui\nend the display\nend milltask\nend linuxcncsvr\nstop the threads\nunload everything\n", ""), (out, err))
         self.assertEqual(["linuxcnc_check_ini CONFIG/machine.ini", "linuxcncsvr -ini CONFIG/machine.ini", "milltask -ini CONFIG/machine.ini",
-                          "halui -ini CONFIG/machine.ini", "note netlist", "note 2.10.0~pre1 ui -ini CONFIG/machine.ini"],
-                         [line.replace(str(self.folder), "CONFIG") for line in self.logged()[:6]])
+                          "halui -ini CONFIG/machine.ini", "hal_bridge -d", "note netlist", "note 2.10.0~pre1 ui -ini CONFIG/machine.ini"],
+                         [line.replace(str(self.folder), "CONFIG") for line in self.logged()[:7]])
 
     def test_a_configuration_that_the_checker_rejects(self):
         self.version("2.10.1")

@@ -55,7 +55,7 @@ int Launch::run() {
     const bool started =
         check() && start_server() &&
         (newer ? modules() && component("[TASK]TASK", "inihal", c.task) && component("[HAL]HALUI", "halui", c.halui) &&
-                     component("[HAL]HALBRIDGE", "bridge", c.bridge) && load_netlists() && start_threads() && task_knows_motion()
+                     (c.bridge.empty() || start_component("[HAL]HALBRIDGE", "bridge", c.bridge, false)) && load_netlists() && start_threads() && task_knows_motion()
                : component("[EMCIO]EMCIO", "iocontrol", c.io) && component("[HAL]HALUI", "halui", c.halui) && modules() && load_netlists() &&
                      start_task()) &&
         start_applications() && start_display();
@@ -107,10 +107,10 @@ bool Launch::start_server() {
     return true;
 }
 
-bool Launch::start_component(const char* key, const char* component, const Words& program) {
+bool Launch::start_component(const char* key, const char* component, const Words& program, bool reads_ini) {
     if (!step(fmt::format("start {}", program[0]))) return false;
     Words words{"loadusr", "-Wn", component};
-    for (const std::string& word : with_ini(program, configuration_.file)) words.push_back(word);
+    for (const std::string& word : reads_ini ? with_ini(program, configuration_.file) : program) words.push_back(word);
     if (!command(words, fmt::format("{} {}", configuration_.given, key))) return false;
     components_.emplace_back(component, program[0]);
     return true;

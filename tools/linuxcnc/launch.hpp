@@ -27,7 +27,7 @@ private:
     // The steps, in order. Each returns false after printing why it failed, or when the end was requested.
     bool check();
     bool start_server();
-    bool start_component(const char* key, const char* component, const Words& program);
+    bool start_component(const char* key, const char* component, const Words& program, bool reads_ini = true);
     bool load_module(const Words& module);
     bool load_netlists();
     bool start_threads();  ///< after the commands of [HAL]HALCMD
