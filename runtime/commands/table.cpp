@@ -123,7 +123,7 @@ constexpr CommandRow rows[] = {
     {"help", "", "[COMMAND]", "list all commands, or describe one", "", command_help, 0, command_apart},
     {"explain", "", "CODE", "explain an error code: what it means and what to do", "", command_explain, 0, command_apart},
     {"setexact_for_test_suite_only", "", "", "accepted without effect: periods are always exact", "", command_nothing, 0, command_apart | command_checked},
-    {"quit", "exit", "", "leave the shell, or stop reading the file", "", command_quit, 0, command_apart | command_checked},
+    {"quit", "exit", "[STATUS]", "leave the shell, or stop reading the file", "STATUS is accepted without effect, as in LinuxCNC.", command_quit, 0, command_apart | command_checked},
 };
 
 struct LockBit {

@@ -22,9 +22,10 @@ struct Row {
     void (*elaborate)(Elaboration& on, std::span<const Token> args);
 };
 constexpr Row rows[] = {
-    {"newsig", config, edits::newsig}, {"delsig", config, edits::delsig},   {"linkps", config, edits::linkps},   {"unlinkp", config, edits::unlinkp},
-    {"addf", config, edits::addf},     {"delf", config, edits::delf},       {"alias", config, edits::alias},     {"unalias", config, edits::unalias},
-    {"setp", params, edits::setp},     {"start", run, nullptr},             {"stop", run, nullptr},              {"lock", 0, nullptr}};
+    {"newsig", config, edits::newsig}, {"delsig", config, edits::delsig}, {"linkps", config, edits::linkps}, {"unlinkp", config, edits::unlinkp},
+    {"addf", config, edits::addf},     {"initf", config, edits::initf},   {"delf", config, edits::delf},     {"alias", config, edits::alias},
+    {"unalias", config, edits::unalias}, {"setp", params, edits::setp},   {"start", run, nullptr},           {"stop", run, nullptr},
+    {"lock", 0, nullptr}};
 
 void write(const std::string& text, char* to, std::size_t room) {
     const std::size_t length = std::min(text.size(), room - 1);

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <string>
 
+#include "machine/linuxcnc_home.hpp"
 #include "modules/module_host.hpp"
 #include "paths.hpp"
 
@@ -46,15 +47,15 @@ Library open_library() {
 }
 
 const Library& library() {
-    static const Library opened = open_library();
-    return opened;
+    static const Library found = open_library();
+    return found;
 }
 
 }  // namespace
 
 std::string module_folder() {
     const char* const folder = std::getenv("HAL_RTMOD_DIR");
-    return folder && *folder ? folder : "/usr/lib/linuxcnc/modules";
+    return folder && *folder ? folder : linuxcnc_home().modules();
 }
 
 std::string find_module(std::string_view name) {

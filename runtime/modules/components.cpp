@@ -16,7 +16,7 @@ extern "C" [[gnu::weak, gnu::visibility("default")]] void halcyon_guard_module_f
 namespace hal::modules {
 namespace {
 
-constexpr std::size_t name_length = 47, chunk_bytes = 1 << 20;
+constexpr std::size_t chunk_bytes = 1 << 20;
 
 struct Component {
     std::string name;
@@ -125,8 +125,14 @@ int declaring(const char* function, const char* name, int comp) {
     if (component == components.end()) return fail(function, name, "unknown component");
     if (component->second.ready) return fail(function, name, "the component is ready already");
     if (!name || !*name) return fail(function, name, "the name is empty");
-    return std::strlen(name) > name_length ? fail(function, name, "the name is longer than 47 characters") : 0;
+    return std::strlen(name) > longest_name() ? fail(function, name, too_long().c_str()) : 0;
 }
+
+std::size_t longest_name() noexcept {
+    const Module* const module = Module::current();
+    return module && module->interface() == Interface::v2_10 ? 55 : 47;
+}
+std::string too_long() { return "the name is longer than " + std::to_string(longest_name()) + " characters"; }
 
 }  // namespace hal::modules
 
@@ -138,7 +144,8 @@ int hal_init(const char* name) {
     return guarded([&] {
         Module* const module = Module::current();
         if (!module) return fail("hal_init", name, "only while a module is loaded");
-        if (!name || !*name || std::strlen(name) > name_length) return fail("hal_init", name, "a name has 1 to 47 characters");
+        if (!name || !*name) return fail("hal_init", name, "the name is empty");
+        if (std::strlen(name) > longest_name()) return fail("hal_init", name, too_long().c_str());
         for (const auto& [id, component] : components)
             if (component.name == name) return fail("hal_init", name, "duplicate component name");
         const int id = new_id();
@@ -222,7 +229,8 @@ int hal_create_thread(const char* name, unsigned long period_ns, int) {
     return guarded([&] {
         Module* const module = Module::current();
         if (!module) return fail("hal_create_thread", name, "only while a module is loaded");
-        if (!name || !*name || std::strlen(name) > name_length) return fail("hal_create_thread", name, "a name has 1 to 47 characters");
+        if (!name || !*name) return fail("hal_create_thread", name, "the name is empty");
+        if (std::strlen(name) > longest_name()) return fail("hal_create_thread", name, too_long().c_str());
         if (period_ns == 0) return fail("hal_create_thread", name, "the period is 0");
         if (!module->extension().thread(module->host(), name, static_cast<std::int64_t>(clock_multiple(period_ns))))
             return fail("hal_create_thread", name, "the name is invalid or taken");

@@ -115,7 +115,7 @@ std::string definers_of(const std::string& symbol, const std::string& folder, st
     std::vector<std::string> names;
     std::error_code none;
     for (const auto& entry : std::filesystem::directory_iterator(folder, none)) {
-        if (entry.path().extension() != ".so") continue;
+        if (entry.path().extension() != ".so" || entry.path().stem() == "hal_lib") continue;  // whose place this library takes
         const ElfFile file(entry.path().string());
         if (file.problem().empty() && file.defines(symbol)) names.push_back(entry.path().stem().string());
     }
@@ -137,7 +137,7 @@ bool is_of_linuxcnc(std::string_view symbol) {
     return symbol.starts_with("hal_") || symbol.starts_with("halpr_") || symbol.starts_with("rtapi_") || symbol.starts_with("_rtapi_");
 }
 
-/// What LinuxCNC 2.9 defines beside what this library does: these read its memory.
+/// What LinuxCNC 2.9 and 2.10 define beside what this library does: these read its memory.
 bool reads_its_memory(std::string_view symbol) { return symbol.starts_with("halpr_") || symbol == "hal_data"; }
 
 /// What its headers declare and nothing of it defines for modules.
@@ -147,7 +147,6 @@ bool is_declared_only(std::string_view symbol) {
     return std::any_of(std::begin(beginnings), std::end(beginnings), [&](std::string_view one) { return symbol.starts_with(one); });
 }
 
-bool is_of_this_interface(std::string_view symbol) { return reads_its_memory(symbol) || is_declared_only(symbol); }
 
 }  // namespace
 
@@ -183,7 +182,7 @@ void Module::explain_loading(std::string problem) const {
     if (missing.empty() || problem.find("undefined symbol") == problem.npos) return host_->fail(host_, problem.c_str());
     // one of another version of the interface explains the others
     std::stable_partition(missing.begin(), missing.end(),
-                          [](const std::string& s) { return is_of_linuxcnc(s) && !is_of_this_interface(s); });
+                          [](const std::string& s) { return is_of_linuxcnc(s) && !reads_its_memory(s) && !is_declared_only(s) && !only_in_2_10(s); });
     std::string first;
     const std::string owners = definers_of(missing[0], folder_, first);
     const std::string text =
@@ -191,17 +190,36 @@ void Module::explain_loading(std::string problem) const {
         (missing.size() == 1 ? ", which" : " and " + std::to_string(missing.size() - 1) + " more missing symbols; " + missing[0]) +
         (!owners.empty()                    ? " is defined by " + owners
          : reads_its_memory(missing[0]) ? " reads LinuxCNC's memory directly, which a machine of Halcyon does not have"
-         : is_declared_only(missing[0]) ? " is declared in LinuxCNC's headers, but LinuxCNC 2.9 does not export it to modules either"
-         : is_of_linuxcnc(missing[0]) ? " is not in the interface of LinuxCNC 2.9: the module is built for another version, such as 2.10"
-                                      : " is defined neither by this runtime nor by a module in " + folder_);
+         : only_in_2_10(missing[0])     ? " is a function of LinuxCNC 2.10 that this runtime does not have"
+         : is_declared_only(missing[0]) ? " is declared in LinuxCNC's headers, but LinuxCNC does not export it to modules either"
+         : is_of_linuxcnc(missing[0])   ? " is not in the interface of LinuxCNC 2.9 or 2.10: the module is built for another version"
+                                        : " is defined neither by this runtime nor by a module in " + folder_);
     const std::string help =
         !owners.empty() ? "load that first: loadrt " + first
         : reads_its_memory(missing[0]) ? "hal_get_pin_value_by_name and the like read values by name"
+        : only_in_2_10(missing[0])     ? "docs/linuxcnc-compatibility.md lists what is not supported; hal compile builds a component from its source"
         : is_declared_only(missing[0]) ? "a port or a stream passes data between a module and a program"
-        : is_of_linuxcnc(missing[0]) ? "use the module of LinuxCNC 2.9 (linuxcnc-uspace), or build this one again with 2.9's halcompile"
-                                     : "check that it was built for LinuxCNC 2.9";
+        : is_of_linuxcnc(missing[0]) ? "use the module of LinuxCNC 2.9 (linuxcnc-uspace) or 2.10, or build this one again with the halcompile of one of these"
+                                     : "check that it was built for LinuxCNC 2.9 or 2.10";
     const hal_rejection rejection{sizeof rejection, HAL_SUBJECT_INSTANCE, "", 0, 0, "", text.c_str(), help.c_str()};
     host_->reject(host_, &rejection);
+}
+
+// Functions of the same name differ between the versions, and modules share variables with each other.
+bool Module::fits_the_others() {
+    interface_ = interface_of(file_, folder_);
+    if (interface_ == Interface::any) return true;
+    for (const Module* const other : running_modules) {
+        if (other->interface_ == Interface::any || other->interface_ == interface_) continue;
+        const std::string text = std::string("it is built for LinuxCNC ") + version_text(interface_) + ", and '" + other->name_ + "', which is loaded, for " +
+                                 version_text(other->interface_) + ": a machine runs the modules of one version";
+        const hal_rejection rejection{sizeof rejection, HAL_SUBJECT_INSTANCE, "", 0, 0, "", text.c_str(),
+                                      "take all modules from the folder of one LinuxCNC, which HAL_RTMOD_DIR names"};
+        host_->reject(host_, &rejection);
+        return false;
+    }
+    take_ports_by_pointer(interface_ == Interface::v2_10);
+    return true;
 }
 
 bool Module::create(const hal_host* host, const hal_modules& extension, const hal_module_calls& calls) {
@@ -212,6 +230,7 @@ bool Module::create(const hal_host* host, const hal_modules& extension, const ha
     extension_ = &extension;
     calls_ = &calls;
     machine_ = calls.machine(host);
+    if (!fits_the_others()) return release(), false;
     constructing = this;
     begin_capture();
     const halcyon_message_handler handler = rtapi_get_msg_handler();

@@ -15,6 +15,7 @@
 
 #include "hal/modules.h"
 #include "modules/elf_file.hpp"
+#include "modules/interface.hpp"
 #include "modules/module_host.hpp"
 #include "modules/rtapi_interface.hpp"
 #include "modules/segments.hpp"
@@ -62,6 +63,7 @@ public:
     bool running() const { return running_; }
     bool broken() const { return broken_; }
     bool uses(const Module& other) const { return uses_.contains(&other); }
+    Interface interface() const { return interface_; }
 
     /// Maps the code, takes the arguments and runs rtapi_app_main(). Returns false after reporting; then nothing remains of it.
     bool create(const hal_host* host, const hal_modules& extension, const hal_module_calls& calls);
@@ -107,6 +109,7 @@ public:
 private:
     void note_broken() noexcept;
     void find_neighbours();
+    bool fits_the_others();
     void explain_loading(std::string problem) const;
     bool take_arguments();
     bool run_main();
@@ -132,6 +135,7 @@ private:
     const hal_module_calls* calls_ = nullptr;
     void* machine_ = nullptr;
     std::atomic<bool> settled_{false};  // all its parameters are known
+    Interface interface_ = Interface::any;
     bool running_ = false, broken_ = false, plain_ = false;
 };
 
@@ -177,10 +181,20 @@ int new_id() noexcept;
 bool is_id_of(const Module& module, int id);
 /// Returns 0 if the component may declare something of that name, else a negative errno after printing why.
 int declaring(const char* function, const char* name, int comp);
+/// pins.cpp: a pin or a parameter whose value is the runtime's; the pointer at `slot` leads to it. 0, or a negative errno after printing why.
+int new_slot(const char* function, bool parameter, const char* name, int type, int dir, void** slot, hal_value initial, int comp);
+/// Formats a name. 0, or a negative errno after printing that it is too long.
+int format_name(char (&name)[256], const char* function, const char* format, va_list arguments);
+/// What a name may have in the module that is being created: 47 characters, or 55 in LinuxCNC 2.10. [setup]
+std::size_t longest_name() noexcept;
+std::string too_long();
 /// pci_cards.cpp, io_ports.cpp: gives back what a module has not, because it failed: its cards without their remove function, its claims.
 void release_cards(const Module& module) noexcept;
 void release_claims(const Module& module) noexcept;
-/// ports.cpp: forgets the port pins of a module.
+/// ports.cpp: modules give a port by its number (2.9) or by a pointer to the number (2.10). No function of a module runs. [setup]
+void take_ports_by_pointer(bool pointer) noexcept;
+int new_port_pin(const char* name, int dir, void** slot, int comp);
+/// Forgets the port pins of a module.
 void release_ports(Module& module) noexcept;
 /// The memory of hal_malloc() stays, even when no module is left.
 void keep_memory() noexcept;

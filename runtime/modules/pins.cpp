@@ -9,11 +9,9 @@
 
 namespace hal::modules {
 
-int new_port_pin(const char* name, int dir, void** slot, int comp);  // ports.cpp
-
 namespace {
 
-enum Type { bit = 1, real = 2, s32 = 3, u32 = 4, port = 5 };
+enum Type { bit = 1, real = 2, s32 = 3, u32 = 4, port = 5, s64 = 6, u64 = 7 };
 enum Direction { in = 16, out = 32, io = 48, read_only = 64, read_write = 192 };
 
 bool type_of(int type, hal_type& to, std::uint32_t& width) {
@@ -22,6 +20,8 @@ bool type_of(int type, hal_type& to, std::uint32_t& width) {
     case real: to = HAL_TYPE_FLOAT, width = 8; return true;
     case s32: to = HAL_TYPE_S32, width = 4; return true;
     case u32: to = HAL_TYPE_U32, width = 4; return true;
+    case s64: to = HAL_TYPE_S64, width = 8; return true;
+    case u64: to = HAL_TYPE_U64, width = 8; return true;
     default: return false;
     }
 }
@@ -33,25 +33,7 @@ int fail(const char* function, const char* name, const char* why) {
 
 int new_pin(const char* name, int type, int dir, void** slot, int comp) {
     if (type == port) return new_port_pin(name, dir, slot, comp);
-    if (const int wrong = declaring("hal_pin_new", name, comp); wrong != 0) return wrong;
-    Module& module = *Module::current();
-    hal_pin_decl decl{};
-    decl.size = sizeof decl;
-    std::uint32_t width = 0;
-    if (!slot) return fail("hal_pin_new", name, "no pointer");
-    if (!type_of(type, decl.type, width)) return fail("hal_pin_new", name, "unsupported type");
-    if (dir != in && dir != out && dir != io) return fail("hal_pin_new", name, "invalid direction");
-    if (!module.take_name(false, name)) return fail("hal_pin_new", name, "duplicate pin name");
-    const hal_host* const host = module.host();
-    hal_pin* const pin = static_cast<hal_pin*>(host->allocate(host, sizeof(hal_pin), alignof(hal_pin)));
-    if (!pin) return -ENOMEM;
-    decl.dir = dir == in ? HAL_DIR_IN : dir == out ? HAL_DIR_OUT : HAL_DIR_IO;
-    decl.name = name;
-    decl.doc = decl.unit = "";
-    decl.pointer = reinterpret_cast<hal_value**>(slot);
-    if (!host->pin(host, &decl, pin)) return -EINVAL;
-    module.slots.push_back(decl.pointer);
-    return 0;
+    return new_slot("hal_pin_new", false, name, type, dir, slot, hal_value{.raw = 0}, comp);
 }
 
 int new_parameter(const char* name, int type, int dir, void* value, int comp) {
@@ -80,15 +62,47 @@ int new_parameter(const char* name, int type, int dir, void* value, int comp) {
     return 0;
 }
 
+}  // namespace
+
+int new_slot(const char* function, bool parameter, const char* name, int type, int dir, void** slot, hal_value initial, int comp) {
+    if (const int wrong = declaring(function, name, comp); wrong != 0) return wrong;
+    Module& module = *Module::current();
+    hal_pin_decl decl{};
+    decl.size = sizeof decl;
+    std::uint32_t width = 0;
+    if (!slot) return fail(function, name, "no pointer");
+    if (!type_of(type, decl.type, width)) return fail(function, name, "unsupported type");
+    if (parameter ? dir != read_only && dir != read_write : dir != in && dir != out && dir != io)
+        return fail(function, name, "invalid direction");
+    if (!module.take_name(parameter, name)) return fail(function, name, parameter ? "duplicate parameter name" : "duplicate pin name");
+    const hal_host* const host = module.host();
+    hal_pin* const pin = static_cast<hal_pin*>(host->allocate(host, sizeof(hal_pin), alignof(hal_pin)));
+    if (!pin) return -ENOMEM;
+    decl.dir = parameter ? HAL_DIR_PARAM : dir == in ? HAL_DIR_IN : dir == out ? HAL_DIR_OUT : HAL_DIR_IO;
+    decl.flags = dir == read_only ? HAL_PIN_READ_ONLY : 0;
+    decl.name = name;
+    decl.doc = decl.unit = "";
+    decl.initial = initial;
+    decl.pointer = reinterpret_cast<hal_value**>(slot);
+    if (!host->pin(host, &decl, pin)) return -EINVAL;
+    module.slots.push_back(decl.pointer);
+    return 0;
+}
+
+int format_name(char (&name)[256], const char* function, const char* format, va_list arguments) {
+    const int length = std::vsnprintf(name, sizeof name, format, arguments);
+    if (length >= 0 && static_cast<std::size_t>(length) <= longest_name()) return 0;
+    fail(function, name, too_long().c_str());
+    return -ENOMEM;
+}
+
+namespace {
+
 /// Formats the name and passes it on; one that is too long has an error of its own.
 template <class Action>
 int formatted(const char* format, va_list arguments, Action action) {
     char name[256];
-    const int length = std::vsnprintf(name, sizeof name, format, arguments);
-    if (length < 0 || length > 47) {
-        fail("hal_pin_newf", name, "the name is longer than 47 characters");
-        return -ENOMEM;
-    }
+    if (const int wrong = guarded([&] { return format_name(name, "hal_pin_newf", format, arguments); }); wrong != 0) return wrong;
     return guarded([&] { return action(name); });
 }
 
@@ -127,6 +141,8 @@ HALCYON_DEFINE(bit, bit)
 HALCYON_DEFINE(float, real)
 HALCYON_DEFINE(s32, s32)
 HALCYON_DEFINE(u32, u32)
+HALCYON_DEFINE(s64, s64)
+HALCYON_DEFINE(u64, u64)
 #undef HALCYON_DEFINE
 
 int hal_param_alias(const char* name, const char* alias) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Byte streams between two pins (type `port`). A module has a number for each of its port pins, 0 is none; what it reads and writes by
-// that number is the port of the signal that the pin is linked to.
+// that number is the port of the signal that the pin is linked to. Modules of LinuxCNC 2.9 give the number, those of 2.10 a pointer to it.
 #include <array>
 #include <atomic>
 #include <cerrno>
@@ -23,7 +23,11 @@ struct PortPin {
 };
 std::array<std::atomic<PortPin*>, 256> pins{};  // number - 1; fixed, because threads read it
 
-hal_port* port_of(int number) noexcept {
+bool by_pointer = false;  // what modules give; written while no function of a module runs that has ports
+
+hal_port* port_of(std::intptr_t given) noexcept {
+    if (by_pointer && given == 0) return nullptr;
+    const int number = by_pointer ? *reinterpret_cast<const volatile int*>(given) : static_cast<int>(given);
     if (number < 1 || number > static_cast<int>(pins.size())) return nullptr;
     const PortPin* const pin = pins[static_cast<std::size_t>(number) - 1].load(std::memory_order_acquire);
     return !pin ? nullptr : pin->own ? pin->own : pin->pin.slot->port;
@@ -44,6 +48,10 @@ std::size_t free_place() noexcept {
 }
 
 }  // namespace
+
+void take_ports_by_pointer(bool pointer) noexcept {
+    if (by_pointer != pointer) by_pointer = pointer;
+}
 
 int new_port_pin(const char* name, int dir, void** slot, int comp) {
     if (const int wrong = declaring("hal_pin_port_new", name, comp); wrong != 0) return wrong;
@@ -109,10 +117,9 @@ int hal_pin_port_newf(int dir, void** slot, int comp, const char* format, ...) {
     char name[256];
     va_list arguments;
     va_start(arguments, format);
-    const int length = std::vsnprintf(name, sizeof name, format, arguments);
+    const int wrong = guarded([&] { return format_name(name, "hal_pin_port_new", format, arguments); });
     va_end(arguments);
-    if (length < 0 || length > 47) return fail(name, "the name is longer than 47 characters"), -ENOMEM;
-    return hal_pin_port_new(name, dir, slot, comp);
+    return wrong != 0 ? wrong : hal_pin_port_new(name, dir, slot, comp);
 }
 
 int hal_port_alloc(unsigned size) {
@@ -121,33 +128,33 @@ int hal_port_alloc(unsigned size) {
     return number;
 }
 
-unsigned hal_port_buffer_size(int number) {
+unsigned hal_port_buffer_size(std::intptr_t number) {
     const hal_port* const port = port_of(number);
     return port ? port->capacity : 0;
 }
-unsigned hal_port_readable(int number) {
+unsigned hal_port_readable(std::intptr_t number) {
     const hal_port* const port = port_of(number);
     return port ? held_by(*port) : 0;
 }
-unsigned hal_port_writable(int number) {
+unsigned hal_port_writable(std::intptr_t number) {
     const hal_port* const port = port_of(number);
     return port ? port->capacity - held_by(*port) : 0;
 }
-bool hal_port_peek(int number, char* to, unsigned count) {
+bool hal_port_peek(std::intptr_t number, char* to, unsigned count) {
     const hal_port* const port = port_of(number);
     if (!port || count == 0 || held_by(*port) < count) return false;
     for (std::uint64_t i = 0; i < count; ++i) to[i] = static_cast<char>(port->data[(port->tail + i) % port->capacity]);
     return true;
 }
-bool hal_port_peek_commit(int number, unsigned count) {
+bool hal_port_peek_commit(std::intptr_t number, unsigned count) {
     hal_port* const port = port_of(number);
     if (!port || held_by(*port) < count) return false;
     __atomic_store_n(&port->tail, port->tail + count, __ATOMIC_RELEASE);
     return true;
 }
-bool hal_port_read(int number, char* to, unsigned count) { return hal_port_peek(number, to, count) && hal_port_peek_commit(number, count); }
-void hal_port_clear(int number) { hal_port_peek_commit(number, hal_port_readable(number)); }
-bool hal_port_write(int number, const char* from, unsigned count) {
+bool hal_port_read(std::intptr_t number, char* to, unsigned count) { return hal_port_peek(number, to, count) && hal_port_peek_commit(number, count); }
+void hal_port_clear(std::intptr_t number) { hal_port_peek_commit(number, hal_port_readable(number)); }
+bool hal_port_write(std::intptr_t number, const char* from, unsigned count) {
     hal_port* const port = port_of(number);
     if (!port || count == 0 || port->capacity - held_by(*port) < count) return false;
     for (std::uint64_t i = 0; i < count; ++i) port->data[(port->head + i) % port->capacity] = static_cast<std::uint8_t>(from[i]);

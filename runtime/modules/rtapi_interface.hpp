@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The functions that LinuxCNC's compiled modules (2.9) may call, declared from the documented interface: names, types and sizes. Own text;
+// The functions that LinuxCNC's compiled modules (2.9; those of 2.10 only are in handles.hpp) may call, declared from the documented interface: names, types and sizes. Own text;
 // nothing here comes from LinuxCNC's headers. exports.map makes exactly these visible.
 #pragma once
 
@@ -47,7 +47,7 @@ int hal_get_param_value_by_name(const char* name, int* type, void** data);
 int hal_set_lock(unsigned char lock);
 unsigned char hal_get_lock();
 
-// pins and parameters: [setup]. Types: bit 1, float 2, s32 3, u32 4, port 5. Directions: in 16, out 32, io 48, ro 64, rw 192
+// pins and parameters: [setup]. Types: bit 1, float 2, s32 3, u32 4, port 5, s64 6, u64 7. Directions: in 16, out 32, io 48, ro 64, rw 192
 int hal_pin_new(const char* name, int type, int dir, void** slot, int comp);
 int hal_param_new(const char* name, int type, int dir, void* value, int comp);
 int hal_param_alias(const char* name, const char* alias);
@@ -60,20 +60,22 @@ HALCYON_BOTH_FORMS(bit)
 HALCYON_BOTH_FORMS(float)
 HALCYON_BOTH_FORMS(s32)
 HALCYON_BOTH_FORMS(u32)
+HALCYON_BOTH_FORMS(s64)
+HALCYON_BOTH_FORMS(u64)
 #undef HALCYON_BOTH_FORMS
 
-// ports, by the number that a port pin's pointer points to: pins are [setup], the rest [any]; one thread reads, one writes. A port without a
+// ports, by the number that a port pin's pointer points to, or by that pointer (take_ports_by_pointer()): pins are [setup], the rest [any]; one thread reads, one writes. A port without a
 // signal, or whose signal has no size yet, holds nothing.
 int hal_pin_port_new(const char* name, int dir, void** slot, int comp);
 int hal_pin_port_newf(int dir, void** slot, int comp, const char* format, ...);
-unsigned hal_port_buffer_size(int port);
-unsigned hal_port_readable(int port);
-unsigned hal_port_writable(int port);
-bool hal_port_peek(int port, char* to, unsigned count);
-bool hal_port_peek_commit(int port, unsigned count);
-bool hal_port_read(int port, char* to, unsigned count);
-bool hal_port_write(int port, const char* from, unsigned count);
-void hal_port_clear(int port);
+unsigned hal_port_buffer_size(std::intptr_t port);
+unsigned hal_port_readable(std::intptr_t port);
+unsigned hal_port_writable(std::intptr_t port);
+bool hal_port_peek(std::intptr_t port, char* to, unsigned count);
+bool hal_port_peek_commit(std::intptr_t port, unsigned count);
+bool hal_port_read(std::intptr_t port, char* to, unsigned count);
+bool hal_port_write(std::intptr_t port, const char* from, unsigned count);
+void hal_port_clear(std::intptr_t port);
 int hal_port_alloc(unsigned size);  // [setup] a buffer of the module's own
 void hal_port_wait_readable(volatile int** port, unsigned count, const volatile int* stop);  // of programs
 void hal_port_wait_writable(volatile int** port, unsigned count, const volatile int* stop);  // of programs

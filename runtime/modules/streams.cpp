@@ -41,11 +41,17 @@ int type_of(char letter) {
     case 'b':
     case 'B': return 1;
     case 'f':
-    case 'F': return 2;
+    case 'F':
+    case 'r':
+    case 'R': return 2;
     case 's':
     case 'S': return 3;
     case 'u':
     case 'U': return 4;
+    case 'l':
+    case 'L': return 6;
+    case 'k':
+    case 'K': return 7;
     default: return 0;
     }
 }

@@ -1,16 +1,16 @@
 /* SPDX-License-Identifier: MIT */
-/* LinuxCNC 2.9's functions that act on the machine as a whole: each is a command to it, or asks it. All [setup]; 0, or a negative errno. */
+/* LinuxCNC's functions that act on the machine as a whole: each is a command to it, or asks it. All [setup]; 0, or a negative errno. */
 #define _GNU_SOURCE
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "commands.h"
 #include "linuxcnc/inside.h"
 #include "linuxcnc/program.h"
 
-/* Runs one command, given as its words up to NULL. A program connects with its first hal_init(). Sets number, if there is one, to that behind `key` in
- * what the command prints. */
-static int run(const char *const *words, const char *key, unsigned *number) {
+/* A program connects with its first hal_init(). */
+int halcyon_run(const char *const *words, const char *key, unsigned *number) {
     const locale_t before = halcyon_lock();
     char *reason = NULL;
     bool done = false;
@@ -36,10 +36,10 @@ static int run(const char *const *words, const char *key, unsigned *number) {
     free(reason);
     return done ? 0 : -EINVAL;
 }
-#define RUN(...) run((const char *const[]){__VA_ARGS__, NULL}, NULL, NULL)
 
 int hal_signal_new(const char *name, hal_type_t type) {
-    const char *const word = type == HAL_BIT ? "bit" : type == HAL_FLOAT ? "float" : type == HAL_S32 ? "s32" : type == HAL_U32 ? "u32" : NULL;
+    const char *const word = type == HAL_BIT ? "bit" : type == HAL_FLOAT ? "float" : type == HAL_S32 ? "s32" : type == HAL_U32 ? "u32"
+                             : type == HAL_S64 ? "s64" : type == HAL_U64 ? "u64" : NULL;
     return word ? RUN("newsig", name, word) : -EINVAL;
 }
 int hal_set_unready(int comp) { return hal_unready(comp); }
@@ -59,7 +59,7 @@ int hal_stop_threads(void) { return RUN("stop"); }
 
 unsigned char hal_get_lock(void) {
     unsigned lock = 0;
-    run((const char *const[]){"status", "lock", NULL}, "lock value ", &lock);
+    halcyon_run((const char *const[]){"status", "lock", NULL}, "lock value ", &lock);
     return (unsigned char)lock;
 }
 int hal_set_lock(unsigned char lock) {
@@ -72,57 +72,22 @@ int hal_set_lock(unsigned char lock) {
 
 /* --- values by name -------------------------------------------------------------------------------------------------------- */
 
-union data {
-    bool bit;
-    double real;
-    int32_t s32;
-    uint32_t u32;
-    uint64_t raw;
-};
-
-/* The object of that name in a reply of `describe`: `from` is at its member of that key, or NULL. */
-static const char *member(const char *object, const char *key) {
-    const char *const end = strchr(object, '}'), *const at = strstr(object, key);
-    return at && (!end || at < end) ? at + strlen(key) : NULL;
-}
-
 /* Asks for a value by name. `data` leads to a copy, which the next call of the same thread overwrites. */
-static int value_of(const char *kind, const char *name, int *type, union data **data, const char *key, bool *flag) {
-    static _Thread_local union data copy;
-    if (!name || strlen(name) > HAL_NAME_LEN || !type || !data) return -EINVAL;
-    const locale_t before = halcyon_lock();
-    int result = -EINVAL;
-    if (halcyon_connection >= 0) {
-        halcyon_add("{\"describe\":\"%s\",\"patterns\":[", kind);
-        halcyon_add_string(name);
-        halcyon_add("]}");
-        const char *const answer = halcyon_ask();
-        char wanted[HAL_NAME_LEN + 16];
-        snprintf(wanted, sizeof wanted, "{\"name\":\"%s\"", name);
-        const char *const object = answer ? strstr(answer, wanted) : NULL;
-        const char *const word = object ? member(object, "\"type\":\"") : NULL;
-        const char *value = object ? member(object, "\"value\":") : NULL;
-        static const struct { const char *word; hal_type_t type; hal_type own; } types[] = {
-            {"bit\"", HAL_BIT, HAL_TYPE_BIT}, {"float\"", HAL_FLOAT, HAL_TYPE_FLOAT}, {"s32\"", HAL_S32, HAL_TYPE_S32}, {"u32\"", HAL_U32, HAL_TYPE_U32}};
-        for (size_t i = 0; word && value && i < sizeof types / sizeof *types; ++i) {
-            if (strncmp(word, types[i].word, strlen(types[i].word)) != 0) continue;
-            *type = (int)types[i].type;
-            copy.raw = halcyon_take_value(&value, types[i].own).raw;
-            *data = &copy;
-            if (flag) *flag = member(object, key) != NULL;
-            result = 0;
-        }
-    }
-    halcyon_unlock(before);
-    return result;
+static int value_of(const char *kind, const char *name, int *type, union halcyon_data **data, bool *flag, bool of_signal) {
+    static _Thread_local struct halcyon_object found;
+    if (!type || !data || halcyon_look_up(kind, name, &found) != 0) return -EINVAL;
+    *type = found.type;
+    *data = &found.value;
+    if (flag) *flag = of_signal ? found.has_writer : *found.signal != '\0';
+    return 0;
 }
-int hal_get_pin_value_by_name(const char *name, int *type, union data **data, bool *connected) {
-    return value_of("pin", name, type, data, "\"signal\":\"", connected);
+int hal_get_pin_value_by_name(const char *name, int *type, union halcyon_data **data, bool *connected) {
+    return value_of("pin", name, type, data, connected, false);
 }
-int hal_get_signal_value_by_name(const char *name, int *type, union data **data, bool *has_writers) {
-    return value_of("sig", name, type, data, "\"writer\":\"", has_writers);
+int hal_get_signal_value_by_name(const char *name, int *type, union halcyon_data **data, bool *has_writers) {
+    return value_of("sig", name, type, data, has_writers, true);
 }
-int hal_get_param_value_by_name(const char *name, int *type, union data **data) { return value_of("param", name, type, data, "", NULL); }
+int hal_get_param_value_by_name(const char *name, int *type, union halcyon_data **data) { return value_of("param", name, type, data, NULL, false); }
 
 int hal_param_set(const char *name, int type, void *value) {
     char text[40];
@@ -132,6 +97,8 @@ int hal_param_set(const char *name, int type, void *value) {
         case HAL_FLOAT: snprintf(text, sizeof text, "%.17g", *(double *)value); break;
         case HAL_S32: snprintf(text, sizeof text, "%d", (int)*(int32_t *)value); break;
         case HAL_U32: snprintf(text, sizeof text, "%u", (unsigned)*(uint32_t *)value); break;
+        case HAL_S64: snprintf(text, sizeof text, "%lld", (long long)*(int64_t *)value); break;
+        case HAL_U64: snprintf(text, sizeof text, "%llu", (unsigned long long)*(uint64_t *)value); break;
         default: return -EINVAL;
     }
     return RUN("setp", name, text);
@@ -140,6 +107,8 @@ int hal_param_bit_set(const char *name, int value) { return hal_param_set(name, 
 int hal_param_float_set(const char *name, double value) { return hal_param_set(name, HAL_FLOAT, &value); }
 int hal_param_s32_set(const char *name, signed long value) { return hal_param_set(name, HAL_S32, &(int32_t){(int32_t)value}); }
 int hal_param_u32_set(const char *name, unsigned long value) { return hal_param_set(name, HAL_U32, &(uint32_t){(uint32_t)value}); }
+int hal_param_s64_set(const char *name, signed long value) { return hal_param_set(name, HAL_S64, &(int64_t){value}); }
+int hal_param_u64_set(const char *name, unsigned long value) { return hal_param_set(name, HAL_U64, &(uint64_t){value}); }
 
 /* --- what a program does not have ------------------------------------------------------------------------------------------------ */
 

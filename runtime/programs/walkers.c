@@ -71,3 +71,25 @@ WALKER(halpr_find_pin_by_owner)
 WALKER(halpr_find_pin_by_sig)
 WALKER(halpr_find_sig_by_name)
 WALKER(halpr_find_thread_by_name)
+
+/* Functions that are rarely used and that a machine of ours does not offer to programs. */
+#define MISSING(function)                                                                                                             \
+    int function(void);                                                                                                               \
+    int function(void) {                                                                                                              \
+        fprintf(stderr, "%s: a machine of Halcyon does not have this function of LinuxCNC's; see docs/linuxcnc-compatibility.md\n", #function); \
+        _exit(1);                                                                                                                     \
+    }
+MISSING(hal_comp_by_id)
+MISSING(hal_comp_by_name)
+MISSING(hal_comp_insmod_args)
+MISSING(hal_enforce_exact_base_period)
+MISSING(hal_getref_p)
+MISSING(hal_getref_s)
+MISSING(hal_list_comp)
+MISSING(hal_list_funct)
+MISSING(hal_list_p)
+MISSING(hal_list_p_s)
+MISSING(hal_list_s)
+MISSING(hal_list_thread)
+MISSING(hal_mutex_force_release)
+MISSING(hal_statistics)

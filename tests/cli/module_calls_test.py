@@ -267,8 +267,8 @@ ticker: free-running -38, unknown -22, period -22, start 0 -22
     # --- what it cannot do -------------------------------------------------------------------------------------------------
 
     def test_what_linuxcnc_does_not_export_either(self):
-        for symbol, why in (("rtapi_sem_new", "is declared in LinuxCNC's headers, but LinuxCNC 2.9 does not export it to modules either"),
-                            ("rtapi_fifo_new", "is declared in LinuxCNC's headers, but LinuxCNC 2.9 does not export it to modules either"),
+        for symbol, why in (("rtapi_sem_new", "is declared in LinuxCNC's headers, but LinuxCNC does not export it to modules either"),
+                            ("rtapi_fifo_new", "is declared in LinuxCNC's headers, but LinuxCNC does not export it to modules either"),
                             ("halpr_find_pin_by_name", "reads LinuxCNC's memory directly, which a machine of Halcyon does not have")):
             (self.folder / "other.c").write_text(f"int {symbol}(void);\nint rtapi_app_main(void) {{ return {symbol}(); }}\nvoid rtapi_app_exit(void) {{}}\n")
             subprocess.run([CC, "-shared", "-fPIC", "-o", str(self.modules / "other.so"), str(self.folder / "other.c")], check=True)

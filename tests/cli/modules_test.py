@@ -339,15 +339,15 @@ getp follow.position
         self.assertIn("it uses planner_next, which is defined neither by this runtime nor by a module in", self.error("loadrt follow\n"))
 
     def test_a_module_of_another_version_of_linuxcnc(self):
-        symbol = "hal_init_funct_to_thread"
-        why = "is not in the interface of LinuxCNC 2.9: the module is built for another version, such as 2.10"
+        symbol = "hal_init_future"
+        why = "is not in the interface of LinuxCNC 2.9 or 2.10: the module is built for another version"
         for more, extra in ((", a_neighbour(void)", f" and 1 more missing symbols; {symbol}"), ("", ", which")):
             (self.folder / "other.c").write_text(f"int {symbol}(void){more};\nint rtapi_app_main(void) {{ return {symbol}(){' + a_neighbour()' if more else ''}; }}\nvoid rtapi_app_exit(void) {{}}\n")
             subprocess.run([CC, "-shared", "-fPIC", "-o", str(self.modules / "other.so"), str(self.folder / "other.c")], check=True)
             with self.subTest(extra):
                 error = self.error("loadrt other\n")
                 self.assertIn(f"cannot make 'other': it uses {symbol}{extra} {why} [construct-failed]", error)
-                self.assertIn("= help: use the module of LinuxCNC 2.9 (linuxcnc-uspace), or build this one again with 2.9's halcompile\n", error)
+                self.assertIn("= help: use the module of LinuxCNC 2.9 (linuxcnc-uspace) or 2.10, or build this one again with the halcompile of one of these\n", error)
 
     def test_a_module_in_use_stays(self):
         self.build("planner", "follow")

@@ -180,6 +180,18 @@ except hal.error as problem:
             "c.unready(); c.newpin('b', hal.HAL_BIT, hal.HAL_IN); c.ready(); print('made')\n"
             "s = hal.stream(c, hal.streamer_base + 6, 3, 'bf')\nprint(s.element_types, fails(lambda: hal.stream(c, hal.streamer_base + 7), OSError, hal.error))\n"))
 
+    def test_the_writes_of_two_components_arrive_in_their_order(self):
+        machine = self.machine(SERVO + "loadrt sum2\nloadrt minmax\naddf sum2.0 servo\naddf minmax.0 servo\nsetp sum2.0.gain1 -1\n"
+                                       "net difference sum2.0.out => minmax.0.in\nstart\n")
+        self.python("import hal, subprocess\n"
+                    "a, b = hal.component('a'), hal.component('b')\n"
+                    "b.newpin('in', hal.HAL_BIT, hal.HAL_IN)\n"
+                    "for c in a, b: c.newpin('x', hal.HAL_FLOAT, hal.HAL_OUT), c.ready()\n"
+                    "for words in (['late', 'b.x', 'sum2.0.in0'], ['early', 'a.x', 'sum2.0.in1']): subprocess.run(['halcmd', 'net'] + words, check=True)\n"
+                    "for i in range(1, 1001): a['x'] = i; b['x'] = i; b['in']\n")  # what is read is fetched, after what was written
+        self.assertEqual("0", self.value("minmax.0.max"))  # the second is never ahead of the first
+        self.end(machine)
+
     def test_several_processes_talk_through_signals(self):
         self.machine()
         self.background("import hal, time\nc = hal.component('there')\nc.newpin('in', hal.HAL_S32, hal.HAL_IN)\nc.newpin('out', hal.HAL_S32, hal.HAL_OUT)\nc.ready()\n"

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Runs the simulated machines of LinuxCNC without a window: linuxcnc_sim_sweep.py CONFIGS_FOLDER [--with linuxcnc] [--part N/OF] [NAME...]
+"""Runs the simulated machines of LinuxCNC without a window: linuxcnc_sim_sweep.py CONFIGS_FOLDER [--with linuxcnc] [--home SOURCE] [--part N/OF] [NAME...]
 
 CONFIGS_FOLDER is the `configs` folder of a LinuxCNC source tree that the user provides; nothing of it is part of this project. Each INI file below its
 folder `sim` runs in a copy under `hal linuxcnc` (or LinuxCNC's own launcher), as an ordinary user. The display is sim_sweep/display.py; what belongs to
 a display (`POSTGUI_HALFILE`, panels, `[APPLICATIONS]`) is left out, a tool change is confirmed at once, and 3D models have their pins but no window.
-NAME is a part of a path.
+`--home` names a source tree that was built in place, in the place of the package. NAME is a part of a path.
 
 For each configuration it prints how far it came: started, homed, moved, ran a program, ended in order (all its programs); or the first error. 77: the
 package is not installed."""
@@ -97,14 +97,14 @@ def run(ini, command, environment):
 
 def main():
     words = sys.argv[1:]
-    theirs = linuxcnc_upstream.take_with(words)
+    theirs, source = linuxcnc_upstream.take_with(words), linuxcnc_upstream.take_home(words)
     part, parts = 0, 1
     if "--part" in words:
         part, parts = (int(number) for number in words[words.index("--part") + 1].split("/"))
         del words[words.index("--part"):words.index("--part") + 2]
     if not words or words[0].startswith("-"):
         sys.exit(__doc__)
-    if not shutil.which("milltask", path="/usr/bin"):
+    if not shutil.which("milltask", path=f"{source}/bin" if source else "/usr/bin"):
         print("LinuxCNC is not installed: sudo apt-get install linuxcnc-uspace")
         return 77
     if os.getuid() == 0:
@@ -113,9 +113,9 @@ def main():
     number = 0
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         configs = copy_of(pathlib.Path(words[0]).resolve(), pathlib.Path(folder))
-        common = linuxcnc_upstream.environment_of(theirs, pathlib.Path(folder, ".tools"))
+        common = linuxcnc_upstream.environment_of(theirs, pathlib.Path(folder, ".tools"), source)
         common["PYTHONPATH"] = f"{HERE}:{common.get('PYTHONPATH', '')}".rstrip(":")
-        command = ["/usr/bin/linuxcnc", "-r"] if theirs else ["/usr/bin/env", "hal", "linuxcnc"]
+        command = [f"{source}/scripts/linuxcnc" if source else "/usr/bin/linuxcnc", "-r"] if theirs else ["/usr/bin/env", "hal", "linuxcnc"]
         files = sorted(file for file in (configs / "sim").rglob("*.ini") if MACHINE.search(file.read_text(errors="replace")))
         for at, file in enumerate(files):
             name = str(file.relative_to(configs / "sim"))

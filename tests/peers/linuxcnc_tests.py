@@ -118,7 +118,8 @@ def run(test, script):
 def judge(here, environment):
     """True, or why what the test has printed is wrong."""
     if (here / "checkresult").exists():
-        judged = subprocess.run([str(here / "checkresult"), str(here / "result")], cwd=here, env=environment, timeout=60,
+        # by a shell, because some have no first line that names theirs
+        judged = subprocess.run(["bash", "-c", '"$0" "$1"', str(here / "checkresult"), str(here / "result")], cwd=here, env=environment, timeout=60,
                                 stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
         return True if judged.returncode == 0 else "checkresult: " + judged.stdout.decode(errors="replace").strip()[-200:]
     if (here / "expected").exists():

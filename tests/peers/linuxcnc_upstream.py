@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Runs the whole test folder of LinuxCNC with an installed LinuxCNC: linuxcnc_upstream.py TESTS_FOLDER [--with linuxcnc] [NAME...]
+"""Runs the whole test folder of LinuxCNC with a LinuxCNC: linuxcnc_upstream.py TESTS_FOLDER [--with linuxcnc] [--home SOURCE] [NAME...]
 
 TESTS_FOLDER is the `tests` folder of a LinuxCNC source tree that the user provides; nothing of it is part of this project. The tests run one after the
 other in a copy, as an ordinary user. `halrun`, `halcmd`, `halcompile` and the others are ours, `linuxcnc` is `hal linuxcnc`, and `loadrt NAME` prefers
-LinuxCNC's compiled module; with `--with linuxcnc` all programs are the package's own, as the control. NAME is a part of a test's name.
+LinuxCNC's compiled module; with `--with linuxcnc` all programs are its own, as the control. LinuxCNC is the installed package or, with `--home`, a
+source tree that was built in place; that tree must belong to the user, because halcompile installs into it. NAME is a part of a test's name.
 
 For each class of tests it prints how many passed, failed and were skipped; for each failure the first difference. 77: the package is not installed.
 A test ends after 150 s. LIMIT in the environment sets other seconds."""
@@ -87,22 +88,38 @@ def clean_up():
     pathlib.Path(tempfile.gettempdir(), "linuxcnc.lock").unlink(missing_ok=True)
 
 
-def environment_of(theirs, tools):
+def environment_of(theirs, tools, home):
     name, value = MARK.split("=")
     libraries = sysconfig.get_config_vars()
     common = {name: value, "LC_ALL": "C", "LANGUAGES": "", "EMC2_HOME": "/usr", "SYSTEM_BUILD": "1", "HEADERS": "/usr/include/linuxcnc",
               "LIBDIR": "/usr/lib", "LINUXCNC_EMCSH": "wish", "PYTHON_CPPFLAGS": f"-I{libraries['INCLUDEPY']}", "USER": os.environ.get("USER", "user"),
               "PYTHON_LIBS": f"-lpython{libraries['py_version_short']}", "RUNTESTS": str(pathlib.Path(__file__).resolve())}
     common["PYTHON_EXTRA_LIBS"] = common["PYTHON_LIBS"]
+    if home:
+        common |= in_place(home)
+    if theirs and home:
+        return common | {"PATH": f"{home}/bin:{home}/scripts:{home}/tcl:/usr/bin:/bin:/usr/sbin", "REALTIME": "realtime"}
     if theirs:
         return common | {"PATH": "/usr/bin:/bin:/usr/sbin", "REALTIME": "/usr/lib/linuxcnc/realtime"}
     tools.mkdir()
     for program, text in (("linuxcnc", LAUNCHER), ("realtime", linuxcnc_tests.REALTIME)):
         (tools / program).write_text(text)
         (tools / program).chmod(0o755)
-    return common | {"PATH": f"{tools}:{BIN}:/usr/bin:/bin:/usr/sbin", "REALTIME": str(tools / "realtime"), "HALCYON_MODULES": "linuxcnc",
+    ours = common | {"PATH": f"{tools}:{BIN}:/usr/bin:/bin:/usr/sbin", "REALTIME": str(tools / "realtime"), "HALCYON_MODULES": "linuxcnc",
                      "HAL_RTMOD_DIR": "/usr/lib/linuxcnc/modules", "PYTHONPATH": f"{linuxcnc_tests.MODULE}:/usr/lib/python3/dist-packages",
                      "LD_LIBRARY_PATH": str(BIN.parent / "lib/halcyon/linuxcnc")}
+    if home:
+        ours["PATH"] = f"{tools}:{BIN.parent}/lib/halcyon/linuxcnc/bin:{BIN}:{home}/bin:{home}/scripts:{home}/tcl:/usr/bin:/bin:/usr/sbin"
+        ours |= {"HAL_RTMOD_DIR": f"{home}/rtlib", "LINUXCNC_HOME": str(home)}
+        for name in ("PYTHONPATH", "LD_LIBRARY_PATH"):
+            ours[name] = ours[name].split(":")[0] + ":" + common[name]
+    return ours
+
+
+def in_place(home):
+    """What `. scripts/rip-environment` of a source tree sets."""
+    return {"EMC2_HOME": str(home), "SYSTEM_BUILD": "", "HEADERS": f"{home}/include", "LIBDIR": f"{home}/lib", "LINUXCNC_RIP_FLAG": "True",
+            "LINUXCNC_NCFILES_DIR": f"{home}/nc_files", "TCLLIBPATH": f"{home}/tcl", "LD_LIBRARY_PATH": f"{home}/lib", "PYTHONPATH": f"{home}/lib/python"}
 
 
 def skipped(here, environment):
@@ -156,6 +173,26 @@ def copy_of(top, folder):
     return folder / top.name
 
 
+def take_home(words):
+    """Removes `--home SOURCE` from the words; the folder, or None."""
+    if "--home" not in words[:-1]:
+        return None
+    at = words.index("--home")
+    home = pathlib.Path(words[at + 1]).resolve()
+    del words[at:at + 2]
+    return home
+
+
+def missing_prerequisite(here, home):
+    """Why a test does not apply to a source tree: what its configuration has not found; or an empty text."""
+    wanted = here / "musthave"
+    if not home or not wanted.exists():
+        return ""
+    has = (home / "src/config.h").read_text()
+    missing = [name for name in wanted.read_text().split() if not re.search(rf"^#define HAVE_{name}", has, re.M)]
+    return f"LinuxCNC was built without {', '.join(missing)}" if missing else ""
+
+
 def take_with(words):
     """Removes `--with linuxcnc` from the words; True if it was there."""
     theirs = "--with" in words and words[words.index("--with") + 1:][:1] == ["linuxcnc"]
@@ -166,10 +203,10 @@ def take_with(words):
 
 def main():
     words = sys.argv[1:]
-    theirs = take_with(words)
+    theirs, home = take_with(words), take_home(words)
     if not words or words[0].startswith("-"):
         sys.exit(__doc__)
-    if not shutil.which("milltask", path="/usr/bin"):
+    if not shutil.which("milltask", path=f"{home}/bin" if home else "/usr/bin"):
         print("LinuxCNC is not installed: sudo apt-get install linuxcnc-uspace linuxcnc-uspace-dev")
         return 77
     if os.getuid() == 0:
@@ -177,19 +214,20 @@ def main():
     count = {kind: {"passed": 0, "FAILED": 0, "skipped": 0} for kind in CLASSES}
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         top = copy_of(pathlib.Path(words[0]).resolve(), pathlib.Path(folder))
-        common = environment_of(theirs, pathlib.Path(folder, ".tools"))
+        common = environment_of(theirs, pathlib.Path(folder, ".tools"), home)
+        own = pathlib.Path(folder, ".home")  # one for all, as upstream: a display may read task's tools before task has made the file
+        own.mkdir()
         files = sorted(file for name in linuxcnc_tests.SCRIPTS for file in top.rglob(name) if file.is_file())
         for file in files:
             here, name = file.parent, str(file.parent.relative_to(top))
             if len(words) > 1 and not any(part in name for part in words[1:]):
                 continue
-            home = pathlib.Path(folder, ".home")
-            shutil.rmtree(home, ignore_errors=True)
-            home.mkdir()
-            environment = common | {"HOME": str(home), "XDG_RUNTIME_DIR": str(home), "TEST_DIR": str(here), "USER_MODULE_DIR": str(here),
+            environment = common | {"HOME": str(own), "XDG_RUNTIME_DIR": str(own), "TEST_DIR": str(here), "USER_MODULE_DIR": str(here),
                                     "TOPDIR": str(top.parent), "PATH": f"{here}:{common['PATH']}"}
+            if theirs and home:
+                del environment["USER_MODULE_DIR"]  # upstream's runner sets it for an installed package only
             kind, begin = class_of(file), time.monotonic()
-            reason = skipped(here, environment)
+            reason = missing_prerequisite(here, home) or skipped(here, environment)
             verdict = "skipped" if reason else run(here, file.name, environment)
             word = verdict if reason else "passed" if verdict is True else "FAILED"
             if word == "FAILED" and (here / "xfail").exists():

@@ -3,7 +3,7 @@
 
 #include <cstdlib>
 #include <filesystem>
-#include <fmt/core.h>
+#include <fmt/format.h>
 #include <iterator>
 #include <sstream>
 #include <unistd.h>
@@ -76,12 +76,14 @@ public:
     bool read() {
         if (!version()) return false;
         to_.task = program("TASK", "TASK", "milltask");
-        to_.io = program("EMCIO", "EMCIO", "io");
+        const bool newer = to_.linuxcnc.version == LinuxcncVersion::v2_10;
+        to_.io = newer ? Words{} : program("EMCIO", "EMCIO", "io");
         to_.halui = program("HAL", "HALUI", "");
+        to_.bridge = newer ? program("HAL", "HALBRIDGE", "") : Words{};
         to_.display = program("DISPLAY", "DISPLAY", "");
         to_.planner = words_of(options_.planner.empty() ? value("TRAJ", "TPMOD", "tpmod") : options_.planner);
         to_.homing = words_of(options_.homing.empty() ? value("EMCMOT", "HOMEMOD", "homemod") : options_.homing);
-        to_.nml = value("LINUXCNC", "NML_FILE", value("EMC", "NML_FILE", to_.home + "/share/linuxcnc/linuxcnc.nml"));
+        to_.nml = value("LINUXCNC", "NML_FILE", value("EMC", "NML_FILE", to_.linuxcnc.nml));
         to_.nml = resolve_path(to_.nml, to_.folder);
         to_.shutdown = value("HAL", "SHUTDOWN", "");
         for (const std::string& line : to_.ini.all("APPLICATIONS", "APP")) to_.applications.push_back(application(words_of(line)));
@@ -113,10 +115,11 @@ private:
 
     /// The programs of LinuxCNC, and the display.
     bool programs() {
-        for (const std::string& name : {std::string("linuxcncsvr"), to_.io[0], to_.task[0]})
-            if (find_program(to_, name).empty())
+        for (const std::string& name : {std::string("linuxcncsvr"), to_.io.empty() ? "" : to_.io[0], to_.task[0]})
+            if (!name.empty() && find_program(to_, name).empty())
                 return fail(options_, fmt::format("'{}' is not installed; type: sudo apt-get install linuxcnc-uspace", name)), false;
         if (!to_.halui.empty() && find_program(to_, to_.halui[0]).empty()) return missing("[HAL]HALUI", to_.halui[0]);
+        if (!to_.bridge.empty() && find_program(to_, to_.bridge[0]).empty()) return missing("[HAL]HALBRIDGE", to_.bridge[0]);
         if (to_.display[0] != "dummy" && find_program(to_, to_.display[0]).empty()) return missing("[DISPLAY]DISPLAY", to_.display[0]);
         for (const Words& application : to_.applications)
             if (!application.empty() && find_program(to_, application[0]).empty()) return missing("[APPLICATIONS]APP", application[0]);
@@ -164,6 +167,13 @@ std::string with_rest(const std::string& first, const char* variable) {
     return rest && *rest ? first + ":" + rest : first;
 }
 
+/// The variable with the folder first, or as it is if it has the folder: then what is before the folder, such as our library, is to stay there.
+std::string with_folder(const std::string& folder, const char* variable) {
+    const char* const before = std::getenv(variable);
+    const std::string there = before ? before : "";
+    return (":" + there + ":").find(":" + folder + ":") == there.npos ? with_rest(folder, variable) : there;
+}
+
 }  // namespace
 
 std::string find_program(const Configuration& configuration, const std::string& program) {
@@ -171,11 +181,11 @@ std::string find_program(const Configuration& configuration, const std::string& 
         const std::string file = resolve_path(program, configuration.folder);
         return executable(file) ? file : "";
     }
-    std::istringstream folders(with_rest(configuration.folder + "/bin:" + configuration.home + "/bin", "PATH"));
+    std::istringstream folders(with_rest(fmt::format("{}/bin:{}", configuration.folder, fmt::join(configuration.linuxcnc.programs, ":")), "PATH"));
     for (std::string folder; std::getline(folders, folder, ':');)
         if (std::string file = (folder.empty() ? "." : folder) + "/" + program; executable(file)) return file;
     // Its Tcl programs are not in PATH: tklinuxcnc.
-    const std::string script = configuration.home + "/lib/tcltk/linuxcnc/" + program + ".tcl";
+    const std::string script = configuration.linuxcnc.tcl + "/" + program + ".tcl";
     return executable(script) ? script : "";
 }
 
@@ -188,8 +198,8 @@ std::optional<Configuration> read_configuration(const LinuxcncOptions& options) 
                                                : fmt::format("'{}' is not an INI file; type: hal linuxcnc FILE.ini", extra));
         return std::nullopt;
     }
-    const char* const home = std::getenv("LINUXCNC_HOME");
-    configuration.home = home && *home ? home : "/usr";
+    configuration.linuxcnc = linuxcnc_installation();
+    if (const std::string problem = ask_version(configuration.linuxcnc); !problem.empty()) return fail(options, problem), std::nullopt;
     configuration.file = absolute_path(configuration.given);
     configuration.folder = folder_of(configuration.file);
     if (configuration.given.find('/') != std::string::npos) configuration.given = configuration.file;  // the working folder changes
@@ -206,30 +216,34 @@ void remove_expanded(const Configuration& configuration) {
 }
 
 void export_configuration(const Configuration& configuration, const LinuxcncOptions& options) {
-    const std::string& home = configuration.home;
-    const std::string tcl = home + "/lib/tcltk/linuxcnc", hallib = home + "/share/linuxcnc/hallib";
+    const Installation& of = configuration.linuxcnc;
     set_variable("INI_FILE_NAME", configuration.file);
     set_variable("CONFIG_DIR", configuration.folder);
     set_variable("NMLFILE", configuration.nml);
     if (options.linuxcnc_modules) set_variable("HALCYON_MODULES", "linuxcnc");
-    set_variable("HAL_RTMOD_DIR", home + "/lib/linuxcnc/modules", false);
-    set_variable("HALLIB_DIR", hallib);
-    set_variable("HALLIB_PATH", (options.halfiles.empty() ? "" : canonical_path(options.halfiles) + ":") + ".:" + hallib);
+    set_variable("HAL_RTMOD_DIR", of.modules, false);
+    set_variable("HALLIB_DIR", of.hallib);
+    set_variable("HALLIB_PATH", (options.halfiles.empty() ? "" : canonical_path(options.halfiles) + ":") + ".:" + of.hallib);
     set_variable("HALCMD", options.keep_going ? "halcmd -k" : "halcmd");
     set_variable("REALTIME", "true");  // programs run it with `start` or `stop`; the machine does both itself
-    set_variable("LINUXCNC_HOME", home);
-    set_variable("LINUXCNC_TCL_DIR", tcl);
-    set_variable("LINUXCNC_LANG_DIR", tcl + "/msgs");
+    set_variable("LINUXCNC_HOME", of.home);
+    set_variable("LINUXCNC_TCL_DIR", of.tcl);
+    set_variable("LINUXCNC_LANG_DIR", of.messages);
     set_variable("LINUXCNC_EMCSH", "wish");
-    set_variable("LINUXCNC_HELP_DIR", home + "/share/doc/linuxcnc");
-    set_variable("LINUXCNC_NCFILES_DIR", home + "/share/linuxcnc/ncfiles");
+    set_variable("LINUXCNC_HELP_DIR", of.help);
+    set_variable("LINUXCNC_NCFILES_DIR", of.ncfiles);
     set_variable("PYOPENGL_PLATFORM", "x11", false);
     set_variable("TRAJ_COORDINATES", configuration.ini.get("TRAJ", "COORDINATES").value_or(""));
     set_variable("KINS_KINEMATICS", configuration.ini.get("KINS", "KINEMATICS").value_or(""));
-    set_variable("PYTHONPATH", with_rest(home + "/lib/python", "PYTHONPATH"));
+    set_variable("PYTHONPATH", with_folder(of.python, "PYTHONPATH"));
+    if (!of.libraries.empty()) {
+        set_variable("EMC2_HOME", of.home);
+        set_variable("LD_LIBRARY_PATH", with_folder(of.libraries, "LD_LIBRARY_PATH"));
+        set_variable("TCLLIBPATH", of.tcl);
+    }
     std::error_code unknown;
     const std::string own = fs::read_symlink("/proc/self/exe", unknown).parent_path().string();
-    set_variable("PATH", with_rest(fmt::format("{}/bin:{}/bin:{}:{}/bin", configuration.folder, linuxcnc_folder(), own, home), "PATH"));
+    set_variable("PATH", with_rest(fmt::format("{}/bin:{}/bin:{}:{}", configuration.folder, linuxcnc_folder(), own, fmt::join(of.programs, ":")), "PATH"));
 }
 
 }  // namespace hal::tools

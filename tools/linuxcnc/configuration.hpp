@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "linuxcnc/installation.hpp"
 #include "linuxcnc/linuxcnc.hpp"
 #include "netlist/netlist.hpp"
 
@@ -20,9 +21,9 @@ struct Configuration {
     bool expanded = false;  ///< `file` was written for this run
     Ini ini;
 
-    std::string home;    ///< prefix of the installation: /usr
+    Installation linuxcnc;
     std::string nml;     ///< NML configuration
-    Words task, io, halui, display;  ///< programs with their arguments; halui may be empty
+    Words task, io, halui, bridge, display;  ///< programs with their arguments; io, halui and bridge may be empty
     Words planner, homing;           ///< modules with their parameters
     std::vector<Words> applications;
     std::int64_t applications_delay_ns = 0;

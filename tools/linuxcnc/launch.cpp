@@ -47,9 +47,18 @@ Launch::Launch(const LinuxcncOptions& options, const Configuration& configuratio
 
 int Launch::run() {
     const Configuration& c = configuration_;
-    const bool started = check() && start_server() && start_component("[EMCIO]EMCIO", "iocontrol", c.io) &&
-                         (c.halui.empty() || start_component("[HAL]HALUI", "halui", c.halui)) && load_module(c.planner) &&
-                         load_module(c.homing) && load_netlists() && start_task() && start_applications() && start_display();
+    const auto component = [this](const char* key, const char* name, const Words& program) {
+        return program.empty() || start_component(key, name, program);
+    };
+    const auto modules = [&] { return load_module(c.planner) && load_module(c.homing); };
+    const bool newer = c.linuxcnc.version == LinuxcncVersion::v2_10;
+    const bool started =
+        check() && start_server() &&
+        (newer ? modules() && component("[TASK]TASK", "inihal", c.task) && component("[HAL]HALUI", "halui", c.halui) &&
+                     (c.bridge.empty() || start_component("[HAL]HALBRIDGE", "bridge", c.bridge, false)) && load_netlists() && start_threads() && task_knows_motion()
+               : component("[EMCIO]EMCIO", "iocontrol", c.io) && component("[HAL]HALUI", "halui", c.halui) && modules() && load_netlists() &&
+                     start_task()) &&
+        start_applications() && start_display();
     if (started) {
         if (const auto running = servers(); !running.empty()) lock_.note_server(running.front());
         const FaultLines faults(machine_.session);
@@ -75,10 +84,12 @@ bool Launch::command(const Words& words, const std::string& source) {
 
 bool Launch::check() {
     if (machine_.shell.read_ini(configuration_.given, output_) != 0) return false;
-    const std::string script = configuration_.home + "/share/linuxcnc/hallib/check_config.tcl";
-    if (!std::filesystem::exists(script) || find_program(configuration_, "tclsh").empty()) return step("check the configuration: left out");
+    Words checker{"linuxcnc_check_ini", configuration_.file};
+    if (configuration_.linuxcnc.version == LinuxcncVersion::v2_9) checker = {"tclsh", configuration_.linuxcnc.hallib + "/check_config.tcl", configuration_.file};
+    if (find_program(configuration_, checker[0]).empty() || (checker.size() > 2 && !std::filesystem::exists(checker[1])))
+        return step("check the configuration: left out");
     if (!step("check the configuration")) return false;
-    const pid_t pid = start("check_config.tcl", {"tclsh", script, configuration_.file});
+    const pid_t pid = start(std::filesystem::path(checker[checker.size() - 2]).filename(), checker);
     const auto status = pid == 0 ? std::optional(1) : wait_for(pid, -1);
     return status == 0;
 }
@@ -96,10 +107,10 @@ bool Launch::start_server() {
     return true;
 }
 
-bool Launch::start_component(const char* key, const char* component, const Words& program) {
+bool Launch::start_component(const char* key, const char* component, const Words& program, bool reads_ini) {
     if (!step(fmt::format("start {}", program[0]))) return false;
     Words words{"loadusr", "-Wn", component};
-    for (const std::string& word : with_ini(program, configuration_.file)) words.push_back(word);
+    for (const std::string& word : reads_ini ? with_ini(program, configuration_.file) : program) words.push_back(word);
     if (!command(words, fmt::format("{} {}", configuration_.given, key))) return false;
     components_.emplace_back(component, program[0]);
     return true;
@@ -131,6 +142,26 @@ int Launch::run_netlist_in_tcl(const std::string& path, const Words& arguments, 
     return status == 0 ? 0 : 1;
 }
 
+bool Launch::start_threads() {
+    std::string commands;
+    for (const std::string& line : configuration_.ini.all("HAL", "HALCMD")) commands += line + "\n";
+    if (!commands.empty() && machine_.shell.run_text(configuration_.given + " [HAL]HALCMD", commands, output_) != 0 && !options_.keep_going)
+        return false;
+    if (!step("start the threads")) return false;
+    machine_.start_threads();
+    return !machine_.stop.requested();
+}
+
+// Displays read the limits of motion when they start.
+bool Launch::task_knows_motion() {
+    for (int waited_ms = 0; waited_ms < 10'000 && !machine_.stop.requested(); waited_ms += 10) {
+        TextOutput text;
+        if (machine_.shell.execute(Words{"getp", "ini.traj_max_velocity"}, text, "<linuxcnc>") != 0 || std::strtod(text.out_text.c_str(), nullptr) != 0) break;
+        machine_.stop.wait_ns(10'000'000);
+    }
+    return !machine_.stop.requested();
+}
+
 bool Launch::start_task() {
     // Task waits for motion's threads, which start only after it: so another thread waits for task.
     if (!step(fmt::format("start {}", configuration_.task[0]))) return false;
@@ -144,12 +175,7 @@ bool Launch::start_task() {
         task = sibling.execute(words, output, configuration_.given + " [TASK]TASK");
         waited = true;
     });
-    std::string commands;
-    for (const std::string& line : configuration_.ini.all("HAL", "HALCMD")) commands += line + "\n";
-    bool good =
-        commands.empty() || machine_.shell.run_text(configuration_.given + " [HAL]HALCMD", commands, output_) == 0 || options_.keep_going;
-    good = good && step("start the threads");
-    if (good) machine_.start_threads();
+    const bool good = start_threads();
     while (!waited) {
         if (!good || machine_.stop.requested()) sibling.cancel();
         std::this_thread::sleep_for(5ms);

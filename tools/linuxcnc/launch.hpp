@@ -27,10 +27,12 @@ private:
     // The steps, in order. Each returns false after printing why it failed, or when the end was requested.
     bool check();
     bool start_server();
-    bool start_component(const char* key, const char* component, const Words& program);
+    bool start_component(const char* key, const char* component, const Words& program, bool reads_ini = true);
     bool load_module(const Words& module);
     bool load_netlists();
-    bool start_task();
+    bool start_threads();  ///< after the commands of [HAL]HALCMD
+    bool task_knows_motion();  ///< 2.10: waits until task has given motion the limits of the INI file
+    bool start_task();     ///< of 2.9, with the threads
     bool start_applications();
     bool start_display();
     /// Waits for the first of: the display ends, a program dies, the end is requested. Sets status_.

@@ -181,9 +181,11 @@ void Launch::end() {
     if (display_.pid != 0) step("end the display");
     end_program(display_);
     for (Program& application : applications_) end_program(application);
-    end_component("motion-logger");  // in the place of motmod, for tests: what task sends while it ends does not belong to the log
+    // In the place of motmod, for tests: what task of 2.9 sends while it ends does not belong to the log.
+    if (configuration_.linuxcnc.version == LinuxcncVersion::v2_9) end_component("motion-logger");
     if (runs("inihal")) step(fmt::format("end {}", configuration_.task[0]));
     end_component("inihal");
+    end_component("motion-logger");
     if (!servers().empty()) step("end linuxcncsvr");
     end_server();
     if (!configuration_.shutdown.empty()) {

@@ -4,7 +4,6 @@
 #include <unistd.h>
 
 #include "cli/output.hpp"
-#include "comp/toolchain.hpp"
 #include "linuxcnc/configuration.hpp"
 #include "linuxcnc/launch.hpp"
 #include "linuxcnc/leftovers.hpp"
@@ -13,21 +12,11 @@ namespace hal::tools {
 
 namespace {
 
-/// $LINUXCNCVERSION, which the installation knows.
-void export_version(const Configuration& configuration) {
-    const std::string program = find_program(configuration, "linuxcnc_var");
-    std::string text;
-    if (program.empty() || run_program({program, "LINUXCNCVERSION"}, text) != 0) return;
-    while (text.ends_with('\n')) text.pop_back();
-    ::setenv("LINUXCNCVERSION", text.c_str(), 1);
-}
-
 int run_locked(const LinuxcncOptions& options, const Configuration& configuration) {
     MachineLock lock;
     if (!lock.problem().empty()) return fail(options, lock.problem());
     if (::chdir(configuration.folder.c_str()) != 0) return fail(options, "cannot enter " + configuration.folder);
     export_configuration(configuration, options);
-    export_version(configuration);
     adopt_orphans();
     int status = 1;
     {

@@ -36,6 +36,8 @@ Registry& registry() {
     return *one;
 }
 
+std::atomic<Component*> last_writer{nullptr};  // among the components; compared only, and used while it is registered
+
 template <class Action>
 void for_all(Action action) {
     const std::scoped_lock lock(registry().mutex);
@@ -83,6 +85,8 @@ Component::~Component() {
     }
     const std::scoped_lock lock(registry().mutex);
     registry().components.erase(this);
+    Component* here = this;
+    last_writer.compare_exchange_strong(here, nullptr);
     if (forked_) new std::thread(std::move(flusher_));  // the thread exists in the parent only and cannot be joined
 }
 
@@ -133,8 +137,20 @@ py::object Component::get(std::size_t i) {
     return to_python(items_[i]);
 }
 
+void Component::send_earlier_writes() {
+    Component* const before = last_writer.exchange(this);
+    if (!before || before == this || forked_) return;
+    const py::gil_scoped_release release_gil;
+    for_all([before](Component& component) {
+        if (&component != before || component.forked_) return;
+        const std::scoped_lock lock(component.mutex_);
+        if (component.dirty_ && !component.left_ && component.lost_.empty()) component.exchange(false);
+    });
+}
+
 void Component::set(std::size_t i, const py::object& value) {
     Json wanted = to_json(items_[i], value);
+    send_earlier_writes();
     std::unique_lock lock(mutex_, std::try_to_lock);
     if (!lock) {
         const py::gil_scoped_release release_gil;
@@ -148,6 +164,7 @@ void Component::set(std::size_t i, const py::object& value) {
 }
 
 std::string Component::request(const std::string& text) {
+    send_earlier_writes();
     const py::gil_scoped_release release_gil;
     std::unique_lock lock(mutex_, std::defer_lock);
     acquire(lock);

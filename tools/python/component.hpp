@@ -80,6 +80,9 @@ private:
     void check_process() const;
     void check_usable() const;
     bool stale(const Item& item) const;
+    /// Sends what another component of this process has written before, so that the machine sees the writes in their order. The caller holds the
+    /// GIL and no lock.
+    void send_earlier_writes();
     /// Sends all written values, and fetches all inputs where `read` is set, in one request.
     void exchange(bool read);
     void run_flusher();

@@ -27,6 +27,8 @@ static volatile sig_atomic_t asked_to_end;
 static long machine; /* its process ID */
 static bool tied;    /* the kernel ends this process with the machine */
 static bool loss_reported;
+static unsigned loss_rounds; /* attempts to reconnect since then */
+enum { patient_rounds = 10 };
 
 bool halcyon_find_machine(void) {
     const long pid = halcyon_connect();
@@ -35,14 +37,16 @@ bool halcyon_find_machine(void) {
     int death_signal = 0;
     tied = prctl(PR_GET_PDEATHSIG, &death_signal) == 0 && death_signal != 0 && getppid() == machine;
     loss_reported = false;
+    loss_rounds = 0;
     return true;
 }
 static void report_loss(void) {
     if (loss_reported) return;
-    loss_reported = true;
     const char *const wanted = getenv("HALCYON_LOST");
     const bool end = wanted && strcmp(wanted, "end") == 0;
-    if (end && tied) return; /* the kernel's SIGTERM, or the machine's, is on its way */
+    /* The kernel's SIGTERM, or the machine's, is on its way. A program that has a handler and begins to wait after it has come needs another. */
+    if (end && tied && ++loss_rounds < patient_rounds) return;
+    loss_reported = true;
     rtapi_print_msg(RTAPI_MSG_ERR, "%s: the machine '%s' (process %ld) has ended; %s\n", halcyon_program_name(), halcyon_instance(), machine,
                     end ? "ending" : "pins keep their values until it returns (HALCYON_LOST=end ends the program instead)");
     if (end) kill(getpid(), SIGTERM);
@@ -117,7 +121,8 @@ void halcyon_exchange(struct halcyon_program *of) {
         seen[i] = __atomic_load_n(&one->pin->slot->raw, __ATOMIC_ACQUIRE);
         if (one->type == HAL_TYPE_PORT) continue;
         read = read || !own(one);
-        if (one->dir == HAL_DIR_IN || (!one->fresh && halcyon_significant(one->type, seen[i]) == one->last)) continue;
+        /* also an input that the program itself has set, as LinuxCNC's task does: an unlinked one keeps that value */
+        if (!one->fresh && halcyon_significant(one->type, seen[i]) == one->last) continue;
         halcyon_add(write ? ",%zu," : ",\"write\":[%zu,", i);
         halcyon_add_value(one->type, (hal_value){.raw = seen[i]});
         write = true;
@@ -148,7 +153,7 @@ void halcyon_exchange(struct halcyon_program *of) {
         const uint64_t there = halcyon_significant(one->type, value.raw);
         if (one->type == HAL_TYPE_PORT || there == one->last) continue;
         /* what was written takes a cycle to arrive: until then the old value is still there */
-        if (one->dir != HAL_DIR_IN && there == one->before && now - one->written_ns < settle_ns) continue;
+        if (there == one->before && now - one->written_ns < settle_ns) continue;
         if (__atomic_compare_exchange_n(&one->pin->slot->raw, &seen[i], value.raw, false, __ATOMIC_ACQ_REL, __ATOMIC_RELAXED))
             one->last = there;
     }

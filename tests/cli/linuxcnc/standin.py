@@ -7,7 +7,7 @@ import sys
 import time
 
 NAME = os.path.basename(sys.argv[0])
-COMPONENTS = {"io": "iocontrol", "halui": "halui", "milltask": "inihal"}
+COMPONENTS = {"io": "iocontrol", "halui": "halui", "milltask": "inihal", "hal_bridge": "bridge"}
 
 
 def log(text):

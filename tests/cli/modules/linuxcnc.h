@@ -60,9 +60,12 @@ int hal_get_param_value_by_name(const char *name, int *type, void **data);
 int hal_set_lock(unsigned char lock);
 unsigned char hal_get_lock(void);
 int hal_port_alloc(unsigned size);
-bool hal_port_write(int port, const char *from, unsigned count);
-bool hal_port_read(int port, char *to, unsigned count);
-unsigned hal_port_buffer_size(int port);
+#ifndef PORT
+#define PORT int /* how 2.9 gives a port */
+#endif
+bool hal_port_write(PORT port, const char *from, unsigned count);
+bool hal_port_read(PORT port, char *to, unsigned count);
+unsigned hal_port_buffer_size(PORT port);
 int rtapi_init(const char *name);
 int rtapi_exit(int id);
 int rtapi_is_realtime(void);

@@ -54,7 +54,7 @@ HAL_IN, HAL_OUT, HAL_IO, HAL_RO, HAL_RW = (int(d) for d in Dir)
 MSG_NONE, MSG_ERR, MSG_WARN, MSG_INFO, MSG_DBG, MSG_ALL = range(6)
 RTAPI_MSG_NONE, RTAPI_MSG_ERR, RTAPI_MSG_WARN, RTAPI_MSG_INFO, RTAPI_MSG_DBG, RTAPI_MSG_ALL = range(6)
 is_kernelspace, is_userspace, is_rt, is_sim = 0, 1, 1, 0
-streamer_base, sampler_base = 0x48530000, 0x48540000
+streamer_base, sampler_base = 0x48535430, 0x48534130  # as in LinuxCNC, whose modules have their streams under these keys
 
 # the protocol's names and the numbers of the runtime's types
 _TYPES = {Type.BIT: ("bit", 0), Type.FLOAT: ("float", 1), Type.S32: ("s32", 2), Type.U32: ("u32", 3), Type.S64: ("s64", 4), Type.U64: ("u64", 5),

@@ -17,11 +17,11 @@ def _interrupt_on_sigterm():
 
 
 class Pin:
-    """A pin or parameter of a component of this program."""
+    """A pin or parameter of a component of this program. LinuxCNC's displays derive a class from it, whose objects are made from a pin."""
 
-    __slots__ = ("_core", "_index", "_name", "_type", "_dir", "_full")
-
-    def __init__(self, core, index):
+    def __init__(self, core, index=None):
+        if index is None:
+            core, index = core._core, core._index
         self._core, self._index = core, index
         self._name, self._full, number, word = core.describe(index)
         self._type, self._dir = _BY_NUMBER[number], _BY_DIR[word]
@@ -33,6 +33,10 @@ class Pin:
         self._core.set(self._index, value)
 
     value = property(get, set)
+    _item = property(lambda self: self)
+
+    def _item_wrap(self, item):
+        return self
 
     def get_name(self):
         return self._name
@@ -42,6 +46,8 @@ class Pin:
 
     def get_dir(self):
         return int(self._dir)
+
+    name, type, dir = property(get_name), property(get_type), property(get_dir)
 
     def is_pin(self):
         return self._dir not in (Dir.RO, Dir.RW)

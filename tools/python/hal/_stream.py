@@ -4,6 +4,7 @@ import errno
 import json
 
 from hal._base import StreamError, _good, _plain, error, sampler_base, streamer_base
+from hal._shared import Shared
 
 
 class stream:
@@ -25,13 +26,23 @@ class stream:
         self._name = f"{base}.{key - (sampler_base if base == 'sampler' else streamer_base)}" if base else f"stream.{key}"
         self._comp, self._waiting, self._taken = comp._core, [], 0
         self.num_overruns = self.num_underruns = self.sampleno = 0
+        self._shared = None
         if depth is not None:  # one record stays free, as in LinuxCNC
             about = self._ask(create={"types": types, "depth": max(depth - 1, 1)}, owner=comp._name)
         else:
-            about = self._ask()
+            about = self._find(key, types)
             if types is not None and types != about["types"]:
                 raise StreamError(f"stream {self._name} has column types {about['types']}, not {types}")
         self._types, self.maxdepth = about["types"], about["depth"]
+
+    def _find(self, key, types):
+        try:
+            return self._ask()
+        except StreamError:
+            self._shared = Shared.open(key, types)
+            if not self._shared:
+                raise
+            return {"types": self._shared.types, "depth": self._shared.maxdepth}
 
     @property
     def element_types(self):
@@ -45,33 +56,38 @@ class stream:
 
     @property
     def depth(self):
-        return self._ask()["waiting"] + len(self._waiting)
+        return self._shared.depth if self._shared else self._ask()["waiting"] + len(self._waiting)
 
     @property
     def readable(self):
-        return bool(self._waiting) or self._ask()["waiting"] > 0
+        return self._shared.readable if self._shared else bool(self._waiting) or self._ask()["waiting"] > 0
 
     @property
     def writable(self):
+        if self._shared:
+            return self._shared.writable
         about = self._ask()
         return about["waiting"] < about["depth"]
 
     def read(self):
         """Returns the next record as a tuple, or None when the stream is empty."""
-        if not self._waiting:
+        if self._shared:
+            found = self._shared.read()
+            self._waiting = [found] if found else []
+        elif not self._waiting:
             reply = self._ask(take=100)
             self._waiting = list(zip(reply["numbers"], reply["records"]))[::-1]
         if not self._waiting:
             self.num_underruns += 1
             return None
         number, record = self._waiting.pop()
-        self.sampleno = number + 1
+        self.sampleno = number if self._shared else number + 1
         return tuple(float(value) if letter == "f" else value for letter, value in zip(self._types, record))
 
     def write(self, record):
         row = [bool(value) if letter == "b" else _plain(float(value)) if letter == "f" else int(value) for letter, value in zip(self._types, record)]
         if len(row) != len(self._types) or len(record) != len(row):
             raise ValueError(f"the record has {len(record)} values, but stream {self._name} has {len(self._types)} columns")
-        if self._ask(records=[row])["taken"] == 0:
+        if not self._shared.write(row) if self._shared else self._ask(records=[row])["taken"] == 0:
             self.num_overruns += 1
             raise StreamError(errno.ENOSPC, f"stream {self._name} is full")
