@@ -123,7 +123,8 @@ void print_by_default(int level, const char* format, va_list arguments) {
     const int wanted = std::vsnprintf(text, sizeof text, format, arguments);
     const std::size_t length = wanted < 0 ? 0 : std::min<std::size_t>(static_cast<std::size_t>(wanted), sizeof text - 1);
     if (!captures) return write_text(level, text, length);
-    if (level == errors && !*first_error) std::memcpy(first_error, text, length + 1);
+    const bool announces = std::strstr(text, ": loading ") != nullptr;  // as drivers do at this level, to be seen
+    if (level == errors && !*first_error && !announces) std::memcpy(first_error, text, length + 1);
     if (length > sizeof capture - 1 - capture_length) {  // then it prints earlier
         write_text(errors, capture, capture_length);
         capture_length = 0;

@@ -285,7 +285,7 @@ getp follow.position
         done = self.run_program("sim", "--quiet", "-k", self.write("m.hal", "loadrt gain count=2 names=a\nshow comp\nloadrt troubled fault=fail\nloadrt gain\ngetp gain.0.gain\n"))
         self.assertIn("component 'gain' cannot make 'gain': count= and names= are mutually exclusive (rtapi_app_main: Invalid argument (-22)) [construct-failed]", done.stderr)
         self.assertIn("component 'troubled' cannot make 'troubled': troubled: no card (rtapi_app_main: No such device (-19)) [construct-failed]", done.stderr)
-        self.assertIn("\ntroubled: loading\ntroubled: no card\ntroubled: giving up\n", done.stderr)
+        self.assertIn("\ntroubled: begins\ntroubled: loading a driver without a card\ntroubled: no card\ntroubled: giving up\n", done.stderr)
         self.assertEqual(1, done.stderr.count("troubled: loading"), done.stderr)
         self.assertLess(done.stderr.index("\ntroubled: no card\n"), done.stderr.index("cannot make 'troubled'"))
         self.assertNotIn("never printed", done.stderr)

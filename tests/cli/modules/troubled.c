@@ -21,7 +21,8 @@ int rtapi_app_main(void) {
     comp = hal_init("troubled");
     if (is('m')) crash();
     if (is('f')) {
-        rtapi_print("troubled: loading\n");
+        rtapi_print("troubled: begins\n");
+        rtapi_print_msg(1, "troubled: loading a driver without a card\n");
         rtapi_print_msg(1, "troubled: no card\n");
         rtapi_print_msg(1, "troubled: giving up\n");
         rtapi_print_msg(4, "troubled: never printed\n");
