@@ -121,6 +121,7 @@ class LinuxcncPrograms(harness.Case):
         machine = self.machine()
         self.say("loadusr", "-Wn", "gauge", "gauge")
         self.say("net", "a", "adder.out", "gauge.0.in")
+        self.comes("gauge.0.twice", "10")
         pid = next(line.split()[3] for line in self.say("show", "comp").splitlines() if " gauge " in line)
         subprocess.run(["kill", "-9", pid], check=True)
         wait_until(lambda: "dead since" in self.say("show", "comp"), "it is dead")

@@ -60,7 +60,6 @@ int Launch::run() {
                      start_task()) &&
         start_applications() && start_display();
     if (started) {
-        if (const auto running = servers(); !running.empty()) lock_.note_server(running.front());
         const FaultLines faults(machine_.session);
         watch();
         end();
@@ -103,7 +102,9 @@ bool Launch::start_server() {
     if (status && *status != 0)
         return fail(options_, fmt::format("linuxcncsvr {}: another one may be using its TCP port or NML buffers", how_it_ended(*status))),
                false;
-    if (servers().empty()) return fail(options_, "linuxcncsvr has ended; the NML buffers need it"), false;
+    const auto running = servers();
+    if (running.empty()) return fail(options_, "linuxcncsvr has ended; the NML buffers need it"), false;
+    lock_.note_server(running.front());  // now: this program may be killed at any time, and the next one ends the server
     return true;
 }
 
