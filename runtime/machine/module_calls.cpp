@@ -21,13 +21,13 @@ struct Row {
     unsigned lock;  // bits that forbid it
     void (*elaborate)(Elaboration& on, std::span<const Token> args);
 };
-constexpr Row rows[] = {
+constexpr Row module_commands[] = {
     {"newsig", config, edits::newsig}, {"delsig", config, edits::delsig}, {"linkps", config, edits::linkps}, {"unlinkp", config, edits::unlinkp},
     {"addf", config, edits::addf},     {"initf", config, edits::initf},   {"delf", config, edits::delf},     {"alias", config, edits::alias},
     {"unalias", config, edits::unalias}, {"setp", params, edits::setp},   {"start", run, nullptr},           {"stop", run, nullptr},
     {"lock", 0, nullptr}};
 
-void write(const std::string& text, char* to, std::size_t room) {
+void put_text(const std::string& text, char* to, std::size_t room) {
     const std::size_t length = std::min(text.size(), room - 1);
     std::memcpy(to, text.data(), length);
     to[length] = '\0';
@@ -55,17 +55,17 @@ bool take_later(Construction& c, std::string_view name, const char* number) {
 int carry_out(const hal_host* host, const char* const* words, std::size_t count, char* why, std::size_t room) {
     Construction& c = construction_of(host);
     return guarded(c, -ENOMEM, [&] {
-        write("unknown command", why, room);
-        const Row* const row = std::find_if(std::begin(rows), std::end(rows), [&](const Row& one) { return count > 0 && one.name == words[0]; });
-        if (!c.request.on || row == std::end(rows)) return -EINVAL;
+        put_text("unknown command", why, room);
+        const Row* const row = std::find_if(std::begin(module_commands), std::end(module_commands), [&](const Row& one) { return count > 0 && one.name == words[0]; });
+        if (!c.request.on || row == std::end(module_commands)) return -EINVAL;
         if (locks_of(c) & row->lock) {
-            write("it is locked (lock, hal_set_lock)", why, room);
+            put_text("it is locked (lock, hal_set_lock)", why, room);
             return -EPERM;
         }
         if (!row->elaborate) return take_later(c, row->name, count > 1 ? words[1] : "0") ? 0 : -EINVAL;
         if (!enter_declared(c)) {
             c.said_why = true;
-            write("what the module has declared is rejected", why, room);
+            put_text("what the module has declared is rejected", why, room);
             return -EINVAL;
         }
         std::vector<Token> arguments;
@@ -78,7 +78,7 @@ int carry_out(const hal_host* host, const char* const* words, std::size_t count,
         outer.edit.diagnostics = c.diagnostics;
         if (!found.failed()) return c.diagnostics->take(found), 0;
         const auto error = std::find_if(found.all().begin(), found.all().end(), [](const Diagnostic& one) { return one.severity == Severity::error; });
-        write(error->message, why, room);
+        put_text(error->message, why, room);
         return -EINVAL;
     });
 }
