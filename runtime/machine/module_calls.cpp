@@ -73,9 +73,15 @@ int carry_out(const hal_host* host, const char* const* words, std::size_t count,
         const Elaboration& outer = *c.request.on;
         Diagnostics found;
         Elaboration on{outer.model, outer.edit, outer.plugins, outer.sources, found, outer.auto_orders, {row->name, ""}, outer.check_only, outer.transaction};
-        outer.edit.diagnostics = &found;
-        row->elaborate(on, arguments);
-        outer.edit.diagnostics = c.diagnostics;
+        {
+            struct Restore {  // also when memory runs out on the way
+                Edit& edit;
+                Diagnostics* before;
+                ~Restore() { edit.diagnostics = before; }
+            } restore{outer.edit, c.diagnostics};
+            outer.edit.diagnostics = &found;
+            row->elaborate(on, arguments);
+        }
         if (!found.failed()) return c.diagnostics->take(found), 0;
         const auto error = std::find_if(found.all().begin(), found.all().end(), [](const Diagnostic& one) { return one.severity == Severity::error; });
         put_text(error->message, why, room);

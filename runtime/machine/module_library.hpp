@@ -31,7 +31,7 @@ std::string find_module(std::string_view name);
 /// Reads the module's file; its code is not mapped before its instance is created. Nothing after reporting bad-plugin.
 std::optional<Plugin> open_module(const std::string& name, Span at, Diagnostics& diagnostics);
 /// Returns the name of a loaded module that uses symbols of this one; empty: none. `component` is a module's.
-/// The name of the module whose task, a thread of its own, calls this; nullptr: the thread is none. async-signal-safe.
+/// The name of the module whose task, a thread of its own, calls this; nullptr in all other threads. async-signal-safe.
 const char* module_of_task() noexcept;
 
 std::string user_of_module(const hal_component& component, std::size_t index);

@@ -12,7 +12,7 @@
 namespace hal::modules {
 namespace {
 
-enum Type { bit = 1, real = 2, s32 = 3, u32 = 4, port = 5 };
+enum Type { bit = 1, real = 2, s32 = 3, u32 = 4, port = 5, s64 = 6, u64 = 7 };
 
 int fail(const char* function, const char* name, const char* why, int result = -EINVAL) {
     if (in_cycle) return result;  // the result is enough, in every cycle
@@ -31,18 +31,30 @@ int give_afterwards(const char* function, const char* command, const char* name)
     return fail(function, name, "unknown name");
 }
 
-int width_of(int type) { return type == bit ? 1 : type == real ? 8 : 4; }
+/// LinuxCNC's number of a type of values, or 0.
+int type_of(hal_type type) {
+    switch (type) {
+    case HAL_TYPE_BIT: return bit;
+    case HAL_TYPE_FLOAT: return real;
+    case HAL_TYPE_S32: return s32;
+    case HAL_TYPE_U32: return u32;
+    case HAL_TYPE_S64: return s64;
+    case HAL_TYPE_U64: return u64;
+    default: return 0;
+    }
+}
+int width_of(int type) { return type == bit ? 1 : type == s32 || type == u32 ? 4 : 8; }
 
 /// Sets a parameter of another component, or of one that is being loaded.
 int set_parameter(const char* name, int type, const void* value) {
     Module* const module = Module::current();
     if (!module) return fail("hal_param_set", name, only_while_loaded, -EPERM);
-    if (!name || !value || type < bit || type > u32) return fail("hal_param_set", name, "no value, or an unsupported type");
+    if (!name || !value || type < bit || type > u64 || type == port) return fail("hal_param_set", name, "no value, or an unsupported type");
     hal_type there{};
     hal_value before{};
     bool linked = false;
     if (!module->calls().value(module->host(), HAL_MODULE_PARAMETER, name, &there, &before, &linked)) return fail("hal_param_set", name, "unknown parameter");
-    if (there != (type == bit ? HAL_TYPE_BIT : type == real ? HAL_TYPE_FLOAT : type == s32 ? HAL_TYPE_S32 : HAL_TYPE_U32))
+    if (type_of(there) != type)
         return fail("hal_param_set", name, "the parameter has another type");
     char text[40];
     const auto as = [value]<class T>(T to) { return std::memcpy(&to, value, sizeof to), to; };
@@ -50,6 +62,8 @@ int set_parameter(const char* name, int type, const void* value) {
     case bit: std::snprintf(text, sizeof text, "%d", as(char{}) != 0); break;
     case real: std::snprintf(text, sizeof text, "%.17g", as(double{})); break;
     case s32: std::snprintf(text, sizeof text, "%d", as(std::int32_t{})); break;
+    case s64: std::snprintf(text, sizeof text, "%lld", as(static_cast<long long>(0))); break;
+    case u64: std::snprintf(text, sizeof text, "%llu", as(static_cast<unsigned long long>(0))); break;
     default: std::snprintf(text, sizeof text, "%u", as(std::uint32_t{})); break;
     }
     if (const int wrong = give_command("hal_param_set", "setp", {name, text}); wrong != 0) return wrong;
@@ -67,13 +81,10 @@ int value_of(const char* function, int kind, const char* name, int* type, void**
     hal_type there{};
     bool flag = false;
     if (!name || !type || !data || !module->calls().value(module->host(), kind, name, &there, &copy, &flag)) return fail(function, name, "unknown name");
-    switch (there) {
-    case HAL_TYPE_BIT: *type = bit; break;
-    case HAL_TYPE_FLOAT: *type = real; break;
-    case HAL_TYPE_S32: *type = s32; break;
-    case HAL_TYPE_U32: *type = u32; break;
-    default: return fail(function, name, "LinuxCNC 2.9 has no values of its type");
-    }
+    const int number = type_of(there);
+    if (number == 0 || (number >= s64 && module->interface() != Interface::v2_10))
+        return fail(function, name, number == 0 ? "it is a port, which has no value" : "LinuxCNC 2.9 has no values of 64 bit");
+    *type = number;
     *data = &copy;
     if (linked) *linked = flag;
     return 0;
@@ -106,9 +117,10 @@ using namespace hal::modules;
 extern "C" {
 
 int hal_signal_new(const char* name, int type) {
-    const char* const word = type == bit ? "bit" : type == real ? "float" : type == s32 ? "s32" : type == u32 ? "u32" : type == port ? "port" : nullptr;
+    const char* const word = type == bit ? "bit" : type == real ? "float" : type == s32 ? "s32" : type == u32 ? "u32" : type == port ? "port"
+                             : type == s64 ? "s64" : type == u64 ? "u64" : nullptr;
     if (!name || !word) return fail("hal_signal_new", name, word ? "no name" : "unsupported type");
-    if (std::strlen(name) > 47) return fail("hal_signal_new", name, "the name is longer than 47 characters");
+    if (std::strlen(name) > longest_name()) return fail("hal_signal_new", name, longest_name() == 47 ? "the name is longer than 47 characters" : "the name is longer than 55 characters");
     return give_command("hal_signal_new", "newsig", {name, word});
 }
 int hal_signal_delete(const char* name) {

@@ -38,7 +38,7 @@ class Modules(ModuleCase):
 
     def test_a_function_that_runs_once(self):
         self.build("early")
-        self.assertEqual("1\n", self.good_sim(THREAD + "loadrt early\nstart\nadvance 5 cycles\ngetp early.count\n"))
+        self.assertEqual("1\n1\n", self.good_sim(THREAD + "loadrt early\nstart\nadvance 5 cycles\ngetp early.count\ngets early-wide\n"))
         error = self.sim("loadrt early\n").stderr
         self.assertIn("'t'", error)
         self.assertIn("early", error)

@@ -30,7 +30,7 @@ def _library():
 
 
 class Shared:
-    """One open stream; `open` returns None where there is none of that key and these types."""
+    """One open stream; `open` returns None if no stream has that key and these types."""
 
     @classmethod
     def open(cls, key, types):
