@@ -212,6 +212,12 @@ class Machine(LinuxcncCase):
         self.version("2.9.4")
         self.assertEqual("", self.linuxcnc(self.ini())[1])
 
+    def test_a_source_tree_that_is_not_built(self):
+        (self.home / "rtlib").mkdir()
+        (self.home / "bin/milltask").unlink()
+        self.assertEqual("hal linuxcnc: 'milltask' is missing in the source tree CONFIG/installed, which LINUXCNC_HOME names; build it there\n",
+                         self.linuxcnc(self.ini(), status=1)[1])
+
     def test_a_source_tree_that_was_built_in_place(self):
         for folder in ("rtlib", "scripts", "lib/hallib"):
             (self.home / folder).mkdir(parents=True)

@@ -117,7 +117,10 @@ private:
     bool programs() {
         for (const std::string& name : {std::string("linuxcncsvr"), to_.io.empty() ? "" : to_.io[0], to_.task[0]})
             if (!name.empty() && find_program(to_, name).empty())
-                return fail(options_, fmt::format("'{}' is not installed; type: sudo apt-get install linuxcnc-uspace", name)), false;
+                return fail(options_, to_.linuxcnc.libraries.empty()
+                                          ? fmt::format("'{}' is not installed; type: sudo apt-get install linuxcnc-uspace", name)
+                                          : fmt::format("'{}' is missing in the source tree {}, which LINUXCNC_HOME names; build it there", name, to_.linuxcnc.home)),
+                       false;
         if (!to_.halui.empty() && find_program(to_, to_.halui[0]).empty()) return missing("[HAL]HALUI", to_.halui[0]);
         if (!to_.bridge.empty() && find_program(to_, to_.bridge[0]).empty()) return missing("[HAL]HALBRIDGE", to_.bridge[0]);
         if (to_.display[0] != "dummy" && find_program(to_, to_.display[0]).empty()) return missing("[DISPLAY]DISPLAY", to_.display[0]);
