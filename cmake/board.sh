@@ -12,7 +12,7 @@ use_board() {
     esac
     if [ "$in_cache" ]; then die "builds for a board need a source tree that can be written to"; fi
     need "$qemu-static=qemu-user-static" "$triplet-g++=g++-$triplet" mmdebstrap=mmdebstrap python3=python3
-    content="libc6-dev libstdc++-12-dev libfmt-dev nlohmann-json3-dev libcli11-dev libedit-dev libcap-dev libgtest-dev libpugixml-dev libzstd-dev libeigen3-dev libwebsockets-dev"
+    content="libc6-dev libstdc++-12-dev libfmt-dev nlohmann-json3-dev libcli11-dev libedit-dev libcap-dev libgtest-dev libpugixml-dev libzstd-dev liblz4-dev libeigen3-dev libwebsockets-dev"
     folder=$build/boards/$board sysroot=$build/boards/$board/sysroot
     if [ -f "$folder/content" ] && [ "$(cat "$folder/content")" = "$content" ]; then return; fi
     mirror=${HALCYON_MIRROR:-http://deb.debian.org/debian}

@@ -170,7 +170,7 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Playback, "playback", "Plays a recording into pins", R"(
-The file is one that `hal record` wrote, or another MCAP file with flat ROS 2 messages. Each recorded value becomes an output of its own name and
+The file is one that `hal record` wrote, or another MCAP file with ROS 2 messages: their numbers are played, texts and arrays of any length are skipped. Each recorded value becomes an output of its own name and
 type: `x-pid.error` is `playback.0.x-pid.error`. In each cycle the outputs have the values that were recorded at that time after the first row; a
 recording of a thread of the same period is played row by row. The whole file is read when the component is loaded, at most 1 GiB of values.
 

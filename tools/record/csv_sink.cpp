@@ -87,6 +87,12 @@ std::unique_ptr<Sink> make_csv_sink(const std::string& path, const std::vector<P
     return std::make_unique<CsvSink>(path, columns);
 }
 
+std::string unsupported_profile(const std::string& profile, const std::string& path) {
+    if (profile.empty()) return "";
+    if (profile != "ros2") return "unknown --profile '" + profile + "'; supported: ros2";
+    return path.ends_with(".mcap") ? "" : "--profile is for a recording that ends in .mcap";
+}
+
 std::unique_ptr<Sink> make_sink(const std::string& path, const std::vector<ProbeColumn>& columns, const Origin& origin) {
     return path.ends_with(".csv") ? make_csv_sink(path, columns) : make_mcap_sink(path, columns, origin);
 }

@@ -4,7 +4,8 @@
 #include <algorithm>
 #include <bit>
 #include <limits>
-#include <string_view>
+
+#include "record/cdr.hpp"
 
 namespace hal::tools {
 namespace {
@@ -19,26 +20,6 @@ Quantity quantity_of(const ProbeColumn& column) {
     if (unit == "N*m" || unit == "N") return effort;
     return other;
 }
-
-/// Common Data Representation, XCDR1, little-endian; positions are counted from behind its header.
-class Cdr {
-public:
-    explicit Cdr(std::string& to) : to_(to) { to.assign("\x00\x01\x00\x00", 4); }
-    void word(std::uint32_t value) { put(value, 4); }
-    void text(std::string_view value) {
-        word(static_cast<std::uint32_t>(value.size() + 1));
-        to_ += value;
-        to_ += '\0';
-    }
-    void real(double value) { put(std::bit_cast<std::uint64_t>(value), 8); }
-
-private:
-    void put(std::uint64_t value, std::size_t bytes) {
-        while ((to_.size() - 4) % bytes != 0) to_ += '\0';
-        for (std::size_t k = 0; k < bytes; ++k) to_ += static_cast<char>(value >> (8 * k));
-    }
-    std::string& to_;
-};
 
 }  // namespace
 

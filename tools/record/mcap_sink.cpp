@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include <cstring>
 #include <map>
+#include <set>
 #include <nlohmann/json.hpp>
 
+#include "record/cdr.hpp"
 #include "record/joints.hpp"
 #include "record/sink.hpp"
 #include "recording/mcap/rows.hpp"
@@ -13,6 +15,25 @@ namespace {
 
 constexpr const char* event_schema =
     R"({"type":"object","properties":{"kind":{"type":"string"},"text":{"type":"string"}},"required":["kind","text"]})";
+
+/// The message of ROS 2 for events.
+constexpr const char* log_message = "rcl_interfaces/msg/Log";
+constexpr const char* log_schema =
+    "builtin_interfaces/Time stamp\nuint8 level\nstring name\nstring msg\nstring file\nstring function\nuint32 line\n"
+    "================================================================================\n"
+    "MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n";
+
+/// Writes an event as `log_message`, with its kind as the name.
+void write_log(const ProbeClient::Entry& entry, std::int64_t unix_ns, std::string& to) {
+    constexpr std::int64_t second = 1'000'000'000;
+    constexpr std::uint32_t info = 20, error = 40;  // of that message
+    Cdr cdr(to);
+    cdr.word(static_cast<std::uint32_t>(unix_ns / second));
+    cdr.word(static_cast<std::uint32_t>(unix_ns % second));
+    cdr.byte(entry.kind == "fault" ? error : info);
+    for (const std::string& text : {entry.kind, entry.text, std::string(), std::string()}) cdr.text(text);
+    cdr.word(0);
+}
 
 /// servo-thread: ServoThread, as ROS names messages.
 std::string message_name(const std::string& thread) {
@@ -29,14 +50,15 @@ std::string message_name(const std::string& thread) {
 class McapSink final : public Sink {
 public:
     McapSink(const std::string& path, const std::vector<ProbeColumn>& columns, const Origin& origin)
-        : columns_(columns), offset_ns_(origin.unix_offset_ns), writer_(path) {
+        : columns_(columns), offset_ns_(origin.unix_offset_ns), ros_(origin.profile == "ros2"), writer_(path, origin.profile) {
         std::map<std::string, std::string> about{
             {"instance", origin.instance}, {"version", origin.version}, {"unix_offset_ns", std::to_string(origin.unix_offset_ns)}};
         if (!origin.cause.empty()) about["cause"] = origin.cause;
         writer_.metadata("halcyon", about);
         if (!origin.netlist.empty()) writer_.attachment("netlist.hal", "text/plain", origin.netlist, 0);
-        const std::uint16_t schema = writer_.add_schema("halcyon.Event", "jsonschema", event_schema);
-        events_ = writer_.add_channel(schema, "/hal/events", "json", {});
+        const std::uint16_t schema = ros_ ? writer_.add_schema(log_message, "ros2msg", log_schema)
+                                          : writer_.add_schema("halcyon.Event", "jsonschema", event_schema);
+        events_ = writer_.add_channel(schema, "/hal/events", ros_ ? "cdr" : "json", {});
     }
 
     bool layout(const std::vector<ProbeGroup>& groups) override {
@@ -58,10 +80,11 @@ public:
             metadata["period_ns"] = std::to_string(group.period_ns);
             const auto schema = writer_.add_schema(
                 "halcyon_msgs/msg/" + message_name(thread) + (number == 1 ? "" : "V" + std::to_string(number)), "ros2msg", rows.schema());
-            groups_.push_back({writer_.add_channel(schema, "/hal/" + thread + suffix, "cdr", std::move(metadata)), std::move(rows), std::move(joints)});
+            const std::string topic = topic_of(thread, suffix);
+            groups_.push_back({writer_.add_channel(schema, topic, "cdr", std::move(metadata)), std::move(rows), std::move(joints)});
             if (groups_.back().joints.empty()) continue;
             if (joint_schema_ == 0) joint_schema_ = writer_.add_schema(Joints::message, "ros2msg", Joints::schema());
-            groups_.back().joint_channel = writer_.add_channel(joint_schema_, "/hal/" + thread + suffix + "/joints", "cdr", {});
+            groups_.back().joint_channel = writer_.add_channel(joint_schema_, topic + "/joints", "cdr", {});
             joint_channels_.push_back(groups_.back().joint_channel);
         }
         return writer_.error() == 0;
@@ -79,9 +102,11 @@ public:
     }
 
     bool event(const ProbeClient::Entry& entry) override {
-        const std::string text =
-            nlohmann::json{{"kind", entry.kind}, {"text", entry.text}}.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
-        return writer_.message(events_, number_++, static_cast<std::uint64_t>(entry.time_ns + offset_ns_), text);
+        const std::int64_t unix_ns = entry.time_ns + offset_ns_;
+        const nlohmann::json object{{"kind", entry.kind}, {"text", entry.text}};
+        std::string text = object.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+        if (ros_) write_log(entry, unix_ns, text);
+        return writer_.message(events_, number_++, static_cast<std::uint64_t>(unix_ns), text);
     }
 
     bool flush() override { return writer_.flush(); }
@@ -100,6 +125,14 @@ public:
     }
 
 private:
+    /// Returns a topic of its own for a thread: ROS allows no dash in it, and two threads may differ in that only.
+    std::string topic_of(const std::string& thread, const std::string& suffix) {
+        const std::string base = "/hal/" + (ros_ ? mcap::ros_name(thread) : thread) + suffix;
+        std::string topic = base;
+        for (int n = 2; !topics_.insert(topic).second; ++n) topic = base + "_" + std::to_string(n);
+        return topic;
+    }
+
     struct Group {
         std::uint16_t channel;
         mcap::RowWriter rows;
@@ -109,6 +142,8 @@ private:
     };
     const std::vector<ProbeColumn> columns_;
     const std::int64_t offset_ns_;
+    const bool ros_;
+    std::set<std::string> topics_{"/hal/events"};
     mcap::Writer writer_;
     std::vector<Group> groups_;
     std::map<std::string, int> layouts_;

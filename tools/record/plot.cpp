@@ -36,7 +36,7 @@ int run_plot(const PlotOptions& options) {
     mcap::Recording recording;
     std::string problem;
     if (!mcap::load(file, recording, problem)) return fail(options, problem);
-    if (!recording.note.empty()) std::fputs(fmt::format("{}: {}\n", options.program, recording.note).c_str(), stderr);
+    for (const std::string& note : recording.notes()) std::fputs(fmt::format("{}: {}\n", options.program, note).c_str(), stderr);
     if (recording.tables.empty())
         return fail(options, fmt::format("'{}' has no rows{}", file, recording.unread.empty() ? "" : "; " + recording.unread));
     std::vector<Trace> traces;

@@ -32,7 +32,7 @@ public:
           what_(what),
           client_(client),
           probe_(probe),
-          origin_{client.instance(), client.version(), client.run("save").out, "", probe.unix_ns(0)} {
+          origin_{client.instance(), client.version(), client.run("save").out, "", probe.unix_ns(0), what.profile} {
         client.cancel_on(-1);
     }
 
@@ -204,6 +204,8 @@ private:
 int record_values(const Options& options, const std::string& instance, Recording what) {
     if (!what.file.ends_with(".mcap") && !what.file.ends_with(".csv"))
         return fail(options, fmt::format("unknown format of '{}'; name the file .mcap or .csv", what.file));
+    std::string problem = unsupported_profile(what.profile, what.file);
+    if (!problem.empty()) return fail(options, problem);
     if (what.names.empty() && what.groups.empty() && !what.all) return fail(options, "missing names of values; or --group NAME; or --all");
     if (what.all && !what.groups.empty()) return fail(options, "--all has every --group; leave one out");
     if (what.last_ns >= 0 && what.rotate_ns >= 0) return fail(options, "--last and --rotate exclude each other; leave one out");
@@ -212,7 +214,6 @@ int record_values(const Options& options, const std::string& instance, Recording
     constexpr std::int64_t default_after_ns = 5'000'000'000;
     if (what.after_ns < 0) what.after_ns = default_after_ns;
     if (what.last_ns < 0 && !what.trigger.empty()) return fail(options, "--trigger needs --last TIME: what is kept until it comes");
-    std::string problem;
     const auto client = Client::connect(instance, problem);
     if (!client) return fail(options, problem);
     if (!what.trigger.empty()) what.names.push_back(what.trigger);

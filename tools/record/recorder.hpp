@@ -22,6 +22,7 @@ struct Recording {
     std::int64_t last_ns = -1;                 ///< flight recorder: how much it keeps
     std::int64_t after_ns = -1;                ///< -1: not given
     std::string trigger;
+    std::string profile;                       ///< of an .mcap: "ros2", or ""
 
     void declare(OptionSet& set) {
         set.flag("-a,--all", all, "record all signals, and all pins and parameters without a signal");
@@ -36,11 +37,13 @@ struct Recording {
                      "flight recorder: keep the last TIME in memory, write it on a fault, a trigger, or the end of the machine", 1'000'000,
                      "60s, 10s or 5min");
         set.value("--trigger", trigger, "NAME", "with --last: also write when this pin or signal becomes TRUE or non-zero");
+        set.value("--profile", profile, "PROFILE", "ros2: write an .mcap of ROS 2 messages only, for rosbags and ros2 bag");
         set.duration("--after", after_ns, "with --last: what to record after the event (default 5s)");
     }
     /// Something of it was given: the words are FILE NAMES.
     bool asked() const {
-        return all || !groups.empty() || every != 1 || for_ns >= 0 || most_mb > 0 || rotate_ns >= 0 || last_ns >= 0 || keep != 0 || !trigger.empty() || after_ns >= 0;
+        return all || !groups.empty() || every != 1 || for_ns >= 0 || most_mb > 0 || rotate_ns >= 0 || last_ns >= 0 || keep != 0 || !trigger.empty() || after_ns >= 0 ||
+               !profile.empty();
     }
 };
 

@@ -15,6 +15,7 @@ namespace hal::tools {
 struct Origin {
     std::string instance, version, netlist, cause;
     std::int64_t unix_offset_ns = 0;  ///< from the machine's clock to Unix time
+    std::string profile = {};         ///< of an .mcap: "ros2", or ""
 };
 
 class Sink {
@@ -44,6 +45,9 @@ public:
 std::unique_ptr<Sink> make_sink(const std::string& path, const std::vector<ProbeColumn>& columns, const Origin& origin);
 std::unique_ptr<Sink> make_mcap_sink(const std::string& path, const std::vector<ProbeColumn>& columns, const Origin& origin);
 std::unique_ptr<Sink> make_csv_sink(const std::string& path, const std::vector<ProbeColumn>& columns);
+
+/// Returns why a file cannot have that profile; "" when it can.
+std::string unsupported_profile(const std::string& profile, const std::string& path);
 
 /// Returns "cannot write 'FILE': REASON; WHAT REMAINS" for a sink that failed. Closes it.
 std::string cannot_write(Sink& sink, const std::string& path);

@@ -182,7 +182,8 @@ private:
             if (!thread) return "";
         }
         for (const mcap::Table& table : recording_.tables) {
-            const Thread* const own = table.topic.starts_with("/hal/") ? model.find_thread(table.topic.substr(5)) : nullptr;
+            const std::string topic = table.topic.starts_with("/hal/") ? table.topic.substr(5) : "";
+            const Thread* const own = model.find_thread(table.thread.empty() ? topic : table.thread);
             if (!thread && own) thread = own;
         }
         if (!thread) thread = model.threads.front().get();
@@ -260,6 +261,7 @@ int run_replay(const ReplayOptions& options) {
     mcap::Recording recording;
     std::string problem;
     if (!mcap::load(options.words.front(), recording, problem)) return fail(options, problem);
+    for (const std::string& note : recording.notes()) write_all(STDERR_FILENO, fmt::format("{}: {}\n", options.program, note));
     if (recording.tables.empty())
         return fail(options,
                     fmt::format("'{}' has no rows{}", options.words.front(), recording.unread.empty() ? "" : "; " + recording.unread));

@@ -91,6 +91,7 @@ int run_sim(const SimOptions& options) {
     const bool advance = options.for_ns >= 0 || options.cycles != 0;
     if (!options.record.empty() && !advance) return fail(options, "--record needs --for TIME or --cycles N");
     if (!options.values.empty() && options.record.empty()) return fail(options, "--values needs --record FILE");
+    if (!options.profile.empty() && options.record.empty()) return fail(options, "--profile needs --record FILE.mcap");
     if (options.for_ns >= 0 && options.cycles != 0) return fail(options, "--for and --cycles exclude each other; leave one out");
     auto nodes = requested_nodes(options);
     if (!nodes) return 1;

@@ -17,6 +17,7 @@ struct SimOptions : NetlistOptions {
     bool report = false;
     bool quiet = false;  ///< no summary
     std::string record;  ///< file
+    std::string profile;  ///< of that file
     std::vector<std::string> values;   ///< to be recorded: names and patterns, separated by commas
 
     void declare(OptionSet& set) override {
@@ -29,6 +30,7 @@ struct SimOptions : NetlistOptions {
         set.flag("--report", report, "print the timing report on stderr at the end");
         set.values("--show", show, "NAMES", "print these pins, parameters and signals at the end; patterns like 'pid.*' too; may be repeated");
         set.value("--record", record, "FILE", "record the time that --for or --cycles advances to FILE.mcap or FILE.csv");
+        set.value("--profile", profile, "PROFILE", "with --record FILE.mcap; ros2: write ROS 2 messages only, for rosbags and ros2 bag");
         set.values("--values", values, "NAMES", "with --record: only these pins, parameters and signals; patterns too; may be repeated");
         set.flag("-q,--quiet", quiet, "no summary (default: on stderr, when that is a terminal or the netlist printed nothing)");
         set.value("--node", part, "NAME", "simulate only this node of a netlist for several machines (default: all nodes)");

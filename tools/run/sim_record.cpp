@@ -67,6 +67,8 @@ bool add_rows(Sink& sink, const ProbeRows& rows, ProbeLayout& layout, std::uint6
 int check_recording(const SimOptions& options) {
     if (!options.record.ends_with(".mcap") && !options.record.ends_with(".csv"))
         return fail(options, fmt::format("unknown format of '{}'; name the file .mcap or .csv", options.record));
+    if (const std::string unsupported = unsupported_profile(options.profile, options.record); !unsupported.empty())
+        return fail(options, unsupported);
     const std::string problem = mcap::unwritable(options.record);
     return problem.empty() ? 0 : fail(options, fmt::format("cannot write '{}': {}", options.record, problem));
 }
@@ -87,7 +89,7 @@ int record_advance(const SimOptions& options, HostedMachine& machine) {
         layout = Probes::layout(*probe);
         journal = session.journal().begin();
     }
-    const auto sink = make_sink(options.record, Probes::columns(*probe), {session.options().name, std::string(paths::version), "", "", 0});
+    const auto sink = make_sink(options.record, Probes::columns(*probe), {session.options().name, std::string(paths::version), "", "", 0, options.profile});
     if (!sink->kept().empty()) write_all(2, kept_line(*sink, options.record));
     bool good = sink->error() == 0 && sink->layout(layout.groups);
     std::uint64_t rows = 0;

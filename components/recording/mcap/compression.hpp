@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Compression of chunks, where the build has libzstd.
+// Compression of chunks: zstd and lz4, each where the build has its library. Only zstd is written.
 #pragma once
 
 #include <cstdint>

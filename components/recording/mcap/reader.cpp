@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <set>
 
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -63,6 +64,26 @@ std::map<std::string, std::string> read_pairs(std::string_view text) {
     return entries;
 }
 
+/// States why a file without the magic bytes of MCAP is not read.
+std::string not_mcap(Source& source) {
+    struct Format {
+        std::string_view magic;
+        const char*      sentence;
+    };
+    constexpr Format formats[] = {
+        {std::string_view("\x28\xb5\x2f\xfd", 4), "it is compressed as a whole, with zstd; type: zstd -d FILE"},
+        {std::string_view("\x04\x22\x4d\x18", 4), "it is compressed as a whole, with lz4; type: lz4 -d FILE"},
+        {std::string_view("\x1f\x8b", 2), "it is compressed as a whole, with gzip; type: gunzip FILE"},
+        {"SQLite format 3", "it is an SQLite database, a .db3 of ROS 2; convert it with rosbags-convert"},
+        {"#ROSBAG V", "it is a bag of ROS 1; convert it with rosbags-convert"},
+    };
+    std::string begin;
+    source.read(0, static_cast<std::size_t>(std::min<std::uint64_t>(source.size(), 16)), begin);
+    for (const Format& format : formats)
+        if (std::string_view(begin).starts_with(format.magic)) return std::string("not an MCAP file: ") + format.sentence;
+    return "not an MCAP file: it does not begin with the bytes that such a file has";
+}
+
 Message read_message(std::string_view content) {
     Fields  fields(content);
     Message message;
@@ -81,7 +102,8 @@ std::unique_ptr<Source> open_file(const std::string& path, std::string& problem)
     struct stat about{};
     if (file >= 0 && ::fstat(file, &about) == 0 && S_ISREG(about.st_mode))
         return std::make_unique<FileSource>(file, static_cast<std::uint64_t>(about.st_size));
-    problem = "cannot read '" + path + "': " + (file < 0 ? std::strerror(errno) : "it is not a regular file");
+    const char* const other = S_ISDIR(about.st_mode) ? "it is a folder; name the .mcap file in it" : "it is not a regular file";
+    problem = "cannot read '" + path + "': " + (file < 0 ? std::strerror(errno) : other);
     if (file >= 0) ::close(file);
     return nullptr;
 }
@@ -91,18 +113,33 @@ std::unique_ptr<Source> open_bytes(std::string_view bytes) { return std::make_un
 bool Reader::open(std::unique_ptr<Source> source) {
     source_ = std::move(source);
     std::string begin;
-    if (!source_->read(0, magic.size(), begin) || begin != magic)
-        return fail("not an MCAP file: it does not begin with the bytes that such a file has");
+    if (!source_->read(0, magic.size(), begin) || begin != magic) return fail(not_mcap(*source_));
     const bool summary = read_summary();
-    if (summary && !chunks_.empty()) return true;
     const bool footer = ends_;
-    schemas_.clear();
-    channels_.clear();
-    chunks_.clear();
-    metadata_.clear();
-    if (!scan()) return false;
-    unfinished_ = !(ends_ && (summary || footer));
+    if (!summary) {
+        schemas_.clear();
+        channels_.clear();
+        chunks_.clear();
+        metadata_.clear();
+        channel_count_.reset();
+    }
+    const bool indexed = !chunks_.empty();
+    if (!scan(!summary_has_channels())) return false;
+    unfinished_ = !indexed && !(ends_ && (summary || footer));
     return true;
+}
+
+// A summary may omit schemas and channels, and then lists chunks only.
+bool Reader::summary_has_channels() const {
+    for (const auto& [id, channel] : channels_)
+        if (channel.schema != 0 && !schemas_.contains(channel.schema)) return false;
+    bool listed = true;
+    for (const ChunkIndex& chunk : chunks_) {
+        listed = listed && !chunk.message_indexes.empty();
+        for (const auto& [channel, offset] : chunk.message_indexes)
+            if (!channels_.contains(channel)) return false;
+    }
+    return channel_count_ ? channels_.size() >= *channel_count_ : listed;
 }
 
 // A schema, a channel or an index: from the summary, or found by a scan.
@@ -136,6 +173,10 @@ bool Reader::take(std::uint8_t opcode, std::string_view content) {
     } else if (opcode == op_metadata_index) {
         const auto offset = fields.get<std::uint64_t>(), length = fields.get<std::uint64_t>();
         metadata_.push_back({offset, length, std::string(fields.text())});
+    } else if (opcode == op_statistics) {
+        fields.get<std::uint64_t>();
+        fields.get<std::uint16_t>();
+        channel_count_ = fields.get<std::uint32_t>();
     }
     return true;
 }
@@ -165,10 +206,14 @@ bool Reader::read_summary() {
     return true;
 }
 
-// What is there up to the first part that is incomplete.
-bool Reader::scan() {
+// Reads the records after each other up to the first that is incomplete. Chunks of the summary are read with `load_known` only, for the schemas and
+// channels in them; metadata of the summary is known.
+bool Reader::scan(bool load_known) {
     const std::uint64_t size = source_->size();
-    std::string         head, content;
+    std::set<std::uint64_t> known, described;
+    for (const ChunkIndex& chunk : chunks_) known.insert(chunk.offset);
+    for (const Metadata& one : metadata_) described.insert(one.offset);
+    std::string head, content;
     ends_ = false;
     for (std::uint64_t at = magic.size(); at + record_head <= size;) {
         if (!source_->read(at, static_cast<std::size_t>(std::min<std::uint64_t>(record_head + message_head, size - at)), head)) break;
@@ -182,38 +227,48 @@ bool Reader::scan() {
             fields.get<std::uint16_t>();
             fields.get<std::uint32_t>();
             add_loose(at, record_head + length, fields.get<std::uint64_t>());
-        } else if (opcode == op_chunk) {
-            constexpr std::size_t fixed = 8 + 8 + 8 + 4 + 4;
-            if (length < fixed || !source_->read(at + record_head, static_cast<std::size_t>(std::min<std::uint64_t>(length, 256)), content))
-                break;
-            Fields     chunk(content);
+        } else if (opcode == op_chunk && (load_known || !known.contains(at))) {
             ChunkIndex index;
-            index.begin_time = chunk.get<std::uint64_t>();
-            index.end_time = chunk.get<std::uint64_t>();
-            index.size = chunk.get<std::uint64_t>();
-            chunk.get<std::uint32_t>();
-            index.compression = chunk.text();
-            index.compressed_size = chunk.get<std::uint64_t>();
             index.offset = at;
             index.length = record_head + length;
-            if (!chunk.good() || chunks_.size() >= most_entries) break;
-            std::string records;
-            if (!load_chunk(index, records)) break;  // torn: the end of what can be read
-            for (Fields inner(records); inner.more();) {
-                const auto             kind = inner.get<std::uint8_t>();
-                const std::string_view what = inner.blob();
-                if (inner.good() && (kind == op_schema || kind == op_channel) && !take(kind, what)) return false;
-            }
-            chunks_.push_back(std::move(index));
+            if (chunks_.size() >= most_entries || !scan_chunk(index)) break;
+            if (!known.contains(at)) chunks_.push_back(std::move(index));
         } else if ((opcode == op_schema || opcode == op_channel) && length <= most_chunk) {
             if (!source_->read(at + record_head, static_cast<std::size_t>(length), content) || !take(opcode, content)) break;
-        } else if (opcode == op_metadata && metadata_.size() < 1000 && length <= (1 << 20) &&
+        } else if (opcode == op_metadata && !described.contains(at) && metadata_.size() < 1000 && length <= (1 << 20) &&
                    source_->read(at + record_head, static_cast<std::size_t>(length), content)) {
             metadata_.push_back({at, record_head + length, std::string(Fields(content).text())});
         }
         at += record_head + length;
     }
     problem_.clear();
+    std::stable_sort(chunks_.begin(), chunks_.end(), [](const ChunkIndex& a, const ChunkIndex& b) { return a.offset < b.offset; });
+    return true;
+}
+
+// Completes the index of a chunk from its head, and reads the schemas and channels in it. A chunk that cannot be expanded stays in the list: each()
+// reports why. Returns false when its head is incomplete.
+bool Reader::scan_chunk(ChunkIndex& index) {
+    constexpr std::size_t fixed = 8 + 8 + 8 + 4 + 4, most_head = 256;
+    const std::uint64_t   length = index.length - record_head;
+    std::string           head;
+    if (length < fixed) return false;
+    if (!source_->read(index.offset + record_head, static_cast<std::size_t>(std::min<std::uint64_t>(length, most_head)), head)) return false;
+    Fields chunk(head);
+    index.begin_time = chunk.get<std::uint64_t>();
+    index.end_time = chunk.get<std::uint64_t>();
+    index.size = chunk.get<std::uint64_t>();
+    chunk.get<std::uint32_t>();
+    index.compression = chunk.text();
+    index.compressed_size = chunk.get<std::uint64_t>();
+    if (!chunk.good()) return false;
+    std::string records;
+    if (!load_chunk(index, records)) return true;
+    for (Fields inner(records); inner.more();) {
+        const auto             kind = inner.get<std::uint8_t>();
+        const std::string_view what = inner.blob();
+        if (inner.good() && (kind == op_schema || kind == op_channel) && !take(kind, what)) return false;
+    }
     return true;
 }
 

@@ -7,6 +7,7 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -34,7 +35,9 @@ public:
     static constexpr std::uint64_t most_chunk = std::uint64_t{256} << 20;   ///< bytes of a chunk, expanded
     static constexpr std::size_t   most_entries = 1'000'000;                   ///< chunks, or other records of the summary
 
-    /// Reads what the file contains. Without a summary, or chunks in it, it scans the file: messages that are in no chunk count as chunks of 1 MiB. Returns false and sets problem() when it is not an MCAP file.
+    /// Reads what the file contains: its summary, and the heads of its records. Where the summary is missing, or omits chunks, schemas or channels,
+    /// it reads these chunks too. Messages that are in no chunk count as chunks of 1 MiB. Returns false and sets problem() when it is not an MCAP
+    /// file.
     bool               open(std::unique_ptr<Source> source);
     const std::string& problem() const { return problem_; }
     /// True: the file has no end, as after a power failure; it was read up to its last complete chunk or message.
@@ -60,7 +63,9 @@ private:
         return false;
     }
     bool read_summary();
-    bool scan();
+    bool summary_has_channels() const;
+    bool scan(bool load_known);
+    bool scan_chunk(ChunkIndex& index);
     void add_loose(std::uint64_t at, std::uint64_t length, std::uint64_t time);
     bool take(std::uint8_t opcode, std::string_view content);
     bool load_chunk(const ChunkIndex& chunk, std::string& records);
@@ -77,6 +82,7 @@ private:
     };
     std::vector<Metadata> metadata_;
     std::uint64_t         chunks_read_ = 0;
+    std::optional<std::uint32_t> channel_count_;  // of the statistics
 };
 
 }  // namespace hal::mcap

@@ -8,10 +8,12 @@
 #include <limits>
 #include <map>
 #include <numeric>
+#include <set>
 #include <sstream>
 #include <type_traits>
 #include <utility>
 
+#include "recording/mcap/bytes.hpp"
 #include "recording/mcap/reader.hpp"
 
 namespace hal::mcap {
@@ -42,7 +44,7 @@ void sort(Table& table) {
     std::vector<std::size_t> order(table.rows());
     std::iota(order.begin(), order.end(), std::size_t{0});
     std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return table.times_ns[a] < table.times_ns[b]; });
-    Table sorted{table.topic, table.columns, {}, {}};
+    Table sorted{table.topic, table.columns, {}, {}, table.thread};
     for (const std::size_t row : order) {
         sorted.times_ns.push_back(table.times_ns[row]);
         for (std::size_t c = 0; c < table.columns.size(); ++c) sorted.words.push_back(table.word(row, c));
@@ -56,7 +58,51 @@ bool is_joint_state(const Reader& reader, const Channel& channel) {
     return channel.topic.starts_with("/hal/") && schema != reader.schemas().end() && schema->second.name == "sensor_msgs/msg/JointState";
 }
 
-constexpr const char* flat_only = "; CDR messages with a 'ros2msg' schema of numbers and bool only are";
+constexpr const char* supported = "; CDR messages with a 'ros2msg' schema are";
+
+/// Adds a sentence to those about what is not read, or counts it when there are many.
+class Skipped {
+public:
+    explicit Skipped(std::vector<std::string>& sentences) : sentences_(sentences) {}
+    void add(std::string sentence) {
+        constexpr std::size_t max_sentences = 8;
+        if (sentences_.size() < max_sentences) sentences_.push_back(std::move(sentence));
+        else
+            ++more_;
+    }
+    void finish() {
+        if (more_ == 1) sentences_.push_back("of 1 more topic not everything is read");
+        if (more_ > 1) sentences_.push_back("of " + std::to_string(more_) + " more topics not everything is read");
+    }
+
+private:
+    std::vector<std::string>& sentences_;
+    std::size_t               more_ = 0;
+};
+
+std::string topic_text(const Channel& channel) { return "topic '" + channel.topic.substr(0, 60) + "'"; }
+
+/// Returns "header.frame_id (string), name (string[]) and 2 more".
+std::string listed(const std::vector<std::string>& fields) {
+    constexpr std::size_t max_fields = 4;
+    std::string           text;
+    for (std::size_t i = 0; i < fields.size() && i < max_fields; ++i) text += (i == 0 ? "" : ", ") + fields[i];
+    if (fields.size() > max_fields) text += " and " + std::to_string(fields.size() - max_fields) + " more";
+    return text;
+}
+
+/// The event in a message of rcl_interfaces/msg/Log: stamp, level, name, msg. Returns false when it is too short.
+bool read_log(std::string_view payload, std::string& kind, std::string& text) {
+    constexpr std::size_t name_at = 4 + 12;  // after the CDR header, the time, the level and its padding
+    if (payload.size() < name_at || payload[1] != 1) return false;
+    Fields fields(payload.substr(name_at));
+    kind = fields.text();
+    fields.take((4 - kind.size() % 4) % 4);
+    text = fields.text();
+    for (std::string* one : {&kind, &text})
+        if (!one->empty()) one->pop_back();  // the zero at its end
+    return fields.good();
+}
 
 bool load_mcap(const std::string& path, Recording& to, std::string& problem, const LoadOptions& options) {
     Reader reader;
@@ -68,36 +114,53 @@ bool load_mcap(const std::string& path, Recording& to, std::string& problem, con
     }
     if (reader.unfinished()) to.note = "'" + path + "' ends without a summary: it was read up to its last complete chunk or message";
     std::map<std::uint16_t, std::pair<RowReader, std::size_t>> rows;
-    std::map<std::uint16_t, bool>                              events;
+    std::map<std::uint16_t, std::string>                       events;  // the encoding of their messages
+    Skipped                                                    skipped(to.skipped);
     for (const auto& [id, channel] : reader.channels()) {
+        if (channel.topic == "/hal/events") {
+            events[id] = channel.encoding;
+            continue;
+        }
+        if (is_joint_state(reader, channel)) continue;
         const auto schema = reader.schemas().find(channel.schema);
         RowReader  row;
         if (schema != reader.schemas().end() && row.open(schema->second, channel)) {
-            to.tables.push_back({channel.topic, row.columns(), {}, {}});
+            if (!row.skipped().empty()) skipped.add(topic_text(channel) + ": not read: " + listed(row.skipped()));
+            const auto thread = channel.metadata.find("thread");
+            to.tables.push_back({channel.topic, row.columns(), {}, {}, thread == channel.metadata.end() ? "" : thread->second});
             rows.emplace(id, std::pair{std::move(row), to.tables.size() - 1});
-        } else if (to.unread.empty() && channel.topic != "/hal/events" && !is_joint_state(reader, channel)) {
-            const std::string why = schema == reader.schemas().end() ? "it has no schema" : row.problem();
-            to.unread = "topic '" + channel.topic.substr(0, 60) + "' is not read: " + why + flat_only;
+            continue;
         }
-        events[id] = channel.topic == "/hal/events" && channel.encoding == "json";
+        const std::string why = schema == reader.schemas().end() ? "it has no schema" : row.problem();
+        const std::string sentence = topic_text(channel) + " is not read: " + why;
+        if (to.unread.empty()) to.unread = sentence + supported;
+        skipped.add(sentence);
     }
     std::vector<std::uint64_t> values;
     std::size_t                bytes = 0;
+    std::set<std::uint16_t>    unreadable;
     const auto                 visit = [&](const Message& message) {
         const auto time_ns = static_cast<std::int64_t>(message.log_time);
         bytes += 8;
         if (const auto at = rows.find(message.channel); at != rows.end()) {
             Table& table = to.tables[at->second.second];
             if (!at->second.first.read(message.payload, values)) {
-                if (to.unread.empty())
-                    to.unread = "a message of topic '" + table.topic.substr(0, 60) + "' is shorter than its schema, or big-endian";
+                if (unreadable.insert(message.channel).second)
+                    skipped.add("a message of topic '" + table.topic.substr(0, 60) + "' is shorter than its schema, or not plain CDR");
                 return true;
             }
             table.times_ns.push_back(time_ns);
             table.words.insert(table.words.end(), values.begin(), values.end());
             bytes += values.size() * 8;
-        } else if (events[message.channel]) {
-            to.events.push_back({time_ns, json_text(message.payload, "kind"), json_text(message.payload, "text")});
+        } else if (const auto event = events.find(message.channel); event != events.end()) {
+            std::string kind, text;
+            if (event->second == "json") {
+                kind = json_text(message.payload, "kind");
+                text = json_text(message.payload, "text");
+            } else if (!read_log(message.payload, kind, text)) {
+                return true;
+            }
+            to.events.push_back({time_ns, std::move(kind), std::move(text)});
             bytes += message.payload.size();
         }
         return bytes <= options.most_bytes;
@@ -105,6 +168,10 @@ bool load_mcap(const std::string& path, Recording& to, std::string& problem, con
     const auto end = options.end_ns == INT64_MAX ? UINT64_MAX : static_cast<std::uint64_t>(options.end_ns);
     if (!reader.each(visit, static_cast<std::uint64_t>(std::max<std::int64_t>(options.begin_ns, 0)), end))
         to.note = "'" + path + "': " + reader.problem() + "; it was read up to there";
+    skipped.finish();
+    if (!reader.problem().empty()) to.unread = reader.problem();
+    else if (to.unread.empty() && !unreadable.empty()) to.unread = to.skipped.back();
+    else if (to.unread.empty()) to.unread = rows.empty() ? "it has no topics" : "none of its topics has a message";
     if (bytes > options.most_bytes) {
         problem = "'" + path + "' has more than " + std::to_string(options.most_bytes >> 20) + " MiB of values; choose a part of it";
         return false;
@@ -257,11 +324,20 @@ std::int64_t Recording::end_ns() const {
     return time == INT64_MIN ? 0 : time;
 }
 
+std::vector<std::string> Recording::notes() const {
+    std::vector<std::string> all;
+    if (!note.empty()) all.push_back(note);
+    all.insert(all.end(), skipped.begin(), skipped.end());
+    return all;
+}
+
 bool load(const std::string& path, Recording& to, std::string& problem, const LoadOptions& options) {
     if (!(path.ends_with(".csv") ? load_csv : load_mcap)(path, to, problem, options)) return false;
     for (Table& table : to.tables) sort(table);
     std::erase_if(to.tables, [](const Table& table) { return table.rows() == 0; });
     if (!to.tables.empty()) to.unread.clear();
+    else
+        to.skipped.clear();
     return true;
 }
 

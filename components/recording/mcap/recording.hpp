@@ -22,6 +22,7 @@ struct Table {
     std::vector<Column>        columns;
     std::vector<std::int64_t>  times_ns;    ///< Unix time, ascending
     std::vector<std::uint64_t> words;      ///< row after row
+    std::string                thread = {};  ///< of a machine; "" of another writer
 
     std::size_t   rows() const { return times_ns.size(); }
     std::uint64_t word(std::size_t row, std::size_t column) const { return words[row * columns.size() + column]; }
@@ -37,10 +38,13 @@ struct Recording {
     std::vector<Table> tables;
     std::vector<Event> events;
     std::string        note;                      ///< what is wrong with the file though it was read; "" when nothing is
-    std::string        unread;  ///< of a file without rows: which of its topics is not read, and why; else ""
+    std::string        unread;  ///< of a file without rows: the reason, such as which of its topics is not read, and why; else ""
+    std::vector<std::string> skipped = {};  ///< of a file with rows: what of it is not read, a sentence per topic
 
     std::int64_t begin_ns() const;
     std::int64_t end_ns() const;
+    /// Returns the sentences for the user of the file: `note` and `skipped`.
+    std::vector<std::string> notes() const;
 };
 
 /// Options of load().

@@ -11,6 +11,7 @@
 
 #include "hal/abi.h"
 #include "recording/mcap/records.hpp"
+#include "recording/mcap/ros_message.hpp"
 
 namespace hal::mcap {
 
@@ -19,6 +20,9 @@ struct Column {
     hal_type    type = HAL_TYPE_FLOAT;
     std::string unit;
 };
+
+/// Returns a name as ROS wants it for fields and parts of topics: `joint.0.pos-cmd` becomes `joint_0_pos_cmd`.
+std::string ros_name(const std::string& name);
 
 /// Writes rows: the fields are sorted by size, so that there is no padding.
 class RowWriter {
@@ -36,23 +40,21 @@ private:
     std::vector<std::size_t> order_;  // of the columns in the message
 };
 
-/// Reads rows of a channel, ours or another writer's, as long as its message is flat: numbers and bool.
+/// Reads rows of a channel, ours or another writer's: the numbers of its ROS 2 messages.
 class RowReader {
 public:
-    /// Returns false when the channel has other messages, and sets problem(), as "its messages are json".
+    /// Returns false when the channel has other messages, and sets problem(), as "its messages are 'json'".
     bool                       open(const Schema& schema, const Channel& channel);
     const std::string&         problem() const { return problem_; }
     const std::vector<Column>& columns() const { return columns_; }
-    /// Replaces `values` by a word per column. Returns false when the message is too short.
-    bool read(std::string_view payload, std::vector<std::uint64_t>& values) const;
+    /// Returns the fields that have no number, as "frame_id (string)".
+    const std::vector<std::string>& skipped() const { return message_.skipped(); }
+    /// Replaces `values` by a word per column. Returns false when the message is too short, or not plain CDR.
+    bool read(std::string_view payload, std::vector<std::uint64_t>& values) const { return message_.read(payload, values); }
 
 private:
-    struct Field {
-        std::size_t bytes;
-        bool        is_signed, is_float;
-    };
     std::vector<Column> columns_;
-    std::vector<Field>  fields_;
+    RosMessage          message_;
     std::string         problem_;
 };
 

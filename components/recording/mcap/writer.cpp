@@ -56,10 +56,10 @@ std::string content(const ChunkIndex& index) {
 
 }  // namespace
 
-Writer::Writer(std::string path) : path_(std::move(path)), held_(hold_part(path_)), file_(held_.file), error_(held_.error) {
+Writer::Writer(std::string path, std::string_view profile) : path_(std::move(path)), held_(hold_part(path_)), file_(held_.file), error_(held_.error) {
     if (file_ < 0) return;
     std::string header;
-    put_text(header, "");  // profile
+    put_text(header, profile);
     put_text(header, "halcyon");
     write(magic);
     record(op_header, header);

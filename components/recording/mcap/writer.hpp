@@ -20,8 +20,8 @@ public:
     static constexpr std::size_t   chunk_bytes = std::size_t{1} << 20;
     static constexpr std::uint64_t chunk_ns = 1'000'000'000;  ///< a chunk is written after this time at the latest
 
-    /// Creates PATH.part; see error(). A PATH.part that a killed recorder left gets another name, kept().
-    explicit Writer(std::string path);
+    /// Creates PATH.part; see error(). A PATH.part that a killed recorder left gets another name, kept(). `profile` goes into the header: "ros2", or "".
+    explicit Writer(std::string path, std::string_view profile = "");
     ~Writer();  ///< close()
     Writer(const Writer&) = delete;
 
