@@ -18,6 +18,9 @@ namespace hal::can {
 std::string log_line(const Frame&, std::string_view channel);
 /// Parses such a line. Returns false for an invalid one. `time_ns` becomes that of the line.
 bool parse_log_line(std::string_view line, Frame&);
+/// Appends the frames of a log: of can-utils or python-can, or candump's terminal format with times. Returns "", or the first line that is invalid and
+/// the reason; then the frames of the other lines are appended all the same.
+std::string parse_log(std::string_view text, std::vector<Frame>& frames);
 
 /// The frames of a capture in order of time: candump log, pcapng or pcap, distinguished by the first bytes. A truncated or damaged part
 /// ends the list, and `problem` has its place; it is empty when all was read.

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include <gtest/gtest.h>
 
+#include <time.h>
 #include <unistd.h>
 
 #include <cstdio>
+#include <cstdlib>
 #include <fstream>
 #include <random>
 #include <string>
@@ -26,6 +28,7 @@ std::vector<Frame> frames_of_every_kind() {
         f.extended = i % 2 == 0;
         f.remote = !f.fd && i % 7 == 0;
         f.bit_rate_switch = f.fd && i % 4 == 0;
+        f.error_state = f.fd && i % 5 == 0;
         f.id = static_cast<std::uint32_t>(random()) & (f.extended ? 0x1fffffffU : 0x7ffU);
         f.length = f.fd ? length_of_code(static_cast<unsigned>(random() % 16)) : static_cast<std::uint8_t>(random() % 9);
         f.time_ns = 1'700'000'000'000'000'000LL + i * 1'234'567LL;
@@ -124,6 +127,93 @@ TEST(Capture, log_lines_are_candumps) {
     for (const char* wrong : {"", "(1) can0", "(x) can0 123#", "(1) can0 12#", "(1) can0 123#1", "(1) can0 123#112233445566778899",
                               "(1) can0 923#R9"})
         EXPECT_FALSE(parse_log_line(wrong, f)) << wrong;
+}
+
+TEST(Capture, log_lines_of_every_writer_are_read) {
+    struct Case {
+        const char* line;
+        Frame frame;
+    };
+    Frame fd(0x123, {0x11, 0x22, 0x33});
+    fd.fd = fd.bit_rate_switch = fd.error_state = true;
+    const Frame eight(0x123, {1, 2, 3, 4, 5, 6, 7, 8});
+    for (const auto& [line, frame] : std::vector<Case>{
+             {"(1436509052.249713)  vcan0 044#2A R", {0x44, {0x2a}}},                 // candump -x, a channel with a shorter name
+             {"(1436509052.249713) vcan0 044#2A T\r", {0x44, {0x2a}}},
+             {"(1436509052.249713) vcan0 044#2a t", {0x44, {0x2a}}},
+             {"(1436509052.249713123) vcan0 044#2A", {0x44, {0x2a}}},                 // candump -N
+             {"(0.000000) vcan0 044#2A R", {0x44, {0x2a}}},                           // python-can
+             {"(0.000000) can0 044#R R", Frame::request(0x44, 0)},
+             {"(1.0) can0 044#R8_E", Frame::request(0x44, 8)},                        // the raw DLC
+             {"(1.0) can0 123#0102030405060708_9", eight},
+             {"(1.0) can0 123#01.02.03.04.05.06.07.08", eight},                       // cansend's separators
+             {"(1.0) can0 123##3.11.22.33", fd},
+             {"(1.0) can0 123##7112233 R", fd}}) {                                    // with the mark of FD
+        Frame f;
+        ASSERT_TRUE(parse_log_line(line, f)) << line;
+        EXPECT_TRUE(f.same(frame)) << line;
+    }
+    for (const char* wrong : {"(1) can0 123#R9", "(1) can0 123#R8_", "(1) can0 123#0102_9", "(1) can0 123#.", "(1) can0 123#1.2", "(2026-13-01) can0 123#",
+                              "(1) can0 123##101_9", "(2026-11-28 18:00) can0 123#", "(1) 123#11"}) {
+        Frame f;
+        EXPECT_FALSE(parse_log_line(wrong, f)) << wrong;
+    }
+}
+
+TEST(Capture, the_terminal_format_with_times_is_read) {
+    std::vector<Frame> frames;
+    ASSERT_EQ(parse_log(" (1436509052.249713)  vcan0       044   [5]  2A 36 6C 2B BA            '*6l+.'\n"
+                        " (1436509053.000001)  \x1b[1mvcan0\x1b[0m  TX B E  12345678  [02]  AA BB\n"
+                        " (1436509053.000002)  vcan0  RX - -  123   {E}  01 02 03 04 05 06 07 08\n"
+                        "(1436509054.0)  can1       123   [4]  remote request\r\n"
+                        " (1436509055.0)  can1  20000080   [8]  00 00 00 00 00 00 00 00   ERRORFRAME\n"
+                        "\tbus-error\n"
+                        "DROPCOUNT: dropped 3 CAN frames on 'can1' socket (total drops 3)\n"
+                        "(1436509056.0) can1 7FF#\n",  // a log that follows it
+                        frames), "");
+    ASSERT_EQ(frames.size(), 6U);
+    EXPECT_TRUE(frames[0].same({0x44, {0x2a, 0x36, 0x6c, 0x2b, 0xba}}));
+    EXPECT_EQ(frames[0].time_ns, 1'436'509'052'249'713'000);
+    EXPECT_TRUE(frames[1].extended && frames[1].fd && frames[1].bit_rate_switch && frames[1].error_state && frames[1].length == 2);
+    EXPECT_TRUE(frames[2].same({0x123, {1, 2, 3, 4, 5, 6, 7, 8}}));
+    EXPECT_TRUE(frames[3].same(Frame::request(0x123, 4)));
+    EXPECT_TRUE(frames[4].error && frames[4].id == 0x80);
+}
+
+TEST(Capture, dates_are_in_the_zone_of_the_machine) {
+    const char* const before = std::getenv("TZ");
+    const std::string zone = before != nullptr ? before : "";
+    ::setenv("TZ", "UTC-2", 1);
+    ::tzset();
+    std::vector<Frame> frames;
+    EXPECT_EQ(parse_log("(2026-11-28 18:00:00.249713) can0 044#2A\n (2026-11-28 18:00:01.25)  can0  044   [1]  2A\n", frames), "");
+    before != nullptr ? ::setenv("TZ", zone.c_str(), 1) : ::unsetenv("TZ");
+    ::tzset();
+    ASSERT_EQ(frames.size(), 2U);
+    EXPECT_EQ(frames[0].time_ns, 1'795'881'600'249'713'000);
+    EXPECT_EQ(frames[1].time_ns, 1'795'881'601'250'000'000);
+}
+
+TEST(Capture, what_is_not_a_log_is_named) {
+    const auto problem = [](std::string_view text) {
+        std::vector<Frame> frames;
+        return parse_log(text, frames);
+    };
+    EXPECT_EQ(problem("  can0  123   [2]  01 02\n"), "line 1: terminal format of candump, without times; record with: candump -L, or candump -ta");
+    EXPECT_EQ(problem("\n  can0  TX - -  123   [0]\n"), "line 2: terminal format of candump, without times; record with: candump -L, or candump -ta");
+    for (const char* const bytes : {"00000001 00000010", "02`01"})
+        EXPECT_EQ(problem(std::string(" (1436509052.249713)  can0  123   [2]  ") + bytes + "\n"),
+                  "line 1: terminal format of candump, not with plain hexadecimal bytes; record with: candump -L");
+    EXPECT_EQ(problem("(000.000000) can0 123#\n(000.100000) can0 123#\n(000.050000) can0 123#\n"),
+              "line 3: the time goes back: differences, as candump -td prints them; record with: candump -L");
+    EXPECT_EQ(problem("(000.000000) can0 123#\n(000.100000) can0 123#\n"), "");
+    EXPECT_EQ(problem("(5.0) can0 123#\n(4.0) can1 123#\n"), "") << "two buses, put in order";
+    EXPECT_EQ(problem("(1.0) can0 00123#81:00:12345678#11223344\n"), "line 1: CAN XL frame; supported: classic and FD frames");
+    EXPECT_EQ(problem("hello\n"), "line 1: invalid frame; expected `(1436509052.249713) can0 181#0102`");
+    EXPECT_EQ(problem("date Sat Nov 28 18:00:00 2026\nbase hex  timestamps absolute\n"),
+              "not a candump log: it is a Vector log (.asc); convert it with: can_logconvert FILE FILE.log");
+    EXPECT_EQ(problem("Timestamp:        0.000000    ID:      123    S Rx                DL:  0\n"),
+              "not a candump log: it is the terminal output of python-can; record with: can_logger -f FILE.log");
 }
 
 TEST(Capture, both_formats_give_back_what_was_recorded) {

@@ -9,7 +9,7 @@ import signal
 import subprocess
 import unittest
 
-from harness import HAL, TIMEOUT, Case, wait_until
+from harness import HAL, TIMEOUT, Case, Terminal, wait_until
 
 
 class Node(Case):
@@ -165,6 +165,16 @@ class Dcf(Node):
         self.write("moves.dcf", text.replace("[6411sub1]\n", "[6411sub1]\nParameterValue=5\n"))
         done = self.run_program("can", "dcf", "write", self.bus, "5", "moves.dcf", "--check")
         self.assertEqual("hal can dcf write: skipped: 6411:1 Write analogue output 16-bit, Analogue output 1: it moves the device\n", done.stderr)
+        self.write("other.dcf", text.replace("\nNodeID=5\n", "\nNodeID=6\n"))
+        other = ("can", "dcf", "write", self.bus, "5", "other.dcf", "--check")
+        self.assertEqual("hal can dcf write: 'other.dcf' does not fit: it is for node 6, not for node 5; to write it all the same, add --other-node\n",
+                         self.bad(*other))
+        self.assertRegex(self.good(*other, "--other-node"), r"^node 5: 0 of \d+ settings differ\n$")
+        self.write("rate.dcf", re.sub(r"\nBaudrate=\d+", "\nBaudrate=250", text))
+        rate = ("can", "dcf", "write", self.bus + "?bitrate=500k", "5", "rate.dcf", "--check")
+        self.assertEqual("hal can dcf write: 'rate.dcf' does not fit: it is for a bus of 250 kbit/s, not of 500 kbit/s; to write it all the same, "
+                         "add --other-node\n", self.bad(*rate))
+        self.assertRegex(self.good(*rate, "--other-node"), r"^node 5: 0 of \d+ settings differ\n$")
         # its replacement knows nothing of it
         self.can("sdo", "write", self.bus, "5", "6207:1", "0", "--type", "u8")
         self.can("pdo", "map", self.bus, "5", "tpdo2", "6401:1", "6401:2", "--transmission", "255", "--inhibit", "0ms")
@@ -350,6 +360,30 @@ class Flash(Node):
         self.assertEqual("hal can flash: node 6, 1F50:1: data cannot be transferred or stored to the application (0x08000020); the device rejected "
                          "the image and may have no valid program now; check that the image is for this device\n", self.bad("can", "flash", self.bus, 6, "bad.bin"))
         self.assertIn("program running, software identification", self.good("can", "flash", self.bus, 6, "new.bin"))
+
+    def test_a_long_transfer_shows_its_progress_on_a_terminal(self):
+        """The node is stopped until the line has appeared: a transfer that takes long."""
+        node = subprocess.Popen(["hal", "node", "bootloader", "--link", self.bus, "--id", "6"], executable=str(HAL), cwd=self.folder, env=self.environment,
+                                stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, text=True)
+        self.addCleanup(Case.end, self, node)
+        node.stdout.readline()
+        (self.folder / "image.bin").write_bytes(bytes(20_000))
+        for control in ("0", "3"):
+            self.good("can", "sdo", "write", self.bus, 6, "1f51:1", control, "--type", "u8")
+        write = ("can", "sdo", "write", self.bus, 6, "1f50:1", "--from", "image.bin", "--type", "domain", "--timeout", "60s")
+        node.send_signal(signal.SIGSTOP)
+        self.addCleanup(node.send_signal, signal.SIGCONT)  # before its end
+        shown = Terminal(self, *write)
+        self.assertEqual("\r\x1b[Knode 6, 1F50:1: 0.0 of 20.0 kB, 0 %", shown.expect("0 %"))
+        node.send_signal(signal.SIGCONT)
+        shown.wait()
+        self.assertTrue(shown.seen.endswith("\r\x1b[K") or "\r\x1b[Khal can sdo write: " in shown.seen, shown.seen)  # the image is not a program
+        node.send_signal(signal.SIGSTOP)
+        silent = subprocess.Popen(["hal", "can", "sdo", "read", self.bus, "6", "1008:0", "--timeout", "700ms"], executable=str(HAL), cwd=self.folder,
+                                  env=self.environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        out, error = silent.communicate(timeout=2 * TIMEOUT)
+        self.assertNotIn("\x1b", out + error, "not where no terminal is")
+        self.assertIn("node 6 did not respond within 2.1 s", error)
 
     def test_a_node_without_one_and_wrong_files(self):
         self.assertIn("hal can flash: node 5 has no program control 1F51:1", self.bad("can", "flash", self.bus, 5, "/proc/version"))

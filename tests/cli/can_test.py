@@ -26,6 +26,8 @@ CAPTURE = """(1000.000000) can0 000#0102
 (1000.010000) can0 100#0000000064320000
 (1000.011000) can0 100#000000006432
 (1000.012000) can0 123##1AABB
+(1000.012500) can0 123##3AABB
+(1000.012600) can0 123##2AABB
 (1000.013000) can0 701#R
 (1000.014000) can0 702#00
 (1000.015000) can0 602#C612100020000000
@@ -48,6 +50,8 @@ DUMPED = """    0.000000  rx       000  [2] 01 02                    NMT start: 
     0.010000  rx       100  [8] 00 00 00 00 64 32 00 00  TIME with a wrong length: it has 6 bytes
     0.011000  rx       100  [6] 00 00 00 00 64 32        TIME 2019-04-27 00:00:00.000
     0.012000  rx       123  [2] FD+ AA BB
+    0.012500  rx       123  [2] FD+ ESI AA BB
+    0.012600  rx       123  [2] FD ESI AA BB
     0.013000  rx       701  [0] remote request, 0 bytes  node guarding: asks node 1
     0.014000  rx       702  [1] 00                       boot-up of node 2
     0.015000  rx       602  [8] C6 12 10 00 20 00 00 00  SDO to node 2: write 1012:0 in blocks, 32 bytes

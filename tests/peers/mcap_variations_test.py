@@ -225,7 +225,7 @@ def profile(folder):
     (folder / "b.hal").write_text(NETLIST.replace("loadrt siggen names=wave\n", "").replace("setp wave.frequency 2\n", "")
                                   .replace("addf wave.update servo-thread\n", "").replace("net sine wave.sine\n", "net sine => late.in1\n"))
     status, out = hal(folder, "replay", "ros.mcap", "b.hal", "--names", "sine,axis.*")
-    check("and hal replay, on the thread with its dash", status == 0 and "not read" not in out and "1 input driven" in out, out)
+    check("and hal replay, on the thread with its dash", status == 0 and "not read" not in out and "axis.twist           equal in 2000 rows" in out, out)
     (folder / "fault.hal").write_text("loadrt threads name1=servo period1=1000000\nloadrt siggen names=wave\naddf wave.update servo\n")
     status, out = hal(folder, "sim", "-q", "a.hal", "--for", "1s", "--record", "a.csv", "--profile", "ros2")
     check("not of a table", status == 1 and "--profile is for a recording that ends in .mcap" in out, out)

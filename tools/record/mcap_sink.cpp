@@ -78,8 +78,7 @@ public:
             auto metadata = rows.metadata();
             metadata["thread"] = group.thread;
             metadata["period_ns"] = std::to_string(group.period_ns);
-            const auto schema = writer_.add_schema(
-                "halcyon_msgs/msg/" + message_name(thread) + (number == 1 ? "" : "V" + std::to_string(number)), "ros2msg", rows.schema());
+            const auto schema = writer_.add_schema(type_of(thread), "ros2msg", rows.schema());
             const std::string topic = topic_of(thread, suffix);
             groups_.push_back({writer_.add_channel(schema, topic, "cdr", std::move(metadata)), std::move(rows), std::move(joints)});
             if (groups_.back().joints.empty()) continue;
@@ -133,6 +132,14 @@ private:
         return topic;
     }
 
+    /// Returns the name of another type of message: a reader has one definition for each.
+    std::string type_of(const std::string& thread) {
+        const std::string base = "halcyon_msgs/msg/" + message_name(thread);
+        std::string type = base;
+        for (int n = 2; !types_.insert(type).second; ++n) type = base + "V" + std::to_string(n);
+        return type;
+    }
+
     struct Group {
         std::uint16_t channel;
         mcap::RowWriter rows;
@@ -143,7 +150,7 @@ private:
     const std::vector<ProbeColumn> columns_;
     const std::int64_t offset_ns_;
     const bool ros_;
-    std::set<std::string> topics_{"/hal/events"};
+    std::set<std::string> topics_{"/hal/events"}, types_;
     mcap::Writer writer_;
     std::vector<Group> groups_;
     std::map<std::string, int> layouts_;

@@ -182,6 +182,13 @@ Reading read_eds(std::string_view bytes);
 /// Writes an EDS, or a DCF if there is a commissioning. UTF-8; lines end with CR LF, as in CiA 306.
 std::string write_eds(const DeviceDescription& description);
 
+/// Returns why the parameter values of a DCF are not for this node, as "it is for node 5, not for node 7"; "" when they are, or when the file does not
+/// state it. `bit_rate` is in bit/s; 0: unknown.
+std::string misfit(const DeviceDescription& dcf, unsigned node_id, std::uint32_t bit_rate);
+
+/// Returns the number of entries with a parameter value.
+std::size_t parameter_values(const DeviceDescription& description);
+
 /// Adds the objects of the connected modules.
 void connect_modules(DeviceDescription& description, std::vector<Message>& messages);
 

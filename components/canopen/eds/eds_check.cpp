@@ -8,6 +8,8 @@ namespace hal::canopen::eds {
 
 namespace {
 
+bool has_parameter_value(const Entry& entry) { return !entry.parameter_value.empty(); }
+
 constexpr unsigned most_pdo_bits = 64 * 8;  // CAN FD; a classic frame has 64
 
 class Checks {
@@ -21,11 +23,29 @@ public:
         }
         count(0x1400, d_.device.rx_pdos, d_.device.rx_pdos_at, "NrOfRXPDO");
         count(0x1800, d_.device.tx_pdos, d_.device.tx_pdos_at, "NrOfTXPDO");
+        if (!d_.commissioning) values_of_eds();
     }
 
 private:
     void report(Severity severity, Topic topic, const Span& at, std::string sentence, std::string help = "") {
         messages_.push_back({severity, topic, at, std::move(sentence), std::move(help)});
+    }
+
+    // An EDS describes a type of device; values for one device make a DCF.
+    void values_of_eds() {
+        const std::size_t all = parameter_values(d_);
+        for (const Object& object : d_.objects) {
+            const auto entry = std::find_if(object.entries.begin(), object.entries.end(), has_parameter_value);
+            if (entry == object.entries.end()) continue;
+            const std::string where = object.single() ? label(object.index) : label(object.index, entry->sub);
+            std::string sentence = "parameter value of " + where;
+            if (all == 2) sentence += " and 1 more";
+            if (all > 2) sentence += " and " + std::to_string(all - 1) + " more";
+            report(Severity::note, Topic::value, entry->at,
+                sentence + ": a file without [DeviceComissioning] is an EDS, and a master does not write its parameter values",
+                "add [DeviceComissioning] with the NodeID to make it a DCF");
+            return;
+        }
     }
 
     std::optional<std::uint64_t> value(const Entry& entry) const {
@@ -112,6 +132,22 @@ private:
 };
 
 }  // namespace
+
+std::string misfit(const DeviceDescription& dcf, unsigned node_id, std::uint32_t bit_rate) {
+    if (!dcf.commissioning) return "";
+    const unsigned its_node = dcf.commissioning->node_id, its_rate = dcf.commissioning->baud_rate;
+    if (its_node != 0 && its_node != node_id)
+        return "it is for node " + std::to_string(its_node) + ", not for node " + std::to_string(node_id);
+    if (its_rate == 0 || bit_rate == 0 || its_rate * 1000 == bit_rate) return "";
+    return "it is for a bus of " + std::to_string(its_rate) + " kbit/s, not of " + std::to_string(bit_rate / 1000) + " kbit/s";
+}
+
+std::size_t parameter_values(const DeviceDescription& description) {
+    std::size_t count = 0;
+    for (const Object& object : description.objects)
+        count += static_cast<std::size_t>(std::count_if(object.entries.begin(), object.entries.end(), has_parameter_value));
+    return count;
+}
 
 void check_objects(const DeviceDescription& description, std::vector<Message>& messages) { Checks(description, messages).run(); }
 

@@ -98,6 +98,10 @@ public:
     std::uint64_t unexpected_responses() const noexcept { return unexpected_; }
     /// Returns the number of repeated frames and restarted transfers. [any]
     std::uint64_t retries() const noexcept { return retries_; }
+    /// Returns the bytes of the transfer in progress that the other side has confirmed, or that were received; 0 when none is. Not for another thread.
+    std::size_t transferred() const noexcept { return first_ != nullptr ? offset_ : 0; }
+    /// Returns the bytes of the transfer in progress; 0 when the server has not announced them.
+    std::size_t announced() const noexcept { return first_ != nullptr ? size_ : 0; }
 
 private:
     enum class State : std::uint8_t {

@@ -87,15 +87,7 @@ Capture parse_capture(std::string_view bytes) {
             capture.frames.push_back(f);
         });
     } else {
-        for (std::size_t at = 0, number = 1; at < bytes.size(); ++number) {
-            const auto end = std::min(bytes.find('\n', at), bytes.size());
-            const auto line = bytes.substr(at, end - at);
-            at = end + 1;
-            Frame f;
-            if (parse_log_line(line, f)) capture.frames.push_back(f);
-            else if (line.find_first_not_of(" \t\r") != line.npos && capture.problem.empty())
-                capture.problem = "line " + std::to_string(number) + ": invalid frame; expected `(1436509052.249713) can0 181#0102`";
-        }
+        capture.problem = parse_log(bytes, capture.frames);
     }
     std::stable_sort(capture.frames.begin(), capture.frames.end(), [](const Frame& a, const Frame& b) { return a.time_ns < b.time_ns; });
     return capture;

@@ -1,7 +1,13 @@
 // SPDX-License-Identifier: MIT
 // The candump log format: `(SECONDS.FRACTION) CHANNEL ID#DATA`, remote frames `ID#R` or `ID#R4`, FD `ID##FLAGSDATA`. Three digits are a
-// standard identifier, eight an extended one, or an error frame if bit 29 is set.
+// standard identifier, eight an extended one, or an error frame if bit 29 is set. The time may be a date, as `candump -L -tA` writes it; a direction
+// R or T may follow (`candump -x`, python-can); bytes may be separated by dots, and a raw DLC of 9 to 15 may follow eight of them (`_E`).
+// The terminal format is `(TIME)  CHANNEL  [RX|TX - -]  ID  [LENGTH]  BYTES`, with the time only for `candump -t`.
+#include <algorithm>
+#include <array>
 #include <cstdio>
+#include <ctime>
+#include <vector>
 
 #include "link/capture.hpp"
 
@@ -39,15 +45,73 @@ bool time_of(std::string_view text, std::int64_t& ns) {
     return digits;
 }
 
+/// Parses `2026-11-28 18:00:00.249713`, which candump writes in the time zone of its machine.
+bool date_of(std::string_view text, std::int64_t& ns) {
+    std::tm local{};
+    int     size = 0;
+    const std::string copy(text);
+    const int fields = std::sscanf(copy.c_str(), "%4d-%2d-%2d %2d:%2d:%2d%n", &local.tm_year, &local.tm_mon, &local.tm_mday, &local.tm_hour,
+                                   &local.tm_min, &local.tm_sec, &size);
+    if (fields != 6 || local.tm_year < 1970) return false;
+    local.tm_year -= 1900;
+    local.tm_mon -= 1;
+    local.tm_isdst = -1;
+    const std::time_t seconds = std::mktime(&local);
+    std::int64_t fraction = 0;
+    constexpr std::time_t max_seconds = 9'000'000'000;  // as in time_of()
+    if (seconds < 0 || seconds > max_seconds || !time_of("0" + copy.substr(static_cast<std::size_t>(size)), fraction)) return false;
+    ns = std::int64_t{seconds} * 1'000'000'000 + fraction;
+    return true;
+}
+
+/// Takes `(TIME)` from the begin of a line.
+bool take_time(std::string_view& line, std::int64_t& ns) {
+    const auto close = line.find(')');
+    if (line.empty() || line[0] != '(' || close == line.npos) return false;
+    const std::string_view text = line.substr(1, close - 1);
+    line.remove_prefix(close + 1);
+    return text.find(' ') == text.npos ? time_of(text, ns) : date_of(text, ns);
+}
+
+bool set_identifier(std::string_view text, Frame& f) {
+    std::uint32_t id = 0;
+    if ((text.size() != 3 && text.size() != 8) || !hex(text, id)) return false;
+    f.extended = text.size() == 8;
+    f.error = f.extended && (id & 0x20000000U) != 0;
+    if (f.error) f.extended = false;
+    f.id = f.error ? id & 0x1fffffffU : id;
+    return true;
+}
+
+/// Parses `R`, `R4` or `R8_E`.
+bool parse_remote(std::string_view text, Frame& f) {
+    std::uint32_t length = 0, code = 0;
+    f.remote = true;
+    text.remove_prefix(1);
+    const auto raw = text.find('_');
+    if (raw != text.npos && (!hex(text.substr(raw + 1), code) || text.size() != raw + 2)) return false;
+    text = text.substr(0, raw);
+    if (text.size() > 1 || (!text.empty() && !hex(text, length))) return false;
+    f.length = static_cast<std::uint8_t>(length);
+    return f.valid();
+}
+
+bool parse_bytes(std::string_view text, Frame& f) {
+    const std::size_t most = f.fd ? 64 : 8;
+    while (!text.empty()) {
+        if (text[0] == '.') text.remove_prefix(1);  // a separator, as cansend accepts it
+        if (!f.fd && f.length == 8 && text.size() == 2 && text[0] == '_') return true;  // the raw DLC; it has no byte
+        std::uint32_t byte = 0;
+        if (f.length >= most || text.size() < 2 || !hex(text.substr(0, 2), byte)) return false;
+        f.data[f.length++] = static_cast<std::uint8_t>(byte);
+        text.remove_prefix(2);
+    }
+    return true;
+}
+
 bool parse_frame(std::string_view text, Frame& f) {
     const auto mark = text.find('#');
-    if (mark != 3 && mark != 8) return false;
-    std::uint32_t id = 0;
-    if (!hex(text.substr(0, mark), id)) return false;
-    f.extended = mark == 8;
-    f.error = f.extended && (id & 0x20000000U) != 0;
-    if (f.error) f.extended = false, id &= 0x1fffffffU;
-    f.id = id;
+    if (mark == text.npos || !set_identifier(text.substr(0, mark), f)) return false;
     text.remove_prefix(mark + 1);
     if (!text.empty() && text[0] == '#') {
         std::uint32_t flags = 0;
@@ -57,19 +121,105 @@ bool parse_frame(std::string_view text, Frame& f) {
         f.error_state = (flags & 2) != 0;
         text.remove_prefix(2);
     } else if (!text.empty() && (text[0] == 'R' || text[0] == 'r')) {
+        return parse_remote(text, f);
+    }
+    return parse_bytes(text, f) && (f.error || f.valid());
+}
+
+std::string_view next_word(std::string_view& line) {
+    line.remove_prefix(std::min(line.find_first_not_of(" \t"), line.size()));
+    const std::string_view word = line.substr(0, line.find_first_of(" \t"));
+    line.remove_prefix(word.size());
+    return word;
+}
+
+/// The length in `[2]`, of an FD frame `[02]`, or the raw DLC in `{2}`. Returns false for anything else.
+bool parse_length(std::string_view word, bool& fd, std::uint32_t& length) {
+    if (word.size() < 3 || word.size() > 4) return false;
+    const bool raw = word.front() == '{' && word.back() == '}';
+    if (!raw && (word.front() != '[' || word.back() != ']')) return false;
+    fd = word.size() == 4;
+    std::int64_t ns = 0;
+    if (raw && !hex(word.substr(1, word.size() - 2), length)) return false;
+    if (!raw && !time_of(word.substr(1, word.size() - 2), ns)) return false;
+    if (!raw) length = static_cast<std::uint32_t>(ns / 1'000'000'000);
+    if (raw && length > 8) length = 8;
+    return length <= 64;
+}
+
+enum class Screen : std::uint8_t { other, frame, no_time, not_hexadecimal };
+
+/// Parses a line of the terminal format.
+Screen parse_screen_line(std::string_view line, Frame& f) {
+    f = {};
+    line.remove_prefix(std::min(line.find_first_not_of(" \t"), line.size()));
+    const bool timed = !line.empty() && line[0] == '(';
+    if (timed && !take_time(line, f.time_ns)) return Screen::other;
+    next_word(line);  // the channel
+    std::string_view word = next_word(line);
+    if (word == "RX" || word == "TX") {
+        f.bit_rate_switch = next_word(line) == "B";
+        f.error_state = next_word(line) == "E";
+        word = next_word(line);
+    }
+    std::uint32_t length = 0;
+    if (!set_identifier(word, f) || !parse_length(next_word(line), f.fd, length)) return Screen::other;
+    if (!timed) return Screen::no_time;
+    line.remove_prefix(std::min(line.find_first_not_of(' '), line.size()));
+    if (line.starts_with("remote request")) {
         f.remote = true;
-        std::uint32_t length = 0;
-        if (text.size() > 2 || (text.size() == 2 && !hex(text.substr(1), length))) return false;
         f.length = static_cast<std::uint8_t>(length);
-        return f.valid();
+        return f.valid() ? Screen::frame : Screen::other;
     }
-    if (text.size() % 2 != 0 || text.size() > (f.fd ? 128U : 16U)) return false;
-    for (std::size_t i = 0; i < text.size(); i += 2) {
-        std::uint32_t byte = 0;
-        if (!hex(text.substr(i, 2), byte)) return false;
-        f.data[f.length++] = static_cast<std::uint8_t>(byte);
+    for (std::uint32_t i = 0; i < length; ++i) {
+        const std::string_view byte = next_word(line);
+        if (byte.size() != 2 || !parse_bytes(byte, f)) return Screen::not_hexadecimal;  // candump -i, -S
     }
-    return f.error || f.valid();
+    return f.error || f.valid() ? Screen::frame : Screen::other;
+}
+
+/// Returns the line without its end and without the colours of a terminal.
+std::string plain(std::string_view line) {
+    std::string text;
+    for (std::size_t at = 0; at < line.size(); ++at) {
+        if (line[at] == '\x1b') at = std::min(line.find('m', at), line.size());
+        else
+            text += line[at];
+    }
+    while (!text.empty() && (text.back() == '\r' || text.back() == ' ')) text.pop_back();
+    return text;
+}
+
+bool is_xl(std::string_view line) {
+    const std::string_view frame = line.substr(line.rfind(' ') + 1);
+    const auto             first = frame.find('#');
+    return first == 5 && frame.find('#', first + 1) == first + 15;
+}
+
+struct OtherFormat {
+    std::string_view begin;
+    const char*      name;
+    bool             converted;  // by python-can
+};
+
+constexpr std::array<OtherFormat, 9> other_formats{{
+    {"date ", "a Vector log (.asc)", true},
+    {";$FILEVERSION", "a PCAN trace (.trc)", true},
+    {"timestamp,arbitration_id,", "a table of python-can (.csv)", true},
+    {"LOGG", "a Vector log (.blf)", true},
+    {"MDF ", "a measurement file (.mf4)", true},
+    {"SQLite format 3", "a database of python-can (.db)", true},
+    {"Timestamp: ", "the terminal output of python-can; record with: can_logger -f FILE.log", false},
+    {"\x89MCAP", "an MCAP recording; hal replay and hal plot read it", false},
+    {"time_s,", "a table of values; hal replay and hal plot read it", false},
+}};
+
+/// States which other format the text has; "" when it may be a log.
+std::string other_format(std::string_view text) {
+    for (const OtherFormat& format : other_formats)
+        if (text.starts_with(format.begin))
+            return std::string("not a candump log: it is ") + format.name + (format.converted ? "; convert it with: can_logconvert FILE FILE.log" : "");
+    return "";
 }
 
 }  // namespace
@@ -93,12 +243,45 @@ std::string log_line(const Frame& f, std::string_view channel) {
 bool parse_log_line(std::string_view line, Frame& f) {
     f = {};
     while (!line.empty() && (line.back() == '\r' || line.back() == ' ')) line.remove_suffix(1);
-    if (line.size() >= 2 && (line.ends_with(" R") || line.ends_with(" T"))) line.remove_suffix(2);  // direction, as candump -x writes it
-    if (line.empty() || line[0] != '(') return false;
-    const auto close = line.find(')');
-    if (close == line.npos || !time_of(line.substr(1, close - 1), f.time_ns)) return false;
+    if (line.size() >= 2 && line[line.size() - 2] == ' ' && std::string_view("RTrt").find(line.back()) != std::string_view::npos)
+        line.remove_suffix(2);  // direction, as candump -x and python-can write it
+    if (!take_time(line, f.time_ns)) return false;
     const auto space = line.rfind(' ');
-    return space > close + 1 && parse_frame(line.substr(space + 1), f);
+    return space != line.npos && space > 0 && parse_frame(line.substr(space + 1), f);
+}
+
+std::string parse_log(std::string_view text, std::vector<Frame>& frames) {
+    std::string problem = other_format(text);
+    if (!problem.empty()) return problem;
+    // candump -tz writes the time since the first frame, and -td that since the last one, in the same form
+    const bool since = text.substr(std::min(text.find('('), text.size())).starts_with("(000.");
+    bool       details = false;  // of an error frame, candump -e: lines that begin with a tab
+    for (std::size_t at = 0, number = 1; at < text.size(); ++number) {
+        const auto end = std::min(text.find('\n', at), text.size());
+        const std::string line = plain(text.substr(at, end - at));
+        at = end + 1;
+        if (line.empty() || line.starts_with("DROPCOUNT: ") || (details && line[0] == '\t')) continue;
+        Frame      f;
+        const bool logged = parse_log_line(line, f);
+        Screen     screen = logged ? Screen::other : parse_screen_line(line, f);
+        details = screen == Screen::frame && f.error;
+        if (logged || screen == Screen::frame) {
+            const bool back = since && !frames.empty() && f.time_ns < frames.back().time_ns;
+            frames.push_back(f);
+            if (!back || !problem.empty()) continue;
+            problem = "line " + std::to_string(number) + ": the time goes back: differences, as candump -td prints them; record with: candump -L";
+        }
+        if (!problem.empty()) continue;
+        problem = "line " + std::to_string(number) + ": ";
+        if (screen == Screen::no_time) problem += "terminal format of candump, without times; record with: candump -L, or candump -ta";
+        else if (screen == Screen::not_hexadecimal)
+            problem += "terminal format of candump, not with plain hexadecimal bytes; record with: candump -L";
+        else if (is_xl(line))
+            problem += "CAN XL frame; supported: classic and FD frames";
+        else
+            problem += "invalid frame; expected `(1436509052.249713) can0 181#0102`";
+    }
+    return problem;
 }
 
 }  // namespace hal::can

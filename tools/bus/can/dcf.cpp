@@ -115,6 +115,13 @@ int run_can_dcf_read(const DcfReadOptions& options) {
 
 namespace {
 
+/// Returns false after printing why the file is not for this node and bus. `bit_rate` 0: unknown.
+bool fits(const DcfWriteOptions& options, const eds::DeviceDescription& dcf, std::uint8_t node, std::uint32_t bit_rate) {
+    const std::string problem = options.other_node ? "" : eds::misfit(dcf, node, bit_rate);
+    if (problem.empty()) return true;
+    return fail(options, fmt::format("'{}' does not fit: {}; to write it all the same, add --other-node", options.words[2], problem)), false;
+}
+
 /// Compares the settings of a file with those of a node.
 class Download {
 public:
@@ -124,6 +131,8 @@ public:
     int run() {
         for (const eds::Write& write : writes_) wanted_[key(write)] = &write;
         if (!station_.open(options_.words[0])) return 1;
+        const std::uint32_t rate = station_.bus.link->description().bit_rate;
+        if (!fits(options_, *names_.description(), node_, rate == can::unlimited ? 0 : rate)) return 1;
         for (const auto& [at, write] : wanted_)
             if (!compare(*write)) return 1;
         std::size_t written = 0;
@@ -207,6 +216,7 @@ int run_can_dcf_write(const DcfWriteOptions& options) {
     if (!node_of(options, options.words[1], node)) return 1;
     ObjectNames names;
     if (!names.load(options, options.words[2])) return 1;
+    if (!fits(options, *names.description(), node, 0)) return 1;
     eds::Configuration configuration = eds::configuration_of(*names.description(), node, true);
     for (const eds::Message& message : configuration.messages)
         fail(options, fmt::format("{}:{}: {}{}", options.words[2], message.at.line, message.sentence,

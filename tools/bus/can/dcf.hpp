@@ -22,11 +22,13 @@ struct DcfReadOptions : Options {
 
 struct DcfWriteOptions : Options {
     bool check = false;           ///< only compare
+    bool other_node = false;      ///< write a DCF that was made for another node or bit rate
     std::int64_t timeout_ns = 0;  ///< of one response; 0: not given
 
     void declare(OptionSet& set) override {
         set.words("ADDRESS NODE FILE", "the bus; node ID 1..127; a DCF");
         set.flag("--check", check, "only print the differences; exit code 1 if there are any");
+        set.flag("--other-node", other_node, "write a DCF that was made for another node ID or bit rate");
         declare_timeout(set, timeout_ns);
     }
 };

@@ -46,7 +46,9 @@ struct Source {
 };
 
 std::string line(const can::Frame& f, double time, const std::string& bus, const DecodedFrame& decoded, bool coloured) {
-    const char* mark = f.fd ? f.bit_rate_switch ? " FD+" : " FD" : "";
+    std::string mark = f.fd ? " FD" : "";
+    if (f.bit_rate_switch) mark += '+';
+    if (f.error_state) mark += " ESI";
     std::string text =
         fmt::format("{:12.6f}  {}{}  {:>8}  [{}]{} {:23}", time, bus, f.own ? "tx" : "rx", id_text(f), f.length, mark, data_text(f, " "));
     if (!decoded.text.empty()) text += "  " + decoded.text;
@@ -61,7 +63,7 @@ std::string json_line(const can::Frame& f, double time, const Source& source, co
     std::string text = fmt::format(R"({{"time":{:.6f},{}"direction":"{}","id":{},"extended":{},"length":{},"data":"{}")", time,
                                    bus_member(source), f.own ? "tx" : "rx", f.id, f.extended, f.length, f.remote ? "" : data_text(f, ""));
     if (f.remote) text += R"(,"remote":true)";
-    if (f.fd) text += fmt::format(R"(,"fd":true,"bit_rate_switch":{})", f.bit_rate_switch);
+    if (f.fd) text += fmt::format(R"(,"fd":true,"bit_rate_switch":{},"error_state":{})", f.bit_rate_switch, f.error_state);
     if (f.error) text += R"(,"error":true)";
     if (!decoded.text.empty()) text += fmt::format(R"(,"meaning":"{}")", decoded.text);
     return text + "}\n";

@@ -4,6 +4,7 @@
 #include <charconv>
 #include <fmt/core.h>
 
+#include "bus/can/transfer_progress.hpp"
 #include "cli/output.hpp"
 
 namespace hal::tools {
@@ -61,7 +62,12 @@ bool NodeClient::until(const std::function<bool()>& done, std::int64_t for_ns) {
 bool NodeClient::transfer(std::uint8_t node, canopen::SdoRequest& request) {
     canopen::SdoClient& client = network.add(node).sdo();
     client.submit(request);
-    if (!until([&] { return request.done(); })) {  // Ctrl-C: abort the transfer on the node, too
+    TransferProgress progress(fmt::format("node {}, {:04X}:{}", node, request.index, request.sub));
+    const auto done = [&] {
+        progress.update(client.transferred(), client.announced());
+        return request.done();
+    };
+    if (!until(done)) {  // Ctrl-C: abort the transfer on the node, too
         client.cancel(request);
         turn(0);
     }

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "canopen/eds/concise_dcf.hpp"
+#include "link/can.hpp"
 
 namespace hal::canopen::config {
 
@@ -159,16 +160,33 @@ void NodeReader::writes() {
     if (bus_.sync_counter != 0) agree(0x1019, bus_.sync_counter);
     if (bus_.sync_window != 0) agree(0x1007, static_cast<std::uint32_t>(bus_.sync_window / microsecond));
     if (bus_.sync_cob != 0x80) agree(0x1005, bus_.sync_cob);
-    if (eds_ != nullptr && eds_->commissioning) values_of_dcf();
+    if (eds_ != nullptr && (eds_->commissioning || eds::parameter_values(*eds_) != 0)) values_of_dcf();
     std::vector<Line*> lines = keys_.all_of("write "), commands = keys_.all_of("command ");
     lines.insert(lines.end(), commands.begin(), commands.end());
     std::sort(lines.begin(), lines.end(), [](const Line* a, const Line* b) { return a->key.at.offset < b->key.at.offset; });
     for (Line* line : lines) write_one(*line);
 }
 
+/// Reports a DCF that was made for another node or bit rate, and parameter values in an EDS. Returns false when the values are not to be written.
+bool NodeReader::dcf_fits(const Word& file) {
+    if (!eds_->commissioning) {
+        const std::size_t values = eds::parameter_values(*eds_);
+        report_.note(Topic::value, file.at, "'" + file.text + "' has " + counted(values, "parameter value") + " that the master does not write: it is an EDS",
+                     "add [DeviceComissioning] with NodeID=" + std::to_string(node_.setup.id) + " to make it a DCF, or write lines here: write 0x6083 = 1000");
+        return false;
+    }
+    const bool        has_rate = can::describe(bus_.link).has_bit_rate;
+    const std::string problem = eds::misfit(*eds_, node_.setup.id, has_rate ? bus_.bit_rate : 0);
+    if (problem.empty()) return true;
+    report_.error(Topic::node, file.at, "DCF '" + file.text + "' does not fit: " + problem,
+                  "its parameter values are for that device; name the DCF or the EDS of this one");
+    return false;
+}
+
 /// Values that a DCF configures, except PDOs and error control, which this file configures.
 void NodeReader::values_of_dcf() {
     const Word& file = keys_.find("eds")->value;
+    if (!dcf_fits(file)) return;
     const auto  configuration = eds::configuration_of(*eds_, node_.setup.id);
     for (const auto& m : configuration.messages)
         report_.warning(Topic::value, file.at, "line " + std::to_string(m.at.line) + " of '" + file.text + "': " + m.sentence, m.help);

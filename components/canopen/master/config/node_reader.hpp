@@ -51,6 +51,7 @@ private:
     void                                         firmware();
     void                                         writes();
     void                                         values_of_dcf();
+    bool                                         dcf_fits(const Word& file);
     void                                         write_one(const Line& line);
     void                                         pdos();
     std::map<std::pair<bool, unsigned>, PdoWish> wishes(const char* what = "pdo", unsigned most = 512);

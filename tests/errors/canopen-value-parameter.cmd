@@ -1,0 +1,1 @@
+hal canopen check canopen-value-parameter.canopen

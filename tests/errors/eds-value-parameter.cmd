@@ -1,0 +1,1 @@
+hal can eds check eds-value-parameter.eds
