@@ -26,8 +26,6 @@ CAPTURE = """(1000.000000) can0 000#0102
 (1000.010000) can0 100#0000000064320000
 (1000.011000) can0 100#000000006432
 (1000.012000) can0 123##1AABB
-(1000.012500) can0 123##3AABB
-(1000.012600) can0 123##2AABB
 (1000.013000) can0 701#R
 (1000.014000) can0 702#00
 (1000.015000) can0 602#C612100020000000
@@ -50,8 +48,6 @@ DUMPED = """    0.000000  rx       000  [2] 01 02                    NMT start: 
     0.010000  rx       100  [8] 00 00 00 00 64 32 00 00  TIME with a wrong length: it has 6 bytes
     0.011000  rx       100  [6] 00 00 00 00 64 32        TIME 2019-04-27 00:00:00.000
     0.012000  rx       123  [2] FD+ AA BB
-    0.012500  rx       123  [2] FD+ ESI AA BB
-    0.012600  rx       123  [2] FD ESI AA BB
     0.013000  rx       701  [0] remote request, 0 bytes  node guarding: asks node 1
     0.014000  rx       702  [1] 00                       boot-up of node 2
     0.015000  rx       602  [8] C6 12 10 00 20 00 00 00  SDO to node 2: write 1012:0 in blocks, 32 bytes
@@ -100,6 +96,21 @@ class Dump(Can):
                           "meaning": "heartbeat of node 2: operational"}, frames[6])
         self.assertTrue(frames[9]["extended"] and frames[12]["fd"] and frames[13]["remote"])
         self.assertEqual((20, None, 0), tuple(last["statistics"][key] for key in ("frames", "load_percent", "lost")))
+
+    def test_the_flags_of_fd_frames(self):
+        self.write("fd.log", "".join(f"(0.0{n}) can0 123##{n}AABB\n" for n in range(4)))
+        done = self.run_program("can", "dump", "replay:fd.log")
+        self.assertEqual(["[2] FD AA BB", "[2] FD+ AA BB", "[2] FD ESI AA BB", "[2] FD+ ESI AA BB"],
+                         [line[line.index("["):] for line in done.stdout.splitlines()])
+        *frames, _ = [json.loads(line) for line in self.run_program("can", "dump", "replay:fd.log", "--json", "--count", 2).stdout.splitlines()]
+        self.assertEqual([(True, False, False), (True, True, False)], [(f["fd"], f["bit_rate_switch"], f["error_state"]) for f in frames])
+
+    def test_a_file_that_is_not_a_log_is_named(self):
+        self.write("screen.txt", "  can0  123   [2]  01 02\n")
+        self.assertIn("line 1: terminal format of candump, without times; record with: candump -L, or candump -ta", self.bad_can("dump", "replay:screen.txt"))
+        self.write("timed.txt", "(1436509052.249713)  can0  12300001   [2]  01 02\n (1436509052.349713)  can0  12400001   [2]  remote request\n")
+        self.assertEqual("    0.000000  rx  12300001  [2] 01 02\n    0.100000  rx  12400001  [2] remote request, 2 bytes\n",
+                         self.run_program("can", "dump", "replay:timed.txt").stdout)
 
     def test_filter_count_and_end_of_capture(self):
         self.write("c.log", CAPTURE)
