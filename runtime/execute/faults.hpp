@@ -22,10 +22,15 @@ struct FaultEvent {
     const void* self = nullptr;     ///< component faults: the instance
     std::uint64_t repeats = 0;      ///< number of events of the same kind, including this one; 0: queued individually
     std::int64_t last_ns = 0;       ///< time of the last of them
+    bool varied = false;            ///< the repeats have different error numbers; `value` is the newest
 
     /// Returns true if both are of the same kind: they differ in time and measured value only. [any]
     bool same(const FaultEvent& o) const noexcept {
-        return code == o.code && subject == o.subject && reason == o.reason && self == o.self && (!has_code() || value == o.value);
+        return similar(o) && varied == o.varied && (varied || !has_code() || value == o.value);
+    }
+    /// Returns true if both differ in time, measured value and error number only. [any]
+    bool similar(const FaultEvent& o) const noexcept {
+        return code == o.code && subject == o.subject && reason == o.reason && self == o.self;
     }
     /// Returns true if the detail is an error number, {x}, not a measured value. [any]
     bool has_code() const noexcept {
@@ -37,7 +42,8 @@ struct FaultEvent {
 };
 
 /// Lets a few faults per kind and second pass, then one per second with a count until there is a quiet second, so that a storm of them
-/// neither fills the queue nor buries another fault.
+/// neither fills the queue nor buries another fault. Faults that differ in their error number are kinds of their own, up to a few in a second;
+/// further ones are counted together.
 class FaultLimiter {
 public:
     static constexpr std::int64_t interval_ns = 1'000'000'000;
@@ -46,16 +52,18 @@ public:
     /// Calls `queue(event)` at once, or counts it. [realtime]
     template <class Queue>
     void raise(FaultEvent event, Queue&& queue) noexcept {
+        event.varied = event.has_code() && is_one_of_many(event);
         Kind* place = kinds_.data();
         for (Kind& k : kinds_) {
             const bool same = k.used && k.first.same(event);
             if (same && (k.held != 0 || event.time_ns - k.since_ns < interval_ns)) {
                 if (event.time_ns - k.since_ns >= interval_ns) release(k, queue), k.since_ns = event.time_ns;
-                if (k.passed < burst) {
+                if (k.passed < burst && !event.varied) {
                     ++k.passed;
                     return queue(event);
                 }
                 if (k.held++ == 0) ++pending_, k.first = event;
+                if (event.varied) k.first.value = event.value;
                 k.first.last_ns = event.time_ns;
                 return;
             }
@@ -67,7 +75,10 @@ public:
         }
         release(*place, queue);
         *place = {event, event.time_ns, 0, 1, true};
-        queue(event);
+        if (!event.varied) return queue(event);
+        ++pending_;
+        place->held = 1;
+        place->first.last_ns = event.time_ns;
     }
     /// Queues the counts of past seconds. Called at the end of each cycle. [realtime]
     template <class Queue>
@@ -93,6 +104,17 @@ private:
         unsigned      passed = 0;    // that were queued at once
         bool          used = false;
     };
+    /// Returns true if several others that differ in their error number only were raised within a second, but not this one.
+    bool is_one_of_many(const FaultEvent& event) const noexcept {
+        unsigned others = 0;
+        for (const Kind& k : kinds_) {
+            const bool counts = k.used && k.first.similar(event) && (k.held != 0 || event.time_ns - k.since_ns < interval_ns);
+            if (!counts) continue;
+            if (k.first.same(event)) return false;
+            others += k.first.varied ? burst : 1;
+        }
+        return others >= burst;
+    }
     template <class Queue>
     void release(Kind& k, Queue&& queue) noexcept {
         if (k.held == 0) return;

@@ -122,6 +122,13 @@ FaultMessage message_of(const Model& model, const Thread& thread, const FaultEve
     return {"component", thread.name + ": a fault" + at};
 }
 
+/// Equal for faults that differ in time, measured value and error number only.
+std::string kind_of(const Thread& thread, const FaultEvent& event) {
+    char self[24];
+    std::snprintf(self, sizeof self, " %p ", event.self);
+    return thread.name + " " + std::to_string(event.code) + " " + std::to_string(event.subject) + self + (event.reason ? event.reason : "");
+}
+
 /// What kept the thread from ending its cycle, beginning with its name.
 std::string message_of(const SessionState& s, const Thread& thread, const Stall& stall) {
     const auto name_of = [&](std::uint32_t id) -> std::string {
@@ -200,6 +207,8 @@ void FaultLog::collect(const Thread& thread) {
         record.thread = thread.name;
         record.code = code.name();
         record.sentence = std::move(sentence);
+        record.kind = kind_of(thread, event);
+        record.varied = event.varied;
         record.age_ns = event.time_ns;
         if (event.repeats != 0) record.count = event.repeats, record.span_ns = event.last_ns - event.time_ns;
         add({std::move(record), event});
@@ -215,6 +224,7 @@ void FaultLog::collect_stalls() {
         record.cycle = stall.cycle;
         record.thread = of->first->name;
         record.code = FaultCode("hung-thread").name();
+        record.kind = record.code + " " + record.thread;
         record.sentence = message_of(state_, *of->first, stall);
         add({std::move(record), {}});
     }
@@ -236,8 +246,8 @@ std::vector<FaultRecord> FaultLog::records(std::int64_t now_ns) const {
 std::string FaultRecord::line() const {
     if (count == 1) return sentence;
     char text[80];
-    std::snprintf(text, sizeof text, " (%llu times in %.1f s)", static_cast<unsigned long long>(count),
-                  std::max(static_cast<double>(span_ns) * 1e-9, 0.1));
+    std::snprintf(text, sizeof text, " (%llu times in %.1f s%s)", static_cast<unsigned long long>(count),
+                  std::max(static_cast<double>(span_ns) * 1e-9, 0.1), varied ? ", with different codes" : "");
     return sentence + text;
 }
 

@@ -51,6 +51,8 @@ struct FaultRecord {
     std::string thread, code, sentence;  ///< sentence: what happened, in which cycle, what was done
     std::uint64_t count = 1;             ///< faults of the same kind, less than 2 s apart, that this record stands for
     std::int64_t span_ns = 0;            ///< from the first of them to the last
+    bool varied = false;                 ///< they have different error numbers
+    std::string kind = {};               ///< equal for faults that differ in time, measured value and error number only
 
     /// Returns the sentence and, when there is more than one, the count.
     std::string line() const;

@@ -68,7 +68,8 @@ TEST_F(MessageLogTest, Without_a_subject_numbers_do_not_count) {
     log.print("no frame for 1.5 s", 0);
     log.print("no frame for 12 s", 1 * ms);
     EXPECT_EQ(lines.size(), 1u);
-    EXPECT_EQ(MessageLog::without_numbers("can0: 0x1F is 1.5 s, 12."), "can#: #x#F is # s, #.");
+    EXPECT_EQ(MessageLog::without_numbers("can0: 0x1F is 1.5 s, 12."), "can#: # is # s, #.");
+    EXPECT_EQ(MessageLog::without_numbers("'cell' (010f44aa5e) of 02:00:5e:0a, after 5us"), "'cell' (#) of #:#:#:#, after #us");
 }
 
 TEST_F(MessageLogTest, Subjects_beyond_the_limit_are_counted) {
@@ -77,6 +78,41 @@ TEST_F(MessageLogTest, Subjects_beyond_the_limit_are_counted) {
     log.flush(1000 * ms);
     ASSERT_EQ(lines.size(), MessageLog::most_subjects + 1);
     EXPECT_EQ(lines.back(), "it.0: 99744 messages about further subjects not shown\n");
+}
+
+// What a device chooses, such as an error code, may be different every time.
+TEST_F(MessageLogTest, Storm_of_one_kind_with_ever_other_details_is_a_few_lines_and_one_per_second) {
+    for (int i = 0; i < 3000; ++i)
+        log.print(hal::MessageSubject{"emergency 3", std::to_string(i)}, "node 3: emergency " + std::to_string(i), i * ms);
+    ASSERT_EQ(lines.size(), MessageLog::most_details + 2);
+    EXPECT_EQ(lines[0], "it.0: node 3: emergency 0\n");
+    EXPECT_EQ(lines[MessageLog::most_details - 1], "it.0: node 3: emergency 7\n");
+    EXPECT_EQ(lines[MessageLog::most_details], "it.0: node 3: emergency 1007 (999 similar messages in 1.0 s not shown)\n");
+    EXPECT_EQ(lines.back(), "it.0: node 3: emergency 2007 (999 similar messages in 1.0 s not shown)\n");
+    log.close();
+    EXPECT_EQ(lines.back(), "it.0: node 3: emergency 2999 (991 similar messages in 1.0 s not shown)\n");
+}
+
+TEST_F(MessageLogTest, Storm_of_one_kind_does_not_hide_another) {
+    for (int i = 0; i < 500; ++i) log.print(hal::MessageSubject{"emergency 3", std::to_string(i)}, "node 3: emergency", i * ms);
+    log.print(hal::MessageSubject{"lost 4", ""}, "node 4 is lost", 500 * ms);
+    EXPECT_EQ(lines.back(), "it.0: node 4 is lost\n");
+}
+
+TEST_F(MessageLogTest, Storm_of_one_kind_ends_with_a_quiet_second) {
+    const auto print = [&](int detail, std::int64_t at) { log.print(hal::MessageSubject{"k", std::to_string(detail)}, "k " + std::to_string(detail), at); };
+    for (int i = 0; i < 20; ++i) print(i, i * ms);
+    log.flush(1100 * ms);
+    log.flush(2200 * ms);
+    const std::size_t before = lines.size();
+    print(100, 2300 * ms);
+    print(101, 2301 * ms);
+    EXPECT_EQ(lines.size(), before + 2);
+}
+
+TEST_F(MessageLogTest, Endless_subjects_get_few_lines_after_the_first_second) {
+    for (int i = 0; i < 5000; ++i) log.print(std::to_string(i), "subject", i * ms);
+    EXPECT_LE(lines.size(), MessageLog::most_subjects + 5 * (MessageLog::most_subjects_of_a_storm + 1));
 }
 
 TEST_F(MessageLogTest, Lines_go_to_the_journal_of_the_machine_while_it_is_set) {

@@ -12,10 +12,11 @@ namespace {
 constexpr std::chrono::milliseconds interval{50};
 constexpr std::int64_t storm_ns = 3'000'000'000;
 
-/// Returns the sentence up to its cycle; for a cycle that took too long only the thread, since the rest is measured values.
-std::string subject_of(const FaultRecord& record) {
+/// The detail is the sentence up to its cycle; a cycle that took too long has only measured values, and no detail.
+MessageSubject subject_of(const FaultRecord& record) {
     const bool measured = record.code == "overrun" || record.code == "budget" || record.code == "hung-thread";
-    return record.code + " " + (measured ? record.thread : record.sentence.substr(0, record.sentence.find(" at cycle ")));
+    if (measured) return {record.code + " " + record.thread};
+    return {record.kind, record.sentence.substr(0, record.sentence.find(" at cycle "))};
 }
 
 }  // namespace

@@ -151,7 +151,8 @@ public:
     void Consume(const fastdds::dds::Log::Entry& entry) override {
         std::string line = entry.message;
         while (!line.empty() && line.back() == '\n') line.pop_back();
-        engine_log().print(line + " (Fast DDS, " + (entry.context.category ? entry.context.category : "?") + ")");
+        const std::string source = std::string("Fast DDS, ") + (entry.context.category ? entry.context.category : "?");
+        engine_log().print(hal::MessageSubject{source, hal::MessageLog::without_numbers(line)}, line + " (" + source + ")");
     }
 };
 

@@ -296,6 +296,22 @@ std::string of_bus(const Happened& w, const master::Setup& setup, const std::str
 
 }  // namespace
 
+MessageSubject subject(const Happened& what) {
+    const bool     by_position = what.slave >= Events::of_position && what.slave != Events::bus;
+    MessageSubject of{std::to_string(static_cast<int>(what.event))};
+    (by_position ? of.detail : of.kind) += " " + std::to_string(what.slave);
+    switch (what.event) {
+    case Event::emergency: of.detail += " " + std::to_string(what.first & 0xffff); break;
+    case Event::fell_back:
+    case Event::state_refused:
+    case Event::startup_write_failed:
+    case Event::mapping_failed:
+    case Event::eoe_failed: of.detail += " " + std::to_string(what.first) + " " + std::to_string(what.second); break;
+    default: break;  // what else differs was measured or counted
+    }
+    return of;
+}
+
 std::string no_link_words(const std::string& link) {
     if (!ethernet::describe(link).datagrams) return link + " has no link; check the cable to the first slave";
     return link + " has no link: no program listens there; emulate a line, as in: hal node ethercat FILE --link " + link;

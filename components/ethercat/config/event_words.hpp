@@ -7,6 +7,7 @@
 
 #include "ethercat/master/events.hpp"
 #include "ethercat/master/setup.hpp"
+#include "hal/message_log.hpp"
 
 namespace hal::ethercat::config {
 
@@ -24,6 +25,9 @@ enum class Format : std::uint8_t { ethercat, lcec };
 /// ports. [setup]
 std::string event_words(const Happened& what, const master::Setup& setup, const std::string& link, const std::string& backup = {},
                         Format = Format::ethercat);
+
+/// Returns the subject of an event for rate limiting: an event of one slave is a kind, the code that a device chooses is the detail. [setup]
+MessageSubject subject(const Happened& what);
 
 /// Returns "slave 3 (x-axis)", or "slave at position 3" where the setup does not name it. [setup]
 std::string slave_words(std::uint32_t slave, const master::Setup& setup);

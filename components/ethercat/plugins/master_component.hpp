@@ -321,7 +321,7 @@ private:
     hal::Discipline                        discipline_;
     hal::Reporter<config::Happened>        reporter_{name_, [this](const config::Happened& h) {
         return config::event_words(h, bus_.setup, bus_.link, bus_.backup, bus_.lcec ? config::Format::lcec : config::Format::ethercat);
-    }, 256, [](const config::Happened& h) { return std::to_string(static_cast<int>(h.event)) + " " + std::to_string(h.slave); }};
+    }, 256, [](const config::Happened& h, const std::string&) { return config::subject(h); }};
     const hal_faults*                      faults_ = nullptr;
     bool                                   unknown_raised_ = false, was_fresh_ = false, simulated_ = false, period_reported_ = false;
 };

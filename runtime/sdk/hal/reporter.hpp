@@ -15,12 +15,12 @@
 namespace hal {
 
 /// `Event` must be trivially copyable. A cycle queues events, one thread formats them; on the virtual clock they are printed at the end of
-/// the instant, so that the sentences of several instances come in the same order every time. One line per subject and second is printed.
+/// the instant, so that the sentences of several instances come in the same order every time. The rate is limited as MessageLog states.
 template <class Event>
 class Reporter {
 public:
     using Words = std::function<std::string(const Event&)>;    ///< the sentence; empty: nothing is printed
-    using Subject = std::function<std::string(const Event&)>;  ///< what it is about
+    using Subject = std::function<MessageSubject(const Event&, const std::string& sentence)>;  ///< what it is about
 
     /// Sentences are "INSTANCE: SENTENCE". Without `subject`, sentences that differ only in their numbers are about the same. [setup]
     Reporter(const std::string& instance, Words words, std::size_t room = 256, Subject subject = {})
@@ -49,7 +49,7 @@ private:
         now_ns_ = now_ns;
         for (Event e; events_.pop(e);)
             if (const std::string sentence = words_(e); !sentence.empty())
-                log_.print(subject_ ? subject_(e) : MessageLog::without_numbers(sentence), sentence, now_ns);
+                log_.print(subject_ ? subject_(e, sentence) : MessageSubject{MessageLog::without_numbers(sentence)}, sentence, now_ns);
         if (const auto lost = lost_.exchange(0, std::memory_order_relaxed); lost != 0)
             log_.print(std::to_string(lost) + (lost == 1 ? " message was" : " messages were") + " lost: the queue for them was full", now_ns);
         log_.flush(now_ns);

@@ -23,7 +23,7 @@ public:
           setup_(config.setup()),
           file_(file),
           instance_(instance),
-          reported_(std::move(instance), [this](const Event& e) { return words(e); }, 512, [](const Event& e) { return subject(e); }) {}
+          reported_(std::move(instance), [this](const Event& e) { return words(e); }, 512, [](const Event& e, const std::string&) { return subject(e); }) {}
 
     void start() { reported_.start(); }           // [setup]
     void stop() noexcept { reported_.stop(); }    // [setup]
@@ -67,26 +67,36 @@ private:
         RunnerEvents::Foreign of_foreign{};
     };
 
-    /// One line is printed per subject and second.
-    static std::string subject(const Event& e) {
-        std::string text = std::to_string(e.kind);
-        const auto  add = [&text](auto value) { text += ' ' + std::to_string(value); };
+    /// A kind is an event of one node; what a device can choose, such as an error code, is the detail.
+    static MessageSubject subject(const Event& e) {
+        MessageSubject of{std::to_string(e.kind)};
+        const auto     add = [](std::string& text, auto value) { text += ' ' + std::to_string(value); };
         switch (e.kind) {
         case Event::node:
-            add(e.of_node.id), add(static_cast<int>(e.of_node.cause)), add(e.of_node.index), add(e.of_node.sub);
+            add(of.kind, e.of_node.id);
+            add(of.detail, static_cast<int>(e.of_node.cause));
+            add(of.detail, e.of_node.index);
+            add(of.detail, e.of_node.sub);
             break;
-        case Event::note: add(e.of_node.id), add(e.of_node.notes); break;
-        case Event::network: add(static_cast<int>(e.of_network.state)), add(e.of_network.node); break;
+        case Event::note:
+            add(of.kind, e.of_node.id);
+            add(of.detail, e.of_node.notes);
+            break;
+        case Event::network:
+            add(of.kind, e.of_network.node);
+            add(of.detail, static_cast<int>(e.of_network.state));
+            break;
         case Event::emergency:
-            add(e.of_node.id), add(e.of_emergency.code);
-            if (e.of_emergency.code == 0) add(e.of_emergency.error_register);  // how much is over
+            add(of.kind, e.of_node.id);
+            add(of.detail, e.of_emergency.code);
+            if (e.of_emergency.code == 0) add(of.detail, e.of_emergency.error_register);  // how much is over
             break;
-        case Event::bus: add(static_cast<int>(e.of_bus)); break;
-        case Event::flying: add(e.master); break;
-        case Event::foreign: add(e.of_foreign.id); break;
+        case Event::bus: add(of.detail, static_cast<int>(e.of_bus)); break;
+        case Event::flying: add(of.detail, e.master); break;
+        case Event::foreign: add(of.detail, e.of_foreign.id); break;
         default: break;
         }
-        return text;
+        return of;
     }
     std::string called(std::uint8_t id) const {
         for (const config::Node& n : config_.nodes)

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "fieldbus/scocan/station/station.hpp"
+#include "hal/message_log.hpp"
 
 namespace hal::scocan {
 
@@ -77,8 +78,10 @@ public:
         return {};
     }
 
-    /// Subject for rate limiting. [setup]
-    static std::string subject(const Happened& h) { return std::to_string(static_cast<int>(h.event)) + ' ' + std::to_string(h.id); }
+    /// Subject for rate limiting. The identifier is the detail: frames with random ones are one kind. [setup]
+    static MessageSubject subject(const Happened& h, const std::string&) {
+        return {std::to_string(static_cast<int>(h.event)), std::to_string(h.id)};
+    }
 
     std::string foreign(std::uint32_t id, std::uint32_t who, const std::string& slot) const {
         return "frame " + named(id) + " in slot " + slot + ", outside of its own" + owner(who, id);

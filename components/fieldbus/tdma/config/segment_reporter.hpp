@@ -15,7 +15,7 @@ public:
     /// The schedule outlives it; `known_as` as of EventWords. [setup]
     Reporter(const std::string& instance, const config::Schedule& schedule, std::string known_as = {})
         : words_(schedule, "setp " + instance + ".reset TRUE", std::move(known_as)),
-          reported_(instance, [this](const Happened& h) { return words_(h); }, 256, [](const Happened& h) { return subject(h); }) {}
+          reported_(instance, [this](const Happened& h) { return words_(h); }, 256, [](const Happened& h, const std::string&) { return subject(h); }) {}
 
     void start() { reported_.start(); }         // [setup]
     void stop() noexcept { reported_.stop(); }  // [setup]
