@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "hal/message_log.hpp"
 #include "schedule.hpp"
 
 namespace hal::tdma {
@@ -17,10 +18,8 @@ struct Happened {
     Time    value = 0;
 };
 
-/// Returns the key for rate limiting: one line is printed per subject and second. [setup]
-inline std::string subject(const Happened& h) {
-    return std::to_string(static_cast<int>(h.event)) + ' ' + ethernet::to_string(h.who);
-}
+/// Returns the subject for rate limiting. The station is the detail: frames with random addresses are one kind. [setup]
+inline MessageSubject subject(const Happened& h) { return {std::to_string(static_cast<int>(h.event)), ethernet::to_string(h.who)}; }
 
 class EventWords {
 public:
@@ -52,6 +51,10 @@ public:
         case Event::unknown_master:
             return "sync from " + who + " ignored: it is not one of the addresses (mac) that the configuration gives the master and its backups";
         case Event::foreign_frame: return who + " sends in slot " + value + " of this station; compare the configurations of both";
+        case Event::duplicate_slot:
+            return "two stations send in the slots of " + of_index(duplicate_index(h.value)) + ": " +
+                   ethernet::to_string(duplicate_address(h.value)) + " and " + ethernet::to_string(h.who) +
+                   "; give each a block of its own, or stop one of them";
         case Event::babbling: return "babbling station: " + who + " sends " + value + " frames in one cycle";
         case Event::master_changed: return "new master: " + who;
         case Event::master_there:
@@ -97,6 +100,9 @@ private:
         for (const config::StationEntry& s : schedule_.stations)
             if (s.mac == who) return s.name + " (" + ethernet::to_string(who) + ")";
         return ethernet::to_string(who);
+    }
+    std::string of_index(std::size_t index) const {
+        return index < schedule_.stations.size() ? schedule_.stations[index].name : "station " + std::to_string(index);
     }
     std::string of_schedule(const Happened& h) const {
         return schedule_.stations.at(static_cast<std::size_t>(h.value)).name + " (" + ethernet::to_string(h.who) + ")";

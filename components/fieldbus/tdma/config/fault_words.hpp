@@ -13,7 +13,7 @@ namespace hal::tdma {
 
 struct FaultWords {
     std::string sync_lost, other_master, master_there, withdrew, babbling, uncalibrated, period, other_schedule, out_of_step,
-        no_carrier = "no carrier";
+        no_carrier = "no carrier", duplicate_slot = "two stations send in the same slots";
     std::vector<std::pair<unsigned, std::string>> foreign;  // by slot
 
     explicit FaultWords(const StationSetup& s) {

@@ -45,7 +45,7 @@ StationSetup setup_of(const Schedule& s, std::size_t index) {
     for (const SlotEntry& slot : e.slots) out.slots.push_back(slot.setup);
     for (std::size_t i = 0; i < s.stations.size(); ++i) {
         if (i == index) continue;
-        Other& other = out.others.emplace_back(Other{s.stations[i].mac.value_or(Address{}), s.stations[i].role, {}});
+        Other& other = out.others.emplace_back(Other{s.stations[i].mac.value_or(Address{}), s.stations[i].role, {}, static_cast<std::uint16_t>(i)});
         for (const SlotEntry& slot : s.stations[i].slots) other.slots.push_back(slot.setup);
     }
     bool all_named = true;

@@ -273,6 +273,10 @@ private:
             for (const auto& [id, words] : words_->foreign)
                 if (static_cast<Time>(id) == value) raise(words, not_a_number);
             break;
+        case Event::duplicate_slot:
+            pins_.fault = true;
+            raise(words_->duplicate_slot, not_a_number);
+            break;
         case Event::babbling:
             pins_.fault = true;
             raise(words_->babbling, static_cast<double>(value));

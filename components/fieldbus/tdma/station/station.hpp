@@ -127,6 +127,7 @@ private:
     void            take_reply(const Decoded&, Time arrived, Time now) noexcept;
     void            take_echo(const Decoded&, Time arrived) noexcept;
     void            check_slot(std::span<const std::uint8_t> frame, const Address& from, Time arrived) noexcept;
+    void            check_duplicate(const Address& from, Time arrived, std::size_t length) noexcept;
     void            advance(Time now) noexcept;
     void            count_silence(Time now) noexcept;
     void            start_leading(Time now) noexcept;
@@ -195,6 +196,8 @@ private:
     std::uint32_t           good_row_ = 0;  // consecutive syncs of one schedule
     std::uint32_t           foreign_row_ = 0;  // syncs of another schedule since the last of this one
     std::uint32_t           intruder_row_ = 0;
+    Address                 duplicate_{};  // the last sender in the slots of another station
+    std::uint32_t           duplicate_row_ = 0, duplicate_gap_ = 0;
     std::uint32_t           foreign_gap_ = 0, intruder_gap_ = 0, babble_gap_ = 0;  // cycles until the event is repeated
     std::uint32_t           recalibration_ = 0;  // requests in every n-th cycle only, besides frames; 0: in every cycle
     Address                 measured_{};  // the calibrated master …

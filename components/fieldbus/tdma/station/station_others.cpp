@@ -137,15 +137,33 @@ void Station::note(const Decoded& d, Time arrived, std::size_t length, Time now)
         const Role role = is_from_master(d.sync.stamp - d.sync.scheduled) ? Role::master : Role::backup;
         for (std::size_t i = 0; i < setup_.others.size(); ++i)
             if (const Other& o = setup_.others[i]; o.mac == Address{} && o.role == role && !roster_[i].alive) n = i;
-    } else if (n == setup_.others.size()) {
+    }
+    if (n == setup_.others.size()) {
+        if (by_slot) check_duplicate(d.from, arrived, length);
         return;
     }
-    if (n == setup_.others.size()) return;
     const bool knows = status_.state == State::running && based_ && by_slot;
     std::uint32_t cycle = 0;
     const Time    at = left_at(arrived, length, cycle);
     roster_.frame(n, d.from, now, knows && !is_in_slot(setup_.others[n], at, cycle));
     if (d.kind == Kind::request && status_.leading) roster_.stamp(n, d.request.stamp, clock_.global(arrived));
+}
+
+/// Detects a station that no block names in the slots of another one that sends, too: two stations were given the same block.
+void Station::check_duplicate(const Address& from, Time arrived, std::size_t length) noexcept {
+    if (status_.state != State::running || !based_) return;
+    std::uint32_t cycle = 0;
+    const Time    at = left_at(arrived, length, cycle);
+    for (std::size_t n = 0; n < setup_.others.size(); ++n) {
+        const Heard& first = roster_[n];
+        if (!first.alive || first.from == from || !is_in_slot(setup_.others[n], at, cycle)) continue;
+        duplicate_row_ = from == duplicate_ ? duplicate_row_ + 1 : 1;
+        duplicate_ = from;
+        if (duplicate_row_ < rows || duplicate_gap_ != 0) return;
+        duplicate_gap_ = silence_after;
+        report(Event::duplicate_slot, from, duplicate_value(first.from, setup_.others[n].index));
+        return;
+    }
 }
 
 /// The stamps are from the other station's clock: two of them give its drift.

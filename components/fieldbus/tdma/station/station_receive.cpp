@@ -29,7 +29,7 @@ void Station::receive(Time now) noexcept {
         if (first && arrival->time_ns < now - setup_.cycle) continue;  // received before the thread's first cycle
         take(*arrival, now);
     }
-    for (std::uint32_t* gap : {&foreign_gap_, &intruder_gap_, &babble_gap_, &unknown_gap_})
+    for (std::uint32_t* gap : {&foreign_gap_, &intruder_gap_, &babble_gap_, &unknown_gap_, &duplicate_gap_})
         if (*gap != 0) --*gap;
     std::uint32_t frames = 0;
     if (const Address* who = babble_monitor_.babbler(limit_, frames); who != nullptr && babble_gap_ == 0) {

@@ -31,6 +31,7 @@ struct Other {
     Address                mac{};  ///< zeros: unknown
     Role                   role = Role::slave;
     std::vector<SlotSetup> slots{};
+    std::uint16_t          index = 0;  ///< of its block in the schedule
 };
 
 /// The station's part of the schedule.
@@ -82,6 +83,7 @@ enum class Event : std::uint8_t {
     withdrew,       ///< this master without followers stepped down for another; who
     unknown_master, ///< ignored a sync from an address that the schedule does not allow; who
     foreign_frame,  ///< another station sends in a slot of this one; who; value: slot id
+    duplicate_slot, ///< two stations send in the slots of one block; who: the second; value: the first, and the block: see duplicate_value()
     babbling,       ///< a station floods the segment; who; value: frames in a cycle
     master_changed, ///< who: the new one
     master_there,   ///< this master found another at its start, and waits until that is lost; who
@@ -102,6 +104,19 @@ enum class Event : std::uint8_t {
     station_dead,        ///< no heartbeat of a client; who; value: its index
     station_too_long,    ///< its configuration does not fit into slot 0 of this server; value: its index
 };
+
+/// The value of Event::duplicate_slot: the address of the first station, and the index of the block in the schedule. [any]
+inline Time duplicate_value(const Address& first, std::uint16_t index) noexcept {
+    std::uint64_t value = index;
+    for (const std::uint8_t byte : first) value = value << 8 | byte;
+    return static_cast<Time>(value);
+}
+inline std::uint16_t duplicate_index(Time value) noexcept { return static_cast<std::uint16_t>(static_cast<std::uint64_t>(value) >> 48); }
+inline Address duplicate_address(Time value) noexcept {
+    Address first{};
+    for (std::size_t n = first.size(); n-- > 0; value >>= 8) first[n] = static_cast<std::uint8_t>(value & 0xff);
+    return first;
+}
 
 /// Receives the events of a station, from receive() and transmit(). [realtime]
 class Events {
