@@ -2,13 +2,14 @@
 """Writers of files on a full disk: a replaced file keeps its old content, a growing one ends with a whole line. In a mount namespace."""
 import os
 import shutil
+import signal
 import stat
 import subprocess
 import sys
 import unittest
 from pathlib import Path
 
-from harness import Case, HAL
+from harness import Case, HAL, wait_until
 
 VARIABLE = "HALCYON_OWN_MOUNTS"
 
@@ -122,6 +123,45 @@ class Full(Case):
             width = {len(row.replace(",", " ").split()) for row in rows}
             self.assertEqual({3 if form else 2}, width)  # CSV has a column of times
             (self.disk / "seen.txt").unlink()
+
+    def test_a_flight_recorder_goes_on_and_writes_late_when_there_is_space(self):
+        self.start("run", self.write("a.hal", "loadrt threads name1=servo period1=1000000\nloadrt siggen names=wave\naddf wave.update servo\n"
+                                              "net sine wave.sine\nnewsig crash bit\nstart\n"))
+        out, err = self.folder / "out", self.folder / "err"
+        recorder = subprocess.Popen([str(HAL), "record", self.disk / "box.csv", "sine", "--last", "300ms", "--after", "50ms", "--trigger", "crash"],
+                                    cwd=self.folder, env=self.environment, stdout=out.open("w"), stderr=err.open("w"))
+        self.addCleanup(self.end, recorder)
+
+        def cycles(count):
+            self.good("record", "wait.csv", "sine", "--for", f"{count}ms")
+
+        cycles(400)
+        self.fill()
+        self.say("sets", "crash", "TRUE")
+        wait_until(lambda: "the recorder goes on" in err.read_text(), "the failure is reported")
+        self.say("sets", "crash", "FALSE")
+        cycles(100)
+        self.say("sets", "crash", "TRUE")
+        cycles(400)
+        self.assertIsNone(recorder.poll())
+        self.assertRegex(err.read_text(), r"^hal record: cannot write '\S+/box-\w+-crash-001\.csv': No space left on device[^\n]*; the recorder goes on, "
+                                          r"and writes events from memory when there is space\n$")
+        (self.disk / "ballast").unlink()
+        wait_until(lambda: "writing again" in out.read_text(), "the events are written")
+        self.assertRegex(out.read_text(), r"(?s)box-\w+-crash-001\.csv: \d+ rows.*box-\w+-crash-002\.csv: \d+ rows.*"
+                                          r"writing again: 2 events written late, 0 lost\n$")
+        for number in ("001", "002"):
+            rows = next(self.disk.glob(f"box-*-crash-{number}.csv")).read_text().splitlines()
+            self.assertGreater(len(rows), 200)
+        # At the end, what could not be written is an error.
+        self.fill()
+        self.say("sets", "crash", "FALSE")
+        cycles(100)
+        self.say("sets", "crash", "TRUE")
+        wait_until(lambda: err.read_text().count("the recorder goes on") == 2, "the failure is reported again")
+        recorder.send_signal(signal.SIGINT)
+        self.assertEqual(1, recorder.wait(60))
+        self.assertRegex(err.read_text(), r"\nhal record: 1 event not written: cannot write '\S+-crash-003\.csv': No space left on device")
 
 
 if __name__ == "__main__":

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <ctime>
 #include <fmt/core.h>
+#include <sys/statvfs.h>
+#include <utility>
 
 namespace hal::tools {
 
@@ -30,6 +32,7 @@ void FlightMemory::prune(std::int64_t now_ns, std::int64_t but_from_ns) {
     while (!batches_.empty() && (batches_.front().batch.until_ns < from || bytes_ > most_bytes)) {
         note_last(batches_.front());
         bytes_ -= batches_.front().batch.bytes.size();
+        forgotten_until_ns_ = batches_.front().batch.until_ns;
         batches_.pop_front();
     }
     while (!entries_.empty() && entries_.front().time_ns < from) entries_.pop_front();
@@ -60,6 +63,49 @@ void FlightTrigger::event(std::int64_t time_ns, const std::string& cause) {
     } else {
         end_ = std::max(end_, std::min(time_ns + after_ns_, *since_ + 3 * after_ns_));
     }
+}
+
+void FlightBacklog::add(FlightEvent event) {
+    if (events_.size() >= most_events) ++lost_;
+    else events_.push_back(std::move(event));
+}
+
+void FlightBacklog::forget(std::int64_t until_ns) {
+    while (!events_.empty() && events_.front().end_ns <= until_ns) {
+        events_.pop_front();
+        ++lost_;
+    }
+}
+
+void FlightBacklog::written() {
+    events_.pop_front();
+    if (failing_) ++late_;
+}
+
+bool FlightBacklog::failed(std::int64_t now_ns) {
+    failed_ns_ = looked_ns_ = now_ns;
+    free_at_failure_ = free_bytes();
+    return !std::exchange(failing_, true);
+}
+
+bool FlightBacklog::may_write(std::int64_t now_ns) {
+    constexpr std::int64_t look_ns = 500'000'000, anyway_ns = 30'000'000'000;
+    if (!failing_ || now_ns - failed_ns_ >= anyway_ns) return true;
+    if (now_ns - looked_ns_ < look_ns) return false;
+    looked_ns_ = now_ns;
+    return free_bytes() > free_at_failure_;
+}
+
+std::string FlightBacklog::recovered() {
+    if (!failing_ || !events_.empty()) return "";
+    failing_ = false;
+    const std::uint64_t late = std::exchange(late_, 0), lost = std::exchange(lost_, 0);
+    return fmt::format("writing again: {} event{} written late, {} lost\n", late, late == 1 ? "" : "s", lost);
+}
+
+std::uint64_t FlightBacklog::free_bytes() const {
+    struct statvfs disk{};
+    return ::statvfs(folder_.c_str(), &disk) == 0 ? std::uint64_t{disk.f_bavail} * disk.f_frsize : 0;
 }
 
 std::string flight_name(const std::string& file, std::int64_t unix_ns, const std::string& cause, unsigned number) {

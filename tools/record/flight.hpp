@@ -28,6 +28,8 @@ public:
     /// Forgets what is older than the time to be kept, reckoned from `now_ns`; nothing after `but_from_ns`.
     void prune(std::int64_t now_ns, std::int64_t but_from_ns);
     std::size_t bytes() const { return bytes_; }
+    /// Returns the time up to which nothing is left.
+    std::int64_t forgotten_until_ns() const { return forgotten_until_ns_; }
 
 private:
     struct Held {
@@ -46,6 +48,7 @@ private:
     std::deque<ProbeClient::Entry> entries_;
     std::vector<Last> last_;
     std::size_t bytes_ = 0;
+    std::int64_t forgotten_until_ns_ = INT64_MIN;
 };
 
 /// Decides when a file is written and what it is called.
@@ -66,6 +69,51 @@ private:
     std::optional<std::int64_t> since_;
     std::int64_t end_ = 0;
     std::string cause_;
+};
+
+/// An event whose file is not complete.
+struct FlightEvent {
+    std::int64_t begin_ns = 0, time_ns = 0, end_ns = 0;
+    std::string cause;
+    std::string path;  ///< of the first attempt to write it
+};
+
+/// The events that could not be written yet: they stay in memory until there is space again.
+class FlightBacklog {
+public:
+    static constexpr std::size_t most_events = 1000;
+
+    explicit FlightBacklog(std::string folder) : folder_(std::move(folder)) {}
+
+    /// Adds an event; beyond the limit it is only counted.
+    void add(FlightEvent event);
+    bool empty() const { return events_.empty(); }
+    FlightEvent& oldest() { return events_.front(); }
+    std::size_t size() const { return events_.size(); }
+    std::uint64_t lost() const { return lost_; }
+    /// Returns the time from which the memory is still needed.
+    std::int64_t needed_from_ns() const { return events_.empty() ? INT64_MAX : events_.front().begin_ns; }
+    /// Counts the events of which nothing is left in memory as lost.
+    void forget(std::int64_t until_ns);
+
+    /// The oldest event was written.
+    void written();
+    /// It was not. Returns true for the first failure since the last success.
+    bool failed(std::int64_t now_ns);
+    /// Returns whether an attempt may succeed: nothing has failed, the disk has more space than at the failure, or half a minute has passed.
+    bool may_write(std::int64_t now_ns);
+    /// After a success that ends an outage: returns its line, once.
+    std::string recovered();
+
+private:
+    std::uint64_t free_bytes() const;
+
+    const std::string folder_;
+    std::deque<FlightEvent> events_;
+    std::uint64_t lost_ = 0, late_ = 0;  // of this outage: lost, written late
+    std::uint64_t free_at_failure_ = 0;
+    std::int64_t failed_ns_ = 0, looked_ns_ = 0;
+    bool failing_ = false;
 };
 
 /// Returns BASE-20261126T124501Z-CAUSE-SEQ.ENDING.

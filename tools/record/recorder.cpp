@@ -9,6 +9,7 @@
 
 #include "cli/output.hpp"
 #include "cli/signals.hpp"
+#include "hal/clock.hpp"
 #include "machine/address.hpp"
 #include "machine/probes.hpp"
 #include "record/flight.hpp"
@@ -53,6 +54,8 @@ public:
             return fail(options_, fmt::format("cannot write '{}': {}", what_.file, problem));
         FlightMemory memory(probe_.groups(), what_.last_ns);
         FlightTrigger trigger(what_.last_ns, what_.after_ns);
+        const std::filesystem::path folder = std::filesystem::path(what_.file).parent_path();
+        FlightBacklog backlog(folder.empty() ? "." : folder.string());
         const bool forever = what_.for_ns < 0;
         for (bool over = false; !over;) {
             const auto got = next();
@@ -67,14 +70,18 @@ public:
                 if (first_ns_ == 0) first_ns_ = now_ns_;
                 if (const auto time_ns = triggered()) trigger.event(*time_ns, what_.trigger);
                 memory.add(std::move(batch_));
-                memory.prune(now_ns_, trigger.pending() ? trigger.begin_ns() : INT64_MAX);
+                memory.prune(now_ns_, std::min(backlog.needed_from_ns(), trigger.pending() ? trigger.begin_ns() : INT64_MAX));
             }
             if (got == ProbeClient::Got::disconnected && was_killed(client_.instance())) trigger.event(now_ns_, "end-of-machine");
             if (trigger.pending() && (over || now_ns_ >= trigger.end_ns())) {
-                if (!write(memory, trigger)) return cannot_write();
+                backlog.add({trigger.begin_ns(), trigger.begin_ns() + what_.last_ns, trigger.end_ns(), trigger.cause(), ""});
                 trigger.done();
             }
+            backlog.forget(memory.forgotten_until_ns());
+            if (over || backlog.may_write(monotonic_ns())) write(memory, backlog);
         }
+        if (!backlog.empty() || backlog.lost() != 0)
+            return fail(options_, fmt::format("{} not written: {}", counted(backlog.size() + backlog.lost(), "event"), failure_));
         if (files_ == 0) nothing_written();
         return 0;
     }
@@ -173,14 +180,30 @@ private:
         return at;
     }
 
-    bool write(const FlightMemory& memory, const FlightTrigger& trigger) {
-        do path_ = flight_name(what_.file, probe_.unix_ns(trigger.begin_ns() + what_.last_ns), trigger.cause(), ++files_);
-        while (std::filesystem::exists(path_));  // of another recorder
+    /// Writes the events of the backlog, the oldest first, until one cannot be written. The first failure is reported, and the end of them.
+    void write(const FlightMemory& memory, FlightBacklog& backlog) {
+        while (!backlog.empty()) {
+            if (!write(memory, backlog.oldest())) {
+                failure_ = tools::cannot_write(*sink_, path_);
+                if (backlog.failed(monotonic_ns()))
+                    fail(options_, failure_ + "; the recorder goes on, and writes events from memory when there is space");
+                return;
+            }
+            backlog.written();
+        }
+        print(backlog.recovered());
+    }
+    bool write(const FlightMemory& memory, FlightEvent& event) {
+        if (event.path.empty()) {
+            do event.path = flight_name(what_.file, probe_.unix_ns(event.time_ns), event.cause, ++files_);
+            while (std::filesystem::exists(event.path));  // of another recorder
+        }
+        path_ = event.path;
         rows_ = 0;
         Origin origin = origin_;
-        origin.cause = trigger.cause();
+        origin.cause = event.cause;
         sink_ = make_sink(path_, probe_.columns(), origin);
-        return sink_->error() == 0 && memory.write(*sink_, trigger.begin_ns(), trigger.end_ns(), rows_) && complete();
+        return sink_->error() == 0 && memory.write(*sink_, event.begin_ns, event.end_ns, rows_) && complete();
     }
 
     const Options& options_;
@@ -191,7 +214,7 @@ private:
     StopRequest stop_;
     ProbeBatch batch_;
     std::unique_ptr<Sink> sink_;
-    std::string path_;
+    std::string path_, failure_;  // the file being written; why the last one could not be
     std::vector<std::string> written_;
     std::uint64_t rows_ = 0;
     unsigned files_ = 0;
