@@ -140,6 +140,23 @@ invalid axis 'I'; write A to H
 missing command for axis A; type: help
 """, done.stderr.replace("hal can drive: ", ""))
 
+    def test_what_has_no_effect(self):
+        self.node()
+        for words, expected in (
+            (["PFA:2,1"], "PFA:2,1: a factor is valid for the commands after it, and there are none; "),
+            (["VFA:", "2,1"], "VFA:2,1: a factor is valid for the commands after it, and there are none; "),
+            (["A", "set", "position-factor", "4096/360"],
+             "A set position-factor 4096/360: a factor is valid for the commands after it, and there are none; "),
+            (["quit"], "quit ends a session, and there is none; "),
+            (["-k", "A", "on"], "--keep-going is for commands from a file or pipe; "),
+            (["--axis", "B", "A", "status"], "--axis has no effect on a command with a letter; "),
+            (["--supervise", "off", "--heartbeat-id", 112, "A", "on"], "--heartbeat-id has no effect with --supervise off; "),
+        ):
+            done = self.run_program("can", "drive", self.bus, "--node", 2, *words)
+            self.assertEqual((1, ""), (done.returncode, done.stdout), words)
+            self.assertTrue(done.stderr.startswith("hal can drive: " + expected), done.stderr)
+        self.assertEqual("PFA=1,1\n", self.drive("PFA?"))
+
     def test_command_line(self):
         def bad(*words):
             return self.bad("can", "drive", *words)

@@ -63,6 +63,12 @@ std::string DriveShell::help_text() {
     return text + value_help() + "  HELP lists the robot-shell commands, which end with the axis: ONA: GA:1000 APA?\n";
 }
 
+bool DriveShell::without_effect(const std::string& command) const {
+    return wrong(fmt::format("{0}: a factor is valid for the commands after it, and there are none; type them as lines of a session: "
+                             "printf '{0}\\nGA:100\\n' | hal can drive {1} --node {2}",
+                             command, options_.words.front(), settings_.node));
+}
+
 int DriveShell::execute(std::string_view line) {
     line = line.substr(0, line.find('#'));
     pressed_.store(false);
@@ -143,12 +149,17 @@ bool DriveShell::run(Words words) {
         const char letter = static_cast<char>(words[0][0] & ~0x20);
         if (letter < 'A' || letter > 'H') return wrong(fmt::format("invalid axis '{}'; write A to H", words[0]));
         number = static_cast<unsigned>(letter - 'A');
+        if (settings_.one_shot && settings_.axis_given)
+            return wrong(fmt::format("--axis has no effect on a command with a letter; delete --axis or '{}'", words[0]));
         words.erase(words.begin());
         if (words.empty()) return wrong(fmt::format("missing command for axis {}; type: help", letter));
     }
     const std::string verb = words[0];
     words.erase(words.begin());
-    if (verb == "quit" || verb == "exit") return left_ = over_ = true;
+    if (verb == "quit" || verb == "exit") {
+        if (settings_.one_shot) return wrong(fmt::format("{} ends a session, and there is none; type: hal can drive {} --node {}", verb, options_.words.front(), settings_.node));
+        return left_ = over_ = true;
+    }
     if (verb == "help") return print(help_text());
     SdoAxis& a = axis(number);
     if (verb.ends_with('?')) return query(a, verb.substr(0, verb.size() - 1));
@@ -311,12 +322,18 @@ int run_can_drive(const DriveOptions& given) {
 
     NodeClient station(options, options.timeout_ns);
     const bool one_shot = options.words.size() > 1, terminal = ::isatty(STDIN_FILENO) == 1;
+    if (one_shot && options.keep_going)
+        return fail(options, "--keep-going is for commands from a file or pipe; delete it, or the command");
+    if (options.supervise == "off" && !options.heartbeat_id.empty())
+        return fail(options, "--heartbeat-id has no effect with --supervise off; delete one of them");
     Supervision supervision(options, station, node, watched);
     DriveShell shell(options, station, supervision,
                      {.node = node,
                       .axis = static_cast<unsigned>(axis - 'A'),
                       .ends_at_failure = !terminal && !options.keep_going,
                       .prompt = !one_shot && terminal,
+                      .one_shot = one_shot,
+                      .axis_given = !letter.empty(),
                       .within_ns = within});
     station.bus.stop.when_signalled([&shell] { shell.press(); });
     station.bus.stop.spare(terminal && !one_shot);  // at a prompt Ctrl-C ends a command, not the session

@@ -130,6 +130,7 @@ bool DriveShell::robot_command(SdoAxis& a, const RobotCommand& word, const std::
     if (word.values == 2) {
         Factor& factor = name == "PF" ? a.rules.position : name == "VF" ? a.rules.velocity : a.rules.acceleration;
         if (query) return answer(fmt::format("{:.10g},{:.10g}", factor.numerator, factor.denominator));
+        if (settings_.one_shot) return without_effect(fmt::format("{}{}:{},{}", name, a.letter(), values[0], values[1]));
         factor = {static_cast<double>(values[0]), static_cast<double>(values[1])};
         return true;
     }

@@ -22,6 +22,8 @@ public:
         unsigned axis = 0;          ///< axis of commands without a letter
         bool ends_at_failure = false;
         bool prompt = false;        ///< interactive: `ok` confirms commands without output
+        bool one_shot = false;      ///< a single command of the command line
+        bool axis_given = false;    ///< by --axis
         std::int64_t within_ns = 0; ///< timeout of a command; 0: its default
     };
     DriveShell(const Options&, NodeClient&, Supervision&, const Settings&);
@@ -47,6 +49,8 @@ private:
     bool robot_command(SdoAxis&, const RobotCommand&, const std::vector<std::int64_t>&, bool query);
     bool print_line(const std::string& text) const;
     bool wrong(const std::string& sentence) const;
+    /// Reports a factor that no command uses. Returns false.
+    bool without_effect(const std::string& command) const;
     bool command(SdoAxis&, const std::string& verb, Words arguments);
     bool motion(SdoAxis&, const std::string& verb, Words arguments, const std::string& usage);
     bool query(SdoAxis&, const std::string& name);

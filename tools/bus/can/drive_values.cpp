@@ -123,6 +123,7 @@ bool DriveShell::set(SdoAxis& a, const std::string& name, const std::string& tex
     if (Factor* f = find_factor(a, name)) {
         if (!parse_factor(text, *f))
             return wrong(fmt::format("invalid factor '{}'; write NUMERATOR/DENOMINATOR, such as 4096/360, neither of them 0", text));
+        if (settings_.one_shot) return without_effect(fmt::format("{} set {} {}", a.letter(), name, text));
         return query(a, name);
     }
     double value = 0, back = 0;

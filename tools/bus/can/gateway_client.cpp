@@ -243,6 +243,8 @@ private:
 int run_can_gateway_client(const GatewayOptions& options) {
     if (!options.socket.empty() || !options.listen.empty() || !options.state.empty())
         return fail(options, "--connect is for a client; --socket, --listen and --state are for the gateway");
+    if (!options.identity.empty() || !options.vendor_name.empty() || !options.product_name.empty() || !options.order_code.empty())
+        return fail(options, "--connect is for a client; --identity, --vendor-name, --product-name and --order-code are for the gateway");
     StopRequest stop;
     const int fd = connect_to_gateway(options);
     if (fd < 0) return 1;

@@ -290,6 +290,7 @@ int run_canopen_plan(const CanopenPlanOptions& options) {
     }
     if (file.ends_with(".log") || file.ends_with(".pcapng") || file.ends_with(".pcap")) {
         Table table;
+        if (!options.cycle.empty()) return fail(options, "--cycle is for configurations; a recording has its own SYNCs");
         if (!read_recording(options, file, table)) return 1;
         table.bus.errors = errors;
         return report_plan(options, file, table, "");
@@ -300,13 +301,17 @@ int run_canopen_plan(const CanopenPlanOptions& options) {
     if (const std::string& link = reading.config.link; !can::describe(link).has_bit_rate)
         return fail(options, fmt::format("{} uses Ethernet ({}), where identifiers do not arbitrate; for its schedule type: "
                                          "hal tdma plan FILE.tdma", file, link));
-    const auto cycle = parse_duration_ns(options.cycle);
+    const std::string period = options.cycle.empty() ? "1ms" : options.cycle;
+    const auto cycle = parse_duration_ns(period);
     if (!cycle || *cycle < 1000) return fail(options, fmt::format("invalid --cycle '{}'; write --cycle 1ms", options.cycle));
     Table table = table_of(config::schedule_of(reading.config, *cycle));
     table.bus.errors = errors;
     std::string help;
-    if (reading.config.sync != config::SyncMode::none && reading.config.sync_period == 0)
-        help = fmt::format("  = help: the SYNC is sent every cycle of the thread, assumed to be {}; for another period add: --cycle 2ms\n", options.cycle);
+    const bool every_cycle = reading.config.sync != config::SyncMode::none && reading.config.sync_period == 0;
+    if (!every_cycle && !options.cycle.empty())
+        return fail(options, fmt::format("--cycle has no effect: {} sends no SYNC in every cycle; delete --cycle, or write `sync = cycle` in [bus]", file));
+    if (every_cycle)
+        help = fmt::format("  = help: the SYNC is sent every cycle of the thread, assumed to be {}; for another period add: --cycle 2ms\n", period);
     return report_plan(options, file, table, help);
 }
 

@@ -8,7 +8,7 @@
 namespace hal::tools {
 
 struct CanopenPlanOptions : Options {
-    std::string cycle = "1ms", errors, bitrate;
+    std::string cycle, errors, bitrate;
     bool json = false;
 
     void declare(OptionSet& set) override {

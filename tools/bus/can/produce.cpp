@@ -59,6 +59,8 @@ int run_can_generate(const GenerateOptions& options) {
     std::uint32_t first = 0, last = most;
     if (!options.id.empty() && !parse_range(options.id, most, first, last))
         return fail(options, fmt::format("invalid --id '{}'; write an identifier or a range in hex, at most {:X}: 181 or 100-1FF", options.id, most));
+    if (options.counting && options.length >= 0 && options.seed >= 0)
+        return fail(options, "--seed has no effect with --counting and --length: nothing is random; delete one of them");
     if (options.length > 8) return fail(options, fmt::format("invalid --length {}; write 0..8", options.length));
     Bus bus;
     if (!bus.open(options, options.words[0], false)) return 1;

@@ -60,6 +60,8 @@ int run_can_sdo_read(const SdoReadOptions& options) {
     for (std::size_t n = 0; n < objects.size(); ++n)
         if (!target.names.find(options.words[n + 2], objects[n], problem)) return fail(options, problem);
     if (!options.output.empty() && objects.size() != 1) return fail(options, "-o writes the bytes of one object; name only one");
+    if (!options.output.empty() && (options.json || !options.type.empty()))
+        return fail(options, fmt::format("{} has no effect with -o, which writes the bytes as they are; delete one of them", options.json ? "--json" : "--type"));
     NodeClient station(options, options.timeout_ns);
     if (!station.open(options.words[0])) return 1;
     const auto room = std::make_unique_for_overwrite<std::uint8_t[]>(most_bytes);
