@@ -282,6 +282,41 @@ int Shell::run_ini(const std::string& path, Output& output) {
     return status;
 }
 
+namespace {
+
+bool has_functions(const Model& model) {
+    return std::any_of(model.components.begin(), model.components.end(), [](const auto& component) { return !component->functions.empty(); });
+}
+
+bool runs_functions(const Model& model) {
+    return std::any_of(model.threads.begin(), model.threads.end(), [](const auto& thread) { return !thread->functions.empty(); });
+}
+
+/// Why no function has run although time has passed; nothing when one has, or when there is none.
+void check_that_something_ran(const Session& session, Diagnostics& diagnostics) {
+    const Model& model = session.model();
+    const Span at = session.threads().idle_advance();
+    if (!has_functions(model) || session.threads().now_ns() == 0) return;
+    if (model.threads.empty())
+        diagnostics.warning("nothing-ran", at, "no thread exists, so no function ran", "",
+                            "create one with `newthread servo-thread 1000000`, then `addf FUNCTION servo-thread`");
+    else if (!runs_functions(model))
+        diagnostics.warning("nothing-ran", at, "no function is in a thread, so none ran", "",
+                            "addf FUNCTION " + model.threads.front()->name + "; to see the functions: show function");
+    else if (!session.threads().was_started())
+        diagnostics.warning("nothing-ran", at, "the threads were never started, so no function ran", "", "write `start` before this line");
+}
+
+}  // namespace
+
+void Shell::warn_when_nothing_ran(Output& output) {
+    Diagnostics diagnostics;
+    const auto lock = state_->session.lock();
+    check_that_something_ran(state_->session, diagnostics);
+    if (!diagnostics.all().empty() && options.level != Level::nothing)
+        output.err(render(diagnostics, state_->session.sources, options.color));
+}
+
 bool Shell::may_wait(std::string_view text) {
     static const auto waiting = [] {
         std::vector<std::string_view> names;

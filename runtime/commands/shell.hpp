@@ -96,6 +96,8 @@ public:
     /// Runs a .hal file, or an .ini file with its [HAL] section: HALFILE=, HALCMD=, TWOPASS=. An .ini file also becomes
     /// what [SECTION]KEY is looked up in.
     int run_file(const std::string& path, Output& output);
+    /// After a simulation: prints a warning when time has passed and no function has run.
+    void warn_when_nothing_ran(Output& output);
     /// Reads an .ini file for [SECTION]KEY only (`-i`).
     int read_ini(const std::string& path, Output& output);
     /// Runs the files of [HAL]HALFILE, with TWOPASS, of the INI file at `path`, which was read.

@@ -32,7 +32,10 @@ bool ThreadControl::start(Diagnostics* diagnostics) {
             s.hung_thread(*thread, *core, diagnostics ? *diagnostics : ignored);
             all = false;
         }
-    if (all) s.executor->start();
+    if (all) {
+        s.executor->start();
+        was_started_ = true;
+    }
     return all;
 }
 

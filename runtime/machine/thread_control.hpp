@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <string>
 
+#include "text/source.hpp"
+
 namespace hal {
 
 class Diagnostics;
@@ -24,6 +26,14 @@ public:
     /// Reports the threads that hang as errors. Returns false when there are none.
     bool report_hung(Diagnostics& diagnostics) const;
     bool running() const;
+    /// Returns true when start() was successful once.
+    bool was_started() const { return was_started_; }
+    /// Notes the command that lets time pass while the threads have never been started; only the first is kept.
+    void note_idle_advance(Span command) {
+        if (!was_started_ && !idle_advance_.known()) idle_advance_ = command;
+    }
+    /// Returns the command that was noted, or an unknown span.
+    Span idle_advance() const { return idle_advance_; }
 
     /// Virtual clock: runs the threads for `ns`. Real clock: waits for `ns`.
     void advance_ns(std::int64_t ns);
@@ -42,6 +52,8 @@ public:
 
 private:
     SessionState& state_;
+    bool was_started_ = false;
+    Span idle_advance_;
     int watchdog_ = -1;  // the open device, until it is disarmed
 };
 

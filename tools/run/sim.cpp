@@ -112,6 +112,7 @@ int run_sim(const SimOptions& options) {
     for (const std::string& command : options.execute)
         if (status == 0 && !machine.stop.requested()) status = machine.shell.execute(command, output, "<commandline>");
     if (status == 0 && !options.show.empty()) status = show_values(options, machine.session);
+    if (loaded && status == 0) machine.shell.warn_when_nothing_ran(output);
     if (machine.faulted() || machine.stop.requested()) status = 1;
     if (options.report) write_all(STDERR_FILENO, timing_report(machine.session));
     else if (loaded && summary_wanted(options, output.printed || !options.show.empty()))

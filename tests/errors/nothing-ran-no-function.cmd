@@ -1,0 +1,1 @@
+hal sim nothing-ran-no-function.hal --for 10ms -q

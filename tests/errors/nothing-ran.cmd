@@ -1,0 +1,1 @@
+hal sim nothing-ran.hal
