@@ -239,6 +239,8 @@ public:
     virtual std::vector<DeliveryTime> delivery_times() const { return {}; }
     /// Waits at most `at_most_ns` until receive() has a frame. Returns true when it has. For threads without a cycle. [setup]
     virtual bool wait(std::int64_t at_most_ns) = 0;
+    /// Returns how long the destructor may wait until what is queued is sent, ns. [setup]
+    virtual std::int64_t closing_ns() const noexcept { return 0; }
     /// Returns a descriptor that polls readable when a frame may have arrived, or -1. [any]
     virtual int descriptor() const noexcept { return -1; }
     /// Returns the fault injection of a bus in memory; nullptr on all others. [setup]
@@ -246,6 +248,9 @@ public:
     /// Takes a report of frames rejected since the last call, at most one sender per second. Returns false: none. [realtime] receiver
     virtual bool rejected(Rejected&) noexcept { return false; }
 };
+
+/// Why a component needs closing_ns() to stop.
+inline constexpr const char* closing_text = "a slow bus still sends what is queued";
 
 /// A link, or in `problem` a sentence with place, cause and what to type.
 struct Opened {

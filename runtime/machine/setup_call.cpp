@@ -15,30 +15,65 @@ namespace {
 // The thread that is in the call may hold any lock, the allocator's among them.
 void print(const char* text) noexcept { [[maybe_unused]] const auto written = write(STDERR_FILENO, text, std::strlen(text)); }
 
+/// Prints a duration in whole seconds, rounded up.
+void print_seconds(std::int64_t ns) noexcept {
+    char text[24];
+    char* at = text + sizeof text;
+    *--at = '\0';
+    std::int64_t seconds = (ns + 999'999'999) / 1'000'000'000;
+    do *--at = static_cast<char>('0' + seconds % 10);
+    while ((seconds /= 10) != 0);
+    print(at);
+    print(" s");
+}
+
+void print_name(const SetupCallNow& call) noexcept {
+    print("hal: '");
+    print(call.instance);
+    print("' (");
+    print(call.component);
+    print(")");
+}
+
+void print_announced(const SetupCallNow& call, std::int64_t expected_ns) noexcept {
+    print_name(call);
+    print(" needs up to ");
+    print_seconds(expected_ns);
+    print(" to ");
+    print(call.what);
+    print(": ");
+    print(call.why);
+    print("\n");
+}
+
 void watch(const SetupGuard::Flags& flags) noexcept {
-    constexpr std::int64_t name_after_ns = 2'000'000'000, end_after_ns = 15'000'000'000;
+    constexpr std::int64_t patience_ns = 2'000'000'000, end_after_ns = 13'000'000'000;
     const SetupCallNow& call = SetupCall::now;
-    std::int64_t named_ns = 0, ending_ns = 0;
+    std::int64_t named_ns = 0, announced_ns = 0, ending_ns = 0;
     while (!flags.over.load()) {
         const timespec nap{0, ending_ns == 0 ? 100'000'000 : 20'000'000};
         nanosleep(&nap, nullptr);
         if (ending_ns == 0 && flags.ending.load()) ending_ns = monotonic_ns(), named_ns = 0;
         const std::int64_t since = call.since_ns.load(std::memory_order_acquire);
         if (since == 0) continue;
-        const std::int64_t waited = monotonic_ns() - std::max(ending_ns, since);
-        const bool ends = ending_ns != 0 && waited > end_after_ns;
+        const std::int64_t waited = monotonic_ns() - std::max(ending_ns, since), expected = call.expected_ns.load();
+        const std::int64_t name_after_ns = patience_ns + expected;
+        if (expected > patience_ns && waited >= patience_ns && announced_ns != since) {
+            announced_ns = since;
+            print_announced(call, expected);
+        }
+        const bool ends = ending_ns != 0 && waited > name_after_ns + end_after_ns;
         if (!ends && (waited < name_after_ns || named_ns == since)) continue;
         named_ns = since;
         if (ends) make_all_safe();
-        print("hal: '");
-        print(call.instance);
-        print("' (");
-        print(call.component);
-        print(") has not returned from ");
+        print_name(call);
+        print(" has not returned from ");
         print(call.what);
-        print(ends             ? " for 15 s; outputs set to their safe values; the process ends\n"
-              : ending_ns != 0 ? " for 2 s; the machine ends when it returns, at the latest in 13 s\n"
-                               : " for 2 s; all commands wait for it\n");
+        print(" for ");
+        print_seconds(ends ? name_after_ns + end_after_ns : name_after_ns);
+        print(ends             ? "; outputs set to their safe values; the process ends\n"
+              : ending_ns != 0 ? "; the machine ends when it returns, at the latest in 13 s\n"
+                               : "; all commands wait for it\n");
         if (ends) _exit(1);
     }
 }

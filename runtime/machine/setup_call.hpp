@@ -3,6 +3,7 @@
 // meanwhile, so when the call does not return, nothing else can be reported.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cstdint>
 #include <cstring>
@@ -17,6 +18,8 @@ namespace hal {
 struct SetupCallNow {
     char instance[128] = "", component[128] = "";
     std::atomic<const char*> what{""};
+    std::atomic<const char*> why{""};
+    std::atomic<std::int64_t> expected_ns{0};  ///< duration that the component has announced
     std::atomic<std::int64_t> since_ns{0};  ///< on the monotonic clock; 0: none
 };
 
@@ -27,10 +30,18 @@ public:
         copy(instance, now.instance);
         copy(component, now.component);
         now.what = what;
+        now.expected_ns = 0;
         now.since_ns.store(monotonic_ns(), std::memory_order_release);
     }
     ~SetupCall() { now.since_ns.store(0, std::memory_order_release); }
     SetupCall(const SetupCall&) = delete;
+
+    /// Notes that the present call may take `ns`, a minute at most. [setup]
+    static void expect(std::int64_t ns, const char* why) noexcept {
+        constexpr std::int64_t most_ns = 60'000'000'000;
+        now.why = why;
+        now.expected_ns = std::clamp<std::int64_t>(ns, 0, most_ns);
+    }
 
     inline static SetupCallNow now;  ///< [any]
 
@@ -42,7 +53,8 @@ private:
     }
 };
 
-/// Names a call that does not return within 2 s. After end_soon() it ends the process when the call does not return within 15 s.
+/// Names a call that does not return within 2 s, or 2 s after the duration that the component has announced. After end_soon() it ends the
+/// process when the call does not return 13 s later.
 class SetupGuard {
 public:
     struct Flags {

@@ -5,6 +5,7 @@
 #include "execute/executor.hpp"
 #include "hal/supervision.h"
 #include "hal/path_delay.h"
+#include "hal/setup_time.h"
 #include "machine/construct.hpp"
 #include "machine/setup_call.hpp"
 
@@ -62,6 +63,9 @@ bool report_path_delay(const hal_path_delay*, const hal_host* host, const char* 
 }
 constexpr hal_path_delay path_delay_host{sizeof path_delay_host, report_path_delay};
 
+constexpr hal_setup_time setup_time_host{sizeof setup_time_host, 0,
+                                         [](const hal_setup_time*, std::int64_t ns, const char* why) { SetupCall::expect(ns, why); }};
+
 bool claim_clock(const hal_clock*, const hal_host* host) {
     Starting& starting = *static_cast<Starting*>(host->data);
     if (const Instance* const other = clock_leader(starting.model); other && other != &starting.instance) {
@@ -111,6 +115,7 @@ Failure start_instance(Instance& instance, const Model& model, Executor& executo
             if (std::strcmp(id, "hal.clock/1") == 0) return &static_cast<Starting*>(h->data)->executor.clock();
             if (std::strcmp(id, HAL_SUPERVISION) == 0) return &static_cast<Starting*>(h->data)->executor.supervisor().shared;
             if (std::strcmp(id, HAL_PATH_DELAY) == 0) return &path_delay_host;
+            if (std::strcmp(id, HAL_SETUP_TIME) == 0) return &setup_time_host;
             if (std::strcmp(id, HAL_BACKGROUND) == 0) return &static_cast<Starting*>(h->data)->executor.background();
             return nullptr;
         },

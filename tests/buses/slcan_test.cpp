@@ -6,11 +6,13 @@
 #include <poll.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <string>
+#include <thread>
 
 #include "link/can.hpp"
 
@@ -105,6 +107,28 @@ TEST(Slcan, a_line_that_is_pulled_out_and_plugged_in_again_goes_on_without_old_f
     ASSERT_TRUE(link.wait(20 * second));
     ASSERT_TRUE(link.receive(f, unclocked));
     EXPECT_TRUE(f.same({0x321, {0xff}}));
+}
+
+// At 10 kbit/s what is queued needs seconds: the safe values at its end must arrive all the same, and a reader that is gone must not block.
+TEST(Slcan, a_slow_line_gets_all_that_is_queued_before_it_is_closed) {
+    Adapter adapter;
+    adapter.plug();
+    if (adapter.end < 0) GTEST_SKIP() << "the system gives no pseudo-terminal: " << std::strerror(errno);
+    auto opened = open("slcan:" + adapter.device.string() + "?bitrate=10k");
+    ASSERT_TRUE(opened) << opened.problem;
+    adapter.heard("O\r");
+    EXPECT_EQ(opened.link->closing_ns(), 0);
+    std::size_t sent = 0;
+    const Frame frame(0x123, {1, 2, 3, 4, 5, 6, 7, 8});
+    while (opened.link->send(frame, unclocked) == Sent::queued) ++sent;
+    EXPECT_GT(opened.link->closing_ns(), 2 * second);
+    EXPECT_LE(opened.link->closing_ns(), 60 * second);
+    std::string text;
+    std::thread reader([&] { text = adapter.heard("C\r"); });
+    opened.link.reset();
+    reader.join();
+    const auto frames = static_cast<std::size_t>(std::count(text.begin(), text.end(), 't'));
+    EXPECT_EQ(frames, sent);
 }
 
 TEST(Slcan, a_line_that_is_not_there_is_refused_with_what_to_look_at) {

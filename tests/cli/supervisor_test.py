@@ -159,6 +159,13 @@ class Supervisor(HungCase):
         self.assertEqual("hal: 'stuck.0' (stuck) has not returned from stop for 2 s; the machine ends when it returns, at the latest in 13 s\n"
                          "hal: 'stuck.0' (stuck) has not returned from stop for 15 s; outputs set to their safe values; the process ends\n", err)
 
+    def test_component_that_announces_a_long_stop_is_not_a_hang(self):
+        machine = self.start("run", self.write("a.hal", "newthread servo 1000000\nloadrt stuck takes=3000\naddf stuck.0 servo\n"))
+        machine.send_signal(signal.SIGTERM)
+        err = machine.communicate(timeout=120)[1]
+        self.assertEqual(0, machine.returncode)
+        self.assertEqual("hal: 'stuck.0' (stuck) needs up to 5 s to stop: a slow bus still sends what is queued\n", err)
+
     def test_component_whose_start_does_not_return_is_named_while_the_machine_goes_on(self):
         machine = self.start("run", self.write("a.hal", "newthread servo 1000000\nloadrt stuck start=1\naddf stuck.0 servo\n"), loaded=False)
         self.assertEqual("hal: 'stuck.0' (stuck) has not returned from start for 2 s; all commands wait for it\n", machine.stderr.readline())

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "hal/component.hpp"
+#include "hal/setup_time.hpp"
 #include "node.hpp"
 
 namespace hal::canopen {
@@ -58,12 +59,16 @@ public:
     hal::Out<bool> bus_off{*this, "bus-off", "the CAN controller of the device is bus off"};
 
     void start() {
+        setup_time_.start();
         auto opened = can::open(address_.get());
         if (!opened) throw std::runtime_error(opened.problem);
         node_ = std::make_unique<Node>(program(), std::move(opened.link),
                                        DeviceSettings{.node_id = static_cast<std::uint8_t>(id_), .auto_start = itself_ != 0});
     }
-    void stop() noexcept { node_.reset(); }
+    void stop() noexcept {
+        if (node_) setup_time_.expect(node_->link().closing_ns(), can::closing_text);
+        node_.reset();
+    }
 
 protected:
     /// Returns the program, created by the derived component before its start() ends. [setup]
@@ -103,6 +108,7 @@ private:
     std::deque<hal::In<std::uint32_t>> every_;
     std::deque<hal::In<double>> times_;  // of the faults that have a time, in their order
     std::unique_ptr<Node> node_;
+    hal::SetupTime setup_time_;
 };
 
 }  // namespace hal::canopen

@@ -4,6 +4,7 @@
 #include <stdexcept>
 
 #include "hal/component.hpp"
+#include "hal/setup_time.hpp"
 #include "link/can.hpp"
 
 namespace {
@@ -35,8 +36,13 @@ struct CanBridge : hal::Component {
         if (a.get() == b.get()) throw hal::ArgumentError("a", "a= and b= are the same bus, " + a.get() + "; name two different ones");
         open(ends_[0], a.get());
         open(ends_[1], b.get());
+        setup_time_.start();
     }
     void stop() noexcept {
+        std::int64_t closing_ns = 0;
+        for (const End& end : ends_)
+            if (end.link) closing_ns += end.link->closing_ns();
+        setup_time_.expect(closing_ns, hal::can::closing_text);
         for (End& end : ends_) end.link.reset();
     }
 
@@ -71,6 +77,7 @@ private:
     }
 
     std::array<End, 2> ends_;
+    hal::SetupTime setup_time_;
     std::array<hal::can::Frame, 64> buffer_;
 };
 

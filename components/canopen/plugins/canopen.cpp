@@ -18,6 +18,7 @@
 #include "hal/component.hpp"
 #include "hal/naming.hpp"
 #include "hal/path_delay.hpp"
+#include "hal/setup_time.hpp"
 
 namespace {
 
@@ -55,6 +56,7 @@ public:
 
     void start() {
         faults_ = hal::extension<hal_faults>("hal.faults/1");
+        setup_time_.start();
         hal::can::Options options;
         const hal::can::Description bus = hal::can::describe(config_.link);
         options.bit_rate = bus.in_memory && bus.has_bit_rate ? config_.bit_rate : 0;
@@ -86,6 +88,7 @@ public:
     void stop() noexcept {
         runner_->close();
         reporter_->stop();
+        if (link_) setup_time_.expect(link_->closing_ns(), hal::can::closing_text);
         link_.reset();
     }
 
@@ -297,6 +300,7 @@ private:
     std::unique_ptr<Reporter>    reporter_;
     std::unique_ptr<SharedLink>  link_;
     const hal_faults*            faults_ = nullptr;
+    hal::SetupTime               setup_time_;
     std::vector<std::uint8_t>    reported_notes_;  // bits of NodeStatus::notes, by node
     Time                         period_ = 0, now_ = 0;
     Time                         unsent_ = 0, unheard_ = 0;  // time since transmit, since receive

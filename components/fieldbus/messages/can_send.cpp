@@ -3,6 +3,7 @@
 #include <stdexcept>
 
 #include "hal/component.hpp"
+#include "hal/setup_time.hpp"
 #include "link/can.hpp"
 #include "message_fields.hpp"
 
@@ -38,10 +39,14 @@ struct CanSend : hal::Component {
         auto opened = hal::can::open(address.get(), {.stamps = true});
         if (!opened) throw std::runtime_error(opened.problem);
         link_ = std::move(opened.link);
+        setup_time_.start();
         const hal::can::Filter nothing{.id = 0x1fffffff, .mask = 0x1fffffff, .extended = true};
         link_->set_filters(std::span(&nothing, 1));
     }
-    void stop() noexcept { link_.reset(); }
+    void stop() noexcept {
+        if (link_) setup_time_.expect(link_->closing_ns(), hal::can::closing_text);
+        link_.reset();
+    }
 
     void update(hal::Cycle cycle) noexcept {
         const std::int64_t now = cycle.start_ns();
@@ -76,6 +81,7 @@ private:
     }
 
     std::unique_ptr<hal::can::Link> link_;
+    hal::SetupTime                  setup_time_;
     std::array<hal::can::Frame, 16> buffer_;
     std::array<std::uint8_t, 64>    last_data_{};
     std::uint32_t                   first_ = 0;

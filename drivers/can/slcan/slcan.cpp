@@ -2,6 +2,8 @@
 #include "slcan.hpp"
 
 #include <fcntl.h>
+#include <poll.h>
+#include <sys/ioctl.h>
 #include <termios.h>
 
 #include <algorithm>
@@ -74,8 +76,19 @@ public:
         }
         changed_.notify_all();
         watcher_.join();
-        flush(0);
+        drain(link::monotonic_ns() + closing_ns());
         (void)!::write(line_.get(), "C\r", 2);
+    }
+
+    /// A bus at 10 kbit/s needs seconds for what is queued, the safe values at its end among it.
+    std::int64_t closing_ns() const noexcept override {
+        constexpr std::int64_t least_bits = 47, most_ns = 50'000'000'000;  // frame without data
+        constexpr std::int64_t shortest_line = 6;                          // "t1230\r"
+        if (state() == State::down) return 0;
+        const auto lines = static_cast<std::int64_t>(outgoing_.size()) + (static_cast<std::int64_t>(text_size_) + held_by_kernel()) / shortest_line;
+        if (lines == 0) return 0;
+        const std::int64_t rate = counting_.bit_rate != 0 ? static_cast<std::int64_t>(counting_.bit_rate) : slowest_rate;
+        return std::min(most_ns, 1'000'000'000 + lines * 4 * least_bits * 1'000'000'000 / rate);
     }
 
     Sent send(const Frame& frame, std::int64_t now_ns) noexcept override {
@@ -156,6 +169,25 @@ public:
     int descriptor() const noexcept override { return line_.get(); }
 
 private:
+    static constexpr std::int64_t slowest_rate = 10'000;
+
+    /// Returns the number of bytes that the line has not sent yet.
+    std::int64_t held_by_kernel() const noexcept {
+        int bytes = 0;
+        return ::ioctl(line_.get(), TIOCOUTQ, &bytes) == 0 ? bytes : 0;
+    }
+    /// Writes what is queued until then. What remains is discarded: closing a line would wait for it.
+    void drain(std::int64_t until_ns) noexcept {
+        flush(0);
+        const auto waiting = [&] { return outgoing_.front() != nullptr || text_size_ != 0 || held_by_kernel() != 0; };
+        while (state() != State::down && waiting() && link::monotonic_ns() < until_ns) {
+            const bool full = outgoing_.front() != nullptr || text_size_ != 0;
+            pollfd p{line_.get(), static_cast<short>(full ? POLLOUT : 0), 0};
+            ::poll(&p, 1, 10);
+            flush(0);
+        }
+        if (waiting()) tcflush(line_.get(), TCOFLUSH);
+    }
     void take_status(unsigned bits) noexcept {  // Lawicel: 2 warning, 3 overrun, 5 passive
         if ((bits & 8) != 0) Counting::add(counting_.lost);
         const auto state = (bits & 32) != 0 ? State::passive : (bits & 4) != 0 ? State::warning : State::active;

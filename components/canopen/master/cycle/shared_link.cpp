@@ -125,6 +125,7 @@ bool SharedLink::rejected(can::Rejected& what) noexcept {
     const SharedBus::Try held(*bus_);
     return held && bus_->link->rejected(what);
 }
+std::int64_t            SharedLink::closing_ns() const noexcept { return bus_->link->closing_ns(); }
 bool                    SharedLink::wait(std::int64_t at_most_ns) { return bus_->link->wait(at_most_ns); }
 
 }  // namespace hal::canopen

@@ -36,6 +36,7 @@ public:
     bool set_filters(std::span<const can::Filter>) override { return false; }
     const can::Description& description() const noexcept override;
     std::vector<can::DeliveryTime> delivery_times() const override;
+    std::int64_t closing_ns() const noexcept override;
     bool wait(std::int64_t at_most_ns) override;
     bool rejected(can::Rejected&) noexcept override;
 
