@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
+#include "hal/limit.hpp"
 
 namespace {
 
@@ -17,10 +18,10 @@ struct Gearchange : hal::Component {
     hal::Out<double>   speed_out{*this, "speed-out", "speed for the drive, scaled for gear 1"};
     hal::In<bool>      dir_in{*this, "dir-in", "commanded direction"};
     hal::Out<bool>     dir_out{*this, "dir-out", "direction for the drive"};
-    hal::Param<double> min1{*this, "min1", "lowest speed in gear 1"};
-    hal::Param<double> max1{*this, "max1", "highest speed in gear 1", {.initial = 100000.0}};
-    hal::Param<double> min2{*this, "min2", "lowest speed in gear 2"};
-    hal::Param<double> max2{*this, "max2", "highest speed in gear 2", {.initial = 100000.0}};
+    hal::LimitParam    min1{*this, "min1", "lowest speed in gear 1"};
+    hal::LimitParam    max1{*this, "max1", "highest speed in gear 1", {.initial = 100000.0}};
+    hal::LimitParam    min2{*this, "min2", "lowest speed in gear 2"};
+    hal::LimitParam    max2{*this, "max2", "highest speed in gear 2", {.initial = 100000.0}};
     CorrectedParam     scale2{*this, "scale2", "ratio of the spindle speeds in gear 2 and gear 1; at least 1", {.initial = 1.0}};
     hal::Param<bool>   reverse{*this, "reverse", "TRUE: gear 2 reverses the direction of the spindle"};
     hal::Function      run{*this, "", &Gearchange::update, "computes speed-out and dir-out"};

@@ -2,6 +2,7 @@
 #include <numbers>
 
 #include "hal/component.hpp"
+#include "hal/limit.hpp"
 
 namespace {
 
@@ -42,13 +43,13 @@ struct alignas(64) Pid : hal::Component {
     hal::In<double>  ff3{*this, "FF3", "feed-forward of the third derivative of command"};
     hal::In<double>  bias{*this, "bias", "constant added to the output while enabled"};
     hal::In<double>  deadband{*this, "deadband", "smaller errors count as 0; larger ones are reduced by it"};
-    hal::In<double>  max_error{*this, "maxerror", "limit on the error; 0: no limit"};
-    hal::In<double>  max_error_i{*this, "maxerrorI", "limit on the integral of the error; 0: no limit"};
-    hal::In<double>  max_error_d{*this, "maxerrorD", "limit on the derivative of the error; 0: no limit"};
-    hal::In<double>  max_command_d{*this, "maxcmdD", "limit on the first derivative of command; 0: no limit"};
-    hal::In<double>  max_command_dd{*this, "maxcmdDD", "limit on the second derivative of command; 0: no limit"};
-    hal::In<double>  max_command_ddd{*this, "maxcmdDDD", "limit on the third derivative of command; 0: no limit"};
-    hal::In<double>  max_output{*this, "maxoutput", "limit on the output; 0: no limit"};
+    hal::OptionalLimit max_error{*this, "maxerror", "limit on the error; 0: no limit"};
+    hal::OptionalLimit max_error_i{*this, "maxerrorI", "limit on the integral of the error; 0: no limit"};
+    hal::OptionalLimit max_error_d{*this, "maxerrorD", "limit on the derivative of the error; 0: no limit"};
+    hal::OptionalLimit max_command_d{*this, "maxcmdD", "limit on the first derivative of command; 0: no limit"};
+    hal::OptionalLimit max_command_dd{*this, "maxcmdDD", "limit on the second derivative of command; 0: no limit"};
+    hal::OptionalLimit max_command_ddd{*this, "maxcmdDDD", "limit on the third derivative of command; 0: no limit"};
+    hal::OptionalLimit max_output{*this, "maxoutput", "limit on the output; 0: no limit"};
     hal::In<double>  command_deriv{*this, "command-deriv", "derivative of command; estimated while unlinked"};
     hal::In<double>  feedback_deriv{*this, "feedback-deriv", "derivative of feedback; estimated while unlinked"};
     hal::Out<bool>   saturated{*this, "saturated", "TRUE while maxoutput limits the output"};
@@ -245,12 +246,13 @@ auto-tuning. A limit of 0 disables it. With `error-previous-target` (the default
 previous cycle, which the feedback had time to follow. The slopes are `command-deriv` and `feedback-deriv` if they are
 linked, else the difference from the previous cycle; `maxerror`, `deadband` and `error-previous-target` do not change
 them, so Dgain damps inside the deadband, too. In the cycle of the falling edge of `index-enable`, a slope computed as a difference
-keeps its value. While an input is NaN, `output` is 0 and the integral and the derivatives keep their values.
+keeps its value. While an input is NaN, `output` is 0 and the integral and the derivatives keep their values. While a limit is NaN, its last
+valid value applies, and a fault is raised.
 
 **Differences from LinuxCNC:** the output is bit-identical except in these cases. In the first cycle the slopes
 are 0 and the error is that of the current command (LinuxCNC starts from 0, which kicks FF1 and Dgain). Setting `maxoutput`
 to 0 ends the saturation (LinuxCNC: `saturated` and the held integral remain). A negative limit or deadband counts
-as positive (LinuxCNC: the output jumps between its limits). While an input is NaN the output is 0 (LinuxCNC: NaN).
+as positive (LinuxCNC: the output jumps between its limits). While an input is NaN the output is 0 (LinuxCNC: NaN). While a limit is NaN its last valid value applies (LinuxCNC: no limit).
 Auto-tuning ignores the first two half cycles, before the oscillation is stable (LinuxCNC averages them in).
 
 **Auto-tuning** measures the loop by the relay method and sets the gains by the rules of Ziegler and Nichols. Hold `command`

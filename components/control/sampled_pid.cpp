@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "hal/component.hpp"
+#include "hal/limit.hpp"
 
 namespace {
 
@@ -22,7 +23,7 @@ struct SampledPid : hal::Component {
     hal::Param<double> filter{*this, "filter", "N: the derivative is filtered with Td / N", {.initial = 10.0}};
     hal::Param<double> weight{*this, "setpoint-weight", "b: share of the setpoint in the proportional part", {.initial = 1.0}};
     hal::Param<double> period{*this, "sample-period", "h: designed time between two samples", {.initial = 0.01, .unit = "s"}};
-    hal::Param<double> limit{*this, "max-output", "limit on the output; 0: no limit"};
+    hal::OptionalLimitParam limit{*this, "max-output", "limit on the output; 0: no limit"};
 
     hal::Out<double> output{*this, "output", "control effort of the newest sample", {.safe = 0.0, .finite = true}};
     hal::Out<bool>   fresh{*this, "new", "TRUE for the cycle in which output is that of another sample"};

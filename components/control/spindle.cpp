@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
+#include "hal/limit.hpp"
 
 namespace {
 
@@ -25,10 +26,10 @@ struct Spindle : hal::Component {
     hal::Out<bool>   limited{*this, "limited", "TRUE while commanded-speed is above max, or not 0 and below min"};
 
     hal::Ins<double> scale{*this, "scale.#", gears, "scale of output in gear #; a negative scale inverts the output", {.initial = 1.0}};
-    hal::Ins<double> min{*this, "min.#", gears, "lowest speed in gear #", {.unit = "rpm"}};
-    hal::Ins<double> max{*this, "max.#", gears, "highest speed in gear #", {.unit = "rpm"}};
-    hal::Ins<double> accel{*this, "accel.#", gears, "acceleration: rpm per second without encoder; with an encoder, lead of the output over the speed in rpm"};
-    hal::Ins<double> decel{*this, "decel.#", gears, "deceleration, like accel"};
+    hal::Limits      min{*this, "min.#", gears, "lowest speed in gear #", {.unit = "rpm"}};
+    hal::OptionalLimits max{*this, "max.#", gears, "highest speed in gear #", {.unit = "rpm"}};
+    hal::OptionalLimits accel{*this, "accel.#", gears, "acceleration: rpm per second without encoder; with an encoder, lead of the output over the speed in rpm"};
+    hal::OptionalLimits decel{*this, "decel.#", gears, "deceleration, like accel"};
     hal::Ins<double> speed_tolerance{*this, "speed-tolerance.#", gears, "tolerance of at-speed", {.initial = 20.0, .unit = "rpm"}};
     hal::Ins<double> zero_tolerance{*this, "zero-tolerance.#", gears, "tolerance of zero-speed", {.initial = 20.0, .unit = "rpm"}};
     hal::Ins<double> offset{*this, "offset.#", gears, "offset added to the speed for output in gear #", {.unit = "rpm"}};

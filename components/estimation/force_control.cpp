@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "hal/component.hpp"
+#include "hal/limit.hpp"
 
 namespace {
 
@@ -30,8 +31,8 @@ struct ForceControl : hal::Component {
     hal::In<double> stiffness{
         *this, "k", "admittance and impedance: spring to the path; 0 in an admittance leaves no error of the force", {.unit = "N/m"}};
 
-    hal::In<double> max_effort{*this, "max-effort", "limit of effort; 0: no limit", {.unit = "N"}};
-    hal::In<double> max_offset{*this, "max-offset", "admittance: limit of the offset from the path; 0: no limit", {.unit = "m"}};
+    hal::OptionalLimit max_effort{*this, "max-effort", "limit of effort; 0: no limit", {.unit = "N"}};
+    hal::OptionalLimit max_offset{*this, "max-offset", "admittance: limit of the offset from the path; 0: no limit", {.unit = "m"}};
 
     hal::Out<double>        effort{*this, "effort", "command for the actuator; direct and impedance", {.unit = "N", .safe = 0.0, .finite = true}};
     hal::Out<double>        position_out{*this, "position-out", "command for the position loop; admittance", {.unit = "m", .finite = true}};

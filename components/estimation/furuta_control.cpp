@@ -5,6 +5,7 @@
 
 #include "estimation/furuta_identification.hpp"
 #include "hal/component.hpp"
+#include "hal/limit.hpp"
 
 namespace {
 
@@ -51,7 +52,7 @@ struct FurutaControl : hal::Component {
         *this, "identified-frequency", "identified frequency of small oscillations with the arm fixed", {.unit = "rad/s", .finite = true}};
     hal::Out<std::uint32_t> bad_inputs{*this, "bad-inputs", "cycles with a NaN or infinite angle or speed; the torque is 0"};
 
-    hal::Param<double> max_acceleration{*this, "max-acceleration", "swing-up: maximum acceleration of the arm", {.initial = 30.0, .unit = "rad/s^2"}};
+    hal::LimitParam    max_acceleration{*this, "max-acceleration", "swing-up: maximum acceleration of the arm", {.initial = 30.0, .unit = "rad/s^2"}};
     hal::Param<double> energy_gain{
         *this, "energy-gain", "swing-up: requested acceleration, in multiples of max-acceleration, at zero energy", {.initial = 20.0}};
     hal::Param<double> energy_target{
@@ -60,20 +61,20 @@ struct FurutaControl : hal::Component {
         *this, "centre-gain", "swing-up: acceleration per angle of the arm from arm-command", {.initial = 15.0, .unit = "1/s^2"}};
     hal::Param<double> centre_damping{
         *this, "centre-damping", "swing-up: acceleration per speed of the arm", {.initial = 0.0, .unit = "1/s"}};
-    hal::Param<double> max_velocity{*this,
+    hal::LimitParam    max_velocity{*this,
                                     "max-arm-velocity",
                                     "swing-up: maximum speed of the arm; balancing ends at 1.25 times this speed",
                                     {.initial = 6.5, .unit = "rad/s"}};
     hal::Param<double> catch_angle{
         *this, "catch-angle", "maximum angle from upright at which balancing starts, if the prediction succeeds", {.initial = 0.4, .unit = "rad"}};
-    hal::Param<double> lose_angle{
+    hal::LimitParam    lose_angle{
         *this, "lose-angle", "angle from upright at which balancing ends", {.initial = 0.6, .unit = "rad"}};
-    hal::Param<double> arm_reach{
+    hal::LimitParam    arm_reach{
         *this, "arm-reach", "balance: limit of the arm's deviation from arm-command", {.initial = 1.0, .unit = "rad"}};
     hal::Param<double> upright_angle{*this, "upright-angle", "maximum angle from upright for balanced", {.initial = 0.1, .unit = "rad"}};
     hal::Param<double> upright_time{*this, "upright-time", "time within upright-angle for balanced", {.initial = 0.5, .unit = "s"}};
 
-    hal::Param<double> max_torque{
+    hal::LimitParam    max_torque{
         *this, "max-torque", "maximum torque of motor and amplifier: torque constant times current limit", {.initial = 0.2708, .unit = "N*m"}};
     hal::Param<double> torque_constant{
         *this, "torque-constant", "motor: torque per current, and voltage per speed", {.initial = 0.0677, .unit = "N*m/A"}};

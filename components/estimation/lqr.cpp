@@ -10,6 +10,7 @@
 #include "estimation/matrices.hpp"
 #include "hal/background.hpp"
 #include "hal/component.hpp"
+#include "hal/limit.hpp"
 #include "hal/queue.hpp"
 
 namespace {
@@ -224,7 +225,7 @@ public:
     hal::Ins<double>  x, target;
     hal::Outs<double> u;
     hal::In<bool>     enable{*this, "enable", "FALSE sets all u to 0", {.initial = true}};
-    hal::In<double>   max_output{*this, "max-output", "limit of each u; 0: no limit"};
+    hal::OptionalLimit max_output{*this, "max-output", "limit of each u; 0: no limit"};
     hal::Out<bool>    saturated{*this, "saturated", "TRUE: a u is at its limit"};
     hal::Out<bool>    designing{*this, "designing", "TRUE: a new gain is being computed; the old one is in use"};
     hal::Out<bool>    rejected{*this, "rejected", "TRUE: the weights are invalid (negative or NaN); the last valid gain is in use"};

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
+#include "hal/limit.hpp"
 
 namespace {
 
@@ -9,8 +10,8 @@ struct Integ : hal::Component {
     hal::In<double>  gain{*this, "gain", "factor of in", {.initial = 1.0}};
     hal::Out<double> out{*this, "out", "integral of gain * in over time"};
     hal::In<bool>    reset{*this, "reset", "TRUE sets out to 0"};
-    hal::In<double>  max{*this, "max", "highest output", {.initial = 1e20}};
-    hal::In<double>  min{*this, "min", "lowest output", {.initial = -1e20}};
+    hal::Limit       max{*this, "max", "highest output", {.initial = 1e20}};
+    hal::Limit       min{*this, "min", "lowest output", {.initial = -1e20}};
     hal::Function    run{*this, "", hal::step<&Integ::update>, "integrates"};
 
     void update(hal::Cycle cycle) noexcept {
@@ -27,7 +28,8 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Integ, "integ", "Integrator with gain, reset and limits", R"(
-`out = out + gain * in * period`, limited to `min` and `max`, which also prevents wind-up. NaN inputs are ignored.
+`out = out + gain * in * period`, limited to `min` and `max`, which also prevents wind-up. NaN inputs are ignored; while a limit
+is NaN, its last valid value applies, and a fault is raised.
 
     loadrt integ names=distance
     addf distance servo

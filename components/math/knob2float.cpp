@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
+#include "hal/limit.hpp"
 
 namespace {
 
@@ -9,8 +10,8 @@ struct Knob2float : hal::Component {
     hal::In<bool>         enable{*this, "enable", "TRUE: the knob changes out; FALSE holds out"};
     hal::In<double>       scale{*this, "scale", "change of out per count"};
     hal::Out<double>      out{*this, "out", "value"};
-    hal::Param<double>    max_out{*this, "max-out", "largest value; counts beyond it are lost", {.initial = 1.0}};
-    hal::Param<double>    min_out{*this, "min-out", "smallest value; counts beyond it are lost", {.initial = 0.0}};
+    hal::LimitParam       max_out{*this, "max-out", "largest value; counts beyond it are lost", {.initial = 1.0}};
+    hal::LimitParam       min_out{*this, "min-out", "smallest value; counts beyond it are lost", {.initial = 0.0}};
     hal::Function         run{*this, "", hal::step<&Knob2float::update>, "follows the knob"};
 
     void update(hal::Cycle) noexcept {

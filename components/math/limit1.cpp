@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
+#include "hal/limit.hpp"
 
 namespace {
 
@@ -7,8 +8,8 @@ struct Limit1 : hal::Component {
     using Component::Component;
     hal::In<double>  in{*this, "in", "the value to limit"};
     hal::Out<double> out{*this, "out", "in, limited to min and max"};
-    hal::In<double>  min{*this, "min", "lowest output", {.initial = -1e20}};
-    hal::In<double>  max{*this, "max", "highest output", {.initial = 1e20}};
+    hal::Limit       min{*this, "min", "lowest output", {.initial = -1e20}};
+    hal::Limit       max{*this, "max", "highest output", {.initial = 1e20}};
     hal::Function    run{*this, "", hal::step<&Limit1::update>, "computes out"};
 
     // Not std::clamp: users may set min above max, and then max applies.
@@ -20,7 +21,8 @@ struct Limit1 : hal::Component {
 HAL_COMPONENT(Limit1, "limit1", "Limits a value to a range", R"(
 `out = min(max(in, min), max)`
 
-If `min` is above `max`, `max` applies. NaN passes through unchanged, so that the consumer can detect the fault.
+If `min` is above `max`, `max` applies. A NaN input passes through unchanged, so that the consumer can detect the fault. While `min` or `max` is
+NaN, its last valid value applies, and a fault is raised.
 `limit2` also limits the slope, `limit3` the slope and the acceleration.
 
     loadrt limit1 names=torque-limit

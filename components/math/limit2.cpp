@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
+#include "hal/limit.hpp"
 
 namespace {
 
@@ -8,9 +9,9 @@ struct Limit2 : hal::Component {
     hal::In<double>  in{*this, "in", "target value"};
     hal::Out<double> out{*this, "out", "follows in, within the limits"};
     hal::In<bool>    load{*this, "load", "TRUE sets out to in immediately, regardless of maxv"};
-    hal::In<double>  min{*this, "min", "lowest output", {.initial = -1e20}};
-    hal::In<double>  max{*this, "max", "highest output", {.initial = 1e20}};
-    hal::In<double>  maxv{*this, "maxv", "largest change of out per second", {.initial = 1e20}};
+    hal::Limit       min{*this, "min", "lowest output", {.initial = -1e20}};
+    hal::Limit       max{*this, "max", "highest output", {.initial = 1e20}};
+    hal::Limit       maxv{*this, "maxv", "largest change of out per second", {.initial = 1e20}};
     hal::Function    run{*this, "", hal::step<&Limit2::update>, "follows in"};
 
     void update(hal::Cycle cycle) noexcept {
@@ -24,11 +25,9 @@ struct Limit2 : hal::Component {
     }
 
 private:
-    // Limits `value`, with max last. NaN if one of the three is NaN or the value is infinite.
+    // Limits `value`, with max last. NaN if the value is NaN or infinite.
     double limited(double value) const noexcept {
-        const double low = min, high = max;
-        if (!std::isfinite(value) || std::isnan(low) || std::isnan(high)) return NAN;
-        return std::min(std::max(value, low), high);
+        return std::isfinite(value) ? std::min(std::max(value, min.get()), max.get()) : NAN;
     }
     double state_ = 0.0;
 };
@@ -37,8 +36,8 @@ private:
 
 HAL_COMPONENT(Limit2, "limit2", "Follows a value within limits of position and speed", R"(
 `out` starts at 0 and moves to `in`, limited to `min` and `max`, by at most `maxv` per second. `load` sets it to `in` immediately. While the
-input or a limit is NaN or infinite, `out` keeps its value; it also does while `maxv` is not above 0. If `min` is above `max`,
-`max` applies.
+input is NaN or infinite, `out` keeps its value; it also does while `maxv` is not above 0. While a limit is NaN, its last valid value applies, and a
+fault is raised. If `min` is above `max`, `max` applies.
 
     loadrt limit2 names=spindle-ramp
     addf spindle-ramp servo

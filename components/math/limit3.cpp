@@ -10,6 +10,7 @@
 // That leftover makes one move per stop that neither speeds up nor brakes by a whole `a`; it is avoided where whole ones end there, too.
 // With an input that moves at w the same holds for speed and way relative to it: `out` meets it at w.
 #include "hal/component.hpp"
+#include "hal/limit.hpp"
 
 namespace {
 
@@ -78,10 +79,10 @@ struct Limit3 : hal::Component {
     hal::Out<double> out{*this, "out", "follows in, within the limits"};
     hal::In<bool>    enable{*this, "enable", "TRUE: out follows in; FALSE: out returns to 0 within the limits", {.initial = true}};
     hal::In<bool>    load{*this, "load", "TRUE sets out to in immediately, regardless of maxv and maxa"};
-    hal::In<double>  min{*this, "min", "lowest output", {.initial = -1e20}};
-    hal::In<double>  max{*this, "max", "highest output", {.initial = 1e20}};
-    hal::In<double>  maxv{*this, "maxv", "largest first derivative of out", {.initial = 1e20}};
-    hal::In<double>  maxa{*this, "maxa", "largest second derivative of out", {.initial = 1e20}};
+    hal::Limit       min{*this, "min", "lowest output", {.initial = -1e20}};
+    hal::Limit       max{*this, "max", "highest output", {.initial = 1e20}};
+    hal::Limit       maxv{*this, "maxv", "largest first derivative of out", {.initial = 1e20}};
+    hal::Limit       maxa{*this, "maxa", "largest second derivative of out", {.initial = 1e20}};
     hal::In<std::uint32_t> smooth_steps{*this, "smooth-steps", "cycles before a stop in which acceleration fades out; 2: the fastest stop",
                                         {.initial = 2}};
     hal::Function    run{*this, "", hal::step<&Limit3::update>, "follows in"};
@@ -98,14 +99,13 @@ struct Limit3 : hal::Component {
     }
 
 private:
-    // Reads in, min and max; NaN keeps the last value. Returns the speed at which to meet the input: the smaller of its last
+    // Reads in, min and max; a NaN input keeps the last value. Returns the speed at which to meet the input: the smaller of its last
     // two, because a step or a jitter has a speed in one cycle and none or the opposite in the next. An
     // input faster than maxv cannot be met and counts as stationary.
     double look_at_input(double v) noexcept {
-        const double input = in, low = min, high = max, before = speed_in_;
-        if (!std::isnan(low)) low_ = bounded(low);
-        if (!std::isnan(high)) high_ = bounded(high);
-        low_now_ = std::min(low_, high_);
+        const double input = in, before = speed_in_;
+        high_ = bounded(max);
+        low_now_ = std::min(bounded(min), high_);
         speed_in_ = std::isnan(input) ? 0.0 : bounded(input) - input_;
         if (!std::isnan(input)) input_ = bounded(input);
         const double w = speed_in_ > 0.0 ? std::max(0.0, std::min(speed_in_, before)) : std::min(0.0, std::max(speed_in_, before));
@@ -164,7 +164,7 @@ private:
     double position_ = 0.0, rest_ = 0.0;             // out and its rounding error
     double speed_ = 0.0;                             // of out, per cycle like all speeds here
     double input_ = 0.0, speed_in_ = 0.0;            // last valid in, and its speed
-    double low_ = 0.0, high_ = 0.0, low_now_ = 0.0;  // last valid min and max; the lower of them
+    double high_ = 0.0, low_now_ = 0.0;              // max; the lower of min and max
     bool arrived_ = true;                            // out is on its goal
     bool carried_ = false;                           // by load, in the last cycle
 };
@@ -179,7 +179,8 @@ and `max`. If a limit moves or the input reverses so that the output can no long
 `smooth-steps` above 2 the acceleration fades out over that many cycles: this takes slightly longer and is smoother with a
 jittering input.
 
-`out` starts at 0; `load` sets it to the input. While the input, `min` or `max` is NaN its last valid value applies. If `maxa` is not
+`out` starts at 0; `load` sets it to the input. While the input or a limit is NaN its last valid value applies; for a limit a fault
+is raised. If `maxa` is not
 positive, `out` does not move. If `min` is above `max`, `max` applies.
 
 **Differences from LinuxCNC:** acceleration and cruising are the same. Halcyon's `limit3` stops with `maxa` exactly at the target

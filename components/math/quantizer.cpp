@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
+#include "hal/limit.hpp"
 
 namespace {
 
@@ -12,8 +13,8 @@ struct Quantizer : hal::Component {
     hal::In<double>        offset{*this, "offset", "value of level 0"};
     hal::In<std::uint32_t> mode{*this, "mode", "rounding: 0 nearest; 1 down; 2 up; 3 towards level 0"};
     hal::In<double>        hysteresis{*this, "hysteresis", "distance, in steps, by which in must pass the border of a level to leave it"};
-    hal::In<double>        min{*this, "min-level", "lowest level", {.initial = -most}};
-    hal::In<double>        max{*this, "max-level", "highest level", {.initial = most}};
+    hal::Limit             min{*this, "min-level", "lowest level", {.initial = -most}};
+    hal::Limit             max{*this, "max-level", "highest level", {.initial = most}};
     hal::Out<double>       out{*this, "out", "level * step + offset", {.finite = true}};
     hal::Out<double>       error{*this, "error", "in - out", {.finite = true}};
     hal::Out<std::int64_t> level{*this, "level", "number of the level"};

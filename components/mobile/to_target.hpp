@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "hal/component.hpp"
+#include "hal/limit.hpp"
 
 namespace hal::mobile {
 
@@ -29,7 +30,7 @@ public:
     hal::In<double> heading{c, "heading", "heading of the robot: 0 along x, positive to the left", {.unit = "rad"}};
 
     hal::Param<double> distance_gain{c, "distance-gain", "forward speed per remaining distance", {.initial = 1.5, .unit = "1/s"}};
-    hal::Param<double> max_speed{c, "max-speed", "maximum forward speed", {.initial = 0.5, .unit = "m/s"}};
+    hal::LimitParam    max_speed{c, "max-speed", "maximum forward speed", {.initial = 0.5, .unit = "m/s"}};
     hal::Param<double> tolerance{c, "tolerance", t.doc, {.initial = t.initial_m, .unit = "m"}};
 
     hal::Out<double> linear{c, "linear", "requested forward speed", {.unit = "m/s", .safe = 0.0, .finite = true}};

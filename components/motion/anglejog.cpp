@@ -4,6 +4,7 @@
 
 #include "axis_planner.hpp"
 #include "hal/component.hpp"
+#include "hal/limit.hpp"
 
 namespace {
 
@@ -14,8 +15,8 @@ struct Anglejog : hal::Component {
     hal::In<double>        angle_in{*this, "angle-degrees-in", "direction of the motion", {.unit = "deg"}};
     hal::In<std::int32_t>  factor_in{*this, "iscale-factor", "output counts per input count; at least 1", {.initial = 10000}};
     hal::In<double>        scale_in{*this, "scale-in", "distance per count"};
-    hal::In<double>        max_velocity{*this, "max-vel", "largest speed along the direction"};
-    hal::In<double>        max_acceleration{*this, "max-accel", "largest acceleration along the direction"};
+    hal::Limit             max_velocity{*this, "max-vel", "largest speed along the direction"};
+    hal::Limit             max_acceleration{*this, "max-accel", "largest acceleration along the direction"};
     hal::In<double>        accel_fraction{*this, "accel-fraction-in", "fraction of the axes' acceleration to use", {.initial = 1.0}};
     hal::Out<bool>         enable_out{*this, "enable-out", "for jog-enable of both axes"};
     hal::Out<double>       current_scale{*this, "current-scale", "distance per count in use"};

@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include "hal/component.hpp"
+#include "hal/limit.hpp"
 
 namespace {
 
@@ -23,11 +24,11 @@ struct DiffDrive : hal::Component {
     hal::Param<double> left_radius{*this, "left-radius", "radius of the left wheel", {.initial = 0.04, .unit = "m"}};
     hal::Param<double> right_radius{*this, "right-radius", "radius of the right wheel", {.initial = 0.04, .unit = "m"}};
     hal::Param<double> track{*this, "track", "distance between the wheels' contact points", {.initial = 0.25, .unit = "m"}};
-    hal::Param<double> max_rim{*this, "max-wheel-speed", "limit on the rim speed of each wheel; 0: no limit", {.unit = "m/s"}};
-    hal::Param<double> max_linear{*this, "max-linear", "limit on the forward speed; 0: no limit", {.unit = "m/s"}};
-    hal::Param<double> max_angular{*this, "max-angular", "limit on the turning speed; 0: no limit", {.unit = "rad/s"}};
-    hal::Param<double> max_linear_acceleration{*this, "max-linear-acceleration", "limit on the forward acceleration; 0: no limit", {.unit = "m/s^2"}};
-    hal::Param<double> max_angular_acceleration{*this, "max-angular-acceleration", "limit on the angular acceleration; 0: no limit", {.unit = "rad/s^2"}};
+    hal::OptionalLimitParam max_rim{*this, "max-wheel-speed", "limit on the rim speed of each wheel; 0: no limit", {.unit = "m/s"}};
+    hal::OptionalLimitParam max_linear{*this, "max-linear", "limit on the forward speed; 0: no limit", {.unit = "m/s"}};
+    hal::OptionalLimitParam max_angular{*this, "max-angular", "limit on the turning speed; 0: no limit", {.unit = "rad/s"}};
+    hal::OptionalLimitParam max_linear_acceleration{*this, "max-linear-acceleration", "limit on the forward acceleration; 0: no limit", {.unit = "m/s^2"}};
+    hal::OptionalLimitParam max_angular_acceleration{*this, "max-angular-acceleration", "limit on the angular acceleration; 0: no limit", {.unit = "rad/s^2"}};
 
     hal::Out<double> left_speed{*this, "left-speed", "commanded speed of the left wheel", {.unit = "rad/s", .safe = 0.0, .finite = true}};
     hal::Out<double> right_speed{*this, "right-speed",

@@ -5,6 +5,7 @@
 
 #include "axis_planner.hpp"
 #include "hal/component.hpp"
+#include "hal/limit.hpp"
 
 namespace {
 
@@ -36,10 +37,10 @@ struct Moveoff : hal::Component {
     hal::Outs<double> offset_current{*this, "offset-current-#", personality, "current offset of joint #"};
     hal::Outs<double> pos_plus{*this, "pos-plusoffset-#", personality, "commanded position of joint # plus its offset, for the motor"};
     hal::Outs<double> fb_minus{*this, "fb-minusoffset-#", personality, "feedback of joint # minus its offset, for the motion controller"};
-    hal::Ins<double>  max_velocity{*this, "offset-vel-#", personality, "maximum speed of offset #", {.initial = 10.0}};
-    hal::Ins<double>  max_acceleration{*this, "offset-accel-#", personality, "maximum acceleration of offset #", {.initial = 100.0}};
-    hal::Ins<double>  min{*this, "offset-min-#", personality, "lowest offset of joint #", {.initial = -1e20}};
-    hal::Ins<double>  max{*this, "offset-max-#", personality, "highest offset of joint #", {.initial = 1e20}};
+    hal::Limits       max_velocity{*this, "offset-vel-#", personality, "maximum speed of offset #", {.initial = 10.0}};
+    hal::Limits       max_acceleration{*this, "offset-accel-#", personality, "maximum acceleration of offset #", {.initial = 100.0}};
+    hal::Limits       min{*this, "offset-min-#", personality, "lowest offset of joint #", {.initial = -1e20}};
+    hal::Limits       max{*this, "offset-max-#", personality, "highest offset of joint #", {.initial = 1e20}};
     hal::In<bool>     limit_test{*this, "dbg-waypoint-limit-test", "TRUE limits the memory to ten waypoints"};
     hal::Out<std::int32_t> state{*this, "dbg-state", "0: no offsets, 1: moving to offset-in, 2: returning, 3: machine off"};
 

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "hal/component.hpp"
+#include "hal/limit.hpp"
 #include "hal/queue.hpp"
 
 namespace {
@@ -33,8 +34,8 @@ struct Pwmgen : hal::Component {
     hal::In<double> value{*this, run, "value", "commanded value: scale is full duty forward, -scale in reverse"};
     hal::Io<double> scale{*this, run, "scale", "value for full duty", {.initial = 1.0}};
     hal::Io<double> offset{*this, run, "offset", "added to the duty cycle: dc = value / scale + offset"};
-    hal::Io<double> min_duty{*this, run, "min-dc", "minimum duty cycle while enabled, 0..1"};
-    hal::Io<double> max_duty{*this, run, "max-dc", "maximum duty cycle, 0..1", {.initial = 1.0}};
+    hal::LimitIo    min_duty{*this, run, "min-dc", "minimum duty cycle while enabled, 0..1"};
+    hal::LimitIo    max_duty{*this, run, "max-dc", "maximum duty cycle, 0..1", {.initial = 1.0}};
     hal::Io<double> frequency{*this, run, "pwm-freq", "PWM frequency, rounded to a possible one; 0: pulse density modulation", {.unit = "Hz"}};
     hal::Io<bool> dither{*this, run, "dither-pwm", "TRUE: the duty cycle alternates between two steps so that its average is exact"};
     hal::Out<double> duty{*this, run, "curr-dc", "duty cycle after scaling, limits and rounding, -1..1"};
@@ -74,8 +75,8 @@ struct Pwmgen : hal::Component {
 private:
     Order order(double tick_ns) noexcept {
         if (scale == 0.0 || !std::isfinite(scale)) scale = 1.0;
-        max_duty = std::isfinite(max_duty) ? std::clamp(max_duty.get(), 0.0, 1.0) : 1.0;
-        min_duty = std::isfinite(min_duty) ? std::clamp(min_duty.get(), 0.0, max_duty.get()) : 0.0;
+        max_duty = std::clamp(max_duty.get(), 0.0, 1.0);
+        min_duty = std::clamp(min_duty.get(), 0.0, max_duty.get());
 
         const double raw = value / scale + offset;
         if (!enable || !std::isfinite(raw)) return {};
@@ -162,7 +163,7 @@ HAL_COMPONENT(Pwmgen, "pwmgen", "Pulse width and pulse density modulation in sof
   The upper limit is half the rate of the fast thread. A new value begins with the next period; FALSE on `enable` acts at once.
 * **PDM** (`pwm-freq` 0): single pulses of one fast period, spread evenly; resolution is that of the average.
 
-All outputs go low on stop, unload and faults.
+All outputs go low on stop, unload and faults. A `min-dc` or `max-dc` that is NaN is set to its last valid value, and a fault is raised.
 
 **Differences from LinuxCNC:** the waveforms are the same except in these cases. The first PWM period starts with `enable` (LinuxCNC: the
 outputs stay low for up to a period, and all periods start one fast period earlier). `dir` changes between periods, so that

@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "hal/component.hpp"
+#include "hal/limit.hpp"
 #include "profile.hpp"
 
 namespace {
@@ -39,13 +40,13 @@ struct PxmcAxis : hal::Component {
     hal::In<double> i_gain{*this, "I", "integral gain: output per following error and second"};
     hal::In<double> d_gain{*this, "D", "derivative gain: output per speed error"};
     hal::In<double> feed_forward{*this, "FF", "feed-forward: output per commanded speed"};
-    hal::In<double> max_output{*this, "max-output", "limit on the output; 0: no limit"};
+    hal::OptionalLimit max_output{*this, "max-output", "limit on the output; 0: no limit"};
 
-    hal::In<double> max_following_error{*this, "max-following-error", "following error at which the axis faults; 0: not monitored"};
+    hal::OptionalLimit max_following_error{*this, "max-following-error", "following error at which the axis faults; 0: not monitored"};
     hal::In<double> min_position{*this, "min-position", "lowest position", {.initial = -motion::farthest}};
     hal::In<double> max_position{*this, "max-position", "highest position", {.initial = motion::farthest}};
-    hal::In<double> position_margin{*this, "position-margin", "permitted overtravel beyond min-position and max-position; 0: not monitored"};
-    hal::In<double> overspeed{*this, "overspeed", "measured speed, as a multiple of max-speed, at which the axis faults; 0: not monitored"};
+    hal::OptionalLimit position_margin{*this, "position-margin", "permitted overtravel beyond min-position and max-position; 0: not monitored"};
+    hal::OptionalLimit overspeed{*this, "overspeed", "measured speed, as a multiple of max-speed, at which the axis faults; 0: not monitored"};
     hal::In<double> speed_filter{*this, "speed-filter", "time constant of actual-speed", {.unit = "s"}};
     hal::In<double> window{*this, "position-window", "distance to the target at which busy ends; 0: busy ends with the trajectory"};
 

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: MIT
 #include "axis_planner.hpp"
 #include "hal/component.hpp"
+#include "hal/limit.hpp"
 
 namespace {
 
 struct SimpleTp : hal::Component {
     using Component::Component;
     hal::In<double>  target{*this, "target-pos", "target position"};
-    hal::In<double>  max_velocity{*this, "maxvel", "maximum speed"};
-    hal::In<double>  max_acceleration{*this, "maxaccel", "maximum acceleration"};
+    hal::Limit       max_velocity{*this, "maxvel", "maximum speed"};
+    hal::Limit       max_acceleration{*this, "maxaccel", "maximum acceleration"};
     hal::In<bool>    enable{*this, "enable", "FALSE brakes to a stop"};
     hal::Out<double> position{*this, "current-pos", "current position"};
     hal::Out<double> velocity{*this, "current-vel", "current velocity"};

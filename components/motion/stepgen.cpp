@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "hal/component.hpp"
+#include "hal/limit.hpp"
 #include "hal/queue.hpp"
 
 namespace {
@@ -62,8 +63,8 @@ struct Stepgen : hal::Component {
     hal::In<bool> enable{*this, run, "enable", "FALSE stops the generator"};
     std::optional<hal::In<double>> position_cmd, velocity_cmd;
     hal::Param<double> position_scale{*this, run, "position-scale", "steps per length unit; 0 counts as 1", {.initial = 1.0}};
-    hal::Param<double> max_velocity{*this, run, "maxvel", "limit on the speed in length units per second; 0: limited by the pulse timing only"};
-    hal::Param<double> max_acceleration{*this, run, "maxaccel", "limit on the acceleration in length units per second squared; 0: no limit"};
+    hal::OptionalLimitParam max_velocity{*this, run, "maxvel", "limit on the speed in length units per second; 0: limited by the pulse timing only"};
+    hal::OptionalLimitParam max_acceleration{*this, run, "maxaccel", "limit on the acceleration in length units per second squared; 0: no limit"};
     hal::Out<double> frequency{*this, run, "frequency", "current step rate", {.unit = "Hz"}};
     hal::Param<std::uint32_t> step_length{*this, run, "steplen", "length of a step pulse, or minimum time in a state", {.initial = 1, .unit = "ns"}};
     std::optional<hal::Param<std::uint32_t>> step_space, dir_hold, dir_setup, dir_delay;

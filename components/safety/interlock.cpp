@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "hal/component.hpp"
+#include "hal/limit.hpp"
 
 namespace {
 
@@ -19,7 +20,7 @@ struct Interlock : hal::Component {
     hal::In<std::uint64_t> warn{*this, "warn-mask", "bit n: condition n only warns"};
     hal::In<std::uint64_t> bypass{*this, "bypass-mask", "bit n: condition n is bypassed while bypass-enable is TRUE"};
     hal::In<bool> bypass_enable{*this, "bypass-enable", "TRUE enables the bypass (key switch)"};
-    hal::In<double> bypass_time{*this, "bypass-time", "maximum duration of a bypass; 0: no limit", {.unit = "s"}};
+    hal::OptionalLimit bypass_time{*this, "bypass-time", "maximum duration of a bypass; 0: no limit", {.unit = "s"}};
     hal::In<bool> acknowledge{*this, "acknowledge", "a rising edge turns off the horn and stops the flashing"};
     hal::In<bool> reset{*this, "reset", "a rising edge clears latched conditions that are good again"};
     hal::In<bool> start_needs_reset{*this, "start-needs-reset", "TRUE: ok also requires a reset after the start", {.initial = true}};

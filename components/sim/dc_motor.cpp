@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "hal/component.hpp"
+#include "hal/limit.hpp"
 #include "motor.hpp"
 #include "quadrature.hpp"
 
@@ -34,7 +35,7 @@ struct DcMotor : hal::Component {
     hal::Out<bool> at_max{*this, "at-max", "limit switch: position is at or above max-position"};
 
     hal::Param<double> supply{*this, "supply-voltage", "supply voltage of the amplifier", {.initial = 24.0, .unit = "V"}};
-    hal::Param<double> limit{*this, "current-limit", "current limit of the amplifier; 0: no limit", {.initial = 4.0, .unit = "A"}};
+    hal::OptionalLimitParam limit{*this, "current-limit", "current limit of the amplifier; 0: no limit", {.initial = 4.0, .unit = "A"}};
     hal::Param<double> resistance{*this, "resistance", "winding resistance", {.initial = 0.68, .unit = "Ohm"}};
     hal::Param<double> inductance{*this, "inductance", "winding inductance; 0: none", {.initial = 0.001, .unit = "H"}};
     hal::Param<double> constant{*this, "torque-constant", "torque per current, and voltage per speed", {.initial = 0.0677, .unit = "N*m/A"}};

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "hal/component.hpp"
+#include "hal/limit.hpp"
 #include "linear.hpp"
 
 namespace {
@@ -16,7 +17,7 @@ struct Finger : hal::Component {
 
     hal::Param<double> mass{*this, "mass", "moving mass of finger and actuator", {.initial = 0.5, .unit = "kg"}};
     hal::Param<double> viscous{*this, "viscous", "viscous friction", {.initial = 4.0, .unit = "N*s/m"}};
-    hal::Param<double> max_effort{*this, "max-effort", "maximum force of the actuator", {.initial = 100.0, .unit = "N"}};
+    hal::LimitParam    max_effort{*this, "max-effort", "maximum force of the actuator", {.initial = 100.0, .unit = "N"}};
     hal::Param<double> actuator_lag{*this, "actuator-lag", "time constant of the actuator's force", {.initial = 0.002, .unit = "s"}};
     hal::Param<double> wall_stiffness{*this, "wall-stiffness", "stiffness of the wall (default: a steel sheet on a bench)", {.initial = 2e4, .unit = "N/m"}};
     hal::Param<double> wall_damping{*this, "wall-damping", "damping of the wall while the finger moves into it", {.initial = 50.0, .unit = "N*s/m"}};

@@ -3,6 +3,7 @@
 
 #include "furuta_rig.hpp"
 #include "hal/component.hpp"
+#include "hal/limit.hpp"
 
 namespace {
 
@@ -45,7 +46,7 @@ struct Furuta : hal::Component {
     hal::Param<double> radio_delay{*this, "radio-delay", "latency of the pendulum encoder's radio link; assumed", {.initial = usual.radio_delay, .unit = "s"}};
 
     hal::Param<double> supply{*this, "supply-voltage", "supply voltage of the amplifier; as in the source rig", {.initial = usual.supply, .unit = "V"}};
-    hal::Param<double> current_limit{*this, "current-limit", "current limit of the amplifier, 0: no limit; as in the source rig", {.initial = usual.current_limit, .unit = "A"}};
+    hal::OptionalLimitParam current_limit{*this, "current-limit", "current limit of the amplifier, 0: no limit; as in the source rig", {.initial = usual.current_limit, .unit = "A"}};
     hal::Param<double> torque_constant{*this, "torque-constant", "motor: torque per current, and voltage per speed; from 85 W at 3000 rpm and 4 A", {.initial = usual.torque_constant, .unit = "N*m/A"}};
     hal::Param<double> resistance{*this, "resistance", "motor: winding resistance; from 24 V at 3000 rpm and 4 A", {.initial = usual.resistance, .unit = "Ohm"}};
     hal::Param<double> inductance{*this, "inductance", "motor: winding inductance; typical for this size", {.initial = usual.inductance, .unit = "H"}};

@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "hal/component.hpp"
+#include "hal/limit.hpp"
 
 namespace {
 
@@ -40,7 +41,7 @@ struct Noise : hal::Component {
     hal::In<double> in{*this, "in", "added to it: the signal that is to be noisy"};
     hal::In<bool> enable{*this, "enable", "FALSE: out is in + offset", {.initial = true}};
     hal::In<std::uint32_t> hold{*this, "hold", "cycles for which a value stays", {.initial = 1}};
-    hal::In<double> limit{*this, "limit", "largest noise; 0: none"};
+    hal::OptionalLimit limit{*this, "limit", "largest noise; 0: none"};
     hal::Param<std::uint32_t> seed{*this, "seed", "where the sequence starts; a change starts it anew"};
     hal::In<bool> restart{*this, "restart", "a rising edge starts the sequence anew"};
     hal::Out<double> out{*this, "out", "in + offset + noise"};

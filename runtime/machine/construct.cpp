@@ -210,8 +210,8 @@ bool all_known(const LoadedComponent& component, const LoadRequest& request, con
     return true;
 }
 
-bool construct_again(Model& beside, Edit& edit, const LoadedComponent& old, LoadedComponent& fresh, Span at, Sources& sources,
-                     Diagnostics& diagnostics) {
+bool construct_again(Model& beside, Edit& edit, const LoadedComponent& old, LoadedComponent& fresh, Span at, const hal_faults* faults,
+                     Sources& sources, Diagnostics& diagnostics) {
     edit.diagnostics = &diagnostics;
     const std::shared_ptr<void> storage = block_of(*fresh.plugin, old.instances.size());
     for (std::size_t i = 0; i < old.instances.size(); ++i) {
@@ -219,6 +219,7 @@ bool construct_again(Model& beside, Edit& edit, const LoadedComponent& old, Load
         const Load& load = old.loads[before.load];
         LoadRequest request;
         request.at = at;
+        request.faults = faults;
         for (const auto& [name, value] : load.arguments) request.arguments.emplace(name, GivenArgument{value, at});
         auto instance = std::make_unique<Instance>();
         instance->component = &fresh;

@@ -30,12 +30,13 @@ struct LoadRequest {
     Span count_at;
     std::vector<std::string> personalities;
     std::map<std::string, GivenArgument> arguments;
+    const hal_faults* faults = nullptr;         ///< of the machine; nullptr where none runs
     Elaboration* on = nullptr;                  ///< the command's; what a LinuxCNC module does beside its instance belongs to its transaction
 };
 
 /// The instances of a component once more, from another plugin and in a model beside: same names, arguments and personalities.
-bool construct_again(Model& beside, Edit& edit, const LoadedComponent& old, LoadedComponent& fresh, Span at, Sources& sources,
-                     Diagnostics& diagnostics);
+bool construct_again(Model& beside, Edit& edit, const LoadedComponent& old, LoadedComponent& fresh, Span at, const hal_faults* faults,
+                     Sources& sources, Diagnostics& diagnostics);
 
 /// Instances of `my_comp` and their pins are named my-comp…
 std::string dashed(std::string component);

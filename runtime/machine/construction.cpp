@@ -127,7 +127,8 @@ void name_instance(const hal_host* host, const char* prefix, unsigned digits) {
         return true;
     });
 }
-const void* extension_of(const hal_host*, const char* id) {
+const void* extension_of(const hal_host* host, const char* id) {
+    if (std::strcmp(id, "hal.faults/1") == 0) return construction_of(host).request.faults;
     if (std::strcmp(id, HAL_NAMING) == 0) return &naming_extension;
     if (std::strcmp(id, HAL_MODULES) == 0) return &modules_extension;
     if (std::strcmp(id, HAL_MODULE_CALLS) == 0) return &module_calls_extension;

@@ -32,6 +32,7 @@ struct Elaboration {
     const Usage& usage;  ///< of the command, for messages
     bool check_only = false;  ///< `hal check`: code that may access hardware does not run
     Transaction* transaction = nullptr;  ///< whose edits these are
+    const hal_faults* faults = nullptr;  ///< the fault record of the machine
 };
 
 /// Carries out `addf --auto`.

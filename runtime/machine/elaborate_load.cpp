@@ -61,6 +61,7 @@ bool names_itself(Elaboration& on, const Token& name, Origin origin) {
 bool read_request(Elaboration& on, const Token& name, Origin origin, Args args, LoadRequest& request) {
     request.at = name.span;
     request.on = &on;
+    request.faults = on.faults;
     bool good = true;
     Span names_at;
     for (const Token& token : args) {
@@ -326,7 +327,7 @@ void edits::reload(Elaboration& on, Args args) {
             for (auto it = component.instances.rbegin(); it != component.instances.rend(); ++it) destroy_instance(**it);
         }
     } undo{fresh};
-    const bool made = construct_again(beside, making, *component, fresh, name.span, on.sources, on.diagnostics);
+    const bool made = construct_again(beside, making, *component, fresh, name.span, on.faults, on.sources, on.diagnostics);
     on.model.next_id = beside.next_id;
     if (made) undo.taken = on.edit.replace(*component, beside.components.front(), name.span);
 }

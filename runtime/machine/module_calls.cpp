@@ -72,7 +72,7 @@ int carry_out(const hal_host* host, const char* const* words, std::size_t count,
         for (std::size_t i = 1; i < count; ++i) arguments.push_back({words[i], c.request.at});
         const Elaboration& outer = *c.request.on;
         Diagnostics found;
-        Elaboration on{outer.model, outer.edit, outer.plugins, outer.sources, found, outer.auto_orders, {row->name, ""}, outer.check_only, outer.transaction};
+        Elaboration on{outer.model, outer.edit, outer.plugins, outer.sources, found, outer.auto_orders, {row->name, ""}, outer.check_only, outer.transaction, outer.faults};
         {
             struct Restore {  // also when memory runs out on the way
                 Edit& edit;

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
+#include <cmath>
 
 #include "cia402/axis.hpp"
 #include "hal/component.hpp"
+#include "hal/limit.hpp"
 
 namespace {
 
@@ -27,9 +29,9 @@ struct Cia402 : hal::Component {
     hal::In<bool> relative{*this, "relative", "pp: the set-point is relative to the previous one"};
     hal::In<bool> immediate{*this, "immediate", "pp: the set-point replaces the current move at once"};
     hal::In<bool> blend{*this, "blend", "pp: the drive passes this set-point without stopping if another follows"};
-    hal::In<double> max_velocity{*this, "max-velocity", "profile velocity (profile-velocity) of moves planned by the drive",
+    hal::Limit      max_velocity{*this, "max-velocity", "profile velocity (profile-velocity) of moves planned by the drive",
                                  {.unit = "1/s"}};
-    hal::In<double> max_acceleration{*this, "max-acceleration", "acceleration (profile-acceleration) of moves planned by the drive",
+    hal::Limit      max_acceleration{*this, "max-acceleration", "acceleration (profile-acceleration) of moves planned by the drive",
                                      {.unit = "1/s^2"}};
     hal::In<double> max_deceleration{*this, "max-deceleration",
                                      "deceleration (profile-deceleration) of these moves; 0: same as max-acceleration", {.unit = "1/s^2"}};
@@ -44,11 +46,11 @@ struct Cia402 : hal::Component {
     hal::Param<double> torque_scale{*this, "torque-scale", "thousandths of the rated torque per unit of torque", {.initial = 1000.0}};
     hal::Param<double> vl_scale{*this, "vl-scale", "mode vl: r/min per unit/s", {.initial = 60.0}};
     hal::Param<std::uint32_t> counter_bits{*this, "counter-bits", "valid bits of position-actual-value", {.initial = 32}};
-    hal::Param<double> max_step{*this, "max-step", "largest step of position-cmd in one cycle, a larger one is a fault; 0: not checked"};
+    hal::OptionalLimitParam max_step{*this, "max-step", "largest step of position-cmd in one cycle, a larger one is a fault; 0: not checked"};
     hal::Param<double> blend_time{*this, "blend-time",
                                   "with max-step 0: time to blend out the distance between position-cmd and position-fb at enabling",
                                   {.initial = 0.5, .unit = "s"}};
-    hal::Param<double> max_error{*this, "max-following-error", "csp, ip: largest following error, a larger one is a fault; 0: not checked"};
+    hal::OptionalLimitParam max_error{*this, "max-following-error", "csp, ip: largest following error, a larger one is a fault; 0: not checked"};
     hal::Param<double> step_timeout{*this, "step-timeout", "timeout of a state transition, a mode change, a set-point acknowledge",
                                     {.initial = 2.0, .unit = "s"}};
     hal::Param<double> stop_timeout{*this, "stop-timeout", "timeout of braking to standstill; then the voltage is disabled",
@@ -141,7 +143,7 @@ struct Cia402 : hal::Component {
         c.position = position_cmd, c.velocity = velocity_cmd, c.torque = torque_cmd;
         c.profile_velocity = max_velocity;
         c.profile_acceleration = max_acceleration;
-        c.profile_deceleration = max_deceleration != 0.0 ? max_deceleration : max_acceleration;
+        c.profile_deceleration = max_deceleration != 0.0 && !std::isnan(max_deceleration) ? max_deceleration.get() : max_acceleration.get();
         tell(axis_.act(c, rules_, cycle.start_ns()));
 
         enabled = axis_.enabled();

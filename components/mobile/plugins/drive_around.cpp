@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "hal/component.hpp"
+#include "hal/limit.hpp"
 #include "mobile/to_target.hpp"
 
 namespace {
@@ -31,7 +32,7 @@ struct DriveAround : hal::Component {
     hal::Param<double> memory{*this, "memory", "time for which an obstacle is remembered", {.initial = 3.0, .unit = "s"}};
     hal::Param<double> heading_gain{
         *this, "heading-gain", "turning speed per angle to the chosen direction", {.initial = 3.0, .unit = "1/s"}};
-    hal::Param<double> max_turn{*this, "max-turn", "maximum turning speed", {.initial = 1.5, .unit = "rad/s"}};
+    hal::LimitParam    max_turn{*this, "max-turn", "maximum turning speed", {.initial = 1.5, .unit = "rad/s"}};
 
     hal::Out<double> nearest{
         *this, "nearest", "distance of the nearest obstacle from the centre; 1000: none", {.unit = "m", .finite = true}};
