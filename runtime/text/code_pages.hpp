@@ -272,7 +272,7 @@ inline constexpr CodePage code_pages[] = {
      "`show comp` lists its process ID. End it as that user or with `sudo kill PID`; the machine then notices the closed connection."},
     {"nothing-ran",
      "Time passed in a simulation, but no function ran, so no value could change: the threads were never started, no function is in a "
-     "thread, or there is no thread. `hal run` and `hal sim --for` start the threads; a netlist that uses `advance` starts them itself.\n\n"
+     "thread, or the machine has no thread. `hal run` and `hal sim --for` start the threads; a netlist that uses `advance` starts them itself.\n\n"
      "Write `start` before the first `advance`, and `addf FUNCTION THREAD` for each function."},
     {"open-transaction",
      "Edits between `begin` and `commit` are collected and take effect together. A second `begin` before `commit` is invalid, and a "

@@ -85,6 +85,15 @@ class Sdo(Node):
         for how in ("--block", "--segmented"):
             self.assertEqual(name["value"], json.loads(self.read("1008", how, "--json", "--eds", "io.eds"))["value"])
 
+    def test_options_without_effect_are_errors(self):
+        for how in (["--json"], ["--type", "u8"]):
+            self.assertEqual(f"hal can sdo read: {how[0]} has no effect with -o, which writes the bytes as they are; delete one of them\n",
+                             self.bad_can("sdo", "read", self.bus, "5", "1008", "-o", "name.bin", *how))
+        self.assertEqual("hal can generate: --seed has no effect with --counting and --length: nothing is random; delete one of them\n",
+                         self.bad("can", "generate", self.bus, "--counting", "--length", 2, "--seed", 1))
+        self.assertEqual("hal can gateway: --connect is for a client; --identity, --vendor-name, --product-name and --order-code are for the gateway\n",
+                         self.bad("can", "gateway", "--connect", "127.0.0.1:1", "--vendor-name", "X", "help"))
+
     def test_aborts_say_what_to_do(self):
         sdo = ("sdo", "read", self.bus, "5")
         self.assertEqual("hal can sdo read: node 5, 2FFF:0: object does not exist in the object dictionary (0x06020000); see the EDS of the device for its objects\n",

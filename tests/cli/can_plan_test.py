@@ -58,6 +58,14 @@ class Plan(Case):
         self.assertIn("17 frames with each SYNC of 1 ms take 1.895 ms at most: 189.5 %\n", done.stdout)
         self.assertIn("  = help: the SYNC is sent every cycle of the thread, assumed to be 1ms; for another period add: --cycle 2ms\n", done.stderr)
 
+    def test_a_cycle_without_effect_is_an_error(self):
+        self.write("plan.canopen", PLAN.replace("125k", "250k"))
+        self.assertEqual("hal canopen plan: --cycle has no effect: plan.canopen sends no SYNC in every cycle; delete --cycle, or write `sync = cycle` in [bus]\n",
+                         self.bad("canopen", "plan", "plan.canopen", "--cycle", "2ms"))
+        self.write("bus.log", "(1.0) can0 181#\n(1.1) can0 181#\n")
+        self.assertEqual("hal canopen plan: --cycle is for configurations; a recording has its own SYNCs\n",
+                         self.bad("canopen", "plan", "bus.log", "--bitrate", "1M", "--cycle", "2ms"))
+
     def test_a_bus_in_Ethernet_frames_has_another_plan(self):
         self.write("arm.canopen", AXES.replace("sim:arm", "cane:sim:arm") + "[node 1 x]\ntype = drive\n")
         self.assertEqual("hal canopen plan: arm.canopen uses Ethernet (cane:sim:arm), where identifiers do not arbitrate; for its schedule type: "

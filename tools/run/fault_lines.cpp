@@ -19,6 +19,10 @@ MessageSubject subject_of(const FaultRecord& record) {
     return {record.kind, record.sentence.substr(0, record.sentence.find(" at cycle "))};
 }
 
+std::string text_of(const FaultRecord& record) {
+    return record.sentence + (record.varied ? "; with different codes [" : " [") + record.code + "]";
+}
+
 }  // namespace
 
 FaultLines::FaultLines(Session& session, MessageLog::Sink sink) : session_(session), log_("fault", std::move(sink)) {
@@ -51,7 +55,7 @@ void FaultLines::look(std::int64_t now_ns) {
         seen_.erase(seen_.begin(), records.empty() ? seen_.end() : seen_.lower_bound(records.front().number));
         for (const FaultRecord& record : records) {
             std::uint64_t& seen = seen_[record.number];
-            for (; seen < record.count; ++seen) log_.print(subject_of(record), record.sentence + " [" + record.code + "]", now_ns);
+            for (; seen < record.count; ++seen) log_.print(subject_of(record), text_of(record), now_ns);
         }
     }
     log_.flush(now_ns);

@@ -12,6 +12,7 @@
 #include <memory>
 #include <mutex>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "link/filtering.hpp"
@@ -176,17 +177,24 @@ private:
         int bytes = 0;
         return ::ioctl(line_.get(), TIOCOUTQ, &bytes) == 0 ? bytes : 0;
     }
-    /// Writes what is queued until then. What remains is discarded: closing a line would wait for it.
+    std::int64_t unsent() const noexcept {
+        return static_cast<std::int64_t>(outgoing_.size()) + static_cast<std::int64_t>(text_size_) + held_by_kernel();
+    }
+    /// Writes what is queued until then, as long as the adapter takes some. What remains is discarded: closing a line would wait for it.
     void drain(std::int64_t until_ns) noexcept {
+        constexpr std::int64_t most_idle_ns = 2'000'000'000;
         flush(0);
-        const auto waiting = [&] { return outgoing_.front() != nullptr || text_size_ != 0 || held_by_kernel() != 0; };
-        while (state() != State::down && waiting() && link::monotonic_ns() < until_ns) {
-            const bool full = outgoing_.front() != nullptr || text_size_ != 0;
+        std::int64_t left = unsent();
+        for (std::int64_t moved_ns = link::monotonic_ns(); state() != State::down && left != 0;) {
+            const std::int64_t now_ns = link::monotonic_ns();
+            if (now_ns >= until_ns || now_ns - moved_ns >= most_idle_ns) break;
+            const bool full = outgoing_.size() != 0 || text_size_ != 0;
             pollfd p{line_.get(), static_cast<short>(full ? POLLOUT : 0), 0};
             ::poll(&p, 1, 10);
             flush(0);
+            if (const std::int64_t before = std::exchange(left, unsent()); left != before) moved_ns = now_ns;
         }
-        if (waiting()) tcflush(line_.get(), TCOFLUSH);
+        if (left != 0) tcflush(line_.get(), TCOFLUSH);
     }
     void take_status(unsigned bits) noexcept {  // Lawicel: 2 warning, 3 overrun, 5 passive
         if ((bits & 8) != 0) Counting::add(counting_.lost);

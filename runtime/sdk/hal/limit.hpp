@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Pins that limit something. A limit that is not a number is no limit, so it never replaces one: see
+// Pins that limit something. A limit that becomes NaN keeps its last valid value: see
 // docs/decisions/0035-a-limit-that-is-not-a-number-keeps-its-last-value.md.
 #pragma once
 
