@@ -93,7 +93,6 @@ void command_stop(Context& context) {
 }
 
 void command_advance(Context& context) {
-    context.session.threads().note_idle_advance(context.command.span);
     const std::string& amount = context.argument(0);
     if (context.count() == 2) {
         const auto cycles = whole_number(amount);

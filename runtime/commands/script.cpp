@@ -221,7 +221,7 @@ void Script::act(const Command& command, const CommandRow& row) {
         row.function.act(context);
     }
     if (row.function.act == command_loadusr) text_is_kept_ = true;  // its component remembers the place
-    if (row.function.act == command_advance && !session_.threads().was_started()) text_is_kept_ = true;  // for the warning that nothing ran
+    if (row.function.act == command_advance && session_.threads().note_advance(command.span)) text_is_kept_ = true;  // for the warning that nothing ran
     const bool failed = pending_.errors() > errors_before;
     if (apart) {
         if (failed && row.function.act != command_source) lines_.push_back(command.span);

@@ -295,7 +295,7 @@ bool runs_functions(const Model& model) {
 /// Why no function has run although time has passed; nothing when one has, or when there is none.
 void check_that_something_ran(const Session& session, Diagnostics& diagnostics) {
     const Model& model = session.model();
-    const Span at = session.threads().idle_advance();
+    const Span at = session.threads().first_advance();
     if (!has_functions(model) || session.threads().now_ns() == 0) return;
     if (model.threads.empty())
         diagnostics.warning("nothing-ran", at, "no thread exists, so no function ran", "",

@@ -28,12 +28,14 @@ public:
     bool running() const;
     /// Returns true when start() was successful once.
     bool was_started() const { return was_started_; }
-    /// Notes the command that lets time pass while the threads have never been started; only the first is kept.
-    void note_idle_advance(Span command) {
-        if (!was_started_ && !idle_advance_.known()) idle_advance_ = command;
+    /// Notes a command that lets time pass. Returns true for the first one, whose text is needed later.
+    bool note_advance(Span command) {
+        if (first_advance_.known()) return false;
+        first_advance_ = command;
+        return true;
     }
-    /// Returns the command that was noted, or an unknown span.
-    Span idle_advance() const { return idle_advance_; }
+    /// Returns the first command that was noted, or an unknown span.
+    Span first_advance() const { return first_advance_; }
 
     /// Virtual clock: runs the threads for `ns`. Real clock: waits for `ns`.
     void advance_ns(std::int64_t ns);
@@ -53,7 +55,7 @@ public:
 private:
     SessionState& state_;
     bool was_started_ = false;
-    Span idle_advance_;
+    Span first_advance_;
     int watchdog_ = -1;  // the open device, until it is disarmed
 };
 
