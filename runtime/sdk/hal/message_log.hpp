@@ -52,15 +52,16 @@ public:
         Kind* kind = find(subject.kind);
         if (kind != nullptr) {
             if (Entry* const known = find(*kind, subject.detail)) return known->hold(message);
-            if (kind->others.held != 0 || kind->entries.size() >= most_details) return kind->hold_other(message, now_ns);
+            if (kind->storming || kind->entries.size() >= most_details) return kind->hold_other(message, now_ns);
         }
         if (subjects() >= (overflowed_ ? most_subjects_of_a_storm : most_subjects)) {
             if (suppressed_++ == 0) suppressed_since_ns_ = now_ns;
+            overflowed_ = true;
             return;
         }
         print_held_early(now_ns);
         write(message);
-        if (kind == nullptr) kind = &kinds_.emplace_back(Kind{subject.kind, {}, {}});
+        if (kind == nullptr) kind = &kinds_.emplace_back(Kind{subject.kind, {}, {}, false});
         kind->entries.push_back({subject.detail, {}, now_ns, 0, 0});
     }
     /// About a subject that is the only one of its kind. [setup]
@@ -115,10 +116,12 @@ private:
     struct Kind {
         std::string        name;
         std::vector<Entry> entries;
-        Entry              others;  // further details, which have no entry of their own; held != 0: there is a storm of them
+        Entry              others;  // further details, which have no entry of their own
+        bool               storming = false;  // there were such in this second or the one before
 
         void hold_other(const std::string& message, std::int64_t now_ns) {
-            if (others.held == 0) others.since_ns = now_ns;
+            if (!storming) others.since_ns = now_ns;
+            storming = true;
             others.hold(message);
         }
     };
@@ -169,16 +172,18 @@ private:
     void flush_all(std::int64_t now_ns, bool all) {
         last_ns_ = now_ns;
         for (Kind& k : kinds_) flush_kind(k, now_ns, all);
-        std::erase_if(kinds_, [](const Kind& k) { return k.entries.empty() && k.others.held == 0; });
+        std::erase_if(kinds_, [](const Kind& k) { return k.entries.empty() && !k.storming; });
         if (overflowed_ && suppressed_ == 0 && now_ns - suppressed_since_ns_ >= interval_ns) overflowed_ = false;
         if (suppressed_ == 0 || !(all || now_ns - suppressed_since_ns_ >= interval_ns)) return;
         write(std::to_string(suppressed_) + (suppressed_ == 1 ? " message" : " messages") + " about further subjects not shown");
         suppressed_ = 0;
         suppressed_since_ns_ = now_ns;
-        overflowed_ = true;
     }
     void flush_kind(Kind& k, std::int64_t now_ns, bool all) {
-        if (k.others.held != 0 && (all || k.others.over(now_ns))) write_others(k, now_ns);
+        if (k.storming && (all || k.others.over(now_ns))) {
+            k.storming = k.others.held != 0;
+            if (k.storming) write_others(k, now_ns);
+        }
         std::erase_if(k.entries, [&](Entry& e) {
             if (!e.over(now_ns) && !all) return false;
             if (e.held == 0) return true;  // the next message about it is printed at once
@@ -203,6 +208,7 @@ private:
                           hidden == 1 ? "" : "s", seconds(now_ns - others.since_ns));
         write(others.newest + text);
         for (Entry& e : k.entries) e.since_ns = now_ns;
+        others.since_ns = now_ns;
         others.held = 0;
     }
     static double seconds(std::int64_t in_ns) { return static_cast<double>(std::max<std::int64_t>(in_ns, 100'000'000)) * 1e-9; }
@@ -225,7 +231,7 @@ private:
     std::vector<Kind>  kinds_;
     std::uint64_t      suppressed_ = 0;
     std::int64_t       suppressed_since_ns_ = 0, last_ns_ = 0;
-    bool               overflowed_ = false;  // the second before had more than most_subjects
+    bool               overflowed_ = false;  // there were more than most_subjects, in this second or the one before
 };
 
 }  // namespace hal
