@@ -46,6 +46,13 @@ const AxisOrders& Axis::act(const AxisCommand& command, const AxisRules& rules, 
     return orders_;
 }
 
+void Axis::interrupt() noexcept {
+    wanted_ = enabled_ = active_ = following_ = false;
+    home_ = Home::no;
+    set_points_.clear();
+    walk_.restart_timeout();
+}
+
 /// Updates position, velocity and torque in user units; without a node they keep their values.
 void Axis::observe(const AxisFeedback& in, const AxisRules& rules, Time now) noexcept {
     in_ = in;

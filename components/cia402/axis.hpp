@@ -87,6 +87,10 @@ public:
     void observe(const AxisFeedback&, const AxisRules&, Time now) noexcept;
     const AxisOrders& act(const AxisCommand&, const AxisRules&, Time now) noexcept;
 
+    /// Disables the axis because its cycles were stopped and the drive with them. This is not a failure: enable needs another edge.
+    /// [realtime]
+    void interrupt() noexcept;
+
     State state() const noexcept { return walk_.state(); }
     bool enabled() const noexcept { return enabled_; }
     /// Returns true while commands are followed: enabled, in the commanded mode, not homing. While false, let the position command track

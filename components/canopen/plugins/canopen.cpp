@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <deque>
 #include <memory>
 #include <optional>
@@ -105,7 +106,9 @@ public:
         unheard_ = 0;
         unsent_ += period_;
         if (is_long_now(unsent_, period_)) reporter_->missing(true);
+        const bool interrupted = interrupted_.exchange(false, std::memory_order_acquire);
         runner_->receive(now);
+        if (follower_ && interrupted) follower_->restart();
         if (follower_) follow(now);
         if (flying_) flying_->show(*runner_);
         bus_->show(*runner_, now);
@@ -127,7 +130,10 @@ public:
         transmit(cycle);
     }
 
-    void make_safe(hal::Cycle) noexcept { runner_->make_safe(); }
+    void make_safe(hal::Cycle) noexcept {
+        interrupted_.store(true, std::memory_order_release);
+        runner_->make_safe();
+    }
 
 private:
     static constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
@@ -305,6 +311,7 @@ private:
     Time                         period_ = 0, now_ = 0;
     Time                         unsent_ = 0, unheard_ = 0;  // time since transmit, since receive
     bool                         overran_ = false;
+    std::atomic<bool>            interrupted_{false};  // set by make_safe(), from whichever thread; taken by receive()
 };
 
 }  // namespace

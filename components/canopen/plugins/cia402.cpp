@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 
 #include "cia402/axis.hpp"
@@ -15,7 +16,7 @@ struct Cia402 : hal::Component {
     using Component::Component;
 
     // Commands of the user.
-    hal::In<bool> enable{*this, "enable", "a rising edge enables the axis, FALSE disables it; after a fault another edge is needed"};
+    hal::In<bool> enable{*this, "enable", "a rising edge enables the axis, FALSE disables it; after a fault or a stop another edge is needed"};
     hal::In<bool> reset{*this, "reset", "a rising edge clears the fault of the axis and of the drive"};
     hal::In<bool> quick_stop{*this, "quick-stop",
                              "TRUE: brakes with the drive's quick stop and disables the axis; then enable needs another edge"};
@@ -108,7 +109,11 @@ struct Cia402 : hal::Component {
     hal::Function read{*this, "read-all", &Cia402::read_all, "updates the feedback from the drive; after the bus receives"};
     hal::Function write{*this, "write-all", &Cia402::write_all, "updates the drive from the commands; before the bus sends"};
 
+    hal::Emergency off{*this, &Cia402::interrupt, "disables the axis: when the thread runs again, enable needs another rising edge"};
+
     void start() { faults_ = hal::extension<hal_faults>("hal.faults/1"); }
+
+    void interrupt(hal::Cycle) noexcept { interrupted_.store(true, std::memory_order_release); }
 
     void read_all(hal::Cycle cycle) noexcept {
         read_rules();
@@ -144,6 +149,7 @@ struct Cia402 : hal::Component {
         c.profile_velocity = max_velocity;
         c.profile_acceleration = max_acceleration;
         c.profile_deceleration = max_deceleration != 0.0 && !std::isnan(max_deceleration) ? max_deceleration.get() : max_acceleration.get();
+        if (interrupted_.exchange(false, std::memory_order_acquire)) axis_.interrupt();
         tell(axis_.act(c, rules_, cycle.start_ns()));
 
         enabled = axis_.enabled();
@@ -207,6 +213,7 @@ private:
     Axis axis_;
     AxisRules rules_;
     Cause reported_ = Cause::none;
+    std::atomic<bool> interrupted_{false};  // set by interrupt(), from whichever thread; taken by write_all()
 };
 
 }  // namespace
@@ -223,6 +230,8 @@ the state machine of the drive and steps it towards the commanded state, one tra
   with `max-step` 0, the difference is blended out over `blend-time`.
 * A fault (see the table) brakes with quick stop, disables the axis and stays until a rising edge of `reset`. After a fault, after
   `quick-stop` and after the node was lost, `enable` needs another rising edge. At start-up, `enable` waits until the node is operational.
+* When the thread is stopped (`stop`, an exception, a hang, a suspended process), the axis is disabled, without a fault. When the thread runs
+  again, it stays off until `enable` has another rising edge.
 * `mode` may change at any time; the command is followed once the drive displays the new mode.
 * `halt` brakes on the drive's ramp in modes 1 to 7. In the cyclic modes the target freezes, or drops to 0, at once: bring the command to
   rest first.

@@ -22,7 +22,7 @@ public:
         using master::Event;
         if (slave >= slaves_.size()) return true;
         Slave& s = slaves_[slave];
-        if (event == Event::slave_operational || event == Event::slave_lost || event == Event::slave_returned) {
+        if (ends_start_up(event) || event == Event::slave_lost || event == Event::slave_returned) {
             s = {};
             return true;
         }
@@ -37,6 +37,9 @@ public:
     }
 
 private:
+    static bool ends_start_up(master::Event event) noexcept {
+        return event == master::Event::slave_operational || event == master::Event::slave_settled;
+    }
     static bool is_cause(master::Event event) noexcept {
         using master::Event;
         switch (event) {

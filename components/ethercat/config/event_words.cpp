@@ -223,6 +223,8 @@ std::string of_slave(const Happened& w, const master::Setup& setup, const std::s
     case Event::slave_lost: return "does not answer; check its supply and the cable to it";
     case Event::slave_returned: return "answers again";
     case Event::slave_operational: return "is operational after " + std::to_string(second) + " ms";
+    case Event::slave_settled:
+        return "is in " + state_words(first) + ", the state of its configuration, after " + std::to_string(second) + " ms";
     case Event::dc_unsupported:
         return std::string("has no distributed clock, but the configuration has ") +
                (lcec ? "<dcConf>; delete it" : "`dc`; remove that line");

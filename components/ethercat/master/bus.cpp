@@ -13,6 +13,7 @@ Bus::Bus(Setup setup_, const std::array<std::uint8_t, 6>& source, Events& events
       coe(coe_),
       device_of(setup.slaves.size(), -1),
       absent(setup.slaves.size()),
+      in_op(setup.slaves.size()),
       wkc_seen(image.domain_count(), WkcState::none) {
     constexpr std::size_t spare = 64;
     const std::size_t     capacity = setup.most_slaves != 0 ? setup.most_slaves : setup.slaves.size() + spare;
@@ -48,13 +49,21 @@ bool Bus::clocks_missing() const noexcept {
 
 void Bus::leave(Device& d) noexcept {
     d.slave.present = false, d.slave.state = State::none, d.slave.mailbox_status = nullptr;
-    d.status.online = d.status.operational = d.status.al_error = false;
+    d.status.online = d.status.al_error = false;
+    unsettle(d);
+    note_in_op(d, false);
     d.status.state = State::none;
     d.clock_set = d.synchronised = false;
     if (d.slave.configured < 0) return;
     const auto index = static_cast<std::size_t>(d.slave.configured);
     image.set_counting(index, false, false, false);
     image.clear_mailbox_status(index);
+}
+
+void Bus::note_in_op(const Device& d, bool is_in_op) noexcept {
+    if (d.slave.configured < 0) return;
+    const std::uint16_t station = is_in_op ? d.slave.station : std::uint16_t{0};
+    in_op[static_cast<std::size_t>(d.slave.configured)].store(station, std::memory_order_relaxed);
 }
 
 void Bus::update_status() noexcept {
@@ -68,7 +77,7 @@ void Bus::update_status() noexcept {
         }
         any = true;
         lowest = std::min(lowest, d->slave.state);
-        all &= d->status.operational;
+        all &= d->settled;
     }
     status.state = any ? lowest : State::none;
     status.operational = all && any;

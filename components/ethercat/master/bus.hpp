@@ -5,6 +5,7 @@
 // Another one reads error counters and clock deviations in turn. All of them run in the thread of the cycle.
 #pragma once
 
+#include <atomic>
 #include <bitset>
 #include <memory>
 #include <vector>
@@ -35,6 +36,7 @@ struct Device {
     bool         synchronised = false;  ///< its clock was within the window
     bool         drifted = false;  ///< it was reported as not in step, while it is operational
     std::int64_t drifts_since_ns = 0;  ///< when its clock left the window; 0: it is there
+    bool         settled = false;  ///< it is in the state that the setup names for it, brought there by a start-up
     bool         to_boot = false;  ///< it is to be in BOOT, for its firmware; only a slave that the setup does not name
     bool         helping = false;  ///< the task on its channel works for that of the bus
     std::int64_t began_ns = 0;  ///< of the newest start-up
@@ -56,11 +58,12 @@ struct Bus {
     std::vector<std::unique_ptr<Device>> devices;  ///< capacity of the bus; the number is that of the station address
     std::vector<int>                     device_of;  ///< by index of Setup::slaves; -1: none
     std::vector<SlaveStatus>             absent;  ///< status of the slaves of the setup that have no device
+    /// By index of Setup::slaves: station addresses of those that may be in OP, 0: not. Written in the cycle, read by any thread.
+    std::vector<std::atomic<std::uint16_t>> in_op;
     Channel                              bus_channel{32 * 1024}, watch_channel;
     std::vector<std::uint16_t>           by_position;  ///< device numbers along the line
     std::vector<WkcState>                wkc_seen;  ///< of the domains, as last reported
     unsigned                             known = 0;  ///< slaves on the bus after the newest scan
-    State                                target = State::op;  ///< no slave goes beyond this state
     bool                                 outputs_valid = true;  ///< the slaves may go to OP
     bool                                 exchange = false;  ///< process data frames are sent
     bool                                 suspicious = true;  ///< look at the slaves now
@@ -92,7 +95,19 @@ struct Bus {
     bool clocks_missing() const noexcept;  ///< Returns whether a slave has a clock that is not set, or the reference clock is lost.
     std::uint64_t dc_now() const noexcept;  ///< Returns the system time at the start of the cycle, as well as it is known.
     void          leave(Device&) noexcept;  ///< Takes a slave out of the working counters and the list of those present.
-    void          update_status() noexcept;  ///< Derives the state of the bus from those of the slaves.
+    /// Returns the state that a slave is to be brought to.
+    State target(const Device& d) const noexcept {
+        if (d.to_boot) return State::boot;
+        const Slave* slave = config(d);
+        return slave != nullptr ? slave->target : State::preop;
+    }
+    /// Notes that a slave is no longer in its state, or is about to leave it.
+    void unsettle(Device& d) noexcept {
+        d.settled = false;
+        d.status.operational = false;
+    }
+    void note_in_op(const Device&, bool in_op) noexcept;  ///< Lets shut_down() address the slave, or no longer.
+    void update_status() noexcept;  ///< Derives the state of the bus from those of the slaves.
 };
 
 // Registers of one slave. The data stays in channel.data().

@@ -54,6 +54,7 @@ enum class Event : std::uint8_t {
     damaged_frames,                ///< received at a port, damaged on the cable there [port | neighbour << 8, frames]
     emergency,                     ///< of CoE, from the slave itself [code | error register << 16, its 5 bytes, the first lowest]
     start_up_failed,               ///< gives up for now and starts again later [State it was in, seconds to the next try]
+    slave_settled,                 ///< in the state below OP that the setup names for it [State, ms since its start-up began]
 };
 
 /// Receives events. [realtime] in the thread of the master's cycle

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "ethercat/master/master.hpp"
 
+#include <optional>
+
 #include "ethercat/master/bus.hpp"
 
 namespace hal::ethercat::master {
@@ -71,14 +73,37 @@ void Master::rescan() noexcept {
 
 std::span<std::uint8_t> Master::data(std::size_t slave, std::size_t n) noexcept { return bus_->image.data(slave, n); }
 
-void Master::set_target(State target) noexcept {
-    if (target == bus_->target) return;
-    bus_->target = target;
-    for (const auto& d : bus_->devices) {
-        if (!d->slave.present || d->slave.configured < 0 || d->refused) continue;
-        d->status.operational = false;
-        bus_->run(*d, [&] { return boot(d->channel, *bus_, *d); });
+void Master::shut_down() noexcept {
+    if (primary_ == nullptr) return;
+    std::array<std::uint8_t, largest_frame_bytes> buffer;
+    std::optional<FrameWriter>                    frame;
+    const auto                                    send = [&] {
+        if (frame) bus_->engine.send_now(frame->finish());
+        frame.reset();
+    };
+    for (const std::atomic<std::uint16_t>& in_op : bus_->in_op) {
+        const std::uint16_t station = in_op.load(std::memory_order_relaxed);
+        if (station == 0) continue;
+        if (frame && frame->space() < sizeof station) send();
+        if (!frame) frame.emplace(buffer, primary_->address(), bus_->setup.frame_bytes);
+        std::uint8_t* data = frame->add(Command::fpwr, 0, at_station(station, registers::al_control), sizeof station);
+        if (data != nullptr) put(data, static_cast<std::uint16_t>(State::safeop));
     }
+    send();
+}
+
+void Master::restart() noexcept {
+    Bus& bus = *bus_;
+    for (const auto& device : bus.devices) {
+        Device& d = *device;
+        if (!d.slave.present || !d.identified || d.refused || d.slave.configured < 0 || bus.target(d) != State::op) continue;
+        bus.unsettle(d);
+        // Nobody corrected the clocks meanwhile. On a broken ring they cannot be measured: they drift back into the window.
+        if (d.slave.number != bus.reference && !bus.status.ring_broken) d.clock_set = d.synchronised = false;
+        if (!d.helping) bus.run(d, [&] { return boot(d.channel, bus, d); });  // otherwise the supervision starts it
+    }
+    bus.suspicious = true;
+    bus.update_status();
 }
 void Master::set_boot(const BusSlave& slave, bool to_boot) noexcept {
     Device& d = *bus_->devices[slave.number];

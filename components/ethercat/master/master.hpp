@@ -49,8 +49,12 @@ public:
 
     /// Returns the process data of sync manager `n` of `Setup::slaves[slave].sync_managers`. The place stays the same. [any]
     std::span<std::uint8_t> data(std::size_t slave, std::size_t n) noexcept;
-    /// Lets no slave beyond a state; slaves beyond it are taken back, those below are brought up. [realtime]
-    void set_target(State target) noexcept;
+    /// Takes the slaves in OP to SAFE-OP, where their outputs are off, by frames that leave at once. Does nothing while transmit() runs in
+    /// another thread; then call it again, or wait for the watchdogs of the slaves. After it, restart(). [any], async-signal-safe
+    void shut_down() noexcept;
+    /// Starts every slave again that belongs in OP, after cycles in which nothing was exchanged: none is operational until it has reached OP
+    /// from INIT. [realtime]
+    void restart() noexcept;
     /// Keeps slaves in SAFE-OP while false: their outputs are not valid yet. True at start. [realtime]
     void set_outputs_valid(bool valid) noexcept;
     /// Takes a slave that the setup does not name to BOOT, where it takes its firmware by FoE, or back to PRE-OP. The slave must be idle().

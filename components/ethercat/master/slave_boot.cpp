@@ -14,15 +14,17 @@ constexpr std::uint16_t code(State state) noexcept { return static_cast<std::uin
 
 Task<bool> bring_up(Channel& c, Bus& bus, Device& d) noexcept {
     const Slave*    config = bus.config(d);
-    const State     last = std::min(config != nullptr ? config->target : State::preop, bus.target);
+    const State     last = bus.target(d);
     const Timeouts& t = d.slave.timeouts;
     const auto      done = [&](State reached) {
         if (reached != last) return false;
-        d.status.operational = config != nullptr;
+        d.settled = config != nullptr;
+        d.status.operational = d.settled && reached == State::op;
         return true;
     };
     bool ok = co_await request_state(c, bus, d, State::init, t.to_init);
     if (!ok) co_return false;
+    bus.note_in_op(d, false);
     ok = co_await clear_settings(c, bus, d);
     if (!ok) co_return false;
     ok = co_await startup_writes(c, bus, d, State::preop);
@@ -64,6 +66,7 @@ Task<bool> bring_up(Channel& c, Bus& bus, Device& d) noexcept {
     if (d.sync_begins_ns > c.now_ns()) co_await c.sleep_until(d.sync_begins_ns + bus.setup.cycle_ns);  // after the first one
     ok = co_await synchronise(c, bus, d);  // a clock may have jumped while the slave waited for its SYNC signals
     if (!ok) co_return false;
+    bus.note_in_op(d, true);
     ok = co_await request_state(c, bus, d, State::op, t.to_safeop_op);
     if (!ok) co_return false;
     co_return done(State::op);
@@ -112,7 +115,7 @@ Task<bool> request_state(Channel& c, Bus& bus, Device& d, State state, std::uint
 Task<void> boot(Channel& c, Bus& bus, Device& d) noexcept {
     d.began_ns = c.now_ns();
     while (true) {
-        d.status.operational = false;
+        bus.unsettle(d);
         const bool ok = co_await bring_up(c, bus, d);
         if (ok) break;
         const bool here = co_await read_state(c, bus, d);
@@ -130,7 +133,10 @@ Task<void> boot(Channel& c, Bus& bus, Device& d) noexcept {
         co_await c.sleep(pause);
     }
     d.attempts = 0;
-    if (d.status.operational) bus.report(Event::slave_operational, d, d.slave.position, (c.now_ns() - d.began_ns) / millisecond);
+    if (!d.settled) co_return;
+    const std::int64_t took_ms = (c.now_ns() - d.began_ns) / millisecond;
+    if (d.status.operational) bus.report(Event::slave_operational, d, d.slave.position, took_ms);
+    else bus.report(Event::slave_settled, d, code(d.slave.state), took_ms);
 }
 
 }  // namespace hal::ethercat::master

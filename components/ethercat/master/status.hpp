@@ -32,7 +32,7 @@ struct BusStatus {
     State         state = State::none;        ///< lowest state of the configured slaves that are present
     bool          link = false;                ///< the primary port has a carrier
     bool          scanned = false;             ///< the slaves are identified
-    bool          operational = false;         ///< every slave that is not optional is in its target state
+    bool          operational = false;         ///< every slave that is not optional is in OP, or in the lower state that the setup names for it
     std::uint16_t responding = 0;     ///< slaves that answered the newest broadcast
     std::uint16_t expected = 0;       ///< slaves of the setup that are not optional
     std::uint16_t wkc = 0, wkc_expected = 0;
@@ -63,7 +63,7 @@ struct SlaveStatus {
     State                     state = State::none;
     std::uint16_t             al_code = 0;
     bool                      online = false;        ///< answers datagrams
-    bool                      operational = false;   ///< in its target state, with process data
+    bool                      operational = false;   ///< in OP, with process data
     bool                      al_error = false;
     std::uint32_t             dc_deviation_ns = UINT32_MAX;  ///< magnitude of 092Ch; UINT32_MAX: no data
     std::uint32_t             losses = 0;   ///< how often it was lost

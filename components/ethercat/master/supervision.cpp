@@ -133,7 +133,7 @@ Task<bool> rediscover(Channel& c, Bus& bus, unsigned count) noexcept {
 void start_returned(Bus& bus) noexcept {
     for (const std::uint16_t number : bus.by_position) {
         Device& d = *bus.devices[number];
-        if (d.slave.present && !d.status.operational && !d.channel.busy()) start(bus, d);
+        if (d.slave.present && !d.settled && !d.channel.busy()) start(bus, d);
     }
 }
 
@@ -152,14 +152,13 @@ Task<void> check(Channel& c, Bus& bus, Device& d) noexcept {
         bus.report(Event::slave_lost, d, d.slave.position);
         co_return;
     }
-    const Slave* config = bus.config(d);
-    const State  last = d.to_boot ? State::boot : std::min(config != nullptr ? config->target : State::preop, bus.target);
-    if (d.slave.state == last && !d.slave.al_failed) co_return;
-    if (d.status.operational) {
+    const bool settles = bus.config(d) != nullptr && !d.to_boot;
+    if (d.slave.state == bus.target(d) && !d.slave.al_failed && (d.settled || !settles)) co_return;
+    if (d.settled) {
         const auto status = static_cast<std::uint16_t>(static_cast<unsigned>(d.slave.state) | (d.slave.al_failed ? al_error : 0U));
         bus.report(Event::fell_back, d, status, d.slave.al_code);
     }
-    d.status.operational = false;
+    bus.unsettle(d);
     d.began_ns = c.now_ns();
     co_await boot(c, bus, d);
 }
@@ -198,10 +197,10 @@ Task<void> supervise(Channel& c, Bus& bus) noexcept {
         for (const auto& device : bus.devices) {  // not by position: one that lost its address has none
             const Device& d = *device;
             present += d.slave.present ? 1 : 0;
-            at_rest &= !d.slave.present || d.status.operational;
+            at_rest &= !d.slave.present || d.settled;
         }
         const bool all_fine =
-            at_rest && count == bus.known && present == count && states == static_cast<std::uint16_t>(std::min(State::op, bus.target));
+            at_rest && count == bus.known && present == count && states == static_cast<std::uint16_t>(State::op);
         if (all_fine && bus.status.wkc_state != WkcState::part) continue;
 
         for (const auto& device : bus.devices) {
@@ -227,7 +226,7 @@ Task<void> supervise(Channel& c, Bus& bus) noexcept {
 
 /// Takes a slave to SAFE-OP, where its outputs are off, until its clock is in the window again.
 static Task<void> resynchronise(Channel& c, Bus& bus, Device& d) noexcept {
-    d.status.operational = false;
+    bus.unsettle(d);
     d.began_ns = c.now_ns();
     bool ok = co_await request_state(c, bus, d, State::safeop, d.slave.timeouts.op_to_safeop);
     if (ok) ok = co_await synchronise(c, bus, d);
@@ -236,6 +235,7 @@ static Task<void> resynchronise(Channel& c, Bus& bus, Device& d) noexcept {
         co_await boot(c, bus, d);
         co_return;
     }
+    d.settled = true;
     d.status.operational = true;
     bus.report(Event::slave_operational, d, d.slave.position, (c.now_ns() - d.began_ns) / millisecond);
 }

@@ -15,19 +15,21 @@ namespace hal::ethercat {
 /// Pins of the bus.
 struct BusPins {
     BusPins(Component& c, const Function& f)
-        : state(c, f, "state", "lowest state of the configured slaves: 1 INIT, 2 PRE-OP, 3 BOOT, 4 SAFE-OP, 8 OP, 0 none"),
+        : state(c, f, "state", "lowest state of the configured slaves: 1 INIT, 2 PRE-OP, 3 BOOT, 4 SAFE-OP, 8 OP, 0 none",
+                {.safe = 0U}),
           link_up(c, f, "link-up", "the port has a link"),
-          all_op(c, f, "all-op", "every slave that is not optional is in its target state and exchanges process data"),
+          all_op(c, f, "all-op", "every slave that is not optional is in OP, or in the lower `state` of its configuration",
+                 {.safe = false}),
           responding(c, f, "slaves-responding", "slaves that answered the newest broadcast"),
           expected(c, f, "slaves-expected", "slaves of the configuration that are not optional"),
           wkc(c, f, "wkc", "working counter of all process data, newest cycle"),
           wkc_expected(c, f, "wkc-expected", "its value when all slaves that are started exchange process data"),
-          wkc_state(c, f, "wkc-state", "0 none, 1 part, 2 complete"),
+          wkc_state(c, f, "wkc-state", "0 none, 1 part, 2 complete", {.safe = 0U}),
           incomplete(c, f, "cycles-incomplete", "cycles in which a slave that is started did not exchange its process data"),
           sent(c, f, "frames-sent", "frames sent"),
           lost(c, f, "frames-lost", "frames that did not return in time"),
           foreign(c, f, "frames-foreign", "EtherCAT frames of other programs, or damaged ones"),
-          dc_synchronised(c, f, "dc-synchronised", "every slave with a clock is within the window"),
+          dc_synchronised(c, f, "dc-synchronised", "every slave with a clock is within the window", {.safe = false}),
           dc_deviation(c, f, "dc-sync-diff", "largest deviation of the slaves' clocks; 4294967295: no data", {.unit = "ns"}),
           phase(c, f, "pll-err", "how late the cycle begins on the grid of the reference clock", {.unit = "ns"}),
           ring_broken(c, f, "ring-broken", "with a backup port: the ring is broken; the slaves are reached from both ends") {}
@@ -57,10 +59,9 @@ struct BusPins {
 /// Pins of one slave.
 struct SlavePins {
     SlavePins(Component& c, const Function& f, const std::string& name)
-        : online(c, f, (name + ".online").c_str(), "the slave answers"),
-          operational(c, f, (name + ".operational").c_str(), "the slave is in its target state and exchanges process data",
-                      {.safe = false}),
-          state(c, f, (name + ".state").c_str(), "1 INIT, 2 PRE-OP, 3 BOOT, 4 SAFE-OP, 8 OP, 0 unknown"),
+        : online(c, f, (name + ".online").c_str(), "the slave answers", {.safe = false}),
+          operational(c, f, (name + ".operational").c_str(), "the slave is in OP and exchanges process data", {.safe = false}),
+          state(c, f, (name + ".state").c_str(), "1 INIT, 2 PRE-OP, 3 BOOT, 4 SAFE-OP, 8 OP, 0 unknown", {.safe = 0U}),
           al_code(c, f, (name + ".al-status-code").c_str(),
                   "AL status code of the slave (0134h), 0 again when it is started anew; the log keeps each"),
           dc_deviation(c, f, (name + ".dc-sync-diff").c_str(), "deviation of its clock; 4294967295: no data", {.unit = "ns"}),

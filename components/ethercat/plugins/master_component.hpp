@@ -112,6 +112,7 @@ public:
         period_reported_ = was_fresh_ = unknown_raised_ = false;
         failed_.assign(bus_.setup.slaves.size(), Event::slave_operational);
         unsent_ = unreceived_ = apart_ = 0;
+        interrupted_.store(false);
         filter_ = config::EventFilter(bus_.setup.slaves.size());
         discipline_.lose();
         reporter_.start();
@@ -139,6 +140,7 @@ public:
         receiver_.store(pthread_self(), std::memory_order_relaxed);
         if (++unsent_ == tolerated_cycles) raise(no_transmit_words_);
         master_->receive(cycle.start_ns());
+        if (interrupted_.exchange(false, std::memory_order_acquire)) resume();
         follow(cycle);
         bus_pins_.show(master_->status(), master_->cycles_incomplete());
         for (std::size_t n = 0; n < slaves_.size(); ++n) slaves_[n].show(master_->slave_status(n), emergencies_->of(n));
@@ -154,6 +156,7 @@ public:
         apart_ = receiver_.load(std::memory_order_relaxed) == pthread_self() ? 0 : apart_ + 1;
         if (apart_ == tolerated_cycles) raise(apart_words_);
         if (unreceived_ > 2 || apart_ > 2) return;  // outputs must not move without their inputs
+        if (interrupted_.load(std::memory_order_acquire)) return;  // declared hung, in a cycle that goes on all the same
         entries_.take(areas_);
         if (eoe_) eoe_->step(*master_);
         server_->step(cycle.start_ns());
@@ -161,7 +164,8 @@ public:
     }
 
     void make_safe(hal::Cycle) noexcept {
-        if (master_) master_->set_target(State::safeop);
+        interrupted_.store(true, std::memory_order_release);
+        if (master_) master_->shut_down();
     }
 
 private:
@@ -220,6 +224,13 @@ private:
         return (now.tv_sec - year_2000_s) * 1'000'000'000 + now.tv_nsec;
     }
 
+    /// Begins anew after the thread was stopped: the slaves are not in OP, or will not be. [realtime]
+    void resume() noexcept {
+        master_->restart();
+        discipline_.lose();
+        was_fresh_ = false;
+    }
+
     /// Lets the threads follow the reference clock. [realtime]
     void follow(hal::Cycle cycle) noexcept {
         const Master::Phase phase = master_->dc_phase();
@@ -272,7 +283,8 @@ private:
         if (named) {
             const std::string* words = start_words(event, slave);
             if (words != nullptr && failed_[slave] != event) raise(*words), failed_[slave] = event;  // not at each try
-            if (event == Event::slave_operational) failed_[slave] = event;
+            const bool started = event == Event::slave_operational || event == Event::slave_settled;
+            if (started) failed_[slave] = Event::slave_operational;
         }
         if (event == Event::unknown_slave && !std::exchange(unknown_raised_, true)) raise(unknown_words_);
         if (event == Event::scanned) unknown_raised_ = false;
@@ -294,7 +306,7 @@ private:
                             &MasterComponent::transmit,
                             "sends the outputs of the slaves, starts and watches them; last in the thread",
                                       {.shared = Names::shared}};
-    hal::Emergency          emergency_{*this, &MasterComponent::make_safe, "takes the slaves to SAFE-OP, where outputs are off"};
+    hal::Emergency          emergency_{*this, &MasterComponent::make_safe, "takes the slaves to SAFE-OP at once, where outputs are off; they are started again when the thread runs again"};
     typename Names::BusPins bus_pins_{*this, receive_};
     std::deque<typename Names::SlavePins> slaves_;
     EntryPins                             entries_{*this, receive_, transmit_};
@@ -307,6 +319,7 @@ private:
     config::EventFilter    filter_{0};
     unsigned               unsent_ = 0, unreceived_ = 0, apart_ = 0;
     std::atomic<pthread_t> receiver_{};
+    std::atomic<bool>      interrupted_{false};  ///< set by make_safe(), from whichever thread; taken by receive()
 
     std::unique_ptr<hal::ethernet::Port>   primary_, backup_;
     std::unique_ptr<master::Mailboxes>     mailboxes_;

@@ -189,11 +189,13 @@ struct NodePins {
     std::uint32_t           losses = 0;
 
     NodePins(Component& c, const Function& f, const std::string& n)
-        : online(c, f, (n + ".online").c_str(), "it is heard"),
+        : online(c, f, (n + ".online").c_str(), "it is heard", {.safe = false}),
           operational(c, f, (n + ".operational").c_str(), "it exchanges process data", {.safe = false}),
           fault(c, f, (n + ".fault").c_str(), "it was lost or could not be booted, and is not operational again yet"),
-          state(c, f, (n + ".state").c_str(), "its NMT state: 0 booting, 4 stopped, 5 operational, 127 pre-operational"),
-          step(c, f, (n + ".step").c_str(), "where the master is with it: 0 off to 13 running, 14 waiting, 15 failed, 16 stopped"),
+          state(c, f, (n + ".state").c_str(), "its NMT state: 0 booting or unknown, 4 stopped, 5 operational, 127 pre-operational",
+                {.safe = 0U}),
+          step(c, f, (n + ".step").c_str(), "where the master is with it: 0 off to 13 running, 14 waiting, 15 failed, 16 stopped",
+               {.safe = 0U}),
           error_register(c, f, (n + ".error-register").c_str(), "error register 1001h of its newest emergency"),
           emcy(c, f, (n + ".emcy").c_str(), "code of its newest emergency; 0: none, or the error is gone"),
           emcy_count(c, f, (n + ".emcy-count").c_str(), "emergencies heard"),
@@ -229,8 +231,8 @@ struct FlyingPins {
     hal::Out<std::uint32_t> state, master, negotiations;
 
     FlyingPins(Component& c, const Function& f)
-        : active(c, f, "active", "this one is the NMT master"),
-          state(c, f, "flying-state", "0 off, 1 waiting, 2 asking, 3 negotiating, 4 passive, 5 active"),
+        : active(c, f, "active", "this one is the NMT master", {.safe = false}),
+          state(c, f, "flying-state", "0 off, 1 waiting, 2 asking, 3 negotiating, 4 passive, 5 active", {.safe = 0U}),
           master(c, f, "active-master", "node-id of the NMT master; 0: there is none now"),
           negotiations(c, f, "negotiations", "which of the masters is it was negotiated so often") {}
 
@@ -256,8 +258,8 @@ struct BusPins {
     BusPins(Component& c, const Function& f)
         : operational(c, f, "operational", "all mandatory nodes are", {.safe = false}),
           bus_off(c, f, "bus-off", "the controller is off the bus, or the bus is gone"),
-          state(c, f, "state", "0 off, 1 booting, 2 operational, 3 degraded, 4 stopped, 5 failed"),
-          nodes_operational(c, f, "nodes-operational", "how many nodes are"),
+          state(c, f, "state", "0 off, 1 booting, 2 operational, 3 degraded, 4 stopped, 5 failed", {.safe = 0U}),
+          nodes_operational(c, f, "nodes-operational", "how many nodes are", {.safe = 0U}),
           tx_errors(c, f, "tx-errors", "the controller's send error counter"),
           rx_errors(c, f, "rx-errors", "the controller's receive error counter"),
           frames_lost(c, f, "frames-lost", "frames of others lost on the wire, where they are numbered (packed frames on Ethernet)"),

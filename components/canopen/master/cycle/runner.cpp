@@ -84,18 +84,37 @@ void Runner::open(can::Link& link) noexcept {
     link_ = &link;
     bus_state_ = can::State::active;
     had_bus_ = false;
+    begun_ = false;
+    safe_.store(true);
     boots_.store(true);
 }
 
 /// From nothing: a flying master finds out first whether it is the one.
 void Runner::begin(Time now) noexcept {
     was_active_ = false;
+    safe_.store(false);
+    if (std::exchange(begun_, true)) drop_backlog(now);
     foreign_from_ = now + start_transient;
     if (!config_.flying.enabled) return boot(now);
     device_.out().clear();
     device_.start(now);
     master_.stand_by(now);
     flying_.start(now);
+}
+
+/// Drops what came while no cycles ran: old values and answers say nothing of now. Emergencies are kept, they are reported.
+void Runner::drop_backlog(Time now) noexcept {
+    constexpr std::size_t      max_frames = 8192;
+    std::array<can::Frame, 32> frames;
+    for (std::size_t dropped = 0; dropped < max_frames; dropped += frames.size()) {
+        const std::size_t count = link_->receive(frames, now);
+        for (std::size_t i = 0; i < count; ++i) {
+            const can::Frame& f = frames[i];
+            const bool        is_emergency = !f.extended && !f.remote && f.id > 0x80 && f.id < 0x100;
+            if (is_emergency && !f.error && active()) master_.handle(f, now);
+        }
+        if (count < frames.size()) return;
+    }
 }
 
 void Runner::boot(Time now) noexcept {
@@ -155,6 +174,7 @@ void Runner::receive(Time now) noexcept {
     open_and_close();
     watch_srdos(now);
     if (config_.sync == config::SyncMode::follow) send(now);  // what a SYNC asked for does not wait for transmit()
+    if (boots_.load()) safe_.store(false);  // made safe meanwhile by another thread, and then something was sent: once more
 }
 
 std::size_t Runner::take_frames(Time now) noexcept {
@@ -253,6 +273,7 @@ void Runner::transmit(Time now, Time period, bool leads) noexcept {
     leads_ = leads;
     send(now);
     serve_boot(now, period);
+    if (boots_.load()) safe_.store(false);
 }
 
 void Runner::produce_sync(Time now, Time period) noexcept {
@@ -332,13 +353,21 @@ bool Runner::is_process_data(const can::Frame& f) const noexcept {
 }
 
 void Runner::make_safe() noexcept {
-    if (link_ == nullptr || boots_.exchange(true)) return;  // nothing was started
-    if (!active()) return;                                  // the network is another one's
-    bool synchronous = false;
+    if (link_ == nullptr) return;
+    boots_.store(true);
+    if (safe_.exchange(true)) return;  // nothing was started, or the safe values were sent
+    if (!active()) return;             // the network is another one's
+    if (!send_safe_values()) safe_.store(false);
+}
+
+/// Returns whether the link took all of them.
+bool Runner::send_safe_values() noexcept {
+    bool       all = true, synchronous = false;
+    const auto send = [&](const can::Frame& f) { all &= link_->send(f, now_) == can::Sent::queued; };
     for (Output& out : outputs_) {
         if (!out.open) continue;
         if (out.sent->pdo->multiplexed()) {
-            make_safe_alone(out);
+            all &= make_safe_alone(out);
             continue;
         }
         std::uint64_t image = 0;
@@ -347,11 +376,12 @@ void Runner::make_safe() noexcept {
             const std::uint64_t value = s.has_safe ? s.safe : number_in(*s.entry);
             image |= (part.bits >= 64 ? value : value & ((std::uint64_t{1} << part.bits) - 1)) << part.first;
         }
-        store(out.frame.data.data(), image);
-        link_->send(out.frame, now_);
+        can::Frame f = out.frame;
+        store(f.data.data(), image);
+        send(f);
         synchronous = synchronous || out.sent->pdo->synchronous();
     }
-    if (synchronous && produces_) link_->send(sync_frame_, now_);
+    if (synchronous && produces_) send(sync_frame_);
     for (const OwnSrdo& srdo : own_.srdos) {  // silence alone would take the node its SCT
         if (!srdo.pdo->to_node) continue;
         std::uint64_t image = 0;
@@ -365,16 +395,19 @@ void Runner::make_safe() noexcept {
         }
         can::Frame f = make_frame(srdo.pdo->cob, static_cast<std::uint8_t>(srdo.pdo->bytes()));
         store(f.data.data(), image);
-        link_->send(f, now_);
+        send(f);
         f.id = srdo.pdo->cob + 1;
         store(f.data.data(), ~image);
-        link_->send(f, now_);
+        send(f);
     }
-    for (const can::Frame& f : farewell_) link_->send(f, now_);
+    for (const can::Frame& f : farewell_) send(f);
     link_->flush(now_);
+    return all;
 }
 
-void Runner::make_safe_alone(const Output& out) noexcept {
+/// Returns whether the link took all of them.
+bool Runner::make_safe_alone(const Output& out) noexcept {
+    bool all = true;
     for (const Sent::Part& part : out.sent->parts) {
         const Slot& s = slots_[part.placed];
         can::Frame  f = out.frame;
@@ -382,8 +415,9 @@ void Runner::make_safe_alone(const Output& out) noexcept {
         store(f.data.data() + 1, s.object->index);
         f.data[3] = s.object->sub;
         store(f.data.data() + 4, static_cast<std::uint32_t>(s.has_safe ? s.safe : number_in(*s.entry)));
-        link_->send(f, now_);
+        all &= link_->send(f, now_) == can::Sent::queued;
     }
+    return all;
 }
 
 void Runner::on_step(const NodeStatus& status) noexcept {

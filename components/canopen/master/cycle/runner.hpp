@@ -88,7 +88,8 @@ public:
     void receive(Time now) noexcept;
     /// `leads`: the SYNC and the heartbeat are ours; another master on the same bus makes them otherwise. [realtime]
     void transmit(Time now, Time period, bool leads = true) noexcept;
-    /// All outputs to their safe values, nodes out of the operational state as configured. The network boots anew when cycles go on.
+    /// All outputs to their safe values, nodes out of the operational state as configured. The network boots anew when cycles go on. While
+    /// the link is in use by a cycle of another thread it may send nothing: then call it again at the end of that cycle.
     /// Async-signal-safe.
     void make_safe() noexcept;
 
@@ -141,6 +142,8 @@ private:
         bool          sent = false;  // since the node is operational
     };
     void begin(Time now) noexcept;
+    void drop_backlog(Time now) noexcept;
+    bool send_safe_values() noexcept;
     void boot(Time now) noexcept;
     std::size_t take_frames(Time now) noexcept;
     void take(const can::Frame&, Time now) noexcept;
@@ -159,7 +162,7 @@ private:
     void tell_alone(Time now) noexcept;
     void ask(Time now) noexcept;
     void tell_again() noexcept;
-    void make_safe_alone(const Output&) noexcept;
+    bool make_safe_alone(const Output&) noexcept;
     void watch_srdos(Time now) noexcept;
 
     void on_step(const NodeStatus&) noexcept override;
@@ -217,6 +220,8 @@ private:
     FlyingMaster::State            flying_state_ = FlyingMaster::State::off;
     bool                           sync_begun_ = false, time_begun_ = false, produces_ = false, leads_ = true;
     std::atomic<bool>              boots_{true};             // set by make_safe(), from whichever thread; taken by receive()
+    std::atomic<bool>              safe_{true};              // nothing was sent since make_safe(); likewise
+    bool                           begun_ = false;           // since open()
 };
 
 }  // namespace hal::canopen

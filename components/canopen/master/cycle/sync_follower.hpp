@@ -22,7 +22,7 @@ public:
 
     SyncFollower(Component& component, const Function& shows, const config::MasterConfig& config)
         : config_(config),
-          locked_(component, shows, "sync-locked", "the cycles are synchronised to the SYNC"),
+          locked_(component, shows, "sync-locked", "the cycles are synchronised to the SYNC", {.safe = false}),
           error_(component, shows, "sync-error-us", "lateness of the newest SYNC", {.unit = "us"}),
           rate_(component, shows, "sync-rate-ppm", "drift of the clock of the SYNC producer; positive: slower than this host", {.unit = "ppm"}) {}
 
@@ -32,6 +32,13 @@ public:
         seen_ = 0;
         following_ = false;
         clock_.claim();
+    }
+
+    /// Awaits the next SYNC after a time without cycles, which is not a loss. [realtime]
+    void restart() noexcept {
+        beat_.lose();
+        following_ = false;
+        missed_ = 0;
     }
 
     /// Once a cycle, after Runner::receive(). [realtime]

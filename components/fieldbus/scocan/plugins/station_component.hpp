@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <cstring>
 #include <deque>
 #include <limits>
@@ -87,6 +88,7 @@ public:
         now_ = cycle.start_ns();
         if (pins_.reset && !was_reset_) station_->reset(), pins_.fault = false;
         was_reset_ = pins_.reset;
+        if (interrupted_.exchange(false, std::memory_order_acquire)) restart();
         station_->receive(now_);
         exchange_->state.store(station_->state() == State::running ? can::State::active : can::State::down, std::memory_order_relaxed);
         for (auto& m : received_) m.show(now_);
@@ -110,6 +112,8 @@ public:
         before_slots();
         station_->transmit(now_, cycle.period_ns());
     }
+
+    void interrupt(hal::Cycle) noexcept { interrupted_.store(true, std::memory_order_release); }
 
 protected:
     virtual void received() noexcept {}      ///< behind receive(). [realtime]
@@ -142,6 +146,15 @@ protected:
             faults_->raise(faults_, this, text, counts ? static_cast<double>(value) : std::numeric_limits<double>::quiet_NaN());
     }
 
+    /// Begins anew after the thread was stopped. [realtime]
+    void restart() noexcept {
+        station_->restart(now_);
+        exchange_->each([](can::SlotUser& user) {
+            while (user.outgoing.front() != nullptr) user.outgoing.drop();
+        });
+        discipline_.lose();
+    }
+
     /// Synchronises the threads of this process: their cycles begin with slots. [realtime]
     void follow(Time period) noexcept {
         const std::uint64_t syncs = station_->count().syncs;
@@ -158,6 +171,7 @@ protected:
     TableArguments    arguments_{*this};
     hal::Function     receive_{*this, "receive", &StationComponent::receive, "receives frames and follows the SYNC; first in the thread"};
     hal::Function transmit_{*this, "transmit", &StationComponent::transmit, "sends in the slots until the next cycle; last in the thread"};
+    hal::Emergency interruption_{*this, &StationComponent::interrupt, "when the thread runs again, the node listens before it sends"};
     StationPins   pins_{*this, receive_};
     std::deque<SentMessage>                  sent_;
     std::deque<ReceivedMessage>              received_;
@@ -175,6 +189,7 @@ protected:
     std::uint64_t                            followed_ = 0;
     Time                                     now_ = 0;
     bool                                     was_reset_ = false;
+    std::atomic<bool>                        interrupted_{false};  // set by interrupt(), from whichever thread; taken by receive()
 };
 
 }  // namespace hal::scocan

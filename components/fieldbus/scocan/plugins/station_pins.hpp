@@ -13,7 +13,7 @@ struct StationPins {
     hal::Component&         c;
     const hal::Function&    f;
     hal::In<bool>           reset{c, f, "reset", "rising edge: a silenced node sends again; acknowledges fault"};
-    hal::Out<std::int32_t>  state{c, f, "state", "0 listening, 1 running, 2 silent, 3 listen-only, 4 silenced, 5 down"};
+    hal::Out<std::int32_t>  state{c, f, "state", "0 listening, 1 running, 2 silent, 3 listen-only, 4 silenced, 5 down", {.safe = 0}};
     hal::Out<bool>          running{c, f, "running", "the node sends in its slots", {.safe = false}};
     hal::Out<bool>          fault{c, f, "fault", "fault, see show fault; cleared by recovery or by reset"};
     hal::Out<std::uint32_t> mode{c, f, "mode", "mode of the table in use"};

@@ -32,6 +32,9 @@ public:
     void attach(can::Link&) noexcept;  ///< [setup]
     void detach() noexcept { link_ = nullptr; }  ///< [setup]
 
+    /// Starts anew after a time without cycles: it listens first, as another node may send the SYNC now. What waits to be sent or was
+    /// received meanwhile is dropped; a silenced node stays silenced. [realtime]
+    void restart(Time now) noexcept;
     void receive(Time now) noexcept;  ///< [realtime]
     void transmit(Time now, Time period) noexcept;  ///< [realtime]
     /// Queues a frame: for a private slot of this node that carries its identifier, else for shared slots. `state`: a value, which replaces
@@ -85,6 +88,7 @@ private:
     };
 
     // station_receive.cpp
+    void  forget() noexcept;
     void  arrived(const can::Frame&) noexcept;
     void  sync(const can::Frame&, Time begin) noexcept;
     void  begin_cycles() noexcept;

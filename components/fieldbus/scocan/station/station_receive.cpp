@@ -32,18 +32,36 @@ void Station::attach(can::Link& link) noexcept {
     link_ = &link;
     windows_ = wants_windows_ && link.description().has_windows;
     timed_ = link.description().bit_rate != 0;
+    silenced_ = listen_only_ = was_down_ = monitor_lost_ = false;
+    mode_ = offences_ = 0;
+    not_allowed_.fill(false);
+    forget();
+}
+
+/// Forgets the bus: everything that came from it or goes to it.
+void Station::forget() noexcept {
     clock_.clear();
     queue_.clear();
     state_ = State::listening;
-    silenced_ = listen_only_ = mode_unknown_ = was_down_ = was_silent_ = false;
-    numbered_ = leading_ = standby_ = monitored_ = monitor_lost_ = false;
-    armed_ = {}, change_ = {};
-    counter_ = mode_ = offences_ = unannounced_cycles_ = off_rate_ = 0;
+    mode_unknown_ = was_silent_ = false;
+    numbered_ = leading_ = standby_ = monitored_ = false;
+    armed_ = {};
+    change_ = {};
+    counter_ = unannounced_cycles_ = off_rate_ = 0;
     first_seen_ = last_begin_ = INT64_MIN;
+    announced_slot_ = no_slot;
     leader_ = no_node;
-    not_allowed_.fill(false);
     values_.fill({});
     last_call_ = INT64_MIN;
+}
+
+void Station::restart(Time now) noexcept {
+    constexpr std::size_t max_rounds = 512;
+    if (link_ == nullptr) return;
+    for (std::size_t round = 0; round < max_rounds; ++round)
+        if (link_->receive(frames_, now) < frames_.size()) break;
+    if (is_sync_node()) listen_only_ = false;  // whether the tables differ is found out anew
+    forget();
 }
 
 void Station::receive(Time now) noexcept {

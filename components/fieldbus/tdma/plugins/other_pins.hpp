@@ -16,7 +16,7 @@ class OtherPins {
 public:
     OtherPins(hal::Component& c, const hal::Function& f, const config::StationEntry& station)
         : name_(station.name + "."),
-          online_(c, f, (name_ + "online").c_str(), "a frame of the station was received within 1 s"),
+          online_(c, f, (name_ + "online").c_str(), "a frame of the station was received within 1 s", {.safe = false}),
           frames_(c, f, (name_ + "frames").c_str(), "frames received from the station"),
           late_(c, f, (name_ + "late").c_str(), "frames received outside its slots"),
           since_(c, f, (name_ + "since").c_str(), "time since it went online or offline", {.unit = "s"}),

@@ -15,12 +15,12 @@ struct StationPins {
     const hal::Function&    f;
     hal::In<bool>           reset{c, f, "reset", "rising edge: a master that stepped down starts again; acknowledges fault"};
     hal::Out<std::int32_t>  state{c, f, "state",
-                                 "0 listening, 1 synchronising, 2 calibrating, 3 running, 4 withdrawn, 5 unconfigured"};
+                                 "0 listening, 1 synchronising, 2 calibrating, 3 running, 4 withdrawn, 5 unconfigured", {.safe = 0}};
     hal::Out<bool>          synchronous{c, f, "synchronous", "a sync was received within the last few cycles (lost in the schedule)", {.safe = false}};
-    hal::Out<bool>          calibrated{c, f, "calibrated", "path delay to the master calibrated"};
+    hal::Out<bool>          calibrated{c, f, "calibrated", "path delay to the master calibrated", {.safe = false}};
     hal::Out<bool>          running{c, f, "running", "the station may send in its slots", {.safe = false}};
-    hal::Out<bool>          leading{c, f, "leading", "this station sends the syncs"};
-    hal::Out<bool>          master_active{c, f, "master-active", "a master sends syncs"};
+    hal::Out<bool>          leading{c, f, "leading", "this station sends the syncs", {.safe = false}};
+    hal::Out<bool>          master_active{c, f, "master-active", "a master sends syncs", {.safe = false}};
     hal::Out<bool>          configured{c, f, "configured", "the station has a schedule: its own, or one from the master (RTcfg)"};
     hal::Out<std::uint32_t> stations{c, f, "stations",
                                     "on the master: stations online that got their schedule from it"};

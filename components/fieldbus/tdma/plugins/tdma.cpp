@@ -119,7 +119,9 @@ public:
             raise(words_->period, static_cast<double>(cycle.period_ns()) * 1e-3);
             reporter_->event(Event::wrong_period, {}, cycle.period_ns());
         }
+        const bool interrupted = interrupted_.exchange(false, std::memory_order_acquire);
         if (fits) {
+            if (interrupted) station_->restart();
             if (pins_.reset && !was_reset_) {
                 station_->reset();
                 pins_.fault = false;
@@ -137,6 +139,8 @@ public:
         for (std::size_t i = 0; i < waiting_->size(); ++i)
             (*waiting_)[i] = static_cast<std::uint32_t>(station_->waiting(arguments_.setup.slots[i].id));
     }
+
+    void interrupt(hal::Cycle) noexcept { interrupted_.store(true, std::memory_order_release); }
 
 private:
     /// Returns the latency of values that pass through this station's slots. [setup]
@@ -310,6 +314,8 @@ private:
     hal::Function transmit_{*this, "transmit", &Tdma::transmit,
                             "sends the frames queued for the slots of this cycle, and the master's sync; last in the thread"};
 
+    hal::Emergency interruption_{*this, &Tdma::interrupt, "when the thread runs again, the station listens before it sends"};
+
     StationPins pins_{*this, receive_};
 
     std::deque<OtherPins>                   others_;  // in the order of the setup's `others`, then the master of a station without a schedule
@@ -330,6 +336,7 @@ private:
     const hal_faults*                       faults_ = nullptr;
     bool                                    leads_ = false, period_reported_ = false, was_reset_ = false;
     bool                                    was_synchronised_ = false, withdrawn_ = false, had_carrier_ = true;
+    std::atomic<bool>                       interrupted_{false};  // set by interrupt(), from whichever thread; taken by receive()
 };
 
 }  // namespace

@@ -97,6 +97,11 @@ void Station::reset() noexcept {
     if (status_.state == State::withdrawn) begin();
 }
 
+void Station::restart() noexcept {
+    for (Slot& s : slots_) s.clear();
+    begin();
+}
+
 void Station::become(State state, Time) noexcept {
     status_.state = state;
     const bool ready = state == State::running;

@@ -58,6 +58,9 @@ public:
     void receive(Time now) noexcept;   ///< processes received frames. [realtime]
     void transmit(Time now) noexcept;  ///< sends; with the same `now`, after receive(). [realtime]
     void reset() noexcept;             ///< restarts a master that stepped down. [realtime]
+    /// Starts anew after a time without cycles: it listens first, as another station may send the syncs now, and its clock estimate is old.
+    /// What waits in the queues is dropped. [realtime]
+    void restart() noexcept;
 
     const Status&       status() const noexcept { return status_; }
     const StationSetup& setup() const noexcept { return setup_; }
@@ -89,6 +92,7 @@ private:
     static constexpr std::size_t most_pending = 64;  // as RTnet's master
     static constexpr std::uint32_t rows = 3;  // consecutive observations that confirm something
     static constexpr std::uint32_t silence_after = 1000;  // cycles until the same event is repeated
+    static constexpr Time max_absence = 100'000'000;  // ns without cycles after which a master listens before it sends again
     static constexpr Time gone_after = 1'000'000'000;  // ns without frames: a second master, or a station that sends, is lost
     struct Pending {
         Address       to{};
@@ -189,6 +193,7 @@ private:
     bool                    heard_ever_ = false;
     Time                    last_sync_ = 0;  // local
     Time                    began_ = 0;  // local; 0: before the first cycle
+    Time                    last_cycle_ = 0;  // local, of the last receive()
     Time                    sent_until_ = 0;  // global; slots up to here are done
     bool                    sent_any_ = false;
     std::uint32_t           lead_wait_ = 0;  // cycles before a returning master leads again

@@ -2,6 +2,7 @@
 // Received frames, and missing ones.
 #include <algorithm>
 #include <cstdlib>
+#include <utility>
 
 #include "station.hpp"
 
@@ -19,6 +20,8 @@ constexpr Time          too_long_out = 5'000'000'000;    // coming into phase ta
 
 void Station::receive(Time now) noexcept {
     if (port_ == nullptr) return;
+    const Time absence = now - std::exchange(last_cycle_, now);
+    if (status_.leading && absence > std::max<Time>(max_absence, setup_.lost_limit * setup_.cycle)) restart();
     const bool first = began_ == 0;
     if (first) began_ = now;
     heard_ = false;
@@ -324,8 +327,7 @@ void Station::count_silence(Time now) noexcept {
         status_.count.syncs_lost += status_.silent_cycles;
         const Address master = status_.master;
         const Time    since = (now - last_sync_ + 50'000) / 100'000 * 100'000;
-        for (Slot& s : slots_) s.clear();
-        begin();
+        restart();
         began_ = now;
         report(Event::sync_lost, master, since);
     }
