@@ -2,6 +2,7 @@
 #include <cstdio>
 #include <ctime>
 #include <fcntl.h>
+#include <stdexcept>
 #include <unistd.h>
 
 #include "hal/component.hpp"
@@ -13,7 +14,7 @@ struct Stall : hal::Component {
     using Component::Component;
 
     hal::TextArgument file{*this, "file", "", "where to write"};
-    hal::In<std::uint32_t> mode{*this, "mode", "1: block for ever; 2: loop for ever; 3: loop for `ms`; 4: block for `ms`"};
+    hal::In<std::uint32_t> mode{*this, "mode", "1: block for ever; 2: loop for ever; 3: loop for `ms`; 4: block for `ms`; 5: throw"};
     hal::In<std::uint32_t> ms{*this, "ms", "how long", {.initial = 1000}};
     hal::Out<double> out{*this, "out", "5 in every cycle", {.safe = -1.0}};
     hal::Function run{*this, "", &Stall::step, "counts"};
@@ -28,6 +29,7 @@ struct Stall : hal::Component {
         out = 5.0;
         if (mode == 0 || done_ == mode) return;
         done_ = mode;
+        if (mode == 5) fail();
         write("hang");
         const std::int64_t end = mode >= 3 ? now() + ms * std::int64_t{1'000'000} : INT64_MAX;
         while (now() < end) {
@@ -38,6 +40,7 @@ struct Stall : hal::Component {
     void make_safe(hal::Cycle) noexcept { write("safe"); }
 
 private:
+    static void fail() { throw std::runtime_error("thrown in a cycle"); }
     static std::int64_t now() noexcept {
         timespec t{};
         clock_gettime(CLOCK_MONOTONIC, &t);
