@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Buses after every kind of stop: an exception, a hang, a process without CPU, a lost partner. `operational` is FALSE meanwhile, the bus
 returns by itself once the thread runs again, and an axis needs another edge of its enable."""
+import os
+import random
 import re
 import signal
 import socket
@@ -128,6 +130,28 @@ class Live(Case):
     def expect(self, process, pattern, times=1):
         wait_until(lambda: len(re.findall(pattern, self.said(process))) >= times, f"{pattern} in {self.said(process)}")
 
+    @staticmethod
+    def kill(process):
+        process.kill()
+        process.wait(60)
+
+    def switch_on(self, enable, *axes):
+        """As the READMEs say; again where a busy host lost a drive in between."""
+        def are_on():
+            self.say("sets", enable, "FALSE")
+            self.say("sets", enable, "TRUE")
+            for axis in axes:
+                wait_until(lambda: "TRUE" in (self.value(f"{axis}.active"), self.value(f"{axis}.fault")), f"{axis} is on, or reports why not")
+            return all(self.value(f"{axis}.active") == "TRUE" for axis in axes)
+        wait_until(are_on, f"{axes} are on")
+
+    def slaves_are(self, node, state):
+        """Waits until the newest line about each slave of a `hal node ethercat` is that state, without an error."""
+        def newest(slave):
+            return (re.findall(rf"slave {slave} \(servo\): (.*)\n", self.said(node)) or [""])[-1]
+        for slave in "01":
+            wait_until(lambda: newest(slave) == state, f"slave {slave} is in {state}: {self.said(node)}")
+
     def all_are(self, pins, value):
         for pin in pins:
             self.comes(pin, value)
@@ -151,9 +175,7 @@ class Live(Case):
                 self.assertEqual("FALSE", self.value(pin), pin)
             for d in drive:
                 self.assertEqual("FALSE", self.value(f"{d}.fault"), d)
-            self.say("sets", enable, "FALSE")
-            self.say("sets", enable, "TRUE")
-            self.all_are(on, "TRUE")
+            self.switch_on(enable, *drive)
 
         self.write("a.hal", f"source {HALFILES / name}\nloadrt stall names=s\naddf s servo-thread\n")
         machine = self.begin("run", "--no-picture", "a.hal")
@@ -197,36 +219,32 @@ class Live(Case):
         self.write("servo.line", (servo / "servo.line").read_text())
         # without watchdogs and SYNC signals: what takes a drive out of OP is the master
         self.write("servo.ethercat", (servo / "servo.ethercat").read_text().replace("sim:servo", link)
-                   .replace("dc      = sync0\n", "outputs.watchdog = no\n"))
-        self.write("servo.hal", "".join(line for line in (servo / "servo.hal").read_text().splitlines(True)
+                   .replace("dc      = sync0\n", "outputs.watchdog = no\n")
+                   # slow: the drives have no real-time priority on a busy host
+                   .replace("cycle = 1ms\n", "cycle = 10ms\nframe-timeout = 200ms\n"))
+        self.write("servo.hal", "".join(line for line in (servo / "servo.hal").read_text().replace("=1000000", "=10000000").splitlines(True)
                                         if "ethercat_segment" not in line and "ethercat-segment" not in line))
         node = self.begin("node", "ethercat", "servo.line", "--link", link)
         self.expect(node, "press Ctrl-C to end")
         machine = self.begin("run", "--no-picture", "servo.hal")
         operational = ["ethercat.0.left.operational", "ethercat.0.right.operational"]
         on = ["left.active", "right.active"]
-        self.all_are(on, "TRUE")
-        for slave in "01":
-            self.expect(node, rf"slave {slave} \(servo\): OP\n")
+        self.all_are(operational, "TRUE")
+        self.switch_on("on", "left", "right")
+        self.slaves_are(node, "OP")
 
         self.say("stop")
-        for slave in "01":
-            self.expect(node, rf"slave {slave} \(servo\): SAFE-OP\n")  # without an error: as commanded
+        self.slaves_are(node, "SAFE-OP")  # without an error: as commanded
         self.say("start")
-        for slave in "01":
-            self.expect(node, rf"slave {slave} \(servo\): OP\n", 2)
+        self.slaves_are(node, "OP")
         self.all_are(operational, "TRUE")
 
         self.suspend(machine)
-        for slave in "01":
-            self.expect(node, rf"slave {slave} \(servo\): SAFE-OP\n", 2)
+        self.slaves_are(node, "SAFE-OP")
         self.say("start")
-        for slave in "01":
-            self.expect(node, rf"slave {slave} \(servo\): OP\n", 3)
+        self.slaves_are(node, "OP")
         self.all_are(operational, "TRUE")
-        self.say("sets", "on", "FALSE")
-        self.say("sets", "on", "TRUE")
-        self.all_are(on, "TRUE")
+        self.switch_on("on", "left", "right")
 
         # the drives are gone for a while: a fault of the axes, and the way back of the README
         node.send_signal(signal.SIGSTOP)
@@ -234,10 +252,55 @@ class Live(Case):
         self.all_are(["left.fault", "right.fault"], "TRUE")
         node.send_signal(signal.SIGCONT)
         self.all_are(operational, "TRUE")
-        self.say("sets", "on", "FALSE")
-        self.say("sets", "on", "TRUE")
-        self.all_are(on, "TRUE")
-        self.assertEqual("0", self.value("ethercat.0.frames-foreign"))
+        self.switch_on("on", "left", "right")
+
+        # the master is killed, and another one started
+        self.kill(machine)
+        self.begin("run", "--no-picture", "servo.hal")
+        self.all_are(operational, "TRUE")
+        self.switch_on("on", "left", "right")
+
+    def test_a_canopen_drive_in_another_process(self):
+        place = random.Random(os.urandom(8))
+        bus = f"udp:239.{place.randrange(1, 255)}.{place.randrange(256)}.{place.randrange(1, 255)}%lo:{place.randrange(20000, 60000)}"
+        axis = HALFILES / "canopen-axis"
+        # slow and at rest: the drive has no real-time priority on a busy host
+        self.write("axis.canopen", (axis / "axis.canopen").read_text().replace("sim:axis", bus).replace("50ms", "1s"))
+        self.write("axis.hal", "".join(line for line in (axis / "axis.hal").read_text().replace("amplitude        50", "amplitude 0").splitlines(True)
+                                       if "canopen_drive" not in line and "canopen-drive" not in line))
+        node = self.begin("node", "drive", "--id", "2", "--link", bus)
+        self.expect(node, "pre-operational")
+        machine = self.begin("run", "--no-picture", "axis.hal")
+        self.comes("x.active", "TRUE")
+
+        self.say("stop")
+        self.expect(node, "pre-operational", 2)  # commanded at once
+        self.say("start")
+        self.comes("canopen.0.x.operational", "TRUE")
+        self.assertEqual("FALSE", self.value("x.enabled"))
+        self.switch_on("x-on", "x")
+
+        self.suspend(machine)
+        self.hung(1)
+        self.all_are(["canopen.0.operational", "canopen.0.x.operational", "canopen.0.x.online", "x.enabled"], "FALSE")
+        self.say("start")
+        self.comes("canopen.0.x.operational", "TRUE")
+        self.assertEqual("FALSE", self.value("x.enabled"))
+        self.switch_on("x-on", "x")
+
+        # the drive is gone for a while
+        node.send_signal(signal.SIGSTOP)
+        self.all_are(["canopen.0.x.operational", "x.enabled"], "FALSE")
+        self.comes("x.fault", "TRUE")
+        node.send_signal(signal.SIGCONT)
+        self.comes("canopen.0.x.operational", "TRUE")
+        self.switch_on("x-on", "x")
+
+        # the master is killed, and another one started
+        self.kill(machine)
+        self.begin("run", "--no-picture", "axis.hal")
+        self.comes("canopen.0.x.operational", "TRUE")
+        self.switch_on("x-on", "x")
 
 
 if __name__ == "__main__":

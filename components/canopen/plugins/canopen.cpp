@@ -347,7 +347,7 @@ pins, objects it receives are input pins. `receive`, at the beginning of the cyc
 the last cycle; `transmit`, at its end, sends the SYNC and the input pins of this cycle. While a node is not operational, the master sends
 it safe values: quick stop in controlwords, 0 for speeds, torques and digital outputs, the last value for everything else. On `stop`,
 `unload`, a fault of the thread or the end of the process, the master sends the safe values at once and commands the nodes to leave the
-operational state.
+operational state. When the thread runs again it boots the network; an axis needs another edge of its `enable`.
 
 With `sync = follow` all threads of the machine are synchronised to the SYNC of another node (see `show thread`); with
 `flying-master = medium` several masters share a network and one of them is active. docs/canopen-configuration.md is the reference.

@@ -46,7 +46,8 @@ values.
 
 With `dc` in the configuration the threads of this machine follow the reference clock, unless `clock = thread` is written there. `pll-err` is the remaining error.
 
-At the end, and as a reaction to a fault, the slaves leave OP: their outputs are off.
+At the end, on `stop` and when a fault stops the thread, the slaves leave OP at once: their outputs are off, and `operational` is FALSE. When the thread
+runs again they are started again; an axis needs another edge of its `enable`.
 
 EtherCAT is a registered trademark and patented technology, licensed by Beckhoff Automation GmbH, Germany.
 )")

@@ -19,6 +19,22 @@ const std::string one_axis =
     "[bus]\nlink = sim:runner-wire\nbitrate = 1M\nsync = cycle\n"
     "[node 2 x]\ndevice = cia402\ntpdo1 = statusword\nrpdo1 = controlword, target-position\n";
 
+/// A link that may take no frames, as one that another thread uses at the moment.
+struct BusyLink final : can::Link {
+    explicit BusyLink(can::Link& behind_) : behind(behind_) {}
+    can::Sent send(const Frame& f, std::int64_t now) noexcept override { return busy ? can::Sent::full : behind.send(f, now); }
+    void flush(std::int64_t now) noexcept override { behind.flush(now); }
+    std::size_t receive(std::span<Frame> frames, std::int64_t now) noexcept override { return busy ? 0 : behind.receive(frames, now); }
+    can::Statistics statistics() const noexcept override { return behind.statistics(); }
+    can::State state() const noexcept override { return behind.state(); }
+    bool set_filters(std::span<const can::Filter> filters) override { return behind.set_filters(filters); }
+    const can::Description& description() const noexcept override { return behind.description(); }
+    bool wait(std::int64_t at_most) override { return behind.wait(at_most); }
+
+    can::Link& behind;
+    bool       busy = false;
+};
+
 struct Wire : RunnerEvents {
     explicit Wire(const std::string& more = "", bool starts_itself = false, const std::string& axis = one_axis)
         : reading(config::read(axis + more, "x.canopen")), runner(reading.config, *this), link(open()), ear(open()), drive(settings()) {
@@ -252,6 +268,53 @@ TEST(Runner, What_is_sent_on_a_change_is_sent_again_when_a_dead_wire_is_back) {
     for (int n = 0; n < 50; ++n) w.step();
     ASSERT_FALSE(w.heard.empty());
     EXPECT_EQ(w.heard.back(), last);
+}
+
+TEST(Runner, Safe_values_that_the_link_did_not_take_are_sent_with_the_next_call) {
+    Wire     w;
+    BusyLink busy(*w.link);
+    w.runner.open(busy);
+    for (int n = 0; n < 5000 && !w.runner.operational(0); ++n) w.step();
+    ASSERT_TRUE(w.runner.operational(0));
+    unsigned   farewells = 0, set_points = 0;
+    const auto listen = [&] {
+        w.now += millisecond;
+        w.link->flush(w.now);
+        for (Frame f; w.ear->receive(f, w.now);) {
+            farewells += f.id == 0 && f.data[0] == 0x80 && f.data[1] == 2 ? 1 : 0;
+            set_points += f.id == 0x202 ? 1 : 0;
+        }
+    };
+    listen();
+    farewells = set_points = 0;
+    busy.busy = true;
+    w.runner.make_safe();  // by a thread that finds the link in use
+    busy.busy = false;
+    listen();
+    EXPECT_EQ(farewells, 0U);
+    w.runner.make_safe();  // by the thread that used it, at the end of its cycle
+    w.runner.make_safe();
+    listen();
+    EXPECT_EQ(farewells, 1U);
+    EXPECT_EQ(set_points, 1U);
+    for (int n = 0; n < 5000 && !w.runner.operational(0); ++n) w.step();
+    EXPECT_TRUE(w.runner.operational(0)) << "it boots the network again";
+}
+
+TEST(Runner, What_came_while_no_cycles_ran_is_dropped) {
+    Wire w;
+    for (int n = 0; n < 5000 && !w.runner.operational(0); ++n) w.step();
+    ASSERT_TRUE(w.runner.operational(0));
+    w.runner.make_safe();
+    w.now += second;
+    for (int n = 0; n < 200; ++n) w.ear->send({0x182, {0x37, 0x02}}, w.now);  // old statusword
+    w.now += second;
+    w.node->turn(w.now);
+    w.runner.receive(w.now);
+    for (const Slot& s : w.runner.slots())
+        if (!s.to_node) EXPECT_NE(Dictionary::value<std::uint64_t>(*s.entry), 0x0237U);
+    for (int n = 0; n < 5000 && !w.runner.operational(0); ++n) w.step();
+    EXPECT_TRUE(w.runner.operational(0));
 }
 
 }  // namespace

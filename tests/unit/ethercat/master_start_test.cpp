@@ -124,6 +124,51 @@ TEST(EthercatMaster, Waits_for_no_state_without_a_timeout) {
     }
 }
 
+TEST(EthercatMaster, A_shut_down_takes_all_slaves_out_of_OP_at_once_and_restart_brings_them_back) {
+    for (const unsigned count : {3U, 150U}) {  // more than one frame holds
+        World w;
+        for (unsigned n = 0; n < count; ++n) w.add(0x100 + n);
+        w.begin(drives(count));
+        ASSERT_TRUE(w.operational()) << w.log.text();
+        const auto all_are = [&](State state) {
+            for (unsigned n = 0; n < count; ++n)
+                if ((w.line.controller(n).al_status() & 0x1f) != static_cast<unsigned>(state)) return false;
+            return true;
+        };
+        ASSERT_TRUE(all_are(State::op));
+        w.master->shut_down();
+        w.line.advance(w.now_ns + 1);
+        EXPECT_TRUE(all_are(State::safeop)) << "before another cycle";
+
+        w.now_ns += 1'000'000'000;
+        w.master->receive(w.now_ns);
+        w.master->restart();
+        EXPECT_FALSE(w.master->status().operational);
+        for (unsigned n = 0; n < count; ++n) EXPECT_FALSE(w.master->slave_status(n).operational);
+        ASSERT_TRUE(w.operational()) << w.log.text();
+        EXPECT_TRUE(all_are(State::op));
+        EXPECT_EQ(w.log.count(Event::fell_back), 0U);
+        EXPECT_EQ(w.master->status().foreign, 0U) << "the frames were its own";
+    }
+}
+
+TEST(EthercatMaster, A_slave_in_the_lower_state_of_its_setup_is_not_operational) {
+    World w;
+    w.add(0x100);
+    w.add(0x101);
+    auto setup = drives(2);
+    setup.slaves[1].target = State::safeop;
+    w.begin(setup);
+    ASSERT_TRUE(w.operational()) << "the bus does not wait for it: " << w.log.text();
+    EXPECT_TRUE(w.master->slave_status(0).operational);
+    EXPECT_FALSE(w.master->slave_status(1).operational);
+    EXPECT_EQ(w.log.count(Event::slave_operational), 1U);
+    ASSERT_EQ(w.log.count(Event::slave_settled), 1U);
+    EXPECT_EQ(w.log.last(Event::slave_settled)->first, static_cast<std::int64_t>(State::safeop));
+    w.run(500);
+    EXPECT_EQ(w.log.count(Event::slave_settled), 1U) << "it is not started again and again";
+}
+
 TEST(EthercatMaster, A_slave_that_fails_leaves_the_working_counter_of_the_others_complete) {
     World w;
     w.add(0x100);

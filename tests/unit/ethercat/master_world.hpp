@@ -89,10 +89,13 @@ struct EndPort final : hal::ethernet::Port {
     hal::ethernet::Address mine{2, 0, 0, 0, 0, 1};
     hal::ethernet::Description about;
     std::uint64_t sent = 0, lose_every = 0, double_every = 0;
+    std::int64_t last_ns = 0;
     explicit EndPort(esc::Line& l, esc::End e) : line(l), end(e) {}
     const hal::ethernet::Address& address() const noexcept override { return mine; }
     hal::ethernet::Sent send(std::span<const std::uint8_t> frame, const hal::ethernet::Launch&, std::int64_t now_ns) noexcept override {
         ++sent;
+        if (now_ns == hal::ethernet::unclocked) now_ns = last_ns;
+        last_ns = now_ns;
         if (!up) return hal::ethernet::Sent::down;
         std::vector<std::uint8_t> copy(frame.begin(), frame.end());
         const auto passage = line.process(copy, end, now_ns);

@@ -51,5 +51,6 @@ each of them. On `can:` and `udp:` a frame leaves in the cycle of the thread tha
 within its window: let the thread be several times faster than the slots, and make `idle` and `guard` of the table longer than its wake-up latency.
 
 A node that has lost more SYNCs than `lost` of the table sends nothing until the next one. A node whose table differs from that of the SYNC node receives
-only. A node that sent 3 frames outside of its slots within 1 s is silenced until a rising edge of `reset`. docs/scocan.md describes everything in detail.
+only. A node that sent 3 frames outside of its slots within 1 s is silenced until a rising edge of `reset`. After a `stop`, or a fault that stopped the
+thread, a node listens before it sends, and returns by itself. docs/scocan.md describes everything in detail.
 )")

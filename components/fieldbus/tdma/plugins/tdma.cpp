@@ -381,7 +381,8 @@ first in the thread, `transmit` last; between them other components queue frames
 
 Without a sync for `lost` cycles the station stops sending, `synchronous` and `running` become false, and a fault is recorded. It recovers by
 itself with the next syncs. A master that finds another one at its start does not send until that one is lost. A second master that appears later
-is reported and ignored; only a master without followers yields to it, if the address of the second one is smaller.
+is reported and ignored; only a master without followers yields to it, if the address of the second one is smaller. After a `stop`, or a fault that
+stopped the thread, a station listens before it sends, and returns by itself.
 
 With `tunnel=hal0` the component creates a network interface hal0, through which `ping`, `ssh` and other IP traffic crosses the segment in slot 1,
 never in a real-time slot. It has the `ip` of the block, the MAC address of the port and an MTU of the slot size minus 4; creating it needs

@@ -2,6 +2,7 @@
 #include "rtcfg_server.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace hal::tdma::rtcfg {
 
@@ -148,7 +149,16 @@ bool Server::invite(Client& c, Time now) noexcept {
     return send(m);
 }
 
+/// After a time without cycles nobody is dead: the server did not listen.
+void Server::excuse(Time now) noexcept {
+    constexpr Time max_pause = 100'000'000;
+    const Time     pause = now - std::exchange(last_slots_, now);
+    if (pause <= max_pause) return;
+    for (Client& c : clients_) c.heard += pause;
+}
+
 void Server::before_slots(Time now) noexcept {
+    excuse(now);
     if (!station_.status().leading) return rest();
     if (!serves_) serve(now);
     const Time silence = 2 * static_cast<Time>(heartbeat_ms_) * 1'000'000;
