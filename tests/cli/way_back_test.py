@@ -32,10 +32,10 @@ MACHINES = {
 class AfterAnException(Case):
     """On the virtual clock: every run is the same."""
 
-    def sim(self, text, status=0):
+    def sim(self, text, *options):
         self.write("a.hal", text)
-        done = self.run_program("sim", "a.hal")
-        self.assertEqual(status, done.returncode, done.stdout + done.stderr)
+        done = self.run_program("sim", *options, "a.hal")
+        self.assertEqual(0, done.returncode, done.stdout + done.stderr)
         return done.stdout.splitlines()
 
     def machine(self, name, bus, drive, enable):
@@ -70,6 +70,15 @@ class AfterAnException(Case):
                 self.assertEqual(["FALSE", "FALSE"], answers[6:8], "a node is lost")
                 self.assertEqual(["TRUE", "FALSE"], answers[8:10], "it is back")
                 self.assertEqual(["TRUE", "TRUE"], answers[10:12], "switched on again after the loss")
+
+    def test_the_way_back_of_the_robot_on_time_slots(self):
+        ask = "getp scocan.1.running\ngetp estop.ok-out\n"
+        switch_on = "setp estop.reset TRUE\nadvance 100ms\nsetp estop.reset FALSE\nadvance 1s\n"
+        answers = self.sim(
+            f"source {HALFILES / 'yair/yair.hal'}\nadvance 300ms\n{switch_on}{ask}"
+            f"stop\nadvance 1s\n{ask}start\nadvance 3s\n{ask}{switch_on}{ask}"
+            f"sets emergency TRUE\nadvance 500ms\nsets emergency FALSE\nadvance 500ms\n{ask}{switch_on}{ask}", "-i", HALFILES / "yair/yair.ini")
+        self.assertEqual(["TRUE", "TRUE", "FALSE", "FALSE", "TRUE", "FALSE", "TRUE", "TRUE", "TRUE", "FALSE", "TRUE", "TRUE"], answers)
 
     def test_a_tdma_master_listens_before_it_leads_again(self):
         answers = self.sim(
@@ -210,6 +219,39 @@ class Live(Case):
 
     def test_canopen(self):
         self.after_every_stop("canopen-axis/axis.hal", ["canopen.0.x"], ["x"], "x-on")
+
+    def stations(self, text, leading, running):
+        self.write("a.hal", text + "loadrt stall names=s\naddf s servo\nstart\n")
+        machine = self.begin("run", "--no-picture", "a.hal")
+        self.all_are([leading, *running], "TRUE")
+        self.say("stop")
+        self.all_are([leading, *running], "FALSE")
+        self.say("start")
+        self.all_are([leading, *running], "TRUE")
+        self.suspend(machine)
+        self.hung(1)
+        self.all_are([leading, *running], "FALSE")
+        self.say("start")
+        self.all_are([leading, *running], "TRUE")
+        self.say("setp", "s.ms", "400")
+        self.say("setp", "s.mode", "4")
+        self.hung(2)
+        self.all_are([leading, *running], "FALSE")
+        wait_until(lambda: self.shell("start").returncode == 0, "the function returns and the thread is started")
+        self.all_are([leading, *running], "TRUE")
+
+    def test_tdma(self):
+        self.stations("loadrt threads name1=servo period1=1000000\n"
+                      "loadrt tdma link=sim:cell/master,sim:cell/x station=master,x schedule=\"master:; cycle 1000; lost 20; slot 0 100; slave:; name x; slot 0 200\"\n"
+                      "addf tdma.0.receive servo\naddf tdma.1.receive servo\naddf tdma.0.transmit servo\naddf tdma.1.transmit servo\n",
+                      "tdma.0.leading", ["tdma.0.running", "tdma.1.running"])
+
+    def test_scocan(self):
+        table = "table=\"node clock A sync; node motor A; mode 0 run; 0 sync; 2 private motor 0x10A; message position 0x10A fields a:s32\""
+        self.stations("loadrt threads name1=servo period1=500000\n"
+                      f"loadrt scocan_sync link=sim:robot node=clock {table}\nloadrt scocan link=sim:robot node=motor {table}\n"
+                      "addf scocan-sync.0.receive servo\naddf scocan.0.receive servo\naddf scocan-sync.0.transmit servo\n"
+                      "addf scocan.0.transmit servo\n", "scocan-sync.0.leading", ["scocan-sync.0.running", "scocan.0.running"])
 
     def test_ethercat_drives_in_another_process(self):
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
