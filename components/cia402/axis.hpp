@@ -87,8 +87,8 @@ public:
     void observe(const AxisFeedback&, const AxisRules&, Time now) noexcept;
     const AxisOrders& act(const AxisCommand&, const AxisRules&, Time now) noexcept;
 
-    /// Disables the axis because its cycles were stopped and the drive with them. This is not a failure: enable needs another edge.
-    /// [realtime]
+    /// Disables the axis after a time without cycles, in which the drive was stopped. This is not a failure;
+    /// enable needs another edge. [realtime]
     void interrupt() noexcept;
 
     State state() const noexcept { return walk_.state(); }

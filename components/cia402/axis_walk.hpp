@@ -12,7 +12,8 @@ public:
     /// Commands a state: switch on disabled, ready to switch on, switched on, operation enabled or quick stop active. Repeating the command
     /// has no effect; a new one restarts the timeout and clears the failure. [realtime]
     void want(State wanted, Request request) noexcept;
-    /// Counts the timeout of the transition in progress from the next step on, after a time without cycles. [realtime]
+    /// Counts the timeout of the current transition from the next step on, after a time without cycles.
+    /// [realtime]
     void restart_timeout() noexcept { fresh_ = true; }
     State wanted() const noexcept { return wanted_; }
     /// Sends a rising edge of fault reset while the drive is in fault. [realtime]

@@ -311,7 +311,7 @@ private:
     Time                         period_ = 0, now_ = 0;
     Time                         unsent_ = 0, unheard_ = 0;  // time since transmit, since receive
     bool                         overran_ = false;
-    std::atomic<bool>            interrupted_{false};  // set by make_safe(), from whichever thread; taken by receive()
+    std::atomic<bool>            interrupted_{false};  // set by make_safe() in any thread, taken by receive()
 };
 
 }  // namespace

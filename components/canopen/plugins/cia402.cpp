@@ -16,7 +16,8 @@ struct Cia402 : hal::Component {
     using Component::Component;
 
     // Commands of the user.
-    hal::In<bool> enable{*this, "enable", "a rising edge enables the axis, FALSE disables it; after a fault or a stop another edge is needed"};
+    hal::In<bool> enable{*this, "enable",
+                         "a rising edge enables the axis, FALSE disables it; after a fault or a stop another edge is needed"};
     hal::In<bool> reset{*this, "reset", "a rising edge clears the fault of the axis and of the drive"};
     hal::In<bool> quick_stop{*this, "quick-stop",
                              "TRUE: brakes with the drive's quick stop and disables the axis; then enable needs another edge"};
@@ -109,7 +110,8 @@ struct Cia402 : hal::Component {
     hal::Function read{*this, "read-all", &Cia402::read_all, "updates the feedback from the drive; after the bus receives"};
     hal::Function write{*this, "write-all", &Cia402::write_all, "updates the drive from the commands; before the bus sends"};
 
-    hal::Emergency off{*this, &Cia402::interrupt, "disables the axis: when the thread runs again, enable needs another rising edge"};
+    hal::Emergency off{*this, &Cia402::interrupt,
+                       "disables the axis: when the thread runs again, enable needs another rising edge"};
 
     void start() { faults_ = hal::extension<hal_faults>("hal.faults/1"); }
 
@@ -213,7 +215,7 @@ private:
     Axis axis_;
     AxisRules rules_;
     Cause reported_ = Cause::none;
-    std::atomic<bool> interrupted_{false};  // set by interrupt(), from whichever thread; taken by write_all()
+    std::atomic<bool> interrupted_{false};  // set by interrupt() in any thread, taken by write_all()
 };
 
 }  // namespace
@@ -230,8 +232,8 @@ the state machine of the drive and steps it towards the commanded state, one tra
   with `max-step` 0, the difference is blended out over `blend-time`.
 * A fault (see the table) brakes with quick stop, disables the axis and stays until a rising edge of `reset`. After a fault, after
   `quick-stop` and after the node was lost, `enable` needs another rising edge. At start-up, `enable` waits until the node is operational.
-* When the thread is stopped (`stop`, an exception, a hang, a suspended process), the axis is disabled, without a fault. When the thread runs
-  again, it stays off until `enable` has another rising edge.
+* When the thread is stopped (`stop`, an exception, a hang, a suspended process), the axis is disabled without a fault. When the thread
+  runs again, the axis stays off until `enable` has another rising edge.
 * `mode` may change at any time; the command is followed once the drive displays the new mode.
 * `halt` brakes on the drive's ramp in modes 1 to 7. In the cyclic modes the target freezes, or drops to 0, at once: bring the command to
   rest first.

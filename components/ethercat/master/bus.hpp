@@ -36,7 +36,7 @@ struct Device {
     bool         synchronised = false;  ///< its clock was within the window
     bool         drifted = false;  ///< it was reported as not in step, while it is operational
     std::int64_t drifts_since_ns = 0;  ///< when its clock left the window; 0: it is there
-    bool         settled = false;  ///< it is in the state that the setup names for it, brought there by a start-up
+    bool         settled = false;  ///< a start-up brought it to the state that the setup names
     bool         to_boot = false;  ///< it is to be in BOOT, for its firmware; only a slave that the setup does not name
     bool         helping = false;  ///< the task on its channel works for that of the bus
     std::int64_t began_ns = 0;  ///< of the newest start-up
@@ -58,7 +58,8 @@ struct Bus {
     std::vector<std::unique_ptr<Device>> devices;  ///< capacity of the bus; the number is that of the station address
     std::vector<int>                     device_of;  ///< by index of Setup::slaves; -1: none
     std::vector<SlaveStatus>             absent;  ///< status of the slaves of the setup that have no device
-    /// By index of Setup::slaves: station addresses of those that may be in OP, 0: not. Written in the cycle, read by any thread.
+    /// By index of Setup::slaves: station address of a slave that may be in OP; 0: it is not. Written in the
+    /// cycle, read by any thread.
     std::vector<std::atomic<std::uint16_t>> in_op;
     Channel                              bus_channel{32 * 1024}, watch_channel;
     std::vector<std::uint16_t>           by_position;  ///< device numbers along the line
@@ -106,7 +107,8 @@ struct Bus {
         d.settled = false;
         d.status.operational = false;
     }
-    void note_in_op(const Device&, bool in_op) noexcept;  ///< Lets shut_down() address the slave, or no longer.
+    /// Lets shut_down() address the slave while it may be in OP.
+    void note_in_op(const Device&, bool in_op) noexcept;
     void update_status() noexcept;  ///< Derives the state of the bus from those of the slaves.
 };
 

@@ -86,7 +86,8 @@ void Master::shut_down() noexcept {
         if (station == 0) continue;
         if (frame && frame->space() < sizeof station) send();
         if (!frame) frame.emplace(buffer, primary_->address(), bus_->setup.frame_bytes);
-        std::uint8_t* data = frame->add(Command::fpwr, 0, at_station(station, registers::al_control), sizeof station);
+        const std::uint32_t control = at_station(station, registers::al_control);
+        std::uint8_t*       data = frame->add(Command::fpwr, 0, control, sizeof station);
         if (data != nullptr) put(data, static_cast<std::uint16_t>(State::safeop));
     }
     send();
@@ -96,11 +97,17 @@ void Master::restart() noexcept {
     Bus& bus = *bus_;
     for (const auto& device : bus.devices) {
         Device& d = *device;
-        if (!d.slave.present || !d.identified || d.refused || d.slave.configured < 0 || bus.target(d) != State::op) continue;
+        const bool startable = d.slave.present && d.identified && !d.refused && d.slave.configured >= 0;
+        if (!startable || bus.target(d) != State::op) continue;
         bus.unsettle(d);
-        // Nobody corrected the clocks meanwhile. On a broken ring they cannot be measured: they drift back into the window.
-        if (d.slave.number != bus.reference && !bus.status.ring_broken) d.clock_set = d.synchronised = false;
-        if (!d.helping) bus.run(d, [&] { return boot(d.channel, bus, d); });  // otherwise the supervision starts it
+        // Nobody corrected the clocks meanwhile. On a broken ring their delays cannot be measured: they
+        // drift back into the window.
+        if (d.slave.number != bus.reference && !bus.status.ring_broken) {
+            d.clock_set = false;
+            d.synchronised = false;
+        }
+        if (d.helping) continue;  // the supervision starts it once its channel is free
+        bus.run(d, [&] { return boot(d.channel, bus, d); });
     }
     bus.suspicious = true;
     bus.update_status();

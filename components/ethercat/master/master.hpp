@@ -49,11 +49,12 @@ public:
 
     /// Returns the process data of sync manager `n` of `Setup::slaves[slave].sync_managers`. The place stays the same. [any]
     std::span<std::uint8_t> data(std::size_t slave, std::size_t n) noexcept;
-    /// Takes the slaves in OP to SAFE-OP, where their outputs are off, by frames that leave at once. Does nothing while transmit() runs in
-    /// another thread; then call it again, or wait for the watchdogs of the slaves. After it, restart(). [any], async-signal-safe
+    /// Takes the slaves in OP to SAFE-OP, where their outputs are off, by frames that leave at once. Sends
+    /// nothing while transmit() runs in another thread: call it again after that. Requires restart() before
+    /// the next transmit(). [any], async-signal-safe
     void shut_down() noexcept;
-    /// Starts every slave again that belongs in OP, after cycles in which nothing was exchanged: none is operational until it has reached OP
-    /// from INIT. [realtime]
+    /// Starts every slave that belongs in OP again, after a time in which nothing was exchanged. None is
+    /// operational until it has reached OP from INIT. [realtime]
     void restart() noexcept;
     /// Keeps slaves in SAFE-OP while false: their outputs are not valid yet. True at start. [realtime]
     void set_outputs_valid(bool valid) noexcept;

@@ -32,7 +32,7 @@ struct BusStatus {
     State         state = State::none;        ///< lowest state of the configured slaves that are present
     bool          link = false;                ///< the primary port has a carrier
     bool          scanned = false;             ///< the slaves are identified
-    bool          operational = false;         ///< every slave that is not optional is in OP, or in the lower state that the setup names for it
+    bool          operational = false;         ///< every slave that is not optional is in OP, or in its lower target
     std::uint16_t responding = 0;     ///< slaves that answered the newest broadcast
     std::uint16_t expected = 0;       ///< slaves of the setup that are not optional
     std::uint16_t wkc = 0, wkc_expected = 0;

@@ -50,9 +50,11 @@ bool passed_a_slave(std::span<const std::uint8_t> bytes) noexcept {
 /// Returns whether a frame is one of those that Master::shut_down() sends.
 bool asks_for_safeop(std::span<const std::uint8_t> bytes) noexcept {
     if (bytes.size() < first_datagram + datagram_overhead) return false;
-    return static_cast<Command>(bytes[first_datagram]) == Command::fpwr &&
-           get<std::uint16_t>(&bytes[first_datagram + 4]) == registers::al_control &&
-           get<std::uint16_t>(&bytes[first_datagram + datagram_header_bytes]) == static_cast<std::uint16_t>(State::safeop);
+    const auto command = static_cast<Command>(bytes[first_datagram]);
+    const auto address = get<std::uint16_t>(&bytes[first_datagram + 4]);
+    const auto state = get<std::uint16_t>(&bytes[first_datagram + datagram_header_bytes]);
+    return command == Command::fpwr && address == registers::al_control &&
+           state == static_cast<std::uint16_t>(State::safeop);
 }
 
 }  // namespace
@@ -103,7 +105,8 @@ std::uint8_t WireEngine::send(std::span<const std::uint8_t> frame, bool backup) 
 
 void WireEngine::transmit(std::int64_t now_ns, bool process_data, bool all_domains, unsigned acyclic_frames,
                           std::uint64_t dc_time_ns) noexcept {
-    if (sending_.test_and_set(std::memory_order_acquire)) return;  // another thread takes the slaves out of OP
+    // Another thread takes the slaves out of OP at this moment.
+    if (sending_.test_and_set(std::memory_order_acquire)) return;
     sent_after_ns_ = now_ns - cycle_start_ns_;
     now_ns_ = now_ns;
     std::size_t cyclic_bytes = 0;
@@ -130,8 +133,9 @@ void WireEngine::transmit(std::int64_t now_ns, bool process_data, bool all_domai
 void WireEngine::send_now(std::span<const std::uint8_t> frame) noexcept {
     if (sending_.test_and_set(std::memory_order_acquire)) return;
     for (ethernet::Port* port : {primary_, backup_}) {
-        if (port == nullptr || port->send(frame, {}, ethernet::unclocked) != ethernet::Sent::queued) continue;
-        unnoted_.fetch_add(1, std::memory_order_relaxed);
+        if (port == nullptr) continue;
+        const ethernet::Sent sent = port->send(frame, {}, ethernet::unclocked);
+        if (sent == ethernet::Sent::queued) unmatched_.fetch_add(1, std::memory_order_relaxed);
     }
     sending_.clear(std::memory_order_release);
 }
@@ -236,8 +240,8 @@ void WireEngine::count_foreign(std::span<const std::uint8_t> bytes) noexcept {
     const bool             own =
         ((bytes[6] ^ address[0]) & ~set_by_slaves) == 0 && std::equal(address.begin() + 1, address.end(), bytes.begin() + 7);
     const bool passed = passed_a_slave(bytes);
-    if (own && asks_for_safeop(bytes) && unnoted_.load(std::memory_order_relaxed) != 0) {
-        unnoted_.fetch_sub(1, std::memory_order_relaxed);
+    if (own && asks_for_safeop(bytes) && unmatched_.load(std::memory_order_relaxed) != 0) {
+        unmatched_.fetch_sub(1, std::memory_order_relaxed);
         return;
     }
     if (missing_ != 0 && passed && own) return count_late();

@@ -42,8 +42,8 @@ public:
     /// Sends the process data that is due, then at most `acyclic_frames` frames of the channels.
     void transmit(std::int64_t now_ns, bool process_data, bool all_domains, unsigned acyclic_frames, std::uint64_t dc_time_ns) noexcept;
 
-    /// Sends a frame of the master at once; what returns of it is ignored. Does nothing while transmit() runs in another thread.
-    /// [any], async-signal-safe
+    /// Sends a frame of the master at once and ignores its answer. Sends nothing while transmit() runs in
+    /// another thread. [any], async-signal-safe
     void send_now(std::span<const std::uint8_t> frame) noexcept;
 
     const ClockSample& clock() const noexcept { return clock_; }
@@ -115,8 +115,8 @@ private:
     std::size_t                                                next_channel_ = 0;
     unsigned                                                   in_flight_ = 0;
     std::uint64_t                                              missing_ = 0;  // copies of expired frames that have not returned
-    std::atomic_flag                                           sending_;      // held by the thread that uses the ports to send
-    std::atomic<std::uint32_t>                                 unnoted_{0};   // copies of frames of send_now() that have not returned
+    std::atomic_flag           sending_;       // held by the thread that sends
+    std::atomic<std::uint32_t> unmatched_{0};  // copies of frames of send_now() that have not returned
     int                                                        primary_wkc_ = -1;
     std::size_t                                                wire_bytes_ = SIZE_MAX;  // that fit a cycle, with a reserve
     std::uint8_t                                               next_index_ = 0;

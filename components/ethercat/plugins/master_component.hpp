@@ -156,7 +156,8 @@ public:
         apart_ = receiver_.load(std::memory_order_relaxed) == pthread_self() ? 0 : apart_ + 1;
         if (apart_ == tolerated_cycles) raise(apart_words_);
         if (unreceived_ > 2 || apart_ > 2) return;  // outputs must not move without their inputs
-        if (interrupted_.load(std::memory_order_acquire)) return;  // declared hung, in a cycle that goes on all the same
+        // The thread was declared hung, but its cycle goes on.
+        if (interrupted_.load(std::memory_order_acquire)) return;
         entries_.take(areas_);
         if (eoe_) eoe_->step(*master_);
         server_->step(cycle.start_ns());
@@ -224,7 +225,7 @@ private:
         return (now.tv_sec - year_2000_s) * 1'000'000'000 + now.tv_nsec;
     }
 
-    /// Begins anew after the thread was stopped: the slaves are not in OP, or will not be. [realtime]
+    /// Begins anew after the thread was stopped. [realtime]
     void resume() noexcept {
         master_->restart();
         discipline_.lose();
@@ -306,7 +307,9 @@ private:
                             &MasterComponent::transmit,
                             "sends the outputs of the slaves, starts and watches them; last in the thread",
                                       {.shared = Names::shared}};
-    hal::Emergency          emergency_{*this, &MasterComponent::make_safe, "takes the slaves to SAFE-OP at once, where outputs are off; they are started again when the thread runs again"};
+    hal::Emergency          emergency_{*this, &MasterComponent::make_safe,
+                              "takes the slaves to SAFE-OP at once, where outputs are off; they are started again "
+                              "when the thread runs again"};
     typename Names::BusPins bus_pins_{*this, receive_};
     std::deque<typename Names::SlavePins> slaves_;
     EntryPins                             entries_{*this, receive_, transmit_};
@@ -319,7 +322,7 @@ private:
     config::EventFilter    filter_{0};
     unsigned               unsent_ = 0, unreceived_ = 0, apart_ = 0;
     std::atomic<pthread_t> receiver_{};
-    std::atomic<bool>      interrupted_{false};  ///< set by make_safe(), from whichever thread; taken by receive()
+    std::atomic<bool>      interrupted_{false};  ///< set by make_safe() in any thread, taken by receive()
 
     std::unique_ptr<hal::ethernet::Port>   primary_, backup_;
     std::unique_ptr<master::Mailboxes>     mailboxes_;

@@ -102,7 +102,8 @@ void Runner::begin(Time now) noexcept {
     flying_.start(now);
 }
 
-/// Drops what came while no cycles ran: old values and answers say nothing of now. Emergencies are kept, they are reported.
+/// Drops the frames that arrived while no cycles ran: their values and answers are old. Emergencies are
+/// still reported.
 void Runner::drop_backlog(Time now) noexcept {
     constexpr std::size_t      max_frames = 8192;
     std::array<can::Frame, 32> frames;
@@ -110,8 +111,9 @@ void Runner::drop_backlog(Time now) noexcept {
         const std::size_t count = link_->receive(frames, now);
         for (std::size_t i = 0; i < count; ++i) {
             const can::Frame& f = frames[i];
-            const bool        is_emergency = !f.extended && !f.remote && f.id > 0x80 && f.id < 0x100;
-            if (is_emergency && !f.error && active()) master_.handle(f, now);
+            const bool        is_data = !f.extended && !f.remote && !f.error;
+            const bool        is_emergency = is_data && f.id > 0x80 && f.id < 0x100;
+            if (is_emergency && active()) master_.handle(f, now);
         }
         if (count < frames.size()) return;
     }
@@ -174,7 +176,8 @@ void Runner::receive(Time now) noexcept {
     open_and_close();
     watch_srdos(now);
     if (config_.sync == config::SyncMode::follow) send(now);  // what a SYNC asked for does not wait for transmit()
-    if (boots_.load()) safe_.store(false);  // made safe meanwhile by another thread, and then something was sent: once more
+    // Another thread made the network safe meanwhile, but this cycle went on sending: it is done once more.
+    if (boots_.load()) safe_.store(false);
 }
 
 std::size_t Runner::take_frames(Time now) noexcept {
@@ -362,12 +365,15 @@ void Runner::make_safe() noexcept {
 
 /// Returns whether the link took all of them.
 bool Runner::send_safe_values() noexcept {
-    bool       all = true, synchronous = false;
-    const auto send = [&](const can::Frame& f) { all &= link_->send(f, now_) == can::Sent::queued; };
+    bool       all = true;
+    bool       synchronous = false;
+    const auto send = [&](const can::Frame& f) {
+        if (link_->send(f, now_) != can::Sent::queued) all = false;
+    };
     for (Output& out : outputs_) {
         if (!out.open) continue;
         if (out.sent->pdo->multiplexed()) {
-            all &= make_safe_alone(out);
+            if (!make_safe_alone(out)) all = false;
             continue;
         }
         std::uint64_t image = 0;
@@ -415,7 +421,7 @@ bool Runner::make_safe_alone(const Output& out) noexcept {
         store(f.data.data() + 1, s.object->index);
         f.data[3] = s.object->sub;
         store(f.data.data() + 4, static_cast<std::uint32_t>(s.has_safe ? s.safe : number_in(*s.entry)));
-        all &= link_->send(f, now_) == can::Sent::queued;
+        if (link_->send(f, now_) != can::Sent::queued) all = false;
     }
     return all;
 }

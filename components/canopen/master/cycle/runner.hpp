@@ -88,9 +88,9 @@ public:
     void receive(Time now) noexcept;
     /// `leads`: the SYNC and the heartbeat are ours; another master on the same bus makes them otherwise. [realtime]
     void transmit(Time now, Time period, bool leads = true) noexcept;
-    /// All outputs to their safe values, nodes out of the operational state as configured. The network boots anew when cycles go on. While
-    /// the link is in use by a cycle of another thread it may send nothing: then call it again at the end of that cycle.
-    /// Async-signal-safe.
+    /// Sets all outputs to their safe values and takes nodes out of the operational state as configured.
+    /// The network boots anew when cycles go on. Sends nothing while a cycle of another thread uses the
+    /// link: call it again at the end of that cycle. Async-signal-safe.
     void make_safe() noexcept;
 
     std::span<Slot>             slots() noexcept { return slots_; }
@@ -220,7 +220,7 @@ private:
     FlyingMaster::State            flying_state_ = FlyingMaster::State::off;
     bool                           sync_begun_ = false, time_begun_ = false, produces_ = false, leads_ = true;
     std::atomic<bool>              boots_{true};             // set by make_safe(), from whichever thread; taken by receive()
-    std::atomic<bool>              safe_{true};              // nothing was sent since make_safe(); likewise
+    std::atomic<bool>              safe_{true};  // nothing was sent since make_safe()
     bool                           begun_ = false;           // since open()
 };
 

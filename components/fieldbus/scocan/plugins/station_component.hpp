@@ -171,7 +171,8 @@ protected:
     TableArguments    arguments_{*this};
     hal::Function     receive_{*this, "receive", &StationComponent::receive, "receives frames and follows the SYNC; first in the thread"};
     hal::Function transmit_{*this, "transmit", &StationComponent::transmit, "sends in the slots until the next cycle; last in the thread"};
-    hal::Emergency interruption_{*this, &StationComponent::interrupt, "when the thread runs again, the node listens before it sends"};
+    hal::Emergency interruption_{*this, &StationComponent::interrupt,
+                                 "when the thread runs again, the node listens before it sends"};
     StationPins   pins_{*this, receive_};
     std::deque<SentMessage>                  sent_;
     std::deque<ReceivedMessage>              received_;
@@ -189,7 +190,7 @@ protected:
     std::uint64_t                            followed_ = 0;
     Time                                     now_ = 0;
     bool                                     was_reset_ = false;
-    std::atomic<bool>                        interrupted_{false};  // set by interrupt(), from whichever thread; taken by receive()
+    std::atomic<bool>                        interrupted_{false};  // set by interrupt(), taken by receive()
 };
 
 }  // namespace hal::scocan

@@ -32,8 +32,8 @@ public:
     void attach(can::Link&) noexcept;  ///< [setup]
     void detach() noexcept { link_ = nullptr; }  ///< [setup]
 
-    /// Starts anew after a time without cycles: it listens first, as another node may send the SYNC now. What waits to be sent or was
-    /// received meanwhile is dropped; a silenced node stays silenced. [realtime]
+    /// Starts anew after a time without cycles: the node listens first, as another one may send the SYNC
+    /// now. Drops queued frames and those received meanwhile; a silenced node stays silenced. [realtime]
     void restart(Time now) noexcept;
     void receive(Time now) noexcept;  ///< [realtime]
     void transmit(Time now, Time period) noexcept;  ///< [realtime]

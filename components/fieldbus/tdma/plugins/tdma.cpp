@@ -314,7 +314,8 @@ private:
     hal::Function transmit_{*this, "transmit", &Tdma::transmit,
                             "sends the frames queued for the slots of this cycle, and the master's sync; last in the thread"};
 
-    hal::Emergency interruption_{*this, &Tdma::interrupt, "when the thread runs again, the station listens before it sends"};
+    hal::Emergency interruption_{*this, &Tdma::interrupt,
+                                 "when the thread runs again, the station listens before it sends"};
 
     StationPins pins_{*this, receive_};
 
@@ -336,7 +337,7 @@ private:
     const hal_faults*                       faults_ = nullptr;
     bool                                    leads_ = false, period_reported_ = false, was_reset_ = false;
     bool                                    was_synchronised_ = false, withdrawn_ = false, had_carrier_ = true;
-    std::atomic<bool>                       interrupted_{false};  // set by interrupt(), from whichever thread; taken by receive()
+    std::atomic<bool>                       interrupted_{false};  // set by interrupt(), taken by receive()
 };
 
 }  // namespace

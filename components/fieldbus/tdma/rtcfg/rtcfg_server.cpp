@@ -149,7 +149,7 @@ bool Server::invite(Client& c, Time now) noexcept {
     return send(m);
 }
 
-/// After a time without cycles nobody is dead: the server did not listen.
+/// Extends all timeouts by a time without cycles, in which the server could not receive heartbeats.
 void Server::excuse(Time now) noexcept {
     constexpr Time max_pause = 100'000'000;
     const Time     pause = now - std::exchange(last_slots_, now);

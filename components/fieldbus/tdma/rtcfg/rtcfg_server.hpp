@@ -77,7 +77,7 @@ private:
     std::uint64_t                                     foreign_ = 0;
     bool                                              serves_ = false;
     Time                                              began_ = 0;  // local time when it began to serve
-    Time                                              last_slots_ = 0;  // local time of the last before_slots()
+    Time                                              last_slots_ = 0;  // local, last before_slots()
     std::array<std::uint8_t, ethernet::largest_frame> frame_{};
 };
 

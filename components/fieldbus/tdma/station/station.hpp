@@ -58,8 +58,8 @@ public:
     void receive(Time now) noexcept;   ///< processes received frames. [realtime]
     void transmit(Time now) noexcept;  ///< sends; with the same `now`, after receive(). [realtime]
     void reset() noexcept;             ///< restarts a master that stepped down. [realtime]
-    /// Starts anew after a time without cycles: it listens first, as another station may send the syncs now, and its clock estimate is old.
-    /// What waits in the queues is dropped. [realtime]
+    /// Starts anew after a time without cycles: the station listens first, as another one may send the syncs
+    /// now, and its clock estimate is old. Drops queued frames. [realtime]
     void restart() noexcept;
 
     const Status&       status() const noexcept { return status_; }
@@ -92,7 +92,7 @@ private:
     static constexpr std::size_t most_pending = 64;  // as RTnet's master
     static constexpr std::uint32_t rows = 3;  // consecutive observations that confirm something
     static constexpr std::uint32_t silence_after = 1000;  // cycles until the same event is repeated
-    static constexpr Time max_absence = 100'000'000;  // ns without cycles after which a master listens before it sends again
+    static constexpr Time max_absence = 100'000'000;  // ns; after more a master listens before it sends
     static constexpr Time gone_after = 1'000'000'000;  // ns without frames: a second master, or a station that sends, is lost
     struct Pending {
         Address       to{};

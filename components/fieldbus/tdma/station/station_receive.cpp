@@ -21,7 +21,8 @@ constexpr Time          too_long_out = 5'000'000'000;    // coming into phase ta
 void Station::receive(Time now) noexcept {
     if (port_ == nullptr) return;
     const Time absence = now - std::exchange(last_cycle_, now);
-    if (status_.leading && absence > std::max<Time>(max_absence, setup_.lost_limit * setup_.cycle)) restart();
+    const Time max_pause = std::max<Time>(max_absence, setup_.lost_limit * setup_.cycle);
+    if (status_.leading && absence > max_pause) restart();
     const bool first = began_ == 0;
     if (first) began_ = now;
     heard_ = false;
