@@ -5,6 +5,7 @@
 
 #include "estimation/furuta_identification.hpp"
 #include "hal/component.hpp"
+#include "hal/lasting_fault.hpp"
 #include "hal/limit.hpp"
 
 namespace {
@@ -154,13 +155,12 @@ private:
         rig_ = identification_.estimate();
         if (homed && enable && identification_.zero_is_wrong()) {
             homed = false;
-            if (faults_ != nullptr)
-                faults_->raise(
-                    faults_, this,
-                    "not homed: the pendulum oscillates around {} rad, expected 0; the torque is 0; let it hang at rest, zero its encoder, then "
-                    "set enable to FALSE and TRUE",
-                    identification_.zero_offset());
+            fault_.begin(faults_, this,
+                         "not homed: the pendulum oscillates around {} rad, expected 0; the torque is 0; let it hang at rest, zero its encoder, "
+                         "then set enable to FALSE and TRUE",
+                         identification_.zero_offset());
         }
+        if (homed && fault_.lasts()) fault_.end(faults_, this);
         zero_offset = identification_.zero_offset();
         identified_frequency = std::sqrt(rig_.weight_moment / rig_.pendulum_inertia);
     }
@@ -255,6 +255,7 @@ private:
     bool   enabled_ = false;
 
     const hal_faults* faults_ = nullptr;
+    hal::LastingFault fault_;
 
     hal::estimation::FurutaParameters     rig_;
     hal::estimation::FurutaIdentification identification_;

@@ -8,7 +8,7 @@ struct Faults : hal::Component {
     using Component::Component;
     static constexpr hal::Traits traits{.singleton = true};
 
-    hal::In<bool> reset{*this, "reset", "a rising edge acknowledges all faults so far"};
+    hal::In<bool> reset{*this, "reset", "a rising edge acknowledges all faults that are over"};
     hal::Out<bool> active{*this, "active", "TRUE while a fault is not acknowledged", {.safe = true}};
     hal::Out<bool> ok{*this, "ok", "inverse of active", {.safe = false}};
     hal::Out<std::uint64_t> count{*this, "count", "number of faults since the start"};
@@ -52,6 +52,9 @@ HAL_COMPONENT(Faults, "faults", "Faults of the runtime as pins for the safety ch
 An exception in a component, NaN on an output declared finite, a cycle beyond its budget and a hung thread
 are faults; `show fault` describes them. This component provides them as pins: link `ok` into the emergency stop chain.
 
+A fault whose condition lasts cannot be acknowledged: a thread that hangs or that a fault stopped, a node that is offline, a cycle that still
+takes too long. Neither `reset` nor `fault clear` makes `ok` TRUE before it is over, and its end alone does not either.
+
 `alive` is for a watchdog: it toggles only while the thread supervisor runs and each thread has finished a
 cycle within its supervision limit. Add the function to the fastest thread and link `alive` to a watchdog input, or to a
 hardware charge pump: `net alive faults.alive => watchdog.input-0`. It toggles every few milliseconds to 50 ms, so a
@@ -63,7 +66,7 @@ timeout of 200 ms or more is suitable for all machines.
 | 1 | a function threw an exception |
 | 2 | NaN or infinity on an output declared finite |
 | 3 | a cycle took longer than its budget |
-| 4 | a thread hangs |
+| 4 | a thread hangs or gets no CPU time |
 | 5 | raised by a component |
 
     loadrt faults

@@ -28,16 +28,22 @@ struct Watchdog : hal::Component {
         if (!limits_known_.load(std::memory_order_acquire)) return;  // a rising edge of enable-in is not lost: it is detected later
         const bool restart = enable && !was_enabled_;
         was_enabled_ = enable;
-        bool healthy = enable && (ok || restart);
-        if (restart) tripped = -1;
+        const bool all_alive = count(restart, cycle.period_ns());
+        starting_ = enable && (restart || starting_);
+        bool healthy = enable && ok;
+        if (starting_ && all_alive) {
+            starting_ = false;
+            healthy = true;
+            tripped = -1;
+        }
+        const bool was_healthy = healthy;
         for (std::size_t i = 0; i < input.size(); ++i) {
             Watched& w = watched_[i];
-            if (restart || input[i] != w.level) w.silent_ns = 0;
-            else w.silent_ns += cycle.period_ns();
-            w.level = input[i];
-            if (w.silent_ns < w.limit_ns.load(std::memory_order_relaxed)) continue;
+            const std::int64_t limit_ns = w.limit_ns.load(std::memory_order_relaxed);
+            if (w.silent_ns < limit_ns) continue;
             if (healthy) tripped = static_cast<std::int32_t>(i);
             healthy = false;
+            w.dead = w.dead || (was_healthy && limit_ns > 0);
         }
         ok = healthy;
     }
@@ -55,17 +61,36 @@ private:
         std::atomic<std::int64_t> limit_ns{0};  // set-timeouts writes, process reads
         std::int64_t silent_ns = 0;
         bool level = false;
+        bool dead = false;                      // it tripped the watchdog and has not changed since
     };
+
+    /// Updates the time since the last change of each input. Returns true if all that tripped the watchdog have changed since. [realtime]
+    bool count(bool restart, std::int64_t period_ns) noexcept {
+        bool all_alive = true;
+        for (std::size_t i = 0; i < input.size(); ++i) {
+            Watched& w = watched_[i];
+            const bool changed = input[i] != w.level;
+            w.level = input[i];
+            if (changed) w.dead = false;
+            if (changed || (restart && !w.dead)) w.silent_ns = 0;
+            else w.silent_ns += period_ns;
+            all_alive = all_alive && !w.dead;
+        }
+        return all_alive;
+    }
+
     std::unique_ptr<Watched[]> watched_ = std::make_unique<Watched[]>(static_cast<std::size_t>(inputs));
     std::atomic<bool> limits_known_{false};         // set-timeouts writes, process reads
     bool was_enabled_ = false;
+    bool starting_ = false;                         // enabled, and ok-out waits for an input that tripped the watchdog
 };
 
 }  // namespace
 
 HAL_COMPONENT(Watchdog, "watchdog", "Detects inputs that stop changing", R"(
 Each `input-N` must change at least once in `timeout-N` seconds. If one does not, `ok-out` becomes FALSE and remains so until
-a rising edge of `enable-in`; `tripped-by` is the number of the input. Without a timeout `ok-out` is always
+a rising edge of `enable-in`; `tripped-by` is the number of the input. If that input has not changed since, `ok-out` waits for its next
+change: LinuxCNC's watchdog reports OK for another timeout over an input that is still dead. Without a timeout `ok-out` is always
 FALSE: a watchdog that is not configured must not report OK. Add `set-timeouts` to a thread for the timeouts to take
 effect; the thread of `process` must be fast enough to see each change.
 

@@ -19,6 +19,7 @@
 #include "hal/background.hpp"
 #include "hal/clock.hpp"
 #include "hal/component.hpp"
+#include "hal/lasting_fault.hpp"
 #include "hal/naming.hpp"
 #include "hal/queue.hpp"
 #include "hal/texts.hpp"
@@ -156,8 +157,8 @@ private:
                                                                "all frames were shown; valid is FALSE"};
         if (now == raised_) return;
         raised_ = now;
-        if (now == FrameError::none || faults_ == nullptr) return;
-        faults_->raise(faults_, this, reasons[static_cast<std::size_t>(now)], std::numeric_limits<double>::quiet_NaN());
+        if (now == FrameError::none) fault_.end(faults_, this);
+        else fault_.begin(faults_, this, reasons[static_cast<std::size_t>(now)]);
     }
 
     const std::string      instance_;
@@ -171,6 +172,7 @@ private:
     Ordered                ordered_;
     std::int64_t           began_ns_ = no_time;
     const hal_faults*      faults_ = nullptr;
+    hal::LastingFault      fault_;
     FrameError                raised_ = FrameError::none;
     hal::Background        background_;
     hal::Function          update_;

@@ -102,8 +102,8 @@ struct VisionPendulum : CameraComponent<VisionPendulum, Found, Settings> {
         if (fresh && !found.found) missed = missed + 1;
         age = shown_ns_ == no_time ? 0.0 : static_cast<double>(cycle.start_ns() - shown_ns_) * 1e-9;
         const bool lost = shown_ns_ != no_time && lost_time > 0.0 && age > lost_time;
-        if (lost && !lost_ && record_ != nullptr)
-            record_->raise(record_, this, "no frame showed the pendulum for {} s; valid is FALSE", age);
+        if (lost && !lost_) missing_.begin(record_, this, "no frame showed the pendulum for {} s; valid is FALSE", age);
+        else if (!lost && lost_) missing_.end(record_, this);
         lost_ = lost;
     }
 
@@ -113,6 +113,7 @@ private:
     static constexpr std::int64_t no_time = INT64_MIN;
     std::int64_t                  shown_ns_ = no_time;  // stamp of the newest frame that showed it
     const hal_faults*             record_ = nullptr;
+    hal::LastingFault             missing_;
     bool                          lost_ = false;
 };
 

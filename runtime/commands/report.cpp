@@ -150,6 +150,20 @@ void show_latency(Context& context) {
     context.output.out(text);
 }
 
+namespace {
+
+/// How many faults are not acknowledged, and which of them can be.
+std::string acknowledgement_text(const Reports& reports) {
+    const std::uint64_t count = reports.fault_count();
+    const std::uint64_t lasting = std::min(count, reports.lasting_count());
+    if (lasting == 0) return fmt::format("{} not acknowledged; `fault clear` acknowledges them\n", count);
+    const char* const verb = lasting == 1 ? "lasts" : "last";
+    if (lasting == count) return fmt::format("{} not acknowledged; {} {}: type `fault clear` once the cause is over\n", count, lasting, verb);
+    return fmt::format("{} not acknowledged; {} {}, `fault clear` acknowledges the others\n", count, lasting, verb);
+}
+
+}  // namespace
+
 void show_faults(Context& context) {
     const auto records = context.session.reports().faults();
     std::string text;
@@ -157,19 +171,39 @@ void show_faults(Context& context) {
         auto rows = nlohmann::ordered_json::array();
         for (const auto& record : records)
             rows.push_back({{"number", record.number}, {"age_ns", record.age_ns}, {"cycle", record.cycle}, {"count", record.count},
-                            {"span_ns", record.span_ns}, {"thread", record.thread}, {"code", record.code}, {"sentence", record.sentence}});
+                            {"span_ns", record.span_ns}, {"thread", record.thread}, {"code", record.code}, {"lasts", record.lasts}, {"sentence", record.sentence}});
         return context.output.out(json_text(rows) + "\n");
     }
     for (const auto& record : records)
-        text += fmt::format("{:>4}  {} ago  {}\n", record.number, format_duration(static_cast<double>(record.age_ns)), record.line());
+        text += fmt::format("{:>4}  {} ago{}  {}\n", record.number, format_duration(static_cast<double>(record.age_ns)),
+                            record.lasts ? " (lasts)" : "", record.line());
     if (records.empty()) text = "no faults\n";
-    else text += fmt::format("{} not acknowledged; `fault clear` acknowledges them\n", context.session.reports().fault_count());
+    else text += acknowledgement_text(context.session.reports());
     context.output.out(text);
 }
 
+namespace {
+
+/// A fault whose condition lasts is not acknowledged.
+void report_lasting(const std::vector<FaultRecord>& lasting, Span span, Diagnostics& diagnostics) {
+    constexpr std::size_t max_named = 8;
+    if (lasting.empty()) return;
+    const bool one = lasting.size() == 1;
+    std::string text = fmt::format("{} and {} not acknowledged:", one ? "1 fault lasts" : fmt::format("{} faults last", lasting.size()),
+                                   one ? "is" : "are");
+    for (std::size_t i = 0; i < std::min(lasting.size(), max_named); ++i) text += (i == 0 ? " " : "; ") + lasting[i].subject();
+    if (lasting.size() > max_named) text += fmt::format("; {} more", lasting.size() - max_named);
+    diagnostics.warning("lasting-fault", span, text, "", "see: show fault; once the cause is over, type: fault clear");
+}
+
+}  // namespace
+
 void command_fault(Context& context) {
     Session& session = context.session;
-    if (context.argument(0) == "clear") return context.transaction->when_committed([&session] { session.reports().clear_faults(); });
+    if (context.argument(0) == "clear")
+        return context.transaction->when_committed([&session, &diagnostics = context.diagnostics, span = context.command.span] {
+            report_lasting(session.reports().clear_faults(), span, diagnostics);
+        });
     context.diagnostics.error("unknown-word", context.span(0), "'" + context.argument(0) + "' is not an action on faults", "",
                               "type `fault clear`; `show fault` lists the faults");
 }

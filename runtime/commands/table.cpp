@@ -103,7 +103,8 @@ constexpr CommandRow rows[] = {
      "print the state as commands, to the terminal or a file",
      "all (or nothing): comp, alias, sigu, netla, param, thread; allu also sets unlinked inputs and signals without writer.",
      command_save, 0, command_query | command_path},
-    {"fault", "", "clear", "acknowledge all faults", "", command_fault, 0, command_deferred},
+    {"fault", "", "clear", "acknowledge all faults that are over",
+     "A fault whose condition lasts, such as a thread that hangs or a node that is offline, stays a fault: the command names it.", command_fault, 0, command_deferred},
     // --- locks
     {"lock", "", "[none|tune|all]", "forbid changes: tune still allows values, start and stop; all (the default) forbids everything",
      "Values of pins and signals are never locked; `lock all` forbids setp of parameters.", command_lock, 0, command_deferred | command_checked},

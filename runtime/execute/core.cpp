@@ -42,11 +42,38 @@ struct Guard {
 Core* Core::current() noexcept { return current_core; }
 
 Core::Core(std::uint32_t id, std::int64_t period_ns, ThreadPins pins, FaultBoard& board, Timeline& timeline,
-           const std::atomic<bool>& running, bool measure)
-    : id_(id), period_ns_(period_ns), pins_(pins), board_(board), timeline_(timeline), running_(running), measure_(measure) {
+           const std::atomic<bool>& running, bool measure, CycleMark* mark)
+    : id_(id), period_ns_(period_ns), pins_(pins), board_(board), timeline_(timeline), running_(running), measure_(measure),
+      mark_(mark ? mark : &own_mark_) {
     info_.size = sizeof info_;
     info_.period_ns = period_ns;
     info_.period_s = static_cast<double>(period_ns) * 1e-9;
+}
+
+Core::~Core() {
+    board_.end_all(this, this + 1);
+}
+
+void Core::clear_stop() noexcept {
+    stopped_.store(false, std::memory_order_release);
+    board_.end(this, &stopped_);
+}
+
+void Core::not_finite(const hal_pin& pin, bool lasts) noexcept {
+    if (lasts) board_.begin(&info_, &pin);
+    else board_.end(&info_, &pin);
+}
+
+Core::Condition Core::condition(const FaultEvent& event) const noexcept {
+    switch (event.code) {
+    case HAL_FAULT_EXCEPTION:
+    case HAL_FAULT_SILENT_THREAD: return {this, &stopped_};
+    case HAL_FAULT_BUDGET: return {this, &in_budget_};
+    case HAL_FAULT_NOT_FINITE: return {&info_, event.self};
+    case HAL_FAULT_COMPONENT: return {event.self, event.reason};
+    case HAL_FAULT_NONE: break;
+    }
+    return {nullptr, nullptr};
 }
 
 void Core::cycle(std::int64_t grid_ns, std::int64_t due_ns, std::int64_t woke_ns) noexcept {
@@ -163,6 +190,7 @@ void Core::take(plan::Plan* plan) noexcept {
     for (const plan::Rebind& rebind : plan->rebinds) rebind.pin->slot = rebind.slot;
     for (const plan::Pointer& pointer : plan->pointers) *pointer.to = pointer.slot;
     for (std::size_t i = 0; i < plan->carries.size(); ++i) plan->carries[i].to->raw = plan->scratch[i];
+    board_.end_all(&info_, &info_ + 1);  // the checks of the new plan begin anew
     plan_ = plan;
     probes_ = plan->probes.get();
     shown_.store(plan, std::memory_order_release);
@@ -210,7 +238,7 @@ void Core::answer() noexcept {
 
 void Core::run() noexcept {
     safe_ = false;
-    in_function_.store(true, std::memory_order_relaxed);
+    mark_->in_function.store(true, std::memory_order_relaxed);
     if (setjmp(recover) == 0) {
         const bool first = !passed_.load(std::memory_order_relaxed);
         passed_.store(true, std::memory_order_release);
@@ -233,10 +261,11 @@ void Core::run() noexcept {
                 run_rows(row, steps + function.end, steps + functions.back().end);
             }
         }
-        in_function_.store(false, std::memory_order_relaxed);
+        mark_->in_function.store(false, std::memory_order_relaxed);
     } else {
         // An exception left a noexcept function; the terminate handler jumped back here.
-        in_function_.store(false, std::memory_order_relaxed);
+        mark_->in_function.store(false, std::memory_order_relaxed);
+        board_.begin(this, &stopped_);
         raise({HAL_FAULT_EXCEPTION, current_function(), info_.number, info_.start_ns, 0.0, nullptr, nullptr});
         stopped_.store(true, std::memory_order_release);  // output() makes the outputs safe
     }
@@ -248,7 +277,7 @@ void Core::run_rows(const plan::Row*& row, const plan::Step* first, const plan::
         while (steps + row->end <= first) ++row;
         const plan::Step* const end = std::min(last, steps + row->end);
         if (stopped_.load(std::memory_order_relaxed)) [[unlikely]] return;  // declared hung meanwhile
-        if (row->run) row->run(first, end, &info_, &current_);
+        if (row->run) row->run(first, end, &info_, &mark_->current);
         else run_steps(first, end);
         first = end;
     }
@@ -257,8 +286,8 @@ void Core::run_rows(const plan::Row*& row, const plan::Step* first, const plan::
 void Core::run_steps(const plan::Step* first, const plan::Step* last) noexcept {
     // Small functions cost little more than their call: eight per turn save the jumps, a fifth of the cycle of 1000 gates. A function
     // that returns after its thread was declared hung is the last that runs.
-    const auto call = [this](const plan::Step* step) noexcept {
-        current_ = step;
+    const auto call = [this, current = &mark_->current](const plan::Step* step) noexcept {
+        *current = step;
         step->step(step->self, &info_);
         return stopped_.load(std::memory_order_relaxed);
     };
@@ -311,7 +340,10 @@ std::int64_t Core::account(std::int64_t woke_ns) noexcept {
     if (limit != 0 && now_ns - std::max(woke_ns, excused_.load(std::memory_order_acquire)) > limit) {
         if (declare_hung()) raise(event(HAL_FAULT_SILENT_THREAD));  // otherwise the supervisor has reported it
     } else if (!in_budget && in_budget_ && !hung()) {
+        board_.begin(this, &in_budget_);
         raise(event(HAL_FAULT_BUDGET));
+    } else if (in_budget && !in_budget_) {
+        board_.end(this, &in_budget_);
     }
     in_budget_ = in_budget;  // a row of overruns is one fault
     return now_ns;
@@ -351,12 +383,14 @@ void check_finite(void* self, const hal_cycle* cycle) {
     auto& check = *static_cast<plan::FiniteCheck*>(self);
     if (const double value = check.pin->slot->real; !std::isfinite(value)) [[unlikely]] {
         __atomic_store_n(&check.pin->slot->raw, check.instead.raw, __ATOMIC_RELAXED);
-        if (!check.bad)
-            static_cast<Core*>(check.sink)
-                ->raise({HAL_FAULT_NOT_FINITE, check.pin_id, cycle->number, cycle->start_ns, value, nullptr, nullptr});
+        if (check.bad) return;
         check.bad = true;
-    } else {
+        auto& core = *static_cast<Core*>(check.sink);
+        core.not_finite(*check.pin, true);
+        core.raise({HAL_FAULT_NOT_FINITE, check.pin_id, cycle->number, cycle->start_ns, value, nullptr, check.pin});
+    } else if (check.bad) [[unlikely]] {
         check.bad = false;
+        static_cast<Core*>(check.sink)->not_finite(*check.pin, false);
     }
 }
 

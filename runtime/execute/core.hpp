@@ -7,6 +7,7 @@
 #include <atomic>
 #include <cstdint>
 
+#include "execute/cycle_mark.hpp"
 #include "execute/faults.hpp"
 #include "execute/histogram.hpp"
 #include "execute/timeline.hpp"
@@ -41,7 +42,9 @@ struct ThreadPins {
 class Core {
 public:
     Core(std::uint32_t id, std::int64_t period_ns, ThreadPins pins, FaultBoard& board, Timeline& timeline,
-         const std::atomic<bool>& running, bool measure);
+         const std::atomic<bool>& running, bool measure, CycleMark* mark = nullptr);
+    ~Core();
+    Core(const Core&) = delete;
 
     // --- by the thread --------------------------------------------------------------------------------------------
     /// Runs the cycle at position `grid_ns`, which was due at `due_ns`. The thread woke at `woke_ns`, just now; the execution time counts
@@ -53,8 +56,8 @@ public:
     void warm(std::int64_t until_ns) const noexcept;
     /// Counts periods in which no cycle ran. [realtime]
     void skip(std::uint64_t periods) noexcept;
-    /// Begins supervision: from now on the thread must finish cycles. [realtime]
-    void begin(std::int64_t now_ns) noexcept;
+    /// Begins supervision: the thread must finish its first cycle, which is due at `due_ns`, and all others. [realtime]
+    void begin(std::int64_t now_ns, std::int64_t due_ns) noexcept;
     /// Checks the start of the cycle that was due at `due_ns`: a delay above the supervision limit is a fault that stops the
     /// thread. [realtime]
     void woke_late(std::int64_t due_ns, std::int64_t now_ns) noexcept;
@@ -69,6 +72,8 @@ public:
     void step_clock(std::int64_t ns) noexcept;
 
     // --- by the supervisor, in a thread of its own (supervisor.hpp) ----------------------------------------------------
+    /// A thread that was created now and has not begun yet must finish its first cycle one period later. [setup]
+    void expect(std::int64_t now_ns) noexcept;
     /// Returns when the newest cycle ended, CLOCK_MONOTONIC. [any]
     std::int64_t finished_ns() const noexcept { return finished_.load(std::memory_order_acquire); }
     /// Returns the time from which the running or next cycle counts as unfinished; in the future while it is not due yet. [any]
@@ -122,8 +127,17 @@ public:
     bool next_fault(FaultEvent& event) { return faults_.pop(event); }
     /// Returns true after the first pass of the thread, in which initf functions run.
     bool passed() const { return passed_.load(std::memory_order_acquire); }
-    void clear_stop() { stopped_.store(false, std::memory_order_release); }
+    void clear_stop() noexcept;
+    /// A condition that a fault reports begins or is over (FaultBoard::begin). `pin`: of an output that is not finite. [realtime]
+    void not_finite(const hal_pin& pin, bool lasts) noexcept;
+    /// What owns the lasting condition of a fault of this thread, and its key; two nullptrs: the fault is an event. [any]
+    struct Condition {
+        const void *owner, *key;
+    };
+    Condition condition(const FaultEvent& event) const noexcept;
 
+    /// Returns the mark that the thread was given; nullptr: it has one of its own.
+    const CycleMark* mark() const { return mark_ == &own_mark_ ? nullptr : mark_; }
     std::uint32_t id() const { return id_; }
     std::int64_t period_ns() const { return period_ns_; }
     std::atomic<std::int64_t> budget_ns{0};
@@ -142,7 +156,7 @@ public:
     std::uint32_t current_function() const noexcept;
     std::uint32_t interrupted_function() const noexcept;          ///< the same, seen from another thread
     std::uint64_t cycle_number() const noexcept { return info_.number; }
-    bool in_function() const noexcept { return in_function_.load(std::memory_order_relaxed); }
+    bool in_function() const noexcept { return mark_->in_function.load(std::memory_order_relaxed); }
     std::jmp_buf recover;                                         ///< where the cycle continues after an exception left a function
 
 private:
@@ -202,8 +216,8 @@ private:
     TraceRing* tracing_ = nullptr;        // trace_ during a cycle
     hal_cycle info_{};
     std::int64_t grid_ns_ = 0;            // position of the cycle that runs
-    const plan::Step* volatile current_ = nullptr;
-    std::atomic<bool> in_function_{false};
+    CycleMark own_mark_;
+    CycleMark* const mark_;               // own_mark_, or one in shared memory
     bool safe_ = true;
     std::size_t sampled_ = 0;
     bool in_budget_ = true;

@@ -2,6 +2,7 @@
 // How a thread that does not finish its cycle is noticed, in which function it is, and what stands in for it.
 #include <algorithm>
 #include <functional>
+#include <limits>
 
 #include "execute/core.hpp"
 
@@ -25,9 +26,16 @@ std::uint32_t function_of(const plan::Plan* plan, const plan::Step* step) noexce
 
 }  // namespace
 
-void Core::begin(std::int64_t now_ns) noexcept {
-    due_.store(now_ns, std::memory_order_release);
+void Core::begin(std::int64_t now_ns, std::int64_t due_ns) noexcept {
     finished_.store(now_ns, std::memory_order_release);
+    due_.store(due_ns - period_ns_, std::memory_order_release);
+}
+
+void Core::expect(std::int64_t now_ns) noexcept {
+    std::int64_t never = 0;
+    finished_.compare_exchange_strong(never, now_ns, std::memory_order_acq_rel);
+    never = 0;
+    due_.compare_exchange_strong(never, now_ns, std::memory_order_acq_rel);
 }
 
 void Core::woke_late(std::int64_t due_ns, std::int64_t now_ns) noexcept {
@@ -41,16 +49,19 @@ bool Core::declare_hung() noexcept {
     const std::uint64_t next = cycles.load(std::memory_order_acquire) + 1;
     if (hung_at_.exchange(next, std::memory_order_acq_rel) == next) return false;
     hangs.fetch_add(1, std::memory_order_relaxed);
+    board_.begin(this, &stopped_);
     stopped_.store(true, std::memory_order_release);
     return true;
 }
 
-// A function writes current_ as an ordinary variable, millions of times a second; here one look at it is enough.
-__attribute__((no_sanitize("thread"))) const plan::Step* Core::where() const noexcept { return current_; }
+// A function writes the mark as an ordinary variable, millions of times a second; here one look at it is enough.
+__attribute__((no_sanitize("thread"))) const plan::Step* Core::where() const noexcept { return mark_->current; }
 
 std::int64_t Core::overdue_since_ns() const noexcept {
     const std::int64_t busy_since = busy_since_ns();
-    const std::int64_t since = busy_since != 0 ? busy_since : std::max(finished_ns(), due_.load(std::memory_order_acquire) + period_ns_);
+    const std::int64_t due = due_.load(std::memory_order_acquire);
+    if (due == 0 && busy_since == 0) return std::numeric_limits<std::int64_t>::max();
+    const std::int64_t since = busy_since != 0 ? busy_since : std::max(finished_ns(), due + period_ns_);
     return std::max(since, excused_.load(std::memory_order_acquire));
 }
 
@@ -89,7 +100,7 @@ std::uint64_t Core::missed_by(std::int64_t now_ns) const noexcept {
     return counted + (late > 0 ? static_cast<std::uint64_t>(late) : 0);
 }
 
-std::uint32_t Core::current_function() const noexcept { return function_of(plan_, current_); }
+std::uint32_t Core::current_function() const noexcept { return function_of(plan_, mark_->current); }
 
 std::uint32_t Core::interrupted_function() const noexcept {
     return in_function() ? function_of(shown_.load(std::memory_order_acquire), where()) : 0;

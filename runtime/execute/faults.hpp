@@ -7,6 +7,7 @@
 #include <cstdint>
 
 #include "hal/abi.h"
+#include "hal/lasting_faults.h"
 #include "hal/queue.hpp"
 
 namespace hal {
@@ -19,7 +20,7 @@ struct FaultEvent {
     std::int64_t time_ns = 0;
     double value = 0.0;             ///< budget: execution time, ns; component: its detail
     const char* reason = nullptr;   ///< component faults: a literal of the component
-    const void* self = nullptr;     ///< component faults: the instance
+    const void* self = nullptr;     ///< component faults: the instance; not finite: the pin
     std::uint64_t repeats = 0;      ///< number of events of the same kind, including this one; 0: queued individually
     std::int64_t last_ns = 0;       ///< time of the last of them
     bool varied = false;            ///< the repeats have different error numbers; `value` is the newest
@@ -133,16 +134,34 @@ struct FaultBoard {
     FaultBoard() noexcept;
     FaultBoard(const FaultBoard&) = delete;
 
-    hal_faults shared{};                    ///< given out as extension "hal.faults/1"; written with atomic builtins
+    hal_lasting_faults shared{};            ///< given out as extension "hal.faults/1"; written with atomic builtins
     /// Counts a fault; any thread may raise one. [realtime]
     void count(const FaultEvent& event, std::uint32_t thread) noexcept {
-        __atomic_store_n(&shared.last_code, static_cast<std::uint32_t>(event.code), __ATOMIC_RELAXED);
-        __atomic_store_n(&shared.last_thread, thread, __ATOMIC_RELAXED);
-        __atomic_store_n(&shared.last_cycle, event.cycle, __ATOMIC_RELAXED);
-        __atomic_fetch_add(&shared.count, 1, __ATOMIC_RELEASE);
+        __atomic_store_n(&shared.faults.last_code, static_cast<std::uint32_t>(event.code), __ATOMIC_RELAXED);
+        __atomic_store_n(&shared.faults.last_thread, thread, __ATOMIC_RELAXED);
+        __atomic_store_n(&shared.faults.last_cycle, event.cycle, __ATOMIC_RELAXED);
+        __atomic_fetch_add(&shared.faults.count, 1, __ATOMIC_RELEASE);
     }
-    /// Acknowledges all counted faults. [any]
-    void clear() noexcept { __atomic_store_n(&shared.cleared, __atomic_load_n(&shared.count, __ATOMIC_ACQUIRE), __ATOMIC_RELEASE); }
+    /// Acknowledges all counted faults except the newest of each condition that lasts. [any]
+    void clear() noexcept;
+
+    /// A condition begins: until end(), clear() does not acknowledge its newest fault, which is counted next. Does nothing when it lasts
+    /// already. Of more than max_lasting conditions at a time, the newest are acknowledged as if they were over. [realtime]
+    void begin(const void* owner, const void* key) noexcept;
+    /// The condition is over. Does nothing when it does not last. [realtime]
+    void end(const void* owner, const void* key) noexcept;
+    /// All conditions are over whose owner is at first <= owner < last. [any]
+    void end_all(const void* first, const void* last) noexcept;
+    /// [any]
+    bool lasts(const void* owner, const void* key) const noexcept;
+
+    static constexpr std::size_t max_lasting = 1024;
+    /// A free one has no key and no owner. A thread that begins a condition takes the owner first, one that ends it the key.
+    struct Lasting {
+        std::atomic<const void*> owner{nullptr}, key{nullptr};
+    };
+    std::array<Lasting, max_lasting> lasting{};
+    std::atomic<std::size_t> lasting_end{0};  ///< those behind it were never used
 };
 
 }  // namespace hal

@@ -67,7 +67,7 @@ bool use_deadline(const CoreOptions& options) noexcept {
 
 Runner::Runner(std::uint32_t id, const CoreOptions& o, ThreadPins pins, FaultBoard& board, Timeline& timeline, const std::atomic<bool>& running,
                bool measure, std::int64_t epoch_ns)
-    : core(id, o.period_ns, pins, board, timeline, running, measure),
+    : core(id, o.period_ns, pins, board, timeline, running, measure, o.mark),
       options(o),
       timeline_(timeline),
       epoch_ns_(epoch_ns),
@@ -92,6 +92,18 @@ void Runner::start() {
         throw std::runtime_error(std::string("the system gives no thread: ") + std::strerror(failed));
     }
     while (!ready_.load(std::memory_order_acquire)) std::this_thread::yield();
+    bind();
+}
+
+// From outside: a thread that binds itself to the CPU of a busy real-time process does not come back from that call.
+void Runner::bind() noexcept {
+    if (granted.policy == Granted::Policy::deadline) return;  // its affinity must stay the whole root domain
+    const bool wants = options.priority > 0 || options.deadline;
+    const int cpu = options.cpu >= 0 ? options.cpu : default_cpu();
+    cpu_set_t set;
+    CPU_ZERO(&set);
+    CPU_SET(static_cast<std::size_t>(cpu), &set);
+    if ((wants || options.cpu >= 0) && pthread_setaffinity_np(thread, sizeof set, &set) == 0) granted.cpu = cpu;
 }
 
 void Runner::ask_to_end() {
@@ -113,15 +125,10 @@ void Runner::call() {
 void Runner::set_up() noexcept {
     tid = static_cast<int>(syscall(SYS_gettid));
     if (!options.name.empty()) pthread_setname_np(pthread_self(), options.name.substr(0, 15).c_str());
-    const int cpu = options.cpu >= 0 ? options.cpu : default_cpu();
     const bool wants = options.priority > 0 || options.deadline;
     if (options.deadline && use_deadline(options)) {
-        granted.policy = Granted::Policy::deadline;  // its affinity must stay the whole root domain
+        granted.policy = Granted::Policy::deadline;
     } else {
-        cpu_set_t set;
-        CPU_ZERO(&set);
-        CPU_SET(static_cast<std::size_t>(cpu), &set);
-        if ((wants || options.cpu >= 0) && pthread_setaffinity_np(pthread_self(), sizeof set, &set) == 0) granted.cpu = cpu;
         sched_param parameters{};
         parameters.sched_priority = options.priority > 0 ? options.priority : 80;
         if (wants && pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameters) == 0) {
@@ -185,7 +192,7 @@ Runner::Woken Runner::spin() const noexcept {
 void Runner::loop() noexcept {
     set_up();
     place(monotonic_ns());
-    core.begin(monotonic_ns());
+    core.begin(monotonic_ns(), timeline_.due_ns(grid_ns));
     const std::int64_t period = options.period_ns;
     std::uint64_t served = 0;
     while (!quit_.load(std::memory_order_acquire)) {

@@ -25,6 +25,7 @@ struct CoreOptions {
     std::int64_t supervise_ns = 0;  ///< longest time without a finished cycle; 0: not supervised
     bool profile_every = false;
     std::string name{};       ///< as the system shows it: top -H, a debugger; its first 15 bytes
+    CycleMark* mark = nullptr;  ///< nullptr: one of the thread's own
 };
 
 /// What the system granted a thread.
@@ -70,6 +71,7 @@ public:
 private:
     bool callable() const { return options.period_ns >= Wait::callable_period_ns; }
     void set_up() noexcept;
+    void bind() noexcept;
     std::int64_t safe_until(std::int64_t due) const noexcept;
     bool sleep() noexcept;
     struct Woken {

@@ -3,11 +3,8 @@
 
 #include <algorithm>
 #include <csignal>
-#include <cstdio>
-#include <cstdlib>
 #include <cstring>
 #include <ctime>
-#include <fcntl.h>
 #include <poll.h>
 #include <sched.h>
 #include <stdexcept>
@@ -20,6 +17,7 @@ namespace {
 
 constexpr std::int64_t shortest_interval_ns = 2'000'000, longest_interval_ns = 50'000'000;
 constexpr std::int64_t feed_every_ns = 100'000'000;
+constexpr std::int64_t usage_interval_ns = 1'000'000'000;
 
 class Hold {
 public:
@@ -34,40 +32,6 @@ private:
 std::int64_t clock_ns(clockid_t clock) noexcept {
     timespec now{};
     return clock_gettime(clock, &now) == 0 ? now.tv_sec * 1'000'000'000LL + now.tv_nsec : 0;
-}
-
-std::int64_t cpu_time_ns(pthread_t thread) noexcept {
-    clockid_t clock{};
-    return pthread_getcpuclockid(thread, &clock) == 0 ? clock_ns(clock) : 0;
-}
-
-/// A small file of /proc, without taking memory: a thread may hang while it holds the allocator's lock.
-void read_file(const char* path, char* to, std::size_t room) noexcept {
-    to[0] = '\0';
-    const int file = open(path, O_RDONLY | O_CLOEXEC);
-    if (file < 0) return;
-    const ssize_t got = read(file, to, room - 1);
-    to[got > 0 ? got : 0] = '\0';
-    close(file);
-}
-
-struct KernelView {
-    char state = '?';
-    int tracer = 0;
-};
-
-KernelView kernel_view(int tid) noexcept {
-    char path[64], text[2048];
-    std::snprintf(path, sizeof path, "/proc/self/task/%d/status", tid);
-    read_file(path, text, sizeof text);
-    KernelView view;
-    if (const char* const at = std::strstr(text, "\nState:")) {
-        const char* letter = at + 7;
-        while (*letter == ' ' || *letter == '\t') ++letter;
-        if (*letter) view.state = *letter;
-    }
-    if (const char* const at = std::strstr(text, "\nTracerPid:")) view.tracer = std::atoi(at + 11);
-    return view;
 }
 
 /// Above every thread it watches, as far as the system grants that.
@@ -105,7 +69,8 @@ Supervisor::~Supervisor() {
 void Supervisor::add(Core& core, pthread_t thread, int tid, int priority, int cpu) {
     {
         const Hold hold(mutex_);
-        watched_.push_back({&core, thread, tid, priority, cpu});
+        watched_.push_back({&core, thread, tid, priority, cpu, false, {}, scheduler_usage(tid)});
+        core.expect(monotonic_ns());
         std::stable_sort(watched_.begin(), watched_.end(), [](const Watched& a, const Watched& b) { return a.priority > b.priority; });
     }
     if (!started_) {
@@ -165,6 +130,13 @@ bool Supervisor::reset(Core& core) {
         of->demoted = pthread_setschedparam(of->thread, SCHED_FIFO, &parameters) != 0;
     }
     return true;
+}
+
+std::int64_t Supervisor::run_delay_ns(const Core& core) {
+    const Hold hold(mutex_);
+    const Watched* const of = find(core);
+    if (!of || of->usage.taken_ns == 0) return 0;
+    return scheduler_usage(of->tid).delay_ns - of->usage.delay_ns;
 }
 
 bool Supervisor::demoted(const Core& core) {
@@ -253,11 +225,11 @@ bool Supervisor::look(std::int64_t now_ns, std::int64_t gap_ns, std::int64_t sus
         if (silent > limit || suspended_ns > limit) {
             declare(one, now_ns, gap_ns, suspended_ns);
             well = false;
-        } else if (silent <= limit / 4) {
-            one.mark_ns = 0;
-        } else if (one.mark_ns == 0) {
-            one.mark_ns = now_ns;
-            one.mark_cpu_ns = cpu_time_ns(one.thread);
+        } else if (silent > limit / 4) {
+            if (one.mark.taken_ns == 0) one.mark = scheduler_usage(one.tid);
+        } else {
+            one.mark = {};
+            if (now_ns - one.usage.taken_ns > usage_interval_ns) one.usage = scheduler_usage(one.tid);
         }
     }
     return well;
@@ -291,7 +263,7 @@ void Supervisor::declare(Watched& watched, std::int64_t now_ns, std::int64_t gap
         stall.cause = Stall::Cause::process;
         stall.silent_ns = gap_ns;
     } else {
-        find_cause(watched, stall, now_ns);
+        find_cause(watched, stall);
         name_starved(watched, stall, now_ns);  // before they run
         if (stall.cause != Stall::Cause::starved && watched.priority > 0 && !watched.demoted) {
             const sched_param ordinary{};
@@ -303,15 +275,29 @@ void Supervisor::declare(Watched& watched, std::int64_t now_ns, std::int64_t gap
     stalls_.push(stall);
 }
 
-void Supervisor::find_cause(const Watched& watched, Stall& stall, std::int64_t now_ns) const {
+// Less than a tenth since it was first seen late. A function that loops for ever on a busy host has used more than its limit soon.
+bool Supervisor::got_no_cpu(const Watched& watched) noexcept {
+    const SchedulerUsage now = scheduler_usage(watched.tid);
+    if (watched.mark.taken_ns == 0 || now.taken_ns == 0) return false;
+    const std::int64_t used_ns = now.cpu_ns - watched.mark.cpu_ns;
+    const std::int64_t since_ns = now.taken_ns - watched.mark.taken_ns;
+    return used_ns < std::min<std::int64_t>(since_ns, watched.core->supervise_ns) / 10;
+}
+
+bool Supervisor::starved(const Core& core) {
+    const Hold hold(mutex_);
+    const Watched* const of = find(core);
+    return of && kernel_view(of->tid).state == 'R' && got_no_cpu(*of);
+}
+
+void Supervisor::find_cause(const Watched& watched, Stall& stall) const {
     const KernelView seen = kernel_view(watched.tid);
     stall.tracer = seen.tracer;
-    const std::int64_t used = cpu_time_ns(watched.thread) - watched.mark_cpu_ns, since = now_ns - watched.mark_ns;
     if (seen.state == 't' || seen.state == 'T') {
         stall.cause = Stall::Cause::stopped;
     } else if (seen.state == 'S' || seen.state == 'D' || seen.state == 'I') {
         stall.cause = Stall::Cause::waiting;
-    } else if (watched.mark_ns != 0 && used < since / 10) {
+    } else if (got_no_cpu(watched)) {
         stall.cause = Stall::Cause::starved;
         for (const Watched& other : watched_)
             if (&other != &watched && other.cpu == watched.cpu && other.priority > watched.priority && other.core->busy_since_ns() != 0) {

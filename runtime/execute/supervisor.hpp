@@ -12,6 +12,7 @@
 #include <pthread.h>
 
 #include "execute/core.hpp"
+#include "execute/scheduler_view.hpp"
 #include "hal/queue.hpp"
 #include "hal/supervision.h"
 
@@ -56,6 +57,10 @@ public:
     void set_priority(const Core& core, int priority);
     /// Lets the thread's functions run again, at their previous priority. Returns false if the thread still hangs.
     bool reset(Core& core);
+    /// Returns true if the thread is late and ready to run, but has got no CPU time, or hardly any, since it is late.
+    bool starved(const Core& core);
+    /// Returns how long the thread was ready to run without running, within the last one to two seconds before it was late, and since.
+    std::int64_t run_delay_ns(const Core& core);
     /// Returns true if the thread has lost its real-time priority.
     bool demoted(const Core& core);
     /// Removes and returns the oldest fault in the queue.
@@ -77,14 +82,16 @@ private:
         pthread_t thread;
         int tid, priority, cpu;
         bool demoted = false;
-        std::int64_t mark_ns = 0, mark_cpu_ns = 0;    // when it was first seen late, and the CPU time it had used by then
+        SchedulerUsage mark{};                        // when it was first seen late
+        SchedulerUsage usage{};                       // when it was last seen in time, read once a second
     };
     void work();
     bool look(std::int64_t now_ns, std::int64_t gap_ns, std::int64_t suspended_ns);
     bool behind_hog(const Watched& watched, std::int64_t now_ns) const;
     void declare(Watched& watched, std::int64_t now_ns, std::int64_t gap_ns, std::int64_t suspended_ns);
     void name_starved(Watched& hog, Stall& stall, std::int64_t now_ns);
-    void find_cause(const Watched& watched, Stall& stall, std::int64_t now_ns) const;
+    static bool got_no_cpu(const Watched& watched) noexcept;
+    void find_cause(const Watched& watched, Stall& stall) const;
     void settle_down();  // interval and CPUs, after the threads have changed
     void feed_watchdog(std::int64_t now_ns);
     Watched* find(const Core& core);

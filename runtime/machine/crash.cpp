@@ -4,15 +4,22 @@
 #include <atomic>
 #include <csetjmp>
 #include <csignal>
+#include <cstdarg>
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <cxxabi.h>
 #include <exception>
+#include <dlfcn.h>
+#include <pthread.h>
+#include <sys/syscall.h>
 #include <unistd.h>
 
 #include "execute/crash_table.hpp"
 #include "machine/crash.hpp"
+#include "machine/exit_observer.hpp"
 #include "machine/module_library.hpp"
+#include "machine/setup_call.hpp"
 
 extern "C" [[gnu::weak]] void __rtsan_realtime_enter();  // a program with the real-time guard
 
@@ -68,6 +75,7 @@ void on_signal(int signal) {
         raise(signal);
         return;
     }
+    ExitObserver::silence();
     make_all_safe();
     print("hal: ");
     if (const Core* const core = Core::current(); core && core->in_function()) {
@@ -90,19 +98,75 @@ void on_signal(int signal) {
     raise(signal);  // SA_RESETHAND put the default action back
 }
 
-// A function called exit(), or the real-time guard did because of what the function did.
-void on_exit_of_process() {
-    Core* const core = Core::current();
-    const bool in_function = core && core->in_function();
+std::atomic<pid_t> owner{0};  // the process of the machines; one that it forks ends without a word
+
+bool has_machine() noexcept {
+    return std::any_of(std::begin(watched), std::end(watched), [](const auto& one) { return one.load() != nullptr; });
+}
+
+// What calls: a function in its cycle, a task of a module, a constructor, start or stop of an instance, or any other thread.
+void name_caller(const Core* in_function, const char* module) noexcept {
+    if (in_function) return name_function(in_function, in_function->current_function());
+    if (module) {
+        print(module);
+        return print(": a task of the module's own");
+    }
+    if (SetupCall::is_mine()) {
+        print("'");
+        print(SetupCall::now.instance);
+        print("' (");
+        print(SetupCall::now.component);
+        return print(")");
+    }
+    char name[32] = "";
+    pthread_getname_np(pthread_self(), name, sizeof name);
+    print("thread '");
+    print(name);
+    print("'");
+}
+
+// A machine ends by its own orders. Returns false when this is such an end, or one that was reported already.
+bool report_end(const char* call) noexcept {
+    if (owner.load() != getpid()) return false;
+    const Core* const core = Core::current();
+    const Core* const in_function = core && core->in_function() ? core : nullptr;
     const char* const module = in_function ? nullptr : module_of_task();
-    if ((!in_function && !module) || reported.exchange(true)) return;
+    const bool machine = has_machine();
+    if (!in_function && !module && !machine && !SetupCall::is_mine()) return false;
+    if (reported.exchange(true)) return false;
+    ExitObserver::silence();
     make_all_safe();
     print("hal: ");
-    if (in_function) name_function(core, core->current_function());
-    else print(module), print(": a task of the module's own");
-    print(__rtsan_realtime_enter ? " made the call that the real-time guard prints above" : " called exit()");
-    if (in_function) print(__rtsan_realtime_enter ? ", at cycle " : " at cycle "), print(core->cycle_number());
-    print("; outputs were set to their safe values; the process ends\n");
+    name_caller(in_function, module);
+    if (__rtsan_realtime_enter && in_function) {
+        print(" made the call that the real-time guard prints above, at cycle ");
+    } else {
+        print(" called ");
+        print(call);
+        if (in_function) print(" at cycle ");
+        else if (SetupCall::is_mine()) print(" in ");
+        else if (!module) print(" while the machine runs");
+    }
+    if (in_function) print(in_function->cycle_number());
+    else if (!module && SetupCall::is_mine()) print(SetupCall::now.what);
+    print(machine ? "; outputs were set to their safe values; the process ends\n" : "; the process ends\n");
+    return true;
+}
+
+int failure(int status) noexcept { return status != 0 ? status : 1; }
+
+// Static destructors must not run beside threads that use the objects.
+void on_exit_of_process(int status, void*) {
+    if (!report_end("exit()")) {
+        if (reported.load()) end_process(failure(status));
+        return;
+    }
+    if (ftrylockfile(stdout) == 0) fflush_unlocked(stdout);
+    end_process(failure(status));
+}
+
+void on_quick_exit() {
+    if (report_end("quick_exit()")) end_process(1);
 }
 
 // A noexcept function let an exception out. The cycle goes on without the thread's functions.
@@ -112,12 +176,19 @@ void on_exit_of_process() {
         std::longjmp(core->recover, 1);
     }
     if (reported.exchange(true)) std::abort();
+    ExitObserver::silence();
     make_all_safe();
     print("hal: an exception outside of the cycle was not caught; outputs were set to their safe values; the process ends\n");
     std::abort();
 }
 
 }  // namespace
+
+void end_process(int status) noexcept {
+    reported = true;
+    ExitObserver::silence();
+    for (;;) syscall(SYS_exit_group, status);
+}
 
 CycleNames names_of(const CycleNow& now) {
     CycleNames names;
@@ -134,10 +205,16 @@ CycleNames names_of(const CycleNow& now) {
     return names;
 }
 
+void watch_for_exits() {
+    owner = getpid();
+    static const bool installed = ::on_exit(on_exit_of_process, nullptr) == 0 && std::at_quick_exit(on_quick_exit) == 0;
+    (void)installed;
+}
+
 void watch_for_crashes(SessionState* state) {
+    watch_for_exits();
     static const bool installed = [] {
         std::set_terminate(on_terminate);
-        std::atexit(on_exit_of_process);
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
         // for the program's own thread, which runs the cycles of a virtual clock; the executor's threads have one each
         alignas(16) static char room[1 << 15];
@@ -165,3 +242,46 @@ void end_watch_for_crashes(SessionState* state) {
 }
 
 }  // namespace hal
+
+// The program exports these functions: what a plugin or a library of the process calls by these names ends here, safe and named. A sanitizer
+// has its own.
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+
+namespace {
+
+[[noreturn]] void end_directly(int status, const char* call) noexcept {
+    if (hal::report_end(call)) hal::end_process(hal::failure(status));
+    for (;;) syscall(SYS_exit_group, status);
+}
+
+using Syscall = long (*)(long, ...);
+Syscall next_syscall() noexcept {
+    static std::atomic<Syscall> next{nullptr};  // no guarded initialisation: the guard may need a system call
+    Syscall found = next.load(std::memory_order_relaxed);
+    if (found == nullptr) {
+        found = reinterpret_cast<Syscall>(dlsym(RTLD_NEXT, "syscall"));
+        next.store(found, std::memory_order_relaxed);
+    }
+    return found;
+}
+
+}  // namespace
+
+extern "C" {
+
+[[noreturn, gnu::visibility("default")]] void _exit(int status) { end_directly(status, "_exit()"); }
+[[noreturn, gnu::visibility("default")]] void _Exit(int status) noexcept { end_directly(status, "_Exit()"); }
+
+[[gnu::visibility("default")]] long syscall(long number, ...) noexcept {
+    va_list list;
+    va_start(list, number);
+    long argument[6];
+    for (long& one : argument) one = va_arg(list, long);
+    va_end(list);
+    if (number == SYS_exit_group && hal::report_end("the system call exit_group")) argument[0] = hal::failure(static_cast<int>(argument[0]));
+    return next_syscall()(number, argument[0], argument[1], argument[2], argument[3], argument[4], argument[5]);
+}
+
+}  // extern "C"
+
+#endif

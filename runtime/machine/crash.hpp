@@ -16,6 +16,9 @@ struct CycleNames {
 /// Returns the names for a cycle that does not end. The model is read without a lock: an edit waits for the end of the cycle.
 CycleNames names_of(const CycleNow& now);
 
+/// Ends the process as _exit() does; the caller has reported why. async-signal-safe
+[[noreturn]] void end_process(int status) noexcept;
+
 /// After watch_for_crashes(): the machine is going.
 void end_watch_for_crashes(SessionState* state);
 

@@ -89,7 +89,7 @@ void CycleGuard::work() {
             text += "; it goes on (--cycle-limit TIME ends it)\n";
         }
         [[maybe_unused]] const auto written = ::write(STDERR_FILENO, text.data(), text.size());
-        if (end) _exit(1);
+        if (end) end_process(1);
     }
 }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "machine/cpu_occupant.hpp"
 #include "machine/state.hpp"
 #include "text/fault_pages.hpp"
 
@@ -72,8 +73,16 @@ std::string limit_of(const Thread& thread) {
 
 constexpr const char* stopped_and_safe = "; the thread's functions are stopped and its outputs were set to their safe values; see: show thread ";
 
-/// `stopped_ns`: how long the whole process got no CPU time before the event; 0 when it did.
-FaultMessage message_of(const Model& model, const Thread& thread, const FaultEvent& event, std::int64_t stopped_ns) {
+/// "servo: ready to run, but got no CPU time for 105 ms (limit ...) at cycle 7; ...; what to do"
+std::string starved_text(const Thread& thread, std::int64_t starved_ns, int cpu, const std::string& at, const std::string& user) {
+    std::string text = thread.name + ": ready to run, but got no CPU time for " + format_duration(static_cast<double>(starved_ns));
+    if (!user.empty()) text += ": thread " + user + " uses CPU " + std::to_string(cpu);
+    text += limit_of(thread) + at + stopped_and_safe + thread.name + ", start";
+    if (user.empty()) text += "; " + starvation_help(cpu);
+    return text;
+}
+
+FaultMessage message_of(const Model& model, const Thread& thread, const FaultEvent& event, const Absence& absence) {
     const std::string at = " at cycle " + grouped(event.cycle);
     switch (event.code) {
     case HAL_FAULT_EXCEPTION: {
@@ -99,9 +108,11 @@ FaultMessage message_of(const Model& model, const Thread& thread, const FaultEve
                                                         in_function(model, event.subject) + at + "; see: show timing " + thread.name};
     }
     case HAL_FAULT_SILENT_THREAD:
+        if (absence.process_ns == 0 && absence.starved_ns > 0)
+            return {"starved-thread", starved_text(thread, absence.starved_ns, absence.cpu, at, "")};
         return {"hung-thread", thread.name + ": " +
                                    (event.subject != 0 ? "the cycle took " + format_duration(event.value) + in_function(model, event.subject)
-                                    : stopped_ns > 0   ? "the process got no CPU time for " + format_duration(static_cast<double>(stopped_ns)) +
+                                    : absence.process_ns > 0 ? "the process got no CPU time for " + format_duration(static_cast<double>(absence.process_ns)) +
                                                            " (stopped by a signal or a debugger, or the host was busy)"
                                                        : "no cycle for " + format_duration(event.value)) +
                                    limit_of(thread) + at + stopped_and_safe + thread.name + ", start"};
@@ -136,6 +147,9 @@ std::string message_of(const SessionState& s, const Thread& thread, const Stall&
             if (core->id() == id) return "'" + one->name + "'";
         return "a thread that is gone";
     };
+    if (stall.cause == Stall::Cause::starved)
+        return starved_text(thread, stall.silent_ns, stall.cpu, " at cycle " + grouped(stall.cycle),
+                            stall.occupant != 0 ? name_of(stall.occupant) : "");
     const std::string silent = format_duration(static_cast<double>(stall.silent_ns));
     const LoadedFunction* const function = stall.function != 0 ? function_with_id(s.model, stall.function) : nullptr;
     std::string text = thread.name + ": ";
@@ -148,14 +162,12 @@ std::string message_of(const SessionState& s, const Thread& thread, const Stall&
     case busy:
     case waiting:
     case stopped:
-    case starved:
+    case starved:  // is another message
         text += (function ? function_text(*function) + " has not returned, no cycle ended for " : "no cycle ended for ") + silent;
         text += stall.cause == busy      ? ", it uses CPU time (a long computation or an endless loop)"
                 : stall.cause == waiting ? ", it waits in a system call"
-                : stall.cause == stopped ? stall.tracer != 0 ? ", stopped by the debugger with process ID " + std::to_string(stall.tracer)
-                                                             : std::string(", stopped by a signal")
-                                         : ", it gets no CPU time";
-        if (stall.occupant != 0) text += ": thread " + name_of(stall.occupant) + " uses CPU " + std::to_string(stall.cpu);
+                : stall.tracer != 0    ? ", stopped by the debugger with process ID " + std::to_string(stall.tracer)
+                                       : std::string(", stopped by a signal");
         break;
     }
     text += limit_of(thread) + " at cycle " + grouped(stall.cycle);
@@ -198,10 +210,7 @@ void FaultLog::collect(const Thread& thread) {
             again->event = event;
             continue;
         }
-        const bool silent = event.code == HAL_FAULT_SILENT_THREAD && event.subject == 0;
-        const std::int64_t gap_ns =
-            silent ? state_.executor->supervisor().process_gap_ns(event.time_ns, static_cast<std::int64_t>(event.value)) : 0;  // else it may be NaN
-        auto [code, sentence] = message_of(state_.model, thread, event, gap_ns);
+        auto [code, sentence] = message_of(state_.model, thread, event, absence_of(event, *from));
         FaultRecord record;
         record.cycle = event.cycle;
         record.thread = thread.name;
@@ -211,8 +220,20 @@ void FaultLog::collect(const Thread& thread) {
         record.varied = event.varied;
         record.age_ns = event.time_ns;
         if (event.repeats != 0) record.count = event.repeats, record.span_ns = event.last_ns - event.time_ns;
-        add({std::move(record), event});
+        add({std::move(record), event, from->condition(event)});
     }
+}
+
+Absence FaultLog::absence_of(const FaultEvent& event, const Core& core) const {
+    Absence absence;
+    if (event.code != HAL_FAULT_SILENT_THREAD) return absence;  // the value may be NaN
+    Supervisor& supervisor = state_.executor->supervisor();
+    const auto silent_ns = static_cast<std::int64_t>(event.value);
+    absence.cpu = state_.executor->granted(core).cpu;
+    if (event.subject == 0) absence.process_ns = supervisor.process_gap_ns(event.time_ns, silent_ns);
+    const std::int64_t delay_ns = supervisor.run_delay_ns(core);
+    if (10 * delay_ns > 9 * silent_ns) absence.starved_ns = std::min(delay_ns, silent_ns);
+    return absence;
 }
 
 void FaultLog::collect_stalls() {
@@ -223,15 +244,47 @@ void FaultLog::collect_stalls() {
         record.age_ns = stall.time_ns;
         record.cycle = stall.cycle;
         record.thread = of->first->name;
-        record.code = FaultCode("hung-thread").name();
+        const bool starved = stall.cause == Stall::Cause::starved;
+        record.code = (starved ? FaultCode("starved-thread") : FaultCode("hung-thread")).name();
         record.kind = record.code + " " + record.thread;
         record.sentence = message_of(state_, *of->first, stall);
-        add({std::move(record), {}});
+        add({std::move(record), {}, of->second->condition({HAL_FAULT_SILENT_THREAD})});
     }
 }
 
 void FaultLog::close_rows() {
-    for (Row& row : rows_) row.event.code = HAL_FAULT_NONE;
+    for (Row& row : rows_) {
+        row.event.code = HAL_FAULT_NONE;
+        if (!lasts(row)) row.condition = {nullptr, nullptr};  // another instance may begin one at the same address
+    }
+}
+
+bool FaultLog::lasts(const Row& row) const { return state_.executor->board().lasts(row.condition.owner, row.condition.key); }
+
+/// Returns true if no later record has the condition of `row`.
+bool FaultLog::is_newest(const Row& row) const {
+    const auto is_same = [&](const Row& other) {
+        return other.condition.owner == row.condition.owner && other.condition.key == row.condition.key;
+    };
+    return &*std::find_if(rows_.rbegin(), rows_.rend(), is_same) == &row;
+}
+
+void FaultLog::clear() {
+    std::deque<Row> kept;
+    for (const Row& row : rows_)
+        if (lasts(row) && is_newest(row)) kept.push_back(row);
+    rows_ = std::move(kept);
+}
+
+std::vector<FaultRecord> FaultLog::lasting(std::int64_t now_ns) const {
+    std::vector<FaultRecord> records;
+    for (const Row& row : rows_) {
+        if (!lasts(row) || !is_newest(row)) continue;
+        records.push_back(row.record);
+        records.back().age_ns = now_ns - row.record.age_ns;
+        records.back().lasts = true;
+    }
+    return records;
 }
 
 std::vector<FaultRecord> FaultLog::records(std::int64_t now_ns) const {
@@ -239,9 +292,12 @@ std::vector<FaultRecord> FaultLog::records(std::int64_t now_ns) const {
     for (const Row& row : rows_) {
         records.push_back(row.record);
         records.back().age_ns = now_ns - row.record.age_ns;
+        records.back().lasts = lasts(row);
     }
     return records;
 }
+
+std::string FaultRecord::subject() const { return sentence.substr(0, sentence.find(" at cycle ")); }
 
 std::string FaultRecord::line() const {
     if (count == 1) return sentence;

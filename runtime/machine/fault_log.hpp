@@ -16,6 +16,13 @@ struct LoadedFunction;
 struct Model;
 struct Stall;
 
+/// Why a thread could not run while it was silent, as far as it was not its own doing.
+struct Absence {
+    std::int64_t process_ns = 0;  ///< the whole process got no CPU time for so long
+    std::int64_t starved_ns = 0;  ///< the thread was ready to run without running for so long
+    int cpu = -1;                 ///< the thread is bound to; -1: to none
+};
+
 class FaultLog {
 public:
     explicit FaultLog(const SessionState& state) : state_(state) {}
@@ -30,14 +37,21 @@ public:
     bool empty() const { return rows_.empty(); }
     std::uint64_t newest_number() const { return number_; }  ///< 0: there was no fault yet
     const FaultRecord& newest() const { return rows_.back().record; }
-    void clear() { rows_.clear(); }
+    /// Forgets all records except the newest of each condition that lasts.
+    void clear();
+    /// Returns the newest record of each condition that lasts, the oldest first.
+    std::vector<FaultRecord> lasting(std::int64_t now_ns) const;
 
 private:
     struct Row {
         FaultRecord record;      // its age is the time of the first fault
         FaultEvent event;        // the latest; compared with those that follow. HAL_FAULT_NONE: closed
+        Core::Condition condition;  // that may last
     };
+    bool lasts(const Row& row) const;
+    bool is_newest(const Row& row) const;
     void collect_stalls();
+    Absence absence_of(const FaultEvent& event, const Core& core) const;
     void add(Row row);
 
     const SessionState& state_;

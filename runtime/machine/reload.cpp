@@ -50,7 +50,10 @@ bool SessionState::start_replaced(Diagnostics& diagnostics) {
     if (!make_threads(diagnostics) || !end_threads(edit->removed().threads, diagnostics) || !swap(out, diagnostics)) return false;
     for (Edit::Replaced& one : edit->replaced()) {
         one.stopped = true;
-        for (auto it = one.other->instances.rbegin(); it != one.other->instances.rend(); ++it) stop_instance(**it);
+        for (auto it = one.other->instances.rbegin(); it != one.other->instances.rend(); ++it) {
+            stop_instance(**it);
+            end_conditions(**it);
+        }
     }
     for (const Edit::Replaced& one : edit->replaced())
         if (!start(*one.component)) return false;
@@ -67,7 +70,10 @@ void SessionState::restart_replaced(Diagnostics& diagnostics) {
     Diagnostics ignored;
     if (!swap(out, ignored)) return;  // a thread hangs, perhaps in a new one
     for (const Edit::Replaced& one : edit->replaced()) {
-        for (auto it = one.other->instances.rbegin(); it != one.other->instances.rend(); ++it) stop_instance(**it);
+        for (auto it = one.other->instances.rbegin(); it != one.other->instances.rend(); ++it) {
+            stop_instance(**it);
+            end_conditions(**it);
+        }
         for (const auto& instance : one.component->instances) {
             if (instance->started || !one.stopped) continue;
             const Failure why = start_instance(*instance, model, *executor, status, journal.for_plugins());

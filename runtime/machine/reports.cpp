@@ -38,14 +38,19 @@ std::vector<FaultRecord> Reports::faults() const {
 }
 
 std::uint64_t Reports::fault_count() const {
-    const hal_faults& shared = state_.executor->board().shared;
+    const hal_faults& shared = state_.executor->board().shared.faults;
     return __atomic_load_n(&shared.count, __ATOMIC_ACQUIRE) - __atomic_load_n(&shared.cleared, __ATOMIC_ACQUIRE);
 }
 
-void Reports::clear_faults() {
+std::uint64_t Reports::lasting_count() const {
+    return __atomic_load_n(&state_.executor->board().shared.lasting, __ATOMIC_ACQUIRE);
+}
+
+std::vector<FaultRecord> Reports::clear_faults() {
     state_.faults.collect();
-    state_.faults.clear();
     state_.executor->board().clear();
+    state_.faults.clear();
+    return state_.faults.lasting(state_.executor->now_ns());
 }
 
 ThreadReport Reports::thread(const Thread& thread) const {

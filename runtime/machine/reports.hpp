@@ -53,9 +53,12 @@ struct FaultRecord {
     std::int64_t span_ns = 0;            ///< from the first of them to the last
     bool varied = false;                 ///< they have different error numbers
     std::string kind = {};               ///< equal for faults that differ in time, measured value and error number only
+    bool lasts = false;                  ///< its condition is not over: it cannot be acknowledged
 
     /// Returns the sentence and, when there is more than one, the count.
     std::string line() const;
+    /// Returns the sentence up to its cycle: what happened.
+    std::string subject() const;
 };
 
 /// Part of a Session. [setup]
@@ -73,8 +76,10 @@ public:
     std::vector<FaultRecord> faults() const;
     /// Returns the number of faults that are not acknowledged. [any]
     std::uint64_t fault_count() const;
-    /// Acknowledges all faults and forgets their records.
-    void clear_faults();
+    /// Acknowledges all faults whose condition is over, and forgets their records. Returns those that last.
+    std::vector<FaultRecord> clear_faults();
+    /// Returns the number of faults that cannot be acknowledged, because their condition lasts. [any]
+    std::uint64_t lasting_count() const;
 
     /// Returns one line per signal: writer => reader, delay in cycles and the reason; sorted.
     std::vector<std::string> latencies() const;

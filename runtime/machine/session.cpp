@@ -48,7 +48,8 @@ Session::Session(SessionOptions options)
       programs_(std::make_unique<Programs>(*this, *state_)) {
     state_->status.text = status_for_plugins;
     state_->status.data = this;
-    if (!state_->options.check_only) watch_for_crashes(state_.get());
+    if (state_->options.check_only) watch_for_exits();
+    else watch_for_crashes(state_.get());
 }
 
 Session::~Session() {

@@ -36,11 +36,14 @@ namespace hal {
 struct Programs;
 struct SessionState;
 
+class ExitObserver;
+
 struct SessionOptions {
     std::string name = "default";    ///< of the instance; its control socket carries it
     bool virtual_clock = false;      ///< `hal sim`: threads run only in ThreadControl::advance_ns()
     bool check_only = false;         ///< `hal check`: construct, but start nothing
     std::vector<std::string> plugin_path;  ///< searched first
+    ExitObserver* observer = nullptr;      ///< made before the session, and outlives it; nullptr: none
 };
 
 /// Groups of commands that the `lock` command locks; LinuxCNC's names and bits.

@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include "execute/crash_table.hpp"
+#include "machine/crash.hpp"
 
 namespace hal {
 namespace {
@@ -74,7 +75,7 @@ void watch(const SetupGuard::Flags& flags) noexcept {
         print(ends             ? "; outputs set to their safe values; the process ends\n"
               : ending_ns != 0 ? "; the machine ends when it returns, at the latest in 13 s\n"
                                : "; all commands wait for it\n");
-        if (ends) _exit(1);
+        if (ends) end_process(1);
     }
 }
 

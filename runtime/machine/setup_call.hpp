@@ -10,6 +10,8 @@
 #include <memory>
 #include <string>
 
+#include <pthread.h>
+
 #include "execute/core.hpp"
 
 namespace hal {
@@ -20,6 +22,7 @@ struct SetupCallNow {
     std::atomic<const char*> what{""};
     std::atomic<const char*> why{""};
     std::atomic<std::int64_t> expected_ns{0};  ///< duration that the component has announced
+    std::atomic<pthread_t> thread{};        ///< that makes the call
     std::atomic<std::int64_t> since_ns{0};  ///< on the monotonic clock; 0: none
 };
 
@@ -31,6 +34,7 @@ public:
         copy(component, now.component);
         now.what = what;
         now.expected_ns = 0;
+        now.thread = pthread_self();
         now.since_ns.store(monotonic_ns(), std::memory_order_release);
     }
     ~SetupCall() { now.since_ns.store(0, std::memory_order_release); }
@@ -44,6 +48,10 @@ public:
     }
 
     inline static SetupCallNow now;  ///< [any]
+    /// Returns true if the calling thread is in such a call. async-signal-safe
+    static bool is_mine() noexcept {
+        return now.since_ns.load(std::memory_order_acquire) != 0 && pthread_equal(now.thread.load(), pthread_self()) != 0;
+    }
 
 private:
     static void copy(const std::string& from, char (&to)[128]) noexcept {

@@ -76,7 +76,9 @@ struct SessionState {
     void withdraw(Diagnostics* diagnostics = nullptr);
     /// Reports that there is no memory left, and makes some.
     void out_of_memory(Diagnostics& diagnostics);
-    /// One error for a thread that hangs.
+    /// Reports a thread that is ready to run without CPU time. Returns false when it is not one.
+    bool starved_thread(const Thread& thread, const Core& core, Diagnostics& diagnostics) const;
+    /// One error for a thread that hangs or is starved.
     void hung_thread(const Thread& thread, const Core& core, Diagnostics& diagnostics) const;
     /// New values of what threads own, into their queues.
     bool write_values(const Notes<Pin, hal_value>& pins, const Notes<Signal, hal_value>& signals,
@@ -88,11 +90,14 @@ struct SessionState {
     void retire();
     /// The transaction is over: what is no longer in the model is destroyed.
     void close_edit();
+    /// The faults of an instance that was stopped or destroyed do not last any more.
+    void end_conditions(const Instance& instance);
     /// Waits until each thread is between two cycles. False after reporting those that hang.
     bool all_answer(Diagnostics& diagnostics);
 
 private:
     bool swap(const std::unordered_set<const LoadedFunction*>& without, Diagnostics& diagnostics);
+    void describe_functions();
     void keep_values();
     void observe_unknowns(Compiled& compiled);
     void settle(Compiled& compiled, const std::vector<Core*>& silent);
@@ -101,6 +106,8 @@ private:
 
 /// Reports of crashes and escaped exceptions name what `state` knows. nullptr: nothing is known any more.
 void watch_for_crashes(SessionState* state);
+/// Of these, only: a component that ends the process while it is constructed, started or stopped.
+void watch_for_exits();
 
 /// How long a thread may take to answer beyond two of its periods.
 inline constexpr std::int64_t answer_timeout_ns = 1'000'000'000;

@@ -5,6 +5,7 @@
 
 #include "base/keep.hpp"
 #include "machine/construct.hpp"
+#include "machine/exit_observer.hpp"
 #include "machine/state.hpp"
 #include "model/modules.hpp"
 
@@ -25,14 +26,16 @@ bool SessionState::make_threads(Diagnostics& diagnostics) {
         if (Core* const there = core(thread.get())) {
             executor->set_priority(*there, by_rate);
         } else {
-            const CoreOptions wanted{o.period_ns, o.cpu, by_rate, o.policy == Policy::deadline, o.spin_ns, o.budget_ns, o.supervision_limit_ns(),
+            CoreOptions wanted{o.period_ns, o.cpu, by_rate, o.policy == Policy::deadline, o.spin_ns, o.budget_ns, o.supervision_limit_ns(),
                                      o.profile_every, thread->name};
             const ThreadPins pins{&thread->time, &thread->tmax, &thread->tmax_increased, &thread->beat, &thread->missed, &thread->wakeup};
+            if (options.observer) wanted.mark = options.observer->take_mark();
             Core*& place = cores.try_emplace(thread.get(), nullptr).first->second;
             try {
                 place = &executor->add(wanted, pins);
             } catch (const std::runtime_error& e) {
                 cores.erase(thread.get());
+                if (options.observer) options.observer->give_back(wanted.mark);
                 diagnostics.error("thread-refused", thread->made, "thread '" + thread->name + "' cannot be created: " + e.what());
                 return false;
             } catch (const std::bad_alloc&) {
@@ -50,6 +53,7 @@ bool SessionState::end_threads(std::vector<std::unique_ptr<Thread>>& threads, Di
         Thread* const thread = owned.get();
         Core* const leaving = core(thread);
         if (!leaving) continue;
+        const CycleMark* const mark = leaving->mark();
         faults.collect(*thread);
         if (leaving->hung() || !executor->remove(*leaving, answer_timeout_ns)) {
             if (leaving->hung()) {
@@ -59,6 +63,7 @@ bool SessionState::end_threads(std::vector<std::unique_ptr<Thread>>& threads, Di
             diagnostics.error("silent-thread", thread->made, "thread '" + thread->name + "' does not end: one of its functions hangs");
             return false;
         }
+        if (options.observer) options.observer->give_back(mark);
         cores.erase(thread);
         // it writes nothing any more: the session owns what it owned (its last plan's image stays until the swap)
         for (const auto& signal : model.signals) {
@@ -92,7 +97,7 @@ bool SessionState::all_answer(Diagnostics& diagnostics) {
 void SessionState::silent_thread(const Core* hangs, Diagnostics& diagnostics) const {
     for (const auto& [thread, one] : cores)
         if (one == hangs && one->hung()) hung_thread(*thread, *one, diagnostics);
-        else if (one == hangs)
+        else if (one == hangs && !starved_thread(*thread, *one, diagnostics))
             diagnostics.error("silent-thread", thread->made,
                               "thread '" + thread->name + "' did not answer within " +
                                   format_duration(static_cast<double>(answer_timeout_ns)) +
@@ -168,6 +173,7 @@ bool SessionState::swap(const std::unordered_set<const LoadedFunction*>& without
     }
     const std::vector<Core*> silent = executor->swap(offers, answer_timeout_ns);
     settle(compiled, silent);
+    if (options.observer) describe_functions();
     // every thread that answered has begun a cycle since the swap before, so nobody looks into that one's cells any more
     // except for threads of modules' own, which do not answer: while there are any, all cells stay
     const bool own_threads = has_own_threads(model);
@@ -179,6 +185,11 @@ bool SessionState::swap(const std::unordered_set<const LoadedFunction*>& without
     }
     for (const Core* const hangs : silent) silent_thread(hangs, diagnostics);
     return silent.empty();
+}
+
+void SessionState::describe_functions() {
+    for (const auto& [thread, plan] : plans)
+        if (const Core* const of = core(thread)) options.observer->describe(of->mark(), *thread, *plan);
 }
 
 void SessionState::keep_values() {

@@ -8,11 +8,24 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include "machine/cpu_occupant.hpp"
 #include "machine/state.hpp"
 
 namespace hal {
 
+bool SessionState::starved_thread(const Thread& thread, const Core& core, Diagnostics& diagnostics) const {
+    if (!executor->supervisor().starved(core)) return false;
+    const std::string silent = format_duration(static_cast<double>(monotonic_ns() - core.finished_ns()));
+    const int cpu = executor->granted(core).cpu;
+    diagnostics.error("starved-thread", thread.made,
+                      "thread '" + thread.name + "' is ready to run, but has got no CPU time" +
+                          (cpu >= 0 ? " on CPU " + std::to_string(cpu) : "") + " for " + silent,
+                      core.hung() ? "its outputs are at their safe values" : "", starvation_help(cpu));
+    return true;
+}
+
 void SessionState::hung_thread(const Thread& thread, const Core& core, Diagnostics& diagnostics) const {
+    if (starved_thread(thread, core, diagnostics)) return;
     const std::uint32_t id = core.hung_function();
     const LoadedFunction* const function = id != 0 ? function_with_id(model, id) : nullptr;
     const std::string silent = format_duration(static_cast<double>(monotonic_ns() - core.finished_ns()));

@@ -187,16 +187,27 @@ void SessionState::out_of_memory(Diagnostics& diagnostics) {
                       "the machine runs on as it was; 'ulimit -v' and 'ulimit -l' limit a process");
 }
 
+void SessionState::end_conditions(const Instance& instance) {
+    const auto* const first = static_cast<const char*>(instance.memory);
+    const std::size_t size = instance.component->plugin ? instance.component->plugin->instance_size : 0;
+    executor->board().end_all(first, first + size);
+}
+
 // The transaction is over, one way or the other: what is no longer in the model goes.
 void SessionState::close_edit() {
     faults.collect();  // before the plugins whose words they use
     auto& removed = edit->removed();
-    if (!removed.instances.empty() || !edit->replaced().empty())
-        faults.close_rows();  // another instance may soon be where theirs was
-    for (auto it = removed.instances.rbegin(); it != removed.instances.rend(); ++it) destroy_instance(**it);
+    for (auto it = removed.instances.rbegin(); it != removed.instances.rend(); ++it) {
+        destroy_instance(**it);
+        end_conditions(**it);
+    }
     auto& replaced = edit->replaced();
     for (auto one = replaced.rbegin(); one != replaced.rend(); ++one)
-        for (auto it = one->other->instances.rbegin(); it != one->other->instances.rend(); ++it) destroy_instance(**it);
+        for (auto it = one->other->instances.rbegin(); it != one->other->instances.rend(); ++it) {
+            destroy_instance(**it);
+            end_conditions(**it);
+        }
+    if (!removed.instances.empty() || !replaced.empty()) faults.close_rows();  // another instance may soon be where theirs was
     edit.reset();
     auto_orders.clear();
     before.pins.clear();

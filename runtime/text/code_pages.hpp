@@ -149,7 +149,7 @@ inline constexpr CodePage code_pages[] = {
      "A thread has not finished a cycle within its supervision limit (10 periods or 100 ms, whichever is longer; `newthread ... "
      "supervise=TIME`). The supervisor, which runs outside the threads, stopped its functions, wrote the declared safe values and "
      "called the emergency functions of its components. The fault (`show fault`) names the function and why it does not return: it "
-     "uses CPU time (an endless loop), waits in a system call, is stopped by a debugger, or gets no CPU time.\n\n"
+     "uses CPU time (an endless loop), waits in a system call, or is stopped by a debugger. A thread that gets no CPU time is `starved-thread` instead.\n\n"
      "Commands that need a response of the thread (setp, sets, edits, start, stop, delthread, unload) fail with this code while it "
      "hangs; other threads continue. If the function returns, no other function of the thread runs and the outputs stay safe until "
      "`start`. A function that never returns ends only with the process; the exit status of `hal run` is then 1.\n\n"
@@ -172,6 +172,12 @@ inline constexpr CodePage code_pages[] = {
      "unloadrt unloads components from this process. This component is a program of its own: it was started by loadusr, or registered "
      "over the control socket.\n\n"
      "`unloadusr NAME` asks the program to end (SIGTERM). If the program has already ended, it removes the remaining pins."},
+    {"lasting-fault",
+     "`fault clear` acknowledges faults that are over. The condition of these faults lasts: a thread hangs or is stopped, a node is offline, a "
+     "link has no carrier, a cycle still takes too long. They stay faults: `ok` of the component `faults` remains FALSE, and the emergency "
+     "stop chain open. All other faults were acknowledged.\n\n"
+     "`show fault` marks faults that last. Remove the cause (a thread that a fault stopped needs `start`), then type `fault clear` again. The end "
+     "of a condition does not acknowledge its fault."},
     {"linked-set",
      "A linked pin takes its value from its signal, which would overwrite the value of setp in the next cycle.\n\n"
      "Set the signal with sets (if it has no writer), or unlink the pin with unlinkp first."},
@@ -369,6 +375,13 @@ inline constexpr CodePage code_pages[] = {
     {"start-failed",
      "The component could not acquire a resource (a device, a socket, a file) for the reason in the message. The whole edit was "
      "rolled back."},
+    {"starved-thread",
+     "A thread was ready to run, but got no CPU time for its supervision limit (10 periods or 100 ms, whichever is longer; `newthread ... "
+     "supervise=TIME`). Its functions are not the cause: something else uses its CPU, such as a real-time process or thread of a higher "
+     "priority, or the CPU quota of its control group is used up. The functions were stopped and the declared safe values written, as for a "
+     "thread that hangs.\n\n"
+     "The message names the process or thread if it still runs. Move it to another CPU (`taskset -cp CPU PID`), lower its priority, or bind the "
+     "thread to another CPU: `newthread NAME PERIOD cpu=N`. `hal doctor` shows what else delays real-time threads. Then type `start`."},
     {"substitution-too-long",
      "The values that replace `$NAME` and `[SECTION]KEY` in one file exceed 32 MB in total. Probably a value is wrong, or a generated "
      "file contains far too many references."},

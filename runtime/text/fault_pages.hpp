@@ -21,7 +21,7 @@ inline constexpr CodePage fault_pages[] = {
     {"component",
      "A fault that a component raised: a lost node, a sensor out of range, a rejected value. The message names the instance, the cause and "
      "the reaction; the thread continues. `hal doc COMPONENT` describes how to reset the fault.\n\n"
-     "`show fault` lists all faults, `fault clear` acknowledges them. The component `faults` has pins for the safety chain (`ok`, `last-code`)."},
+     "`show fault` lists all faults, `fault clear` acknowledges those that are over. The component `faults` has pins for the safety chain (`ok`, `last-code`)."},
     {"exception",
      "A fault: a function threw an exception in its cycle. No function of its thread runs any more, and the outputs of the thread were "
      "set to their safe values; other threads continue. `start` lets the thread's functions run again. The exit status is then 1.\n\n"

@@ -6,6 +6,7 @@ import os
 import re
 import signal
 import subprocess
+import sys
 import unittest
 from pathlib import Path
 
@@ -173,6 +174,50 @@ class Supervisor(HungCase):
         err = machine.communicate(timeout=120)[1]
         self.assertEqual(1, machine.returncode)
         self.assertIn("(stuck) has not returned from start for 2 s; the machine ends when it returns, at the latest in 13 s\n", err)
+
+    def test_thread_without_cpu_time_is_told_apart_from_one_that_hangs(self):
+        machine = self.machine("policy=other cpu=0")
+        busy = [subprocess.Popen([sys.executable, "-c", "import os\nos.sched_setaffinity(0, {0})\nwhile True: pass"]) for _ in range(3)]
+        for one in busy:
+            self.addCleanup(one.wait)
+            self.addCleanup(one.kill)
+        thread, = (int(task.name) for task in Path(f"/proc/{machine.pid}/task").iterdir() if (task / "comm").read_text().strip() == "servo")
+        os.sched_setscheduler(thread, os.SCHED_IDLE, os.sched_param(0))  # it gets what the others leave
+        wait_until(lambda: "starved-thread" in self.shell("--json", "show", "fault").stdout, "the fault is known")
+        fault = self.faults()
+        self.assertRegex(fault, r"servo: ready to run, but got no CPU time for [\d.]+ m?s \(limit 100 ms\) at cycle [\d ]+; the thread's functions are "
+                         r"stopped and its outputs were set to their safe values; see: show thread servo, start; .* uses CPU 0: move it to another CPU "
+                         r"\(taskset -cp\), or cpu=N of newthread binds the thread to another CPU")
+        self.assertNotIn("(stall)", fault)
+        self.assertEqual("-1", self.value("s.out"))
+        started = self.shell("start")
+        if started.returncode != 0:  # otherwise it has just had a cycle
+            self.assertRegex(started.stderr, r"thread 'servo' is ready to run, but has got no CPU time on CPU 0 for [\d.]+ m?s \[starved-thread\]")
+            self.assertNotIn("does not return", started.stderr)
+        for one in busy:
+            one.kill()
+        os.sched_setscheduler(thread, os.SCHED_OTHER, os.sched_param(0))
+        wait_until(lambda: self.shell("start").returncode == 0 and self.value("s.out") == "5", "it runs again after start")
+
+    def test_hang_that_lasts_is_not_acknowledged(self):
+        path = self.write("a.hal", MACHINE.format(options="") + "loadrt faults\naddf faults slow\nloadrt estop_latch\naddf estop-latch.0 slow\n"
+                          "net ok faults.ok => estop-latch.0.ok-in\n")
+        self.start("run", path)
+        wait_until(lambda: self.value("faults.ok") == "TRUE" or self.shell("fault", "clear"), "no fault of a busy host")
+        self.hang(4, 3000)
+        wait_until(lambda: self.value("faults.ok") == "FALSE", "the safety chain sees it")
+        done = self.shell("fault", "clear")
+        self.assertEqual(0, done.returncode)
+        self.assertRegex(done.stderr, r"warning: 1 fault lasts and is not acknowledged: servo: function 's' \(stall\) has not returned, .* \[lasting-fault\]")
+        self.good("shell", "setp", "estop-latch.0.reset", "TRUE")
+        beat = int(self.value("slow.threadbeat"))
+        wait_until(lambda: int(self.value("slow.threadbeat")) > beat + 3, "the chain had its cycles")
+        self.assertEqual(("FALSE", "FALSE"), (self.value("faults.ok"), self.value("estop-latch.0.ok-out")))
+        wait_until(lambda: "back" in self.events(), "the function returns")
+        self.assertIn("[lasting-fault]", self.shell("fault", "clear").stderr)  # its thread is stopped
+        wait_until(lambda: self.shell("start").returncode == 0, "it runs again")
+        self.assertEqual("FALSE", self.value("faults.ok"))
+        wait_until(lambda: "[lasting-fault]" not in self.shell("fault", "clear").stderr and self.value("faults.ok") == "TRUE", "it is over")
 
     def test_limit_of_its_own(self):
         self.machine("supervise=30ms")

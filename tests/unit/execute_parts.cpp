@@ -16,6 +16,56 @@
 namespace hal::test {
 namespace {
 
+TEST(Core, is_not_late_before_its_first_cycle_is_due) {
+    constexpr std::int64_t now = 6'008'000'000'000;  // the uptime of the host
+    constexpr std::int64_t period = 1'000'000;
+    FaultBoard board;
+    Timeline timeline;
+    const std::atomic<bool> running{false};
+    Core core(1, period, {}, board, timeline, running, true);
+    EXPECT_GT(core.overdue_since_ns(), now);
+    core.expect(now);
+    EXPECT_EQ(core.overdue_since_ns(), now + period);
+    EXPECT_EQ(core.finished_ns(), now);
+    core.begin(now + 10, now + 700'000);
+    EXPECT_EQ(core.overdue_since_ns(), now + 700'000);
+    core.expect(now + 20);
+    EXPECT_EQ(core.overdue_since_ns(), now + 700'000) << "it has begun";
+}
+
+TEST(FaultBoard, keeps_one_fault_for_each_condition_that_lasts) {
+    FaultBoard board;
+    const auto open = [&] { return board.shared.faults.count - board.shared.faults.cleared; };
+    const int owner = 0;
+    const int keys[2]{};
+    board.begin(&owner, &keys[0]);
+    board.begin(&owner, &keys[0]);
+    for (int i = 0; i < 3; ++i) board.count({HAL_FAULT_COMPONENT}, 1);
+    board.clear();
+    EXPECT_EQ(open(), 1u);
+    board.begin(&owner, &keys[1]);
+    board.count({HAL_FAULT_COMPONENT}, 1);
+    board.end(&owner, &keys[0]);
+    EXPECT_EQ(open(), 2u);
+    board.clear();
+    EXPECT_EQ(open(), 1u);
+    EXPECT_TRUE(board.lasts(&owner, &keys[1]));
+    board.end_all(&owner, &owner + 1);
+    EXPECT_FALSE(board.lasts(&owner, &keys[1]));
+    board.clear();
+    EXPECT_EQ(open(), 0u);
+    EXPECT_EQ(board.shared.lasting, 0u);
+}
+
+TEST(FaultBoard, has_room_for_a_limited_number_of_conditions) {
+    FaultBoard board;
+    std::vector<int> keys(FaultBoard::max_lasting + 10);
+    for (const int& key : keys) board.begin(&board, &key);
+    EXPECT_EQ(board.shared.lasting, FaultBoard::max_lasting);
+    for (const int& key : keys) board.end(&board, &key);
+    EXPECT_EQ(board.shared.lasting, 0u);
+}
+
 TEST(Queue, gives_items_back_in_order_and_refuses_when_full) {
     Queue<int> queue(4);
     int out = 0;

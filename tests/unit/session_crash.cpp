@@ -78,6 +78,47 @@ INSTANTIATE_TEST_SUITE_P(In, Crash,
                                                           trap, Death{"5", SIGFPE, "integer division by zero or overflow"})),
                          [](const auto& death) { return std::string(std::get<0>(death.param)) + std::get<1>(death.param).dies; });
 
+struct Exit {
+    const char *dies, *call;
+};
+struct Exits : testing::TestWithParam<std::tuple<const char*, Exit>> {};
+
+TEST_P(Exits, makes_outputs_safe_names_the_function_and_ends_with_a_failure) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+    GTEST_SKIP() << "the sanitizer has these functions itself";
+#endif
+    const auto& [clock, exit] = GetParam();
+    const Result result = run(clock, netlist(exit.dies));
+    EXPECT_TRUE(WIFEXITED(result.status) && WEXITSTATUS(result.status) == 1) << result.status;
+    EXPECT_EQ(std::regex_replace(result.said, std::regex("at cycle [0-9]+;"), "at cycle N;"),
+              std::string("emergency function called\nhal: test-faulty: function 'f.run' called ") + exit.call +
+                  " at cycle N; outputs were set to their safe values; the process ends\n");
+}
+
+INSTANTIATE_TEST_SUITE_P(Of, Exits,
+                         testing::Combine(testing::Values("real", "virtual"),
+                                          testing::Values(Exit{"6", "exit()"}, Exit{"7", "_exit()"}, Exit{"8", "quick_exit()"},
+                                                          Exit{"9", "the system call exit_group"})),
+                         [](const auto& exit) { return std::string(std::get<0>(exit.param)) + std::get<1>(exit.param).dies; });
+
+TEST(A_constructor_that_exits, is_named) {
+    const Result result = run("virtual", "loadrt test-exits in=constructor\n");
+    EXPECT_TRUE(WIFEXITED(result.status) && WEXITSTATUS(result.status) == 1) << result.status;
+    EXPECT_EQ(result.said, "hal: 'test-exits.0' (test-exits) called exit() in its constructor; outputs were set to their safe values; the process ends\n");
+}
+
+TEST(A_start_that_exits, is_named) {
+    const Result result = run("virtual", "loadrt test-exits in=start\n");
+    EXPECT_TRUE(WIFEXITED(result.status) && WEXITSTATUS(result.status) == 1) << result.status;
+    EXPECT_EQ(result.said, "hal: 'test-exits.0' (test-exits) called exit() in start; outputs were set to their safe values; the process ends\n");
+}
+
+TEST(A_helper_thread_that_exits, is_named) {
+    const Result result = run("real", "newthread t 1000000\nloadrt test-exits in=thread\n");
+    EXPECT_TRUE(WIFEXITED(result.status) && WEXITSTATUS(result.status) == 1) << result.status;
+    EXPECT_EQ(result.said, "hal: thread 'helper' called exit() while the machine runs; outputs were set to their safe values; the process ends\n");
+}
+
 TEST(A_process_without_a_fault, ends_quietly) {
     const Result result = run("virtual", netlist("0"));
     EXPECT_TRUE(WIFEXITED(result.status) && WEXITSTATUS(result.status) == 0) << result.status;

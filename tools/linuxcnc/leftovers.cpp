@@ -143,7 +143,7 @@ void adopt_orphans() { ::prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0); }
 std::vector<Child> children() {
     std::vector<Child> all;
     for (const Process& process : processes())
-        if (process.parent == ::getpid()) all.push_back({process.pid, process.name, process.state == 'Z'});
+        if (process.parent == ::getpid() && process.name != "hal-observer") all.push_back({process.pid, process.name, process.state == 'Z'});
     return all;
 }
 

@@ -14,9 +14,9 @@ constexpr std::int64_t storm_ns = 3'000'000'000;
 
 /// The detail is the sentence up to its cycle; a cycle that took too long has only measured values, and no detail.
 MessageSubject subject_of(const FaultRecord& record) {
-    const bool measured = record.code == "overrun" || record.code == "budget" || record.code == "hung-thread";
+    const bool measured = record.code == "overrun" || record.code == "budget" || record.code == "hung-thread" || record.code == "starved-thread";
     if (measured) return {record.code + " " + record.thread};
-    return {record.kind, record.sentence.substr(0, record.sentence.find(" at cycle "))};
+    return {record.kind, record.subject()};
 }
 
 std::string text_of(const FaultRecord& record) {

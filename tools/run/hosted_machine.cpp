@@ -16,8 +16,9 @@ namespace hal::tools {
 
 namespace {
 
-SessionOptions session_options(const std::string& name, bool virtual_clock) {
+SessionOptions session_options(const std::string& name, bool virtual_clock, ExitObserver* observer) {
     SessionOptions options;
+    options.observer = observer;
     options.name = name;
     options.virtual_clock = virtual_clock;
     return options;
@@ -86,7 +87,8 @@ std::string own_name(const NetlistOptions& options) {
 }
 
 HostedMachine::HostedMachine(const NetlistOptions& options, const std::string& name, bool virtual_clock)
-    : session(session_options(name, virtual_clock)), shell(session, shell_options(options)), options_(options) {
+    : observer_(virtual_clock ? nullptr : std::make_unique<ExitObserver>(name)),
+      session(session_options(name, virtual_clock, observer_.get())), shell(session, shell_options(options)), options_(options) {
     export_variables(options, name);
     if (!virtual_clock)  // a machine that is stopped from the terminal would leave its outputs as they are
         for (const int number : {SIGTSTP, SIGTTIN, SIGTTOU}) std::signal(number, SIG_IGN);
@@ -100,6 +102,7 @@ HostedMachine::HostedMachine(const NetlistOptions& options, const std::string& n
 
 HostedMachine::~HostedMachine() {
     shut_down();
+    ExitObserver::silence();  // outputs are safe: a second Ctrl-C ends the process at once from here on
     stop.release();  // it calls the shell, which goes now
     server_.reset();
 }

@@ -10,6 +10,7 @@
 #include "commands/shell.hpp"
 #include "control/server.hpp"
 #include "machine/cycle_guard.hpp"
+#include "machine/exit_observer.hpp"
 #include "machine/session.hpp"
 #include "machine/setup_call.hpp"
 #include "run/netlist_options.hpp"
@@ -38,6 +39,9 @@ public:
     /// Returns true when a fault has stopped a thread, or a thread has hung.
     bool faulted();
 
+private:
+    std::unique_ptr<ExitObserver> observer_;  // before the first thread of the process, and after the session
+public:
     StopRequest stop;
     Session session;
     Shell shell;

@@ -17,6 +17,7 @@
 #include "canopen_arguments.hpp"
 #include "fault_messages.hpp"
 #include "hal/component.hpp"
+#include "hal/lasting_fault.hpp"
 #include "hal/naming.hpp"
 #include "hal/path_delay.hpp"
 #include "hal/setup_time.hpp"
@@ -49,6 +50,10 @@ public:
             objects_->declare(*this, by_index() ? "" : config_.nodes[s.node].name + ".", s.to_node, *s.object, i);
         }
         for (const Received& r : runner_->own().received) pdo_messages_.emplace_back(config_.nodes[r.node], *r.pdo);
+        node_faults_.resize(nodes_.size());
+        late_faults_.resize(pdo_messages_.size());
+        short_faults_.resize(pdo_messages_.size());
+        srdo_faults_.resize(runner_->own().srdos.size());
         safety_.emplace(*this, shows, *runner_);
         own_id_message_ = "duplicate node ID " + std::to_string(config_.node_id) +
                           ": another device has the node ID of the master; change one: node-id in [bus], or masternodeid=";
@@ -98,9 +103,10 @@ public:
         if (period_ != cycle.period_ns()) {
             period_ = cycle.period_ns();
             if (config_.sync == config::SyncMode::cycle) reporter_->cycle(period_);
+            period_fault_.end(faults_, this);
             if (config_.sync == config::SyncMode::timed && config_.sync_period % period_ != 0)
-                raise("the SYNC period is not a multiple of the thread's period; SYNCs are up to half a period early or late",
-                      not_a_number);
+                period_fault_.begin(faults_, this,
+                                    "the SYNC period is not a multiple of the thread's period; SYNCs are up to half a period early or late");
         }
         now_ = now;
         unheard_ = 0;
@@ -115,6 +121,7 @@ public:
         for (std::size_t n = 0; n < nodes_.size(); ++n) nodes_[n].show(*runner_, n, now);
         objects_->show(*runner_);
         safety_->show(*runner_, now);
+        end_faults(now);
     }
 
     void transmit(hal::Cycle cycle) noexcept {
@@ -178,19 +185,35 @@ private:
     void follow(Time now) noexcept {
         switch (follower_->cycle(*runner_, now, period_)) {
         case SyncFollower::Notice::lost:
-            raise("followed SYNC missing for {} s; threads run on their own clock until it returns",
-                  follower_->silence(now));
+            sync_fault_.begin(faults_, this, "followed SYNC missing for {} s; threads run on their own clock until it returns",
+                              follower_->silence(now));
             break;
         case SyncFollower::Notice::in_vain:
-            raise("SYNC feedback loop: this machine produces the SYNC its own threads follow; write clock = own in the configuration",
-                  not_a_number);
+            sync_fault_.begin(
+                faults_, this,
+                "SYNC feedback loop: this machine produces the SYNC its own threads follow; write clock = own in the configuration");
             break;
         case SyncFollower::Notice::unequal:
-            raise("cannot follow the SYNC: its period is not a multiple of the thread's; change the thread's period, or write clock = own",
-                  not_a_number);
+            sync_fault_.begin(
+                faults_, this,
+                "cannot follow the SYNC: its period is not a multiple of the thread's; change the thread's period, or write clock = own");
             break;
-        case SyncFollower::Notice::nothing: break;
+        case SyncFollower::Notice::nothing:
+            if (sync_fault_.lasts() && follower_->locked()) sync_fault_.end(faults_, this);
+            break;
         }
+    }
+
+    /// Ends the faults whose end is no event: what is received again, and what has not been repeated. [realtime]
+    void end_faults(Time now) noexcept {
+        constexpr Time repeated_within = 2 * second;
+        if (foreign_fault_.lasts() && now - foreign_seen_ > repeated_within) foreign_fault_.end(faults_, this);
+        if (own_id_fault_.lasts() && now - own_id_seen_ > repeated_within) own_id_fault_.end(faults_, this);
+        for (std::size_t n = 0; n < late_faults_.size(); ++n)
+            if (late_faults_[n].lasts() && !runner_->device().pdos().rpdo(runner_->own().received[n].number).late)
+                late_faults_[n].end(faults_, this);
+        for (std::size_t n = 0; n < srdo_faults_.size(); ++n)
+            if (srdo_faults_[n].lasts() && runner_->srdo(n).valid) srdo_faults_[n].end(faults_, this);
     }
 
     void raise(const char* reason, double detail) noexcept {
@@ -207,13 +230,13 @@ private:
             pins.losses = s.losses;
             pins.is_faulty = true;
             switch (s.cause) {
-            case Cause::guarding: raise(w.guarding.c_str(), silence); break;
-            case Cause::guard_toggle: raise(w.toggle.c_str(), not_a_number); break;
-            case Cause::boot_up: raise((s.foreign_command != 0 ? w.reset : w.rebooted).c_str(), not_a_number); break;
-            case Cause::left_operational: raise((s.foreign_command != 0 ? w.commanded : w.left).c_str(), not_a_number); break;
-            case Cause::not_started: raise(w.not_started.c_str(), not_a_number); break;
-            case Cause::duplicate_id: raise(w.duplicate.c_str(), not_a_number); break;
-            default: raise(w.no_heartbeat.c_str(), silence); break;
+            case Cause::guarding: node_fault(place, w.guarding, silence); break;
+            case Cause::guard_toggle: node_fault(place, w.toggle); break;
+            case Cause::boot_up: node_fault(place, s.foreign_command != 0 ? w.reset : w.rebooted); break;
+            case Cause::left_operational: node_fault(place, s.foreign_command != 0 ? w.commanded : w.left); break;
+            case Cause::not_started: node_fault(place, w.not_started); break;
+            case Cause::duplicate_id: node_fault(place, w.duplicate); break;
+            default: node_fault(place, w.no_heartbeat, silence); break;
             }
             reporter_->node(s);
             return;
@@ -222,7 +245,7 @@ private:
         const bool failed = given_up && s.result != BootResult::none && !booted(s.result);
         if (given_up && s.cause == Cause::not_started && !pins.is_faulty) {
             pins.is_faulty = true;
-            raise(w.not_started.c_str(), not_a_number);
+            node_fault(place, w.not_started);
             reporter_->node(s);
         } else if (failed && !pins.is_faulty) {
             const NodeSetup& setup = config_.nodes[place].setup;
@@ -231,15 +254,23 @@ private:
             if (absent && (!setup.mandatory || now_ - runner_->network().begun < setup.boot_limit)) return;
             pins.is_faulty = true;
             const std::string& why = s.cause == Cause::duplicate_id ? w.duplicate : w.boot[(static_cast<std::size_t>(s.result) - 'A') & 15];
-            raise(why.c_str(), not_a_number);
+            node_fault(place, why);
             reporter_->node(s);
         } else if (s.step == Step::running && pins.is_faulty) {
             reporter_->node(s);
         }
-        if (s.step == Step::running) tell_notes(place, s);
-        if (s.step == Step::running)
-            for (std::size_t n = 0; n < pdo_messages_.size(); ++n)
-                if (runner_->own().received[n].node == place) pdo_messages_[n].short_raised = false;
+        if (s.step != Step::running) return;
+        node_faults_[place].end(faults_, this);
+        tell_notes(place, s);
+        for (std::size_t n = 0; n < pdo_messages_.size(); ++n) {
+            if (runner_->own().received[n].node != place) continue;
+            pdo_messages_[n].short_raised = false;
+            short_faults_[n].end(faults_, this);
+        }
+    }
+    /// A fault of a node lasts until it runs again. [realtime]
+    void node_fault(std::size_t place, const std::string& reason, double detail = not_a_number) noexcept {
+        node_faults_[place].begin(faults_, this, reason.c_str(), detail);
     }
     /// Reports each note about a node once, a suspected duplicate node ID after each boot.
     void tell_notes(std::size_t place, const NodeStatus& s) noexcept {
@@ -258,23 +289,34 @@ private:
     }
     void on_emergency(std::size_t place, const Emergency& e) noexcept override { reporter_->emergency(runner_->status(place), e); }
     void on_late(std::size_t place) noexcept override {
-        raise(pdo_messages_[place].late.c_str(), static_cast<double>(runner_->own().received[place].pdo->limit) * 1e-9);
+        const double timeout_s = static_cast<double>(runner_->own().received[place].pdo->limit) * 1e-9;
+        late_faults_[place].begin(faults_, this, pdo_messages_[place].late.c_str(), timeout_s);
     }
     void on_short(std::size_t place, unsigned bytes) noexcept override {
-        if (!std::exchange(pdo_messages_[place].short_raised, true)) raise(pdo_messages_[place].short_pdo.c_str(), bytes);
+        if (!std::exchange(pdo_messages_[place].short_raised, true))
+            short_faults_[place].begin(faults_, this, pdo_messages_[place].short_pdo.c_str(), bytes);
     }
     void on_foreign(const Foreign& f) noexcept override {
-        if (f.begins && f.sync) raise("another device also produces SYNC; nodes act on both", not_a_number);
-        if (f.begins && f.rpdo) raise("another device also sends RPDO {x} of a node of this master; the node follows both", f.id);
+        if (f.sync || f.rpdo) foreign_seen_ = now_;
+        if (f.begins && f.sync) foreign_fault_.begin(faults_, this, "another device also produces SYNC; nodes act on both");
+        if (f.begins && f.rpdo)
+            foreign_fault_.begin(faults_, this, "another device also sends RPDO {x} of a node of this master; the node follows both", f.id);
         reporter_->foreign(f);
     }
-    void on_own_id_collision() noexcept override { raise(own_id_message_.c_str(), not_a_number); }
-    void on_srdo_fault(std::size_t place, SrdoFault fault) noexcept override { raise(safety_->words(place, fault), not_a_number); }
+    void on_own_id_collision() noexcept override {
+        own_id_seen_ = now_;
+        own_id_fault_.begin(faults_, this, own_id_message_.c_str());
+    }
+    void on_srdo_fault(std::size_t place, SrdoFault fault) noexcept override {
+        srdo_faults_[place].begin(faults_, this, safety_->words(place, fault));
+    }
     void on_bus_state(hal::can::State state) noexcept override {
         if (state == hal::can::State::bus_off)
-            raise("bus off: too many errors; the master retries", not_a_number);
-        if (state == hal::can::State::down && runner_->had_bus())
-            raise("bus down: the interface is off or was removed; the master retries", not_a_number);
+            bus_fault_.begin(faults_, this, "bus off: too many errors; the master retries");
+        else if (state == hal::can::State::down && runner_->had_bus())
+            bus_fault_.begin(faults_, this, "bus down: the interface is off or was removed; the master retries");
+        else if (state != hal::can::State::down)
+            bus_fault_.end(faults_, this);
         reporter_->bus(state, runner_->had_bus());
     }
     void on_rejected(const hal::can::Rejected& what) noexcept override { reporter_->rejected(what); }
@@ -307,6 +349,9 @@ private:
     std::unique_ptr<SharedLink>  link_;
     const hal_faults*            faults_ = nullptr;
     hal::SetupTime               setup_time_;
+    std::vector<hal::LastingFault> node_faults_, late_faults_, short_faults_, srdo_faults_;  // as nodes, received PDOs and SRDOs
+    hal::LastingFault            period_fault_, sync_fault_, bus_fault_, foreign_fault_, own_id_fault_;
+    Time                         foreign_seen_ = 0, own_id_seen_ = 0;
     std::vector<std::uint8_t>    reported_notes_;  // bits of NodeStatus::notes, by node
     Time                         period_ = 0, now_ = 0;
     Time                         unsent_ = 0, unheard_ = 0;  // time since transmit, since receive

@@ -5,6 +5,7 @@
 
 #include "cia402/axis.hpp"
 #include "hal/component.hpp"
+#include "hal/lasting_fault.hpp"
 #include "hal/limit.hpp"
 
 namespace {
@@ -158,8 +159,8 @@ struct Cia402 : hal::Component {
         active = axis_.active();
         fault = axis_.fault();
         const Failure& failure = axis_.failure();
-        if (faults_ != nullptr && failure && failure.cause != reported_)
-            faults_->raise(faults_, this, made_.find(failure), Sentences::number(failure));
+        if (failure && failure.cause != reported_) fault_record_.begin(faults_, this, made_.find(failure), Sentences::number(failure));
+        else if (!failure && fault_record_.lasts()) fault_record_.end(faults_, this);
         reported_ = failure.cause;
         fault_code = static_cast<std::uint32_t>(failure.cause);
         failed_step = static_cast<std::uint32_t>(failure.step);
@@ -211,6 +212,7 @@ private:
     }
 
     const hal_faults* faults_ = nullptr;
+    hal::LastingFault fault_record_;
     const Sentences& made_ = sentences();
     Axis axis_;
     AxisRules rules_;

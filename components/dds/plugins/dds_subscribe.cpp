@@ -8,6 +8,7 @@
 
 #include "dds/topic_connection.hpp"
 #include "dds/field_pins.hpp"
+#include "hal/lasting_fault.hpp"
 #include "hal/queue.hpp"
 
 namespace {
@@ -60,8 +61,9 @@ public:
         const bool good = have_ && silence <= timeout_;
         if (!good && valid) {
             fields_.make_safe();
-            if (faults_ != nullptr) faults_->raise(faults_, this, stale_text_.c_str(), static_cast<double>(silence) * 1e-9);
+            stale_fault_.begin(faults_, this, stale_text_.c_str(), static_cast<double>(silence) * 1e-9);
         }
+        if (good && stale_fault_.lasts()) stale_fault_.end(faults_, this);
         valid = good;
         state_.store(!have_ ? State::waiting : good ? State::valid : State::stale, std::memory_order_relaxed);
         matched = connection_.matched();
@@ -71,8 +73,8 @@ public:
         const std::uint64_t others = others_.load(std::memory_order_relaxed);
         if (others != others_seen_) others_seen_ = others, second_until_ = now + second;
         const bool with_other = now < second_until_;
-        if (with_other && !second_writer && exclusive_ && faults_ != nullptr)
-            faults_->raise(faults_, this, second_text_.c_str(), std::numeric_limits<double>::quiet_NaN());
+        if (with_other && !second_writer && exclusive_) second_fault_.begin(faults_, this, second_text_.c_str());
+        if (!with_other && second_fault_.lasts()) second_fault_.end(faults_, this);
         second_writer = with_other;
         ignored = ignored_.load(std::memory_order_relaxed);
         flood = flood_.load(std::memory_order_relaxed);
@@ -220,6 +222,7 @@ private:
 
     // The cycle's
     const hal_faults* faults_ = nullptr;
+    hal::LastingFault stale_fault_, second_fault_;
     std::int64_t      timeout_ = 0, seen_ = 0, transit_ = 0;
     bool              have_ = false;
     std::uint64_t     others_seen_ = 0;

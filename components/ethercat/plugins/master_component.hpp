@@ -28,6 +28,7 @@
 #include "hal/clock.hpp"
 #include "hal/component.hpp"
 #include "hal/discipline.hpp"
+#include "hal/lasting_fault.hpp"
 #include "hal/naming.hpp"
 #include "hal/reporter.hpp"
 
@@ -111,6 +112,8 @@ public:
         if (!simulated_) master_->set_epoch(since_2000_ns() - hal::monotonic_ns());
         period_reported_ = was_fresh_ = unknown_raised_ = false;
         failed_.assign(bus_.setup.slaves.size(), Event::slave_operational);
+        slave_faults_.resize(bus_.setup.slaves.size());
+        clock_faults_.resize(bus_.setup.slaves.size());
         unsent_ = unreceived_ = apart_ = 0;
         interrupted_.store(false);
         filter_ = config::EventFilter(bus_.setup.slaves.size());
@@ -138,9 +141,12 @@ public:
         if (!master_ || !fits(cycle)) return;
         unreceived_ = 0;
         receiver_.store(pthread_self(), std::memory_order_relaxed);
-        if (++unsent_ == tolerated_cycles) raise(no_transmit_words_);
+        if (unreceived_fault_.lasts()) unreceived_fault_.end(faults_, this);
+        if (++unsent_ == tolerated_cycles) begin(unsent_fault_, no_transmit_words_);
+        now_ns_ = cycle.start_ns();
         master_->receive(cycle.start_ns());
         if (interrupted_.exchange(false, std::memory_order_acquire)) resume();
+        end_faults();
         follow(cycle);
         bus_pins_.show(master_->status(), master_->cycles_incomplete());
         for (std::size_t n = 0; n < slaves_.size(); ++n) slaves_[n].show(master_->slave_status(n), emergencies_->of(n));
@@ -152,9 +158,11 @@ public:
     void transmit(hal::Cycle cycle) noexcept {
         if (!master_ || !fits(cycle)) return;
         unsent_ = 0;
-        if (++unreceived_ == tolerated_cycles) raise(no_receive_words_);
+        if (unsent_fault_.lasts()) unsent_fault_.end(faults_, this);
+        if (++unreceived_ == tolerated_cycles) begin(unreceived_fault_, no_receive_words_);
         apart_ = receiver_.load(std::memory_order_relaxed) == pthread_self() ? 0 : apart_ + 1;
-        if (apart_ == tolerated_cycles) raise(apart_words_);
+        if (apart_ == tolerated_cycles) begin(apart_fault_, apart_words_);
+        else if (apart_ == 0 && apart_fault_.lasts()) apart_fault_.end(faults_, this);
         if (unreceived_ > 2 || apart_ > 2) return;  // outputs must not move without their inputs
         // The thread was declared hung, but its cycle goes on.
         if (interrupted_.load(std::memory_order_acquire)) return;
@@ -213,8 +221,11 @@ private:
 
     /// Returns whether the thread has the period of the configuration; otherwise nothing is exchanged. [realtime]
     bool fits(hal::Cycle cycle) noexcept {
-        if (cycle.period_ns() == bus_.setup.cycle_ns) return true;
-        if (!std::exchange(period_reported_, true)) raise(period_words_, static_cast<double>(cycle.period_ns()) * 1e-3);
+        if (cycle.period_ns() == bus_.setup.cycle_ns) {
+            if (period_fault_.lasts()) period_fault_.end(faults_, this);
+            return true;
+        }
+        if (!std::exchange(period_reported_, true)) begin(period_fault_, period_words_, static_cast<double>(cycle.period_ns()) * 1e-3);
         return false;
     }
     /// Returns the time of the clocks of the slaves: ns since 2000-01-01. [setup]
@@ -254,8 +265,46 @@ private:
         primary_->send(frame.finish(), {}, simulated_ ? hal::ethernet::unclocked : hal::monotonic_ns());
     }
 
-    void raise(const std::string& reason, double detail = not_a_number) noexcept {
-        if (faults_ != nullptr) faults_->raise(faults_, this, reason.c_str(), detail);
+    void begin(hal::LastingFault& fault, const std::string& reason, double detail = not_a_number) noexcept {
+        fault.begin(faults_, this, reason.c_str(), detail);
+    }
+
+    /// Raises and ends the faults of a slave, which last until it is operational. [realtime]
+    void slave_event(Event event, std::uint32_t slave, std::int64_t first, std::int64_t second) noexcept {
+        if (event == Event::slave_lost) begin(slave_faults_[slave], lost_words_[slave]);
+        if (event == Event::fell_back) begin(slave_faults_[slave], left_words_[slave], static_cast<double>(second));
+        if (event == Event::dc_lost) begin(clock_faults_[slave], clock_words_[slave], static_cast<double>(first) * 1e-3);
+        if (event == Event::dc_recovered) clock_faults_[slave].end(faults_, this);
+        const std::string* const reason = start_words(event, slave);
+        if (reason != nullptr && failed_[slave] != event) {  // not at each try
+            begin(slave_faults_[slave], *reason);
+            failed_[slave] = event;
+        }
+        if (event == Event::slave_settled) failed_[slave] = Event::slave_operational;
+        if (event != Event::slave_operational) return;
+        failed_[slave] = event;
+        slave_faults_[slave].end(faults_, this);
+        clock_faults_[slave].end(faults_, this);
+    }
+
+    /// Raises and ends the faults of the bus. [realtime]
+    void bus_event(Event event, std::int64_t first) noexcept {
+        if (event == Event::unknown_slave && !std::exchange(unknown_raised_, true)) begin(unknown_fault_, unknown_words_);
+        if (event == Event::scanned) unknown_raised_ = false;
+        if (event == Event::no_slaves) begin(nobody_fault_, nobody_words_);
+        if (event == Event::scanned && first > 0) nobody_fault_.end(faults_, this);
+        if (event == Event::link_lost && first == 0) begin(link_fault_, link_words_);
+        if (event == Event::link_restored && first == 0) link_fault_.end(faults_, this);
+        if (event == Event::other_master) {
+            begin(other_fault_, other_words_);
+            other_seen_ns_ = now_ns_;
+        }
+    }
+
+    /// Ends the faults whose end is no event. [realtime]
+    void end_faults() noexcept {
+        constexpr std::int64_t repeated_within_ns = 3'000'000'000;
+        if (other_fault_.lasts() && now_ns_ - other_seen_ns_ > repeated_within_ns) other_fault_.end(faults_, this);
     }
 
     /// Returns why a slave is not started; nullptr: the event is another one. [realtime]
@@ -278,20 +327,8 @@ private:
         const bool named = slave < slaves_.size();
         if (event == Event::scanned || event == Event::topology_changed || event == Event::slave_returned || event == Event::slave_lost)
             slaves_changed_ = true;
-        if (event == Event::slave_lost && named) raise(lost_words_[slave]);
-        if (event == Event::fell_back && named) raise(left_words_[slave], static_cast<double>(second));
-        if (event == Event::dc_lost && named) raise(clock_words_[slave], static_cast<double>(first) * 1e-3);
-        if (named) {
-            const std::string* words = start_words(event, slave);
-            if (words != nullptr && failed_[slave] != event) raise(*words), failed_[slave] = event;  // not at each try
-            const bool started = event == Event::slave_operational || event == Event::slave_settled;
-            if (started) failed_[slave] = Event::slave_operational;
-        }
-        if (event == Event::unknown_slave && !std::exchange(unknown_raised_, true)) raise(unknown_words_);
-        if (event == Event::scanned) unknown_raised_ = false;
-        if (event == Event::no_slaves) raise(nobody_words_);
-        if (event == Event::link_lost && first == 0) raise(link_words_);
-        if (event == Event::other_master) raise(other_words_);
+        if (named) slave_event(event, slave, first, second);
+        bus_event(event, first);
     }
 
     const std::string       name_ = hal::own_name(Names::own);
@@ -339,6 +376,10 @@ private:
         return config::event_words(h, bus_.setup, bus_.link, bus_.backup, bus_.lcec ? config::Format::lcec : config::Format::ethercat);
     }, 256, [](const config::Happened& h, const std::string&) { return config::subject(h); }};
     const hal_faults*                      faults_ = nullptr;
+    std::vector<hal::LastingFault>         slave_faults_, clock_faults_;  // by slave
+    hal::LastingFault                      unsent_fault_, unreceived_fault_, apart_fault_, period_fault_, unknown_fault_, nobody_fault_,
+        link_fault_, other_fault_;
+    std::int64_t                           now_ns_ = 0, other_seen_ns_ = 0;
     bool                                   unknown_raised_ = false, was_fresh_ = false, simulated_ = false, period_reported_ = false;
 };
 

@@ -2,10 +2,13 @@
 // Does in its cycle, on demand, what a component must not do.
 #include <chrono>
 #include <csignal>
+#include <cstdlib>
 #include <mutex>
+#include <sys/syscall.h>
 #include <unistd.h>
 
 #include "hal/component.hpp"
+#include "hal/lasting_fault.hpp"
 
 namespace {
 
@@ -19,7 +22,8 @@ struct Faulty : hal::Component {
     hal::In<bool> locks{*this, "locks", "take a mutex"};
     hal::In<bool> sleeps{*this, "sleeps", "sleep"};
     hal::In<bool> raises{*this, "raises", "a fault of its own"};
-    hal::In<std::uint32_t> dies{*this, "dies", "1 bad address, 2 abort, 3 endless recursion, 4 illegal instruction, 5 floating-point signal"};
+    hal::In<bool> open{*this, "open", "a fault that lasts"};
+    hal::In<std::uint32_t> dies{*this, "dies", "1 bad address, 2 abort, 3 endless recursion, 4 illegal instruction, 5 floating-point signal, 6 exit(0), 7 _exit(0), 8 quick_exit(0), 9 syscall(), 10 the instruction"};
     hal::Out<double> value{*this, "value", "the number of the run", {.safe = -5.0, .finite = true}};
     hal::Out<bool> on{*this, "on", "TRUE", {.safe = false}};
     hal::Function run{*this, "run", &Faulty::misbehave, "misbehaves"};
@@ -37,6 +41,8 @@ struct Faulty : hal::Component {
         if (bad_number) value = std::nan("");
         if (throws) throw std::runtime_error("thrown in a cycle");
         if (raises) faults_->raise(faults_, this, "a finger in the gear", 3.0);
+        if (open && !cover_.lasts()) cover_.begin(faults_, this, "the cover is open");
+        if (!open && cover_.lasts()) cover_.end(faults_, this);
         if (allocates) {
             std::string text(1000, 'x');
             keep(text.data());
@@ -74,10 +80,26 @@ private:
         case 2: std::abort();
         case 3: keep(reinterpret_cast<void*>(static_cast<std::intptr_t>(deeper(0)))); break;
         case 4: __builtin_trap();
+        case 6: std::exit(0);
+        case 7: ::_exit(0);
+        case 8: std::quick_exit(0);
+        case 9: ::syscall(SYS_exit_group, 0); break;
+        case 10: exit_by_instruction();
         default: raise(SIGFPE);
         }
     }
+    [[noreturn]] static void exit_by_instruction() noexcept {
+#if defined(__x86_64__)
+        asm volatile("syscall" : : "a"(SYS_exit_group), "D"(0) : "rcx", "r11", "memory");
+#elif defined(__aarch64__)
+        register long number asm("x8") = SYS_exit_group;
+        register long status asm("x0") = 0;
+        asm volatile("svc 0" : : "r"(number), "r"(status) : "memory");
+#endif
+        __builtin_trap();
+    }
     const hal_faults* faults_ = nullptr;
+    hal::LastingFault cover_;
     std::mutex mutex_;
     char* taken_ = nullptr;
 };

@@ -61,6 +61,8 @@ public:
         rate_ = beat_.rate() * 1e6;
         return notice;
     }
+    /// Returns true while the threads follow the SYNC of another device. [realtime]
+    bool locked() const noexcept { return beat_.locked(); }
     /// Returns the time since the newest SYNC in s. [realtime]
     double silence(Time now) const noexcept { return static_cast<double>(now - came_) * 1e-9; }
 

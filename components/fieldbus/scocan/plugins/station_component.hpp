@@ -13,6 +13,7 @@
 #include "discipline/slot_exchange.hpp"
 #include "event_words.hpp"
 #include "hal/component.hpp"
+#include "hal/lasting_fault.hpp"
 #include "hal/discipline.hpp"
 #include "hal/naming.hpp"
 #include "hal/reporter.hpp"
@@ -86,7 +87,10 @@ public:
     void receive(hal::Cycle cycle) noexcept {
         if (!link_) return;
         now_ = cycle.start_ns();
-        if (pins_.reset && !was_reset_) station_->reset(), pins_.fault = false;
+        if (pins_.reset && !was_reset_) {
+            station_->reset();
+            recover();
+        }
         was_reset_ = pins_.reset;
         if (interrupted_.exchange(false, std::memory_order_acquire)) restart();
         station_->receive(now_);
@@ -134,16 +138,22 @@ protected:
     }
     void on_event(Event e, std::uint32_t who, std::uint32_t id, Time value) noexcept override {
         reporter_->tell({e, who, id, value});
-        if (e == Event::running || e == Event::table_agrees || e == Event::bus_on || e == Event::monitor_found) pins_.fault = false;
+        if (e == Event::running || e == Event::table_agrees || e == Event::bus_on || e == Event::monitor_found) recover();
         const char* text = faults_text_->of(e, id);
         if (text == nullptr) return;
         pins_.fault = true;
         Time& last = raised_[static_cast<std::size_t>(e)];
-        if (last != std::numeric_limits<Time>::min() && now_ - last < 1'000'000'000) return;  // one a second of each kind
+        if (last != std::numeric_limits<Time>::min() && now_ - last < 1'000'000'000 && fault_.lasts())
+            return;  // one a second of each kind
         last = now_;
         const bool counts = std::strstr(text, "{}") != nullptr;
-        if (faults_ != nullptr)
-            faults_->raise(faults_, this, text, counts ? static_cast<double>(value) : std::numeric_limits<double>::quiet_NaN());
+        fault_.begin(faults_, this, text, counts ? static_cast<double>(value) : std::numeric_limits<double>::quiet_NaN());
+    }
+
+    /// The fault is over. [realtime]
+    void recover() noexcept {
+        pins_.fault = false;
+        fault_.end(faults_, this);
     }
 
     /// Begins anew after the thread was stopped. [realtime]
@@ -186,6 +196,7 @@ protected:
     hal::DisciplinedClock                    clock_;
     hal::Discipline                          discipline_;
     const hal_faults*                        faults_ = nullptr;
+    hal::LastingFault                        fault_;
     std::array<Time, 32>                     raised_{};
     std::uint64_t                            followed_ = 0;
     Time                                     now_ = 0;

@@ -19,6 +19,7 @@
 #include "fieldbus/tdma/tunnel/tap.hpp"
 #include "hal/background.hpp"
 #include "hal/component.hpp"
+#include "hal/lasting_fault.hpp"
 #include "hal/discipline.hpp"
 #include "hal/naming.hpp"
 #include "hal/texts.hpp"
@@ -115,7 +116,6 @@ public:
         const bool fits = is_cycle(cycle);
         if (!fits && !period_reported_) {
             period_reported_ = true;
-            pins_.fault = true;
             raise(words_->period, static_cast<double>(cycle.period_ns()) * 1e-3);
             reporter_->event(Event::wrong_period, {}, cycle.period_ns());
         }
@@ -124,7 +124,7 @@ public:
             if (interrupted) station_->restart();
             if (pins_.reset && !was_reset_) {
                 station_->reset();
-                pins_.fault = false;
+                if (had_carrier_) recover();
             }
             was_reset_ = pins_.reset;
             for (std::size_t n = 0; n < others_.size(); ++n) others_[n].ask(*station_, n);
@@ -238,38 +238,40 @@ private:
         return heard_;
     }
 
+    /// Raises a fault that lasts until recover(). [realtime]
     void raise(const std::string& reason, double detail) noexcept {
-        if (faults_ != nullptr) faults_->raise(faults_, this, reason.c_str(), detail);
+        pins_.fault = true;
+        fault_.begin(faults_, this, reason.c_str(), detail);
+    }
+    void recover() noexcept {
+        pins_.fault = false;
+        fault_.end(faults_, this);
     }
 
     // Events of the station. [realtime]
     void on_event(Event e, const Address& who, Time value) noexcept override {
         switch (e) {
         case Event::sync_lost:
-            pins_.fault = true;
             raise(words_->sync_lost, static_cast<double>(value) * 1e-9);
             break;
         case Event::other_master:
-            pins_.fault = true;
             raise(words_->other_master, not_a_number);
             break;
         case Event::other_master_gone:
-            if (station_->ready()) pins_.fault = false;
+            if (station_->ready()) recover();
             break;
         case Event::master_there:
-            pins_.fault = withdrawn_ = true;
+            withdrawn_ = true;
             raise(words_->master_there, not_a_number);
             break;
         case Event::other_schedule:
-            pins_.fault = true;
             raise(words_->other_schedule, static_cast<double>(value) * 1e-3);
             break;
         case Event::out_of_step:
-            pins_.fault = true;
             raise(words_->out_of_step, static_cast<double>(value) * 1e-3);
             break;
         case Event::withdrew:
-            pins_.fault = withdrawn_ = true;
+            withdrawn_ = true;
             raise(words_->withdrew, not_a_number);
             break;
         case Event::foreign_frame:
@@ -282,24 +284,21 @@ private:
             raise(words_->duplicate_slot, not_a_number);
             break;
         case Event::babbling:
-            pins_.fault = true;
             raise(words_->babbling, static_cast<double>(value));
             break;
         case Event::uncalibrated:
-            pins_.fault = true;
             raise(words_->uncalibrated, static_cast<double>(value));
             break;
         case Event::no_carrier:
-            pins_.fault = true;
             raise(words_->no_carrier, not_a_number);
             break;
         case Event::carrier:
-            if (station_->ready()) pins_.fault = false;
+            if (station_->ready()) recover();
             break;
         case Event::running:
             if (station_->status().count.losses + station_->status().count.unanswered == 0 && !withdrawn_) break;
             withdrawn_ = false;
-            pins_.fault = false;  // recovered by itself
+            recover();  // by itself
             break;
         default: break;
         }
@@ -335,6 +334,7 @@ private:
     hal::DisciplinedClock                   clock_;
     hal::Discipline                         discipline_;
     const hal_faults*                       faults_ = nullptr;
+    hal::LastingFault                       fault_;
     bool                                    leads_ = false, period_reported_ = false, was_reset_ = false;
     bool                                    was_synchronised_ = false, withdrawn_ = false, had_carrier_ = true;
     std::atomic<bool>                       interrupted_{false};  // set by interrupt(), taken by receive()

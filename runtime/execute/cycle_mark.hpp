@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: MIT
+// Where a thread is in its cycle, in memory that a process outside may share (machine/exit_observer.hpp).
+#pragma once
+
+#include <atomic>
+
+#include "plan/plan.hpp"
+
+namespace hal {
+
+/// Written by the thread, read by the supervisor, by crash handlers and by the observer.
+struct alignas(64) CycleMark {
+    std::atomic<bool> in_function{false};
+    const plan::Step* volatile current = nullptr;  ///< the step that runs, or ran last
+};
+
+}  // namespace hal

@@ -1,0 +1,1 @@
+hal sim lasting-fault.hal
