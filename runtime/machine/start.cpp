@@ -110,6 +110,7 @@ Failure start_instance(Instance& instance, const Model& model, Executor& executo
         [](const hal_host* h, const char* id) -> const void* {
             if (std::strcmp(id, "hal.stream/1") == 0) return &stream_host;
             if (std::strcmp(id, "hal.faults/1") == 0) return &static_cast<Starting*>(h->data)->executor.board().shared.faults;
+            if (std::strcmp(id, HAL_LASTING_FAULTS) == 0) return &static_cast<Starting*>(h->data)->executor.board().shared;
             if (std::strcmp(id, HAL_STATUS) == 0) return &static_cast<Starting*>(h->data)->status;
             if (std::strcmp(id, HAL_MESSAGES) == 0) return &static_cast<Starting*>(h->data)->messages;
             if (std::strcmp(id, "hal.clock/1") == 0) return &static_cast<Starting*>(h->data)->executor.clock();

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* Faults whose condition lasts: what extension "hal.faults/1" offers behind its first members. */
+/* Faults whose condition lasts. The host offers one record under both ids: faults.size of "hal.faults/1" tells whether it is this struct. */
 #ifndef HAL_LASTING_FAULTS_H
 #define HAL_LASTING_FAULTS_H
 
 #include "hal/abi.h"
+#define HAL_LASTING_FAULTS "hal.lasting-faults/1"
 
-/* A host that is older offers a hal_faults only: then faults.size is smaller. */
 typedef struct hal_lasting_faults {
     hal_faults faults;
     uint64_t lasting; /* conditions that last now; written by the host, read atomically [any] */
