@@ -15,9 +15,9 @@
 #include "inspect/play.hpp"
 #include "inspect/record.hpp"
 #include "inspect/shell.hpp"
-#include "linuxcnc/tcl.hpp"
 #include "machine/address.hpp"
 #include "run/run.hpp"
+#include "tcl/tcl.hpp"
 
 namespace hal::tools {
 
@@ -98,9 +98,10 @@ int halcmd(int argc, char** argv) {
 }
 
 constexpr const char* halrun_usage =
-    "usage: halrun [-I] [HALCMD-OPTION…] [FILE.hal | FILE.ini]\n"
+    "usage: halrun [-I | -T] [HALCMD-OPTION…] [FILE.hal | FILE.tcl | FILE.ini]\n"
     "       halrun -U\n\n"
     "  -I          open the shell after the file\n"
+    "  -T          read lines of Tcl after the file\n"
     "  -U          end the running instance\n"
     "Without a file, commands are read from the terminal or from standard input.\n";
 
@@ -122,7 +123,7 @@ int halrun(int argc, char** argv) {
         switch (letter) {
         case 'I': options.interactive = true; break;
         case 'U': return end_running(options);
-        case 'T': return fail(options, "Tcl is not supported; write .hal files, or call halcmd from any language");
+        case 'T': options.tcl = true; break;
         case 'h': return print(halrun_usage) ? 0 : 1;
         default: return 1;
         }
@@ -134,9 +135,8 @@ int halrun(int argc, char** argv) {
     }
     if (!options.words.empty()) {
         const std::string& file = options.words.front();
-        if (file.ends_with(".tcl")) return fail(options, fmt::format("'{}': Tcl is not supported; write a .hal file", file));
-        if (!options.from_file && !file.ends_with(".hal") && !file.ends_with(".ini"))
-            return fail(options, fmt::format("'{}': the name of a netlist must end with .hal or .ini; or type: halrun -f {}", file, file));
+        if (!options.from_file && !file.ends_with(".hal") && !file.ends_with(".tcl") && !file.ends_with(".ini"))
+            return fail(options, fmt::format("'{}': the name of a netlist must end with .hal, .tcl or .ini; or type: halrun -f {}", file, file));
     }
     return run_run(options);
 }

@@ -38,9 +38,9 @@ void parse_bit(std::string_view text, bool& value, std::string& problem) {
     problem = quoted(text) + " is not a bit (TRUE, FALSE, 1, 0, yes, no, on, off)";
 }
 
-/// As strtol with base 0 (0x… is hexadecimal, a leading 0 octal), but the whole range of the type is checked.
+/// As strtol with base 0 (0x… is hexadecimal, a leading 0 may mean octal), but the whole range of the type is checked.
 template <class T>
-void parse_integer(std::string_view text, const char* type, T& value, std::string& problem) {
+void parse_integer(std::string_view text, const char* type, LeadingZero zero, T& value, std::string& problem) {
     std::string_view digits = text;
     const bool negative = !digits.empty() && digits[0] == '-';
     if (!digits.empty() && (digits[0] == '-' || digits[0] == '+')) digits.remove_prefix(1);
@@ -48,7 +48,7 @@ void parse_integer(std::string_view text, const char* type, T& value, std::strin
     if (digits.size() > 2 && digits[0] == '0' && lower(digits[1]) == 'x') {
         base = 16;
         digits.remove_prefix(2);
-    } else if (digits.size() > 1 && digits[0] == '0') {
+    } else if (digits.size() > 1 && digits[0] == '0' && zero == LeadingZero::octal) {
         base = 8;
     }
     std::uint64_t magnitude = 0;
@@ -96,11 +96,11 @@ std::string decimal(double value) {
 
 std::optional<hal_type> type_named(std::string_view name) {
     for (const TypeRow& row : types)
-        if (name == row.name || (!name.empty() && name == row.newer)) return row.type;
+        if (same_word(name, row.name) || (!name.empty() && same_word(name, row.newer))) return row.type;
     return std::nullopt;
 }
 
-Parsed parse_value(hal_type type, std::string_view text) {
+Parsed parse_value(hal_type type, std::string_view text, LeadingZero zero) {
     Parsed parsed;
     parsed.value.raw = 0;  // {} sets the first member of a union only
     if (!row(type).number) {
@@ -112,9 +112,34 @@ Parsed parse_value(hal_type type, std::string_view text) {
         Member value{};
         if constexpr (std::is_same_v<Member, bool>) parse_bit(text, value, parsed.problem);
         else if constexpr (std::is_same_v<Member, double>) parse_float(text, value, parsed.problem);
-        else parse_integer(text, name(type), value, parsed.problem);
+        else parse_integer(text, name(type), zero, value, parsed.problem);
         std::memcpy(&parsed.value, &value, sizeof value);
     });
+    return parsed;
+}
+
+namespace {
+
+/// A pattern of 32 bits, or a small negative number for a type without a sign: the author knows what becomes of it.
+bool is_bit_pattern(hal_type type, std::string_view text, const hal_value& wide) {
+    if (type == HAL_TYPE_U64) return true;
+    if (text.starts_with('-')) return type == HAL_TYPE_U32 && wide.s64 >= std::numeric_limits<std::int32_t>::min();
+    return (text.starts_with("0x") || text.starts_with("0X")) && wide.u64 <= std::numeric_limits<std::uint32_t>::max();
+}
+
+}  // namespace
+
+Parsed parse_wrapping(hal_type type, std::string_view text) {
+    Parsed parsed = parse_value(type, text);
+    const bool negative = text.starts_with('-');
+    const bool wraps = type == HAL_TYPE_S32 || type == HAL_TYPE_U32 || (type == HAL_TYPE_U64 && negative);
+    if (parsed.problem.empty() || !wraps) return parsed;
+    const Parsed wide = parse_value(negative ? HAL_TYPE_S64 : HAL_TYPE_U64, text);
+    if (!wide.problem.empty()) return parsed;
+    if (!is_bit_pattern(type, text, wide.value)) parsed.warning = std::move(parsed.problem);
+    parsed.problem.clear();
+    if (type == HAL_TYPE_U64) parsed.value.u64 = wide.value.u64;
+    else parsed.value.u32 = static_cast<std::uint32_t>(wide.value.u64);
     return parsed;
 }
 

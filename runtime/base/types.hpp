@@ -33,7 +33,7 @@ inline constexpr std::array<TypeRow, 7> types{{
 
 inline constexpr const TypeRow& row(hal_type type) { return types[static_cast<std::size_t>(type)]; }
 inline constexpr const char* name(hal_type type) { return row(type).name; }
-/// Returns the type of either dialect's name.
+/// Returns the type of either dialect's name, in any case.
 std::optional<hal_type> type_named(std::string_view name);
 
 /// Calls `action` with a reference to the member of `value` that `type` selects (a hal_port* for port).
@@ -59,10 +59,16 @@ inline const char* name(hal_dir dir) {
 struct Parsed {
     hal_value value{};
     std::string problem;  ///< empty: none
+    std::string warning;  ///< of parse_wrapping(): the number is out of range
 };
+/// What an integer is that begins with 0: octal in a netlist, as in C; decimal in records.
+enum class LeadingZero { octal, decimal };
 /// Parses a value of `type`. On failure `problem` is the reason: "'abc' is not a number", "3000000000 is out of range for
 /// s32 (-2147483648 to 2147483647)".
-Parsed parse_value(hal_type type, std::string_view text);
+Parsed parse_value(hal_type type, std::string_view text, LeadingZero = LeadingZero::octal);
+/// As setp and sets of LinuxCNC 2.9 do: an integer that is out of range keeps its low bits, -1 is 4294967295 as u32. `warning` says so
+/// unless the text is a pattern of bits, as 0xFFFFFFFF is for s32.
+Parsed parse_wrapping(hal_type type, std::string_view text);
 
 /// Formats a value as `getp` prints it: decimal, floats `%.7g`, bits TRUE/FALSE.
 std::string format_value(hal_type type, const hal_value& value);

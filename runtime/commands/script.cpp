@@ -82,6 +82,7 @@ int Script::run(std::uint32_t source) {
     files_.push_back({own_path(source), {}});
     run_commands(source);
     files_.pop_back();
+    if (shell_.options.linuxcnc) state_.linuxcnc_check.model(session_.model(), pending_);
     finish();
     const bool file = !session_.sources.get(source).name.starts_with('<');
     if (state_.collecting && collecting_before && failed_) forget_collected(collected_before);
@@ -140,6 +141,7 @@ void Script::run_row(const std::vector<Command>& commands, std::size_t from, std
 }
 
 void Script::run_line(const Command& command) {
+    if (shell_.options.linuxcnc) state_.linuxcnc_check.command(command, session_.model(), pending_);
     if (shell_.options.echo) echo_line(session_.sources.text(command.span), session_.sources.place(command.span).line);
     const CommandRow* const row = row_of(command);
     if (!row) {

@@ -73,6 +73,8 @@ private:
     /// Ends the transaction: commits, prints. Sets failed_ and, without -k, stopped_.
     void finish();
     void report(Diagnostics& found, std::size_t edits, bool took_effect);
+    /// The diagnostic with the places in the INI file of the values that the words at its main place have.
+    Diagnostic with_values(Diagnostic diagnostic) const;
     /// After a failure: "nothing was changed", or which lines took effect and which did not.
     std::string outcome(bool edited) const;
     /// -k: each line is a transaction. A check looks at the text as a whole in any case.

@@ -6,9 +6,12 @@
 
 #include "text/quoting.hpp"
 #include "commands/script.hpp"
+#include "netlist/line.hpp"
 
 namespace hal {
 namespace {
+
+constexpr std::size_t most_labels = 5;  // of a diagnostic, those of values included
 
 std::string summary(std::size_t errors, std::size_t warnings, std::size_t notes) {
     std::string text;
@@ -81,7 +84,7 @@ void Script::report(Diagnostics& found, std::size_t edits, bool took_effect) {
     if (options.level == Level::nothing) return;
     Diagnostics shown;
     for (const Diagnostic& one : found.all())
-        if (one.severity != Severity::note || options.notes || options.level >= Level::results) shown.add(one);
+        if (one.severity != Severity::note || options.notes || options.level >= Level::results) shown.add(with_values(one));
     if (!shown.all().empty()) {
         std::string text = render(shown, session_.sources, options.color);
         const std::string counts = "\n" + summary(shown.errors(), shown.warnings(), shown.notes());
@@ -96,6 +99,24 @@ void Script::report(Diagnostics& found, std::size_t edits, bool took_effect) {
     } else if (options.level >= Level::results && edits > 0 && took_effect) {
         output_.err(counted(edits, "edit") + " took effect\n");
     }
+}
+
+Diagnostic Script::with_values(Diagnostic diagnostic) const {
+    if (diagnostic.severity != Severity::error || diagnostic.labels.empty()) return diagnostic;
+    const std::string_view text = session_.sources.text(diagnostic.labels.front().span);
+    const Ini& ini = state_.ini ? *state_.ini : session_.ini;
+    bool has_comment = false;
+    for (std::size_t at = text.find('['); at != text.npos && diagnostic.labels.size() < most_labels; at = text.find('[', at + 1)) {
+        const Reference reference = reference_at(text, at);
+        const Ini::Entry* const entry = reference.kind == Reference::key ? ini.find(reference.section, reference.name) : nullptr;
+        if (!entry) continue;
+        std::string value = std::string(text.substr(at, reference.length)) + " is " + "'" + entry->value + "'";
+        if (!entry->at.known() && !entry->place.empty()) value += " in " + entry->place;
+        diagnostic.labels.push_back({entry->at, std::move(value)});
+        has_comment = has_comment || entry->value.find(" #") != std::string::npos || entry->value.find(" ;") != std::string::npos;
+    }
+    if (has_comment) diagnostic.help.push_back("in an INI file a comment has a line of its own: behind a value it is part of the value");
+    return diagnostic;
 }
 
 std::string Script::outcome(bool edited) const {

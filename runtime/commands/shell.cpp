@@ -15,6 +15,7 @@
 #include "machine/session.hpp"
 #include "commands/table.hpp"
 #include "commands/files.hpp"
+#include "commands/ini_version.hpp"
 #include "commands/script.hpp"
 #include "commands/shell_state.hpp"
 
@@ -147,13 +148,27 @@ void note_programs(Session& session, const Ini& ini) {
     started("DISPLAY", "DISPLAY", "", {"axisui", "pyvcp", "gladevcp", "qtvcp", "gmoccapy", display.substr(0, display.find(' '))});
 }
 
+/// `hal check`: whether `hal linuxcnc` would run the configuration. Returns 1 after reporting that it would not.
+int check_version(Shell& shell, const std::string& path, Output& output) {
+    const Ini& ini = shell.session().ini;
+    std::string problem = is_linuxcnc_configuration(ini) ? ini_version_problem(ini) : "";
+    if (problem.empty()) return 0;
+    const Ini::Entry* const version = ini.find("EMC", "VERSION");
+    if (!version) problem = path + ": " + problem;
+    Diagnostics diagnostics;
+    diagnostics.error("ini-version", version ? version->at : Span{}, problem, "", "type: update_ini " + path);
+    const auto lock = shell.session().lock();
+    if (shell.options.level != Level::nothing) output.err(render(diagnostics, shell.session().sources, shell.options.color));
+    return 1;
+}
+
 }  // namespace
 
 int Shell::run_file(const std::string& path, Output& output) {
     if (path.ends_with(".ini")) return run_ini(path, output);
     if (path.ends_with(".tcl"))
         return cannot_read(*this, output, path, "it is a Tcl script", "unsupported-file",
-                           "only .hal and .ini files are supported; write loops and name lists with [0..5] and {x,y,z}");
+                           "`hal run` executes it, and `haltcl` on a running machine; here only .hal and .ini files are supported, with loops as ranges: pid.[0..5].command");
     std::string text, problem;
     if (!read_text_file(resolve_path(path, options.directory), text, problem, true)) {
         if (options.check) state_->session.absences().note_missing_text(path);
@@ -211,7 +226,7 @@ int Shell::take_files(const std::string& path, const char* key, std::vector<HalF
         if (options.check) state_->session.absences().note_missing_text(file);
         status = script && !state_->run_script
                      ? cannot_read(*this, output, file, problem, "unsupported-file",
-                                   "`hal linuxcnc " + path + "` runs Tcl; or rewrite it as a .hal file, where loops become ranges: pid.[0..5].command")
+                                   "`hal run " + path + "` executes it; or rewrite it as a .hal file, where loops become ranges: pid.[0..5].command")
                      : cannot_read(*this, output, file, problem, "unreadable-file",
                                    "named by [HAL]" + std::string(key) + " in " + path +
                                        "; HALLIB_PATH and HALLIB_DIR are further search paths");
@@ -269,7 +284,8 @@ int Shell::run_ini(const std::string& path, Output& output) {
     const Borrowed in_folder(options.directory, folder_of(absolute_path(resolve_path(path, options.directory))));
     if (options.check) note_programs(state_->session, ini);
     std::vector<HalFile> files, after_display;
-    int status = take_files(path, "HALFILE", files, output);
+    int status = options.check ? check_version(*this, path, output) : 0;
+    status |= take_files(path, "HALFILE", files, output);
     if (options.check) status |= take_files(path, "POSTGUI_HALFILE", after_display, output);  // for `hal check` only: no user interface runs here
     if (status != 0 && !options.keep_going) return status;
     std::string commands;

@@ -61,6 +61,7 @@ struct ShellOptions {
     bool color = false;       ///< of diagnostics
     bool notes = false;       ///< print notes (stale reads …) as well as errors and warnings
     bool check = false;       ///< `hal check`: a file is one transaction, commands that act are only looked at
+    bool linuxcnc = false;    ///< with check: reports also what LinuxCNC would not load
     Level level = Level::errors;
     std::string node = {};    ///< of a netlist with `node` lines: whose part is loaded; `$NODE` in it
     std::string directory = {};  ///< what relative paths of source, save, loadusr are relative to; empty: the process's own

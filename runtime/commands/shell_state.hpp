@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "netlist/netlist.hpp"
+#include "commands/linuxcnc_check.hpp"
 #include "commands/shell.hpp"
 
 namespace hal {
@@ -24,6 +25,7 @@ struct Shell::State {
     /// Lines of `show latency` about signals between machines, shared by all shells of the session and read with its lock held.
     std::shared_ptr<std::vector<std::string>> latencies = std::make_shared<std::vector<std::string>>();
     ScriptRunner run_script = {};
+    LinuxcncCheck linuxcnc_check = {};     ///< `hal check --linuxcnc`
     /// With TWOPASS, while the loads are gathered: one `loadrt` for each LinuxCNC module, which is loaded once; else nullptr.
     std::vector<Command>* module_loads = nullptr;
     std::optional<Ini> ini = {};           ///< what [SECTION]KEY means to this shell, when it is not the session's INI file

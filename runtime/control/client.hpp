@@ -43,7 +43,7 @@ public:
         bool keep_going = false, echo = false, script = false, json = false, color = false, notes = false;
         std::string level = "errors";  ///< nothing, errors, results, debug
         std::string directory;         ///< for relative paths in commands; the tool's working directory
-        std::vector<std::array<std::string, 3>> ini = {};  ///< section, key, value of what [SECTION]KEY means; empty: the instance's INI file
+        std::vector<std::array<std::string, 4>> ini = {};  ///< section, key, value, "FILE:LINE" of what [SECTION]KEY means; empty: the instance's INI file
     };
     /// Holds for all commands of this connection from now on.
     bool set_options(const Options& options);

@@ -80,10 +80,12 @@ namespace {
 /// The entries of a client's INI file: [SECTION, KEY, VALUE] each.
 Ini ini_of(const Json& entries) {
     Ini ini;
-    if (!entries.is_array()) throw RequestError{"ini must be a list of [SECTION, KEY, VALUE]"};
+    if (!entries.is_array()) throw RequestError{"ini must be a list of [SECTION, KEY, VALUE] or [SECTION, KEY, VALUE, PLACE]"};
     for (const Json& entry : entries) {
-        if (!entry.is_array() || entry.size() != 3) throw RequestError{"an entry of ini must be [SECTION, KEY, VALUE]"};
-        ini.add(text_of(entry[0], "a section"), text_of(entry[1], "a key"), text_of(entry[2], "a value"));
+        if (!entry.is_array() || entry.size() < 3 || entry.size() > 4)
+            throw RequestError{"an entry of ini must be [SECTION, KEY, VALUE] or [SECTION, KEY, VALUE, PLACE]"};
+        std::string place = entry.size() == 4 ? text_of(entry[3], "a place") : std::string();
+        ini.add({text_of(entry[0], "a section"), text_of(entry[1], "a key"), text_of(entry[2], "a value"), {}, std::move(place)});
     }
     return ini;
 }

@@ -77,7 +77,7 @@ bool feed_records(hal_stream& stream, const std::vector<std::vector<std::string>
             return false;
         }
         for (std::size_t c = 0; c < columns.size(); ++c) {
-            const Parsed value = parse_value(columns[c], records[i][c]);
+            const Parsed value = parse_value(columns[c], records[i][c], LeadingZero::decimal);
             if (!value.problem.empty()) {
                 why = "record " + std::to_string(i) + ", value " + std::to_string(c) + ": " + value.problem;
                 return false;

@@ -87,6 +87,7 @@ void Core::cycle(std::int64_t grid_ns, std::int64_t due_ns, std::int64_t woke_ns
         due_.store(due_ns, std::memory_order_release);
         busy_since_.store(woke_ns, std::memory_order_release);
         wakeup.add(woke_ns - due_ns);
+        if (max_gap_ns.load(std::memory_order_relaxed) > 0) note_usage();
     }
     take_over();
     if (plan_) {
@@ -337,9 +338,10 @@ std::int64_t Core::account(std::int64_t woke_ns) noexcept {
     const auto event = [&](hal_fault_code code) -> FaultEvent {
         return {code, slow_function(woke_ns), info_.number, info_.start_ns, static_cast<double>(busy_ns), nullptr, nullptr};
     };
-    if (limit != 0 && now_ns - std::max(woke_ns, excused_.load(std::memory_order_acquire)) > limit) {
+    const bool gap = limit != 0 && busy_ns > limit && max_gap_ns.load(std::memory_order_relaxed) > 0 && was_preempted() && tolerate_gap(busy_ns);
+    if (!gap && limit != 0 && now_ns - std::max(woke_ns, excused_.load(std::memory_order_acquire)) > limit) {
         if (declare_hung()) raise(event(HAL_FAULT_SILENT_THREAD));  // otherwise the supervisor has reported it
-    } else if (!in_budget && in_budget_ && !hung()) {
+    } else if (!gap && !in_budget && in_budget_ && !hung()) {
         board_.begin(this, &in_budget_);
         raise(event(HAL_FAULT_BUDGET));
     } else if (in_budget && !in_budget_) {

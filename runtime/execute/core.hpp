@@ -143,6 +143,10 @@ public:
     std::atomic<std::int64_t> budget_ns{0};
     /// Longest time without a finished cycle; 0: not supervised. Set before the thread begins.
     std::atomic<std::int64_t> supervise_ns{0};
+    /// Longest time without CPU above the supervision limit that is counted as a gap and does not stop the thread; 0: none.
+    std::atomic<std::int64_t> max_gap_ns{0};
+    std::atomic<std::uint64_t> gaps{0};                           ///< number of such gaps; written by the thread
+    std::atomic<std::int64_t> newest_gap_ns{0};                   ///< length of the newest; written by the thread before `gaps`
     /// A cycle that takes this many periods is a fault, whatever the budget.
     static constexpr std::int64_t longest_overrun = 10;
     std::atomic<std::uint64_t> hangs{0};                          ///< number of times the thread was declared hung
@@ -176,6 +180,9 @@ private:
     void run_rows(const plan::Row*& row, const plan::Step* first, const plan::Step* last) noexcept;
     void run_steps(const plan::Step* first, const plan::Step* last) noexcept;
     std::int64_t account(std::int64_t woke_ns) noexcept;
+    bool tolerate_gap(std::int64_t silent_ns) noexcept;
+    void note_usage() noexcept;
+    bool was_preempted() const noexcept;
 
     const std::uint32_t id_;
     const std::int64_t period_ns_;
@@ -195,6 +202,7 @@ private:
     std::atomic<std::int64_t> busy_since_{0};         // written by the thread
     std::atomic<std::int64_t> due_{0}, finished_{0};  // of the newest cycle: when it was due and when it ended; written by the thread
     std::atomic<std::int64_t> excused_{0};            // written by the supervisor
+    std::int64_t cpu_before_ns_ = 0, waits_before_ = 0;  // the thread's own, while gaps are tolerated: at the start of its cycle
     std::atomic<std::uint64_t> hung_at_{0};           // cycles + 1 when it was declared hung; written by thread and supervisor
     // Whose turn it is to make outputs safe and to publish: the thread in each cycle, the supervisor in place of a hung thread.
     //   1. thread: nobody -> thread      2. make safe if stopped, publish      3. thread -> nobody     (release)

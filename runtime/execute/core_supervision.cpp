@@ -4,6 +4,8 @@
 #include <functional>
 #include <limits>
 
+#include <sys/resource.h>
+
 #include "execute/core.hpp"
 
 namespace hal {
@@ -40,9 +42,47 @@ void Core::expect(std::int64_t now_ns) noexcept {
 
 void Core::woke_late(std::int64_t due_ns, std::int64_t now_ns) noexcept {
     const std::int64_t limit = supervise_ns.load(std::memory_order_relaxed);
-    const std::int64_t silent_ns = now_ns - std::max({due_ns, finished_ns(), excused_.load(std::memory_order_acquire)});
-    if (limit == 0 || silent_ns <= limit || !declare_hung()) return;
+    const bool tolerant = max_gap_ns.load(std::memory_order_relaxed) > 0;  // then an excuse is a part of the gap
+    const std::int64_t excused = tolerant ? 0 : excused_.load(std::memory_order_acquire);
+    const std::int64_t silent_ns = now_ns - std::max({due_ns, finished_ns(), excused});
+    if (limit == 0 || silent_ns <= limit) return;
+    if (tolerate_gap(silent_ns) || !declare_hung()) return;
     raise({HAL_FAULT_SILENT_THREAD, 0, info_.number, info_.start_ns, static_cast<double>(silent_ns), nullptr, nullptr});
+}
+
+// The thread was ready, or its cycle was under way, and the CPU was another's for so long.
+bool Core::tolerate_gap(std::int64_t silent_ns) noexcept {
+    if (silent_ns > max_gap_ns.load(std::memory_order_relaxed)) return false;
+    newest_gap_ns.store(silent_ns, std::memory_order_relaxed);
+    gaps.store(gaps.load(std::memory_order_relaxed) + 1, std::memory_order_release);
+    return true;
+}
+
+namespace {
+
+struct Usage {
+    std::int64_t cpu_ns, waits;
+};
+
+Usage usage_of_this_thread() noexcept {
+    const auto ns = [](const timeval& t) noexcept { return (std::int64_t{t.tv_sec} * 1'000'000 + t.tv_usec) * 1000; };
+    rusage usage{};
+    getrusage(RUSAGE_THREAD, &usage);
+    return {ns(usage.ru_utime) + ns(usage.ru_stime), usage.ru_nvcsw};
+}
+
+}  // namespace
+
+void Core::note_usage() noexcept {
+    const Usage usage = usage_of_this_thread();
+    cpu_before_ns_ = usage.cpu_ns;
+    waits_before_ = usage.waits;
+}
+
+// The cycle took longer than the limit, but neither by computing nor by waiting in the kernel.
+bool Core::was_preempted() const noexcept {
+    const Usage usage = usage_of_this_thread();
+    return usage.waits == waits_before_ && usage.cpu_ns - cpu_before_ns_ < supervise_ns.load(std::memory_order_relaxed) / 2;
 }
 
 bool Core::declare_hung() noexcept {

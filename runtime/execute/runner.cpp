@@ -136,6 +136,7 @@ void Runner::set_up() noexcept {
             granted.priority = parameters.sched_priority;
         }
     }
+    core.max_gap_ns = granted.policy == Granted::Policy::other ? options.max_gap_ns : options.max_gap_realtime_ns;
     granted.refused = wants && granted.policy == Granted::Policy::other;
     // Without a real-time policy spinning is charged like work, and the kernel preempts the thread for it.
     if (granted.policy == Granted::Policy::other && options.spin_ns < 0) wait_.spin_ns = 0;

@@ -24,6 +24,7 @@ struct CoreOptions {
     std::int64_t budget_ns = 0;
     std::int64_t supervise_ns = 0;  ///< longest time without a finished cycle; 0: not supervised
     bool profile_every = false;
+    std::int64_t max_gap_ns = 0, max_gap_realtime_ns = 0;  ///< Core::max_gap_ns, the second with a real-time policy
     std::string name{};       ///< as the system shows it: top -H, a debugger; its first 15 bytes
     CycleMark* mark = nullptr;  ///< nullptr: one of the thread's own
 };

@@ -222,7 +222,9 @@ bool Supervisor::look(std::int64_t now_ns, std::int64_t gap_ns, std::int64_t sus
         if (limit == 0) continue;
         const std::int64_t silent = now_ns - core.overdue_since_ns();
         if (suspended_ns <= limit && silent > limit && behind_hog(one, now_ns)) continue;
-        if (silent > limit || suspended_ns > limit) {
+        if (silent > limit && suspended_ns <= limit && in_gap(one, now_ns, gap_ns)) {
+            core.excuse(now_ns);  // the thread counts the gap when it has the CPU again
+        } else if (silent > limit || suspended_ns > limit) {
             declare(one, now_ns, gap_ns, suspended_ns);
             well = false;
         } else if (silent > limit / 4) {
@@ -242,6 +244,17 @@ bool Supervisor::behind_hog(const Watched& watched, std::int64_t now_ns) const {
         return other.cpu == watched.cpu && other.priority > watched.priority && limit > 0 && since != 0 && !other.core->hung() &&
                2 * (now_ns - since) > limit && limit - (now_ns - since) < watched.core->supervise_ns / 4;
     });
+}
+
+// The thread tolerates gaps, and has no CPU: as the whole process had none, or because others use it.
+bool Supervisor::in_gap(const Watched& watched, std::int64_t now_ns, std::int64_t gap_ns) const {
+    const Core& core = *watched.core;
+    const std::int64_t silent_ns = now_ns - core.finished_ns() - core.period_ns();
+    if (core.max_gap_ns == 0 || silent_ns > core.max_gap_ns) return false;
+    if (2 * gap_ns > silent_ns) return true;
+    Stall found;
+    find_cause(watched, found, now_ns);
+    return found.cause == Stall::Cause::starved;
 }
 
 void Supervisor::declare(Watched& watched, std::int64_t now_ns, std::int64_t gap_ns, std::int64_t suspended_ns) {

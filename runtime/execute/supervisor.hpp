@@ -88,6 +88,7 @@ private:
     void work();
     bool look(std::int64_t now_ns, std::int64_t gap_ns, std::int64_t suspended_ns);
     bool behind_hog(const Watched& watched, std::int64_t now_ns) const;
+    bool in_gap(const Watched& watched, std::int64_t now_ns, std::int64_t gap_ns) const;
     void declare(Watched& watched, std::int64_t now_ns, std::int64_t gap_ns, std::int64_t suspended_ns);
     void name_starved(Watched& hog, Stall& stall, std::int64_t now_ns);
     static bool got_no_cpu(const Watched& watched) noexcept;

@@ -3,7 +3,6 @@
 #include "machine/elaborate.hpp"
 
 #include <algorithm>
-#include <charconv>
 
 #include "machine/construct.hpp"
 #include "machine/module_library.hpp"
@@ -16,7 +15,7 @@ namespace {
 
 using edits::Args;
 
-constexpr std::int64_t most_instances = 200'000;  // of one loadrt; a slip of the finger must not take all memory
+constexpr std::uint64_t most_instances = 200'000;  // of one loadrt; a slip of the finger must not take all memory
 
 std::vector<std::string> split_list(const std::string& text) {
     std::vector<std::string> parts;
@@ -57,6 +56,25 @@ bool names_itself(Elaboration& on, const Token& name, Origin origin) {
     return plugin && (plugin->component->flags & HAL_COMPONENT_WHOLE_NAMES);
 }
 
+/// `count=` as LinuxCNC reads it: 0x10 and 010 are hexadecimal and octal, nothing is the default. Returns false after reporting.
+bool read_count(Elaboration& on, const Token& token, const std::string& key, const std::string& value, LoadRequest& request) {
+    if (value.empty()) return true;
+    request.count_at = token.span;
+    const Parsed number = parse_value(HAL_TYPE_U64, value);
+    if (number.problem.empty() && number.value.u64 >= 1 && number.value.u64 <= most_instances) {
+        request.count = static_cast<std::int64_t>(number.value.u64);
+        return true;
+    }
+    const std::string range = "1.." + std::to_string(most_instances);
+    const bool digits_only = value.find_first_not_of("0123456789") == value.npos;
+    const bool too_many = number.problem.empty() ? number.value.u64 > most_instances : digits_only && value[0] != '0';
+    if (too_many)
+        on.diagnostics.error("bad-argument", token.span,
+                             key + "=" + value + " exceeds the limit of " + std::to_string(most_instances) + " instances per loadrt", range);
+    else on.diagnostics.error("bad-argument", token.span, quoted(value) + " is not a number of instances", range);
+    return false;
+}
+
 /// Separates the arguments of loadrt that name or count instances from the others. Returns false after reporting.
 bool read_request(Elaboration& on, const Token& name, Origin origin, Args args, LoadRequest& request) {
     request.at = name.span;
@@ -85,20 +103,7 @@ bool read_request(Elaboration& on, const Token& name, Origin origin, Args args, 
                     good = false;
                 }
         } else if (says_instances && key != "personality") {
-            const auto [end, problem] = std::from_chars(value.data(), value.data() + value.size(), request.count);
-            request.count_at = token.span;
-            const bool number = end == value.data() + value.size() && !value.empty() && value[0] != '-';
-            if (number && (problem == std::errc::result_out_of_range || request.count > most_instances)) {
-                on.diagnostics.error(
-                    "bad-argument", token.span,
-                    key + "=" + value + " exceeds the limit of " + std::to_string(most_instances) + " instances per loadrt",
-                    "1.." + std::to_string(most_instances));
-                good = false;
-            } else if (problem != std::errc{} || !number || request.count < 1) {
-                on.diagnostics.error("bad-argument", token.span, quoted(value) + " is not a number of instances",
-                                     "1.." + std::to_string(most_instances));
-                good = false;
-            }
+            if (!read_count(on, token, key, value, request)) good = false;
         } else if (says_instances) {
             request.personalities = split_list(value);
         } else if (!request.arguments.emplace(key, GivenArgument{value, token.span}).second) {

@@ -76,6 +76,8 @@ ThreadReport Reports::thread(const Thread& thread) const {
     report.faulted = core->stopped_by_fault();
     report.supervised = thread.options.supervision_limit_ns() != 0;
     report.hangs = core->hangs.load();
+    report.gaps = core->gaps.load(std::memory_order_acquire);
+    report.gap_ns = core->newest_gap_ns.load(std::memory_order_relaxed);
     report.hung = core->hung();
     if (report.hung) {
         report.silent_ns = monotonic_ns() - core->finished_ns();

@@ -25,6 +25,8 @@ struct ThreadReport {
     bool faulted = false;            ///< stopped by a fault
     bool hung = false;               ///< finishes no cycle; the supervisor has stopped its functions
     std::uint64_t hangs = 0;         ///< number of hangs since the start
+    std::uint64_t gaps = 0;          ///< number of gaps without CPU that did not stop it, and the length of the newest
+    std::int64_t gap_ns = 0;
     std::int64_t silent_ns = 0;      ///< hung: time since its last finished cycle
     std::string function;            ///< hung: the function that does not return; empty: none
     bool supervised = true;          ///< false with supervise=off

@@ -42,6 +42,8 @@ struct SessionOptions {
     std::string name = "default";    ///< of the instance; its control socket carries it
     bool virtual_clock = false;      ///< `hal sim`: threads run only in ThreadControl::advance_ns()
     bool check_only = false;         ///< `hal check`: construct, but start nothing
+    /// Longest gap without CPU that is reported and does not stop a thread: without a real-time policy, and with one.
+    std::int64_t max_gap_ns = 0, max_gap_realtime_ns = 0;
     std::vector<std::string> plugin_path;  ///< searched first
     ExitObserver* observer = nullptr;      ///< made before the session, and outlives it; nullptr: none
 };

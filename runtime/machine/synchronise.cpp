@@ -27,7 +27,7 @@ bool SessionState::make_threads(Diagnostics& diagnostics) {
             executor->set_priority(*there, by_rate);
         } else {
             CoreOptions wanted{o.period_ns, o.cpu, by_rate, o.policy == Policy::deadline, o.spin_ns, o.budget_ns, o.supervision_limit_ns(),
-                                     o.profile_every, thread->name};
+                                     o.profile_every, options.max_gap_ns, options.max_gap_realtime_ns, thread->name};
             const ThreadPins pins{&thread->time, &thread->tmax, &thread->tmax_increased, &thread->beat, &thread->missed, &thread->wakeup};
             if (options.observer) wanted.mark = options.observer->take_mark();
             Core*& place = cores.try_emplace(thread.get(), nullptr).first->second;

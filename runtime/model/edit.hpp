@@ -58,8 +58,10 @@ public:
     void take_from_thread(LoadedFunction& function);
 
     // --- names ------------------------------------------------------------------------------------------------------
+    /// Gives a pin its second name, in place of the one that it has.
     bool alias(Word name, Word second);
-    bool unalias(Word second);
+    /// Removes the second name; a pin that has none stays as it is.
+    bool unalias(Word name);
 
     // --- components and instances -----------------------------------------------------------------------------------
     LoadedComponent& add_component(std::string name, Span at);
@@ -136,6 +138,8 @@ public:
     }
 
 private:
+    void change_alias(Pin& pin, std::string alias);
+    void warn_of_wrap(Word value, hal_type type, const Parsed& parsed);
     bool fail(Code code, Span at, std::string message, std::string label = "", std::string help = "");
     bool name_free(std::string_view name, Span at, const char* what);
     bool names_free(const Instance& of, const std::vector<std::unique_ptr<Pin>>& pins, const std::vector<std::unique_ptr<LoadedFunction>>& functions);

@@ -259,6 +259,13 @@ void Edit::keep_value(Pin& pin) {
     on_undo([&pin, before] { *pin.memory->slot = before; });
 }
 
+void Edit::warn_of_wrap(Word value, hal_type type, const Parsed& parsed) {
+    if (parsed.warning.empty()) return;
+    const std::string result = format_value(type, parsed.value);
+    diagnostics->add({Severity::warning, "value-wraps", parsed.warning + ": " + result + " is set", {{value.span, "keeps its low 32 bits"}},
+                      {"LinuxCNC 2.9 does the same, 2.10 rejects it; write " + result + " if that is meant"}});
+}
+
 bool Edit::set_pin(Word name, Word value) {
     Pin* const target = pin(name);
     if (!target) return false;
@@ -283,9 +290,10 @@ bool Edit::set_pin(Word name, Word value) {
     if (target->type == HAL_TYPE_PORT)
         return fail("bad-value", value.span, "a port pin has no value to set", "",
                     "link it and allocate the buffer of the signal: sets SIGNAL BYTES");
-    const Parsed parsed = parse_value(target->type, value.text);
+    const Parsed parsed = parse_wrapping(target->type, value.text);
     if (!parsed.problem.empty())
         return fail("bad-value", value.span, parsed.problem, kind + quoted(name.text) + " is " + hal::name(target->type));
+    warn_of_wrap(value, target->type, parsed);
     if (target->home) {
         pin_values[target] = parsed.value;
     } else {
@@ -330,42 +338,40 @@ bool Edit::set_signal(Word name, Word value) {
         diagnostics->add(std::move(d));
         return false;
     }
-    const Parsed parsed = parse_value(target->type, value.text);
+    const Parsed parsed = parse_wrapping(target->type, value.text);
     if (!parsed.problem.empty())
         return fail("bad-value", value.span, parsed.problem, "signal " + quoted(name.text) + " is " + hal::name(target->type));
+    warn_of_wrap(value, target->type, parsed);
     signal_values[target] = parsed.value;
     inherited.erase(target);
     return true;
 }
 
+/// Sets or clears the alias of a pin, and the index with it.
+void Edit::change_alias(Pin& pin, std::string alias) {
+    on_undo([this, &pin, before = pin.alias] {
+        if (!pin.alias.empty()) model_.pin.erase(pin.alias);
+        pin.alias = before;
+        if (!pin.alias.empty()) model_.pin.emplace(pin.alias, &pin);
+    });
+    if (!pin.alias.empty()) model_.pin.erase(pin.alias);
+    pin.alias = std::move(alias);
+    if (!pin.alias.empty()) model_.pin.emplace(pin.alias, &pin);
+}
+
 bool Edit::alias(Word name, Word second) {
     Pin* const target = pin(name);
     if (!target) return false;
-    if (!target->alias.empty())
-        return fail("alias-taken", name.span, quoted(name.text) + " already has the alias " + quoted(target->alias), "",
-                    std::string("remove it first: unalias ") + (target->dir == HAL_DIR_PARAM ? "param " : "pin ") + target->alias);
     if (model_.find_pin(second.text)) return fail("name-taken", second.span, "pin or alias " + quoted(second.text) + " already exists");
     if (model_.find_signal(second.text)) return fail("name-taken", second.span, "signal " + quoted(second.text) + " already exists");
-    std::string name_too(second.text);
-    on_undo([this, target] {
-        model_.pin.erase(target->alias);
-        target->alias.clear();
-    });
-    target->alias = std::move(name_too);
-    model_.pin.emplace(target->alias, target);
+    change_alias(*target, std::string(second.text));
     return true;
 }
 
-bool Edit::unalias(Word second) {
-    Pin* const target = pin(second);
+bool Edit::unalias(Word name) {
+    Pin* const target = pin(name);
     if (!target) return false;
-    if (target->alias.empty()) return fail("no-alias", second.span, quoted(second.text) + " has no alias");
-    on_undo([this, target, old = target->alias] {
-        target->alias = old;
-        model_.pin.emplace(target->alias, target);
-    });
-    model_.pin.erase(target->alias);
-    target->alias.clear();
+    if (!target->alias.empty()) change_alias(*target, {});
     return true;
 }
 

@@ -47,7 +47,7 @@ bool Module::take_arguments() {
                 const long value = std::strtol(text.c_str(), &end, 0);
                 const bool fits =
                     parameter.type == 'l' || (value >= std::numeric_limits<int>::min() && value <= std::numeric_limits<int>::max());
-                if (errno != 0 || end == text.c_str() || *end != '\0' || !fits)
+                if (errno != 0 || *end != '\0' || !fits)  // nothing is 0, as in LinuxCNC: most modules have a default for it
                     return reject(host_, parameter.name, text, "is not a whole number");
                 if (parameter.type == 'l') reinterpret_cast<long*>(place)[index] = value;
                 else reinterpret_cast<int*>(place)[index] = static_cast<int>(value);

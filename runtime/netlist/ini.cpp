@@ -52,9 +52,14 @@ private:
         case Kind::comment: return include(ini.whole, span, path, depth);
         case Kind::section: section_ = ini.name; return;
         case Kind::open_section: return warn(span, "section name without ']'");
-        case Kind::entry: return ini_.add(section_, ini.name, ini.value);
+        case Kind::entry: return ini_.add({section_, std::string(ini.name), std::string(ini.value), value_span(line, ini.value)});
         case Kind::other: return warn(span, "invalid line, ignored: neither [SECTION] nor KEY = value");
         }
+    }
+
+    static Span value_span(const Line& line, std::string_view value) {
+        const auto begin = static_cast<std::size_t>(value.data() - line.text().data());
+        return line.span(begin, begin + value.size());
     }
 
     /// Reads the file that the comment `#INCLUDE FILE` names.
@@ -92,15 +97,20 @@ std::string bracketed(std::string_view section, std::string_view key) { return "
 
 }  // namespace
 
-void Ini::add(std::string_view section, std::string_view key, std::string_view value) {
-    first_.try_emplace(bracketed(section, key), entries_.size());
-    first_.try_emplace(bracketed("", key), entries_.size());
-    entries_.push_back({std::string(section), std::string(key), std::string(value)});
+void Ini::add(Entry entry) {
+    first_.try_emplace(bracketed(entry.section, entry.key), entries_.size());
+    first_.try_emplace(bracketed("", entry.key), entries_.size());
+    entries_.push_back(std::move(entry));
+}
+
+const Ini::Entry* Ini::find(std::string_view section, std::string_view key) const {
+    const auto found = first_.find(bracketed(section, key));
+    return found == first_.end() ? nullptr : &entries_[found->second];
 }
 
 std::optional<std::string> Ini::get(std::string_view section, std::string_view key) const {
-    const auto found = first_.find(bracketed(section, key));
-    return found == first_.end() ? std::nullopt : std::optional(entries_[found->second].value);
+    const Entry* const entry = find(section, key);
+    return entry ? std::optional(entry->value) : std::nullopt;
 }
 
 std::vector<std::string> Ini::all(std::string_view section, std::string_view key) const {

@@ -48,9 +48,13 @@ public:
 
     struct Entry {
         std::string section, key, value;
+        Span at = {};            ///< of the value, if the file was read here
+        std::string place = {};  ///< "FILE:LINE", if a client has read it
     };
     const std::vector<Entry>& entries() const { return entries_; }
-    void add(std::string_view section, std::string_view key, std::string_view value);
+    /// The entry that get() takes its value from, or nullptr.
+    const Entry* find(std::string_view section, std::string_view key) const;
+    void add(Entry entry);
 
 private:
     std::vector<Entry> entries_;

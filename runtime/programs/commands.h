@@ -26,6 +26,7 @@ struct halcyon_object {
     bool has_writer;          /* a signal */
     int pins;                 /* linked to the signal */
 };
+bool halcyon_component_exists(const char *name);
 /* Looks one up by its whole name; the kind is "pin", "param" or "sig". 0, or -ENOENT. */
 int halcyon_look_up(const char *kind, const char *name, struct halcyon_object *to);
 

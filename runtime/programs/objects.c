@@ -43,6 +43,23 @@ static bool take(const char *object, struct halcyon_object *to) {
     return true;
 }
 
+bool halcyon_component_exists(const char *name) {
+    const locale_t before = halcyon_lock();
+    bool found = false;
+    if (halcyon_connection >= 0) {
+        halcyon_add("{\"list\":\"comp\",\"patterns\":[");
+        halcyon_add_string(name);
+        halcyon_add("]}");
+        const char *const answer = halcyon_ask();
+        char quoted[256]; /* names of components have no character that JSON writes otherwise */
+        const int length = snprintf(quoted, sizeof quoted, "\"%s\"", name);
+        const char *const names = answer ? strstr(answer, "\"names\":[") : NULL;
+        found = names && length > 0 && length < (int)sizeof quoted && strstr(names, quoted);
+    }
+    halcyon_unlock(before);
+    return found;
+}
+
 int halcyon_look_up(const char *kind, const char *name, struct halcyon_object *to) {
     if (!name || !*name || strlen(name) > HAL_NAME_LEN) return -ENOENT;
     const locale_t before = halcyon_lock();

@@ -6,12 +6,19 @@
  */
 #define _GNU_SOURCE
 #include <dlfcn.h>
+#include <errno.h>
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
 #include <unistd.h>
 
-char *hal_data, *hal_shmem_base; /* 8 bytes each: programs have copies of that size */
+#include "commands.h"
+
+/* 8 bytes each: programs have copies of that size. Of a library they point to a page that nothing may access: so functions of LinuxCNC's Python
+ * module that only test hal_shmem_base work, and those that follow the pointers end with the sentence. */
+char *hal_data, *hal_shmem_base;
 const int halcyon_here = 0;
 
 static const struct { const char *name, *instead; } replaced[] = {
@@ -27,6 +34,34 @@ static void end(const char *name, const char *instead) {
     _exit(1);
 }
 
+static const char *const in_place_of_library = "Python's and Tcl's hal of Halcyon, which loadusr and hal linuxcnc find first where they are built";
+static int own_variables; /* no program has copies of them */
+static char *forbidden;
+static long forbidden_size;
+static struct sigaction before;
+
+static void on_access(int number, siginfo_t *info, void *context) {
+    (void)context;
+    const char *const at = info->si_addr;
+    if (at >= forbidden && at < forbidden + forbidden_size) {
+        end(program_invocation_short_name, in_place_of_library);
+    }
+    sigaction(number, &before, NULL); /* another one's crash: it happens again, as it would without this handler */
+}
+
+/* Called by the first hal_init(). */
+void halcyon_begins(void) {
+    if (forbidden || !own_variables) return;
+    forbidden_size = 1 << 20;
+    char *const pages = mmap(NULL, (size_t)forbidden_size, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+    if (pages == MAP_FAILED) return;
+    forbidden = pages;
+    struct sigaction ours = {.sa_flags = SA_SIGINFO | SA_ONSTACK, .sa_sigaction = on_access};
+    sigemptyset(&ours.sa_mask);
+    sigaction(SIGSEGV, &ours, &before);
+    hal_data = hal_shmem_base = forbidden;
+}
+
 /* Without its window, classicladder only fills the module's memory with a program, and looks for no pin. */
 static int without_window(const char *name, int argc, char **argv) {
     if (strcmp(name, "classicladder") != 0) return 0;
@@ -40,7 +75,10 @@ __attribute__((constructor)) static void check(int argc, char **argv) {
     Dl_info data, here;
     if (dladdr(&halcyon_here, &here) == 0) return;
     for (size_t i = 0;; ++i) {
-        if (i == 2) return;
+        if (i == 2) {
+            own_variables = 1;
+            return;
+        }
         if (dladdr(i == 0 ? &hal_data : &hal_shmem_base, &data) != 0 && strcmp(data.dli_fname, here.dli_fname) != 0) break;
     }
     const char *const slash = strrchr(data.dli_fname, '/'), *const name = slash ? slash + 1 : data.dli_fname;
@@ -53,7 +91,7 @@ __attribute__((constructor)) static void check(int argc, char **argv) {
 /* Reached by libraries that walk (Tcl's, Python's): these have no copies. */
 #define WALKER(function)                                                                                        \
     void *function(void);                                                                                       \
-    void *function(void) { return end(#function, "Python's and Tcl's hal of Halcyon, which loadusr and hal linuxcnc find first"), NULL; }
+    void *function(void) { return end(#function, in_place_of_library), NULL; }
 WALKER(list_add_after)
 WALKER(list_add_before)
 WALKER(list_init_entry)
@@ -61,7 +99,6 @@ WALKER(list_next)
 WALKER(list_prev)
 WALKER(list_remove_entry)
 WALKER(halpr_find_comp_by_id)
-WALKER(halpr_find_comp_by_name)
 WALKER(halpr_find_funct_by_name)
 WALKER(halpr_find_funct_by_owner)
 WALKER(halpr_find_param_by_name)
@@ -71,6 +108,10 @@ WALKER(halpr_find_pin_by_owner)
 WALKER(halpr_find_pin_by_sig)
 WALKER(halpr_find_sig_by_name)
 WALKER(halpr_find_thread_by_name)
+
+/* Python's component_exists() only tests the pointer; component_is_ready() follows it, and ends. */
+void *halpr_find_comp_by_name(const char *name);
+void *halpr_find_comp_by_name(const char *name) { return halcyon_component_exists(name) ? forbidden : NULL; }
 
 /* Functions that are rarely used and that a machine of ours does not offer to programs. */
 #define MISSING(function)                                                                                                             \

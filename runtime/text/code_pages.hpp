@@ -11,9 +11,6 @@ struct CodePage {
 };
 
 inline constexpr CodePage code_pages[] = {
-    {"alias-taken",
-     "A pin has at most one alias, and this pin already has one.\n\n"
-     "Remove the old alias with `unalias pin ALIAS`, then set the new one."},
     {"bad-argument",
      "A load argument has a value that its component does not accept: text where a number is required, a number out of range, or a "
      "list whose length does not match the number of instances.\n\n"
@@ -158,6 +155,10 @@ inline constexpr CodePage code_pages[] = {
      "`hal sim` has no supervision limit, since a cycle of its virtual clock may take any wall time. A cycle that takes more than 10 "
      "s is reported on stderr while it runs, and `--cycle-limit TIME` ends the run with this code and status 1; after Ctrl-C the "
      "limit is two seconds."},
+    {"ini-version",
+     "LinuxCNC 2.9 and later start a configuration only if its INI file has `[EMC]VERSION = 1.1`. Files of 2.7 and before have another version, or none: "
+     "names of sections, keys and pins have changed since. `hal linuxcnc` rejects them, too.\n\n"
+     "LinuxCNC's program converts the file and its netlists: `update_ini FILE.ini` (it keeps a copy)."},
     {"init-done",
      "initf functions run once, in a cycle of their own before the first cyclic pass of their thread. This thread has already made "
      "that pass, so the function would never run."},
@@ -181,6 +182,21 @@ inline constexpr CodePage code_pages[] = {
     {"linked-set",
      "A linked pin takes its value from its signal, which would overwrite the value of setp in the next cycle.\n\n"
      "Set the signal with sets (if it has no writer), or unlink the pin with unlinkp first."},
+    {"linuxcnc-command",
+     "`hal check --linuxcnc` reports what runs here and is an error for LinuxCNC 2.9. This command, option or range of names is an addition of ours; halcmd "
+     "rejects it, or takes it for something else.\n\n"
+     "`begin` and `commit` may be left out: a file is a transaction in any case. docs/linuxcnc-compatibility.md lists all differences."},
+    {"linuxcnc-name",
+     "`hal check --linuxcnc`: names of components, pins, parameters, signals, functions, threads and aliases have at most 47 characters in LinuxCNC, with the "
+     "pin `FUNCTION.time` that it creates for each function.\n\n"
+     "Shorten the name of the instance, `names=...`, or of the signal."},
+    {"linuxcnc-threads",
+     "`hal check --linuxcnc`: LinuxCNC creates threads from the fastest to the slowest and rejects one that is faster than the first. Here they may come in any "
+     "order.\n\n"
+     "`loadrt threads name1=base period1=50000 name2=servo period2=1000000`"},
+    {"linuxcnc-value",
+     "`hal check --linuxcnc`: halcmd of LinuxCNC 2.9 takes `TRUE`, `FALSE`, `1` and `0` for a bit, in any case, and creates signals of the types bit, float, s32, "
+     "u32 and port. `yes`, `no`, `on` and `off` came with LinuxCNC 2.10."},
     {"locked",
      "A lock forbids this kind of change. `lock tune` forbids loading, linking, addf and threads; `lock all` also forbids setting "
      "parameters, start and stop. Values of pins and signals can always be set, as in LinuxCNC.\n\n"
@@ -225,8 +241,6 @@ inline constexpr CodePage code_pages[] = {
      "NAME` ends it, and `loadusr -Wn NAME` waits for that."},
     {"names-and-count",
      "Both `names=` and `count=` (or `num_chan=`) set the number of instances. Use only one of them."},
-    {"no-alias",
-     "unalias removes the alias of a pin, but this pin has none. `show alias` lists all aliases."},
     {"no-dds",
      "The nodes of this netlist exchange signals over DDS, which this build of Halcyon does not include: Fast DDS was missing when it "
      "was built, or it was built with -DHALCYON_DDS=OFF.\n\n"
@@ -445,8 +459,9 @@ inline constexpr CodePage code_pages[] = {
      "separate program that accesses HAL's shared memory.\n\n"
      "The message names the alternative."},
     {"unsupported-file",
-     "Tcl files are programs, not netlists, and cannot be loaded.\n\n"
-     "Most of them are loops over names, which a .hal file expresses by ranges and sets: `net j[0..5]-cmd traj.out-[0..5] => "
+     "A Tcl file is a program: `hal run`, `hal sim` and `halrun` execute it, and nothing can be known about it before. `hal check` and clients of a "
+     "running machine take .hal and .ini files only; `haltcl FILE.tcl` runs a Tcl file on a running machine.\n\n"
+     "Most of these files are loops over names, which a .hal file expresses by ranges and sets: `net j[0..5]-cmd traj.out-[0..5] => "
      "pid.[0..5].command`."},
     {"unterminated-quote",
      "A quote, ' or \", is opened but not closed before the end of the line. Quotes protect spaces and `#`; they remain part of the "
@@ -458,6 +473,11 @@ inline constexpr CodePage code_pages[] = {
     {"writer-set",
      "A signal with a writer gets its value from the writer in every cycle, which would overwrite the value of sets.\n\n"
      "Unlink the writer first, as the help line shows."},
+    {"value-wraps",
+     "`setp` and `sets` set the low 32 bits of a whole number that is out of the range of its s32 or u32, as LinuxCNC 2.9 does: 3000000000 is "
+     "-1294967296 as s32. LinuxCNC 2.10 rejects such a number. There is no warning for a pattern of bits (0xFFFFFFFF for an s32) or for "
+     "a negative number that fits into 32 bits (-1 for a u32).\n\n"
+     "Write the number that is meant, or use a type that can hold it: s64, u64 or float."},
     {"wrong-arguments",
      "The command has too few or too many arguments, or an unexpected one. `help COMMAND` shows its usage."},
     {"wrong-arrow",

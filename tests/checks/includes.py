@@ -25,9 +25,10 @@ ROWS = {
     "runtime/cells": ["runtime/control", "components/dds/links"],
     "tools": ["tools/inspect", "tools/linuxcnc", "tools/trace", "tools/comp", "tools/bus", "tools/panel"],  # the table of subcommands
     "tools/cli": ["runtime/control"],
-    "tools/run": ["tools/record", "runtime/cells"],
+    "tools/run": ["tools/record", "tools/tcl", "runtime/cells"],
     "tools/record": ["tools/cli", "drivers/link", "components/recording/mcap"],
     "tools/inspect": ["tools/run", "tools/scope"],
+    "tools/tcl": ["tools/comp"],
     "tools/linuxcnc": ["tools/run", "tools/comp"],
     "tools/scope": ["tools/cli"],
     "tools/trace": ["tools/cli"],

@@ -24,7 +24,9 @@ net estop iocontrol.0.user-enable-out => iocontrol.0.emc-enable-in
 net bar panel.bar halui.machine.is-on
 setp pid.x.Pgain 5
 """
-INI = """[HAL]
+INI = """[EMC]
+VERSION = 1.1
+[HAL]
 HALFILE = machine.hal
 HALFILE = LIB:library.hal
 HALFILE = more.hal

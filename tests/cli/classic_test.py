@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """halcmd and halrun, with LinuxCNC's options, output and exit status."""
+import shutil
 import signal
 import subprocess
 import unittest
@@ -78,6 +79,17 @@ class Halcmd(Case):
         self.assertIn(f"{path}:4: HALCMD MSG: # not a comment", said)
         self.assertEqual(1, self.halcmd("-i", ini, "-f", path).returncode)
         self.assertIn("HALCMD MSG: 1", self.halcmd("-i", ini, "-f", given="print [A]B\n").stderr)
+
+    def test_the_value_of_an_ini_key_is_shown_with_its_place(self):
+        ini = self.write("x.ini", "[J]\nMAX = 2.5 # end of travel\n")
+        done = self.halcmd("-i", ini, "-f", given="setp adder.in0 [J]MAX\n")
+        self.assertEqual(f"""<stdin>:1:16: error: setp takes 2 arguments, not 6 [wrong-arguments]
+    1 | setp adder.in0 [J]MAX
+      |                ^^^^^^
+      = note: [J]MAX is '2.5 # end of travel' in {ini}:2
+      = help: setp PIN-OR-PARAMETER VALUE
+      = help: in an INI file a comment has a line of its own: behind a value it is part of the value
+""", done.stderr)
 
     def test_letters_may_be_joined(self):
         path = self.write("s.hal", "getp nothing\ngetp adder.in1\n")
@@ -183,10 +195,42 @@ class Halrun(Case):
         terminal.send("quit\r")
         self.assertEqual(0, terminal.wait())
 
+    TCL = """loadrt sum2 names=$::A(NAME)
+foreach pin {in0 in1} { setp $::A(NAME).$pin 2*3 }
+puts "[getp a.in0] [hal getp a.in1] <$argv> [file tail $EMC_INIFILE]"
+puts "[catch {hal setp a.in0 2*3} text] <[show sig]>"
+set flag 1
+setp a.in0 {$flag + 1}
+puts [getp a.in0]
+"""
+
+    @unittest.skipUnless(shutil.which("tclsh"), "tclsh is not installed")
+    def test_a_netlist_in_tcl(self):
+        self.write("a.ini", "[A]\nNAME = a\n")
+        path = self.write("a.tcl", self.TCL)
+        expected = "6 6 <> a.ini\n" + self.halrun("-f", self.write("show.hal", "show sig\n")).stdout + "1 <>\n2\n"
+        done = self.halrun("-i", "a.ini", path)
+        self.assertEqual((0, expected, ""), (done.returncode, done.stdout, done.stderr))
+        done = self.halrun("-i", "a.ini", "-f", path)
+        self.assertEqual((0, expected, ""), (done.returncode, done.stdout, done.stderr))
+        self.write("b.ini", "[HAL]\nHALFILE = a.tcl\n[A]\nNAME = a\n")
+        self.assertEqual((0, expected.replace("a.ini", "b.ini")), (lambda d: (d.returncode, d.stdout))(self.halrun("b.ini")))
+        self.assertEqual(expected.replace("<>", "<x y>", 1), self.good("sim", "--quiet", "-i", "a.ini", path, "--", "x", "y"))
+
+    @unittest.skipUnless(shutil.which("tclsh"), "tclsh is not installed")
+    def test_an_error_in_tcl_is_its_status(self):
+        done = self.halrun(self.write("a.tcl", "loadrt sum2 names=a\nsetp a.in7 1\n"))
+        self.assertEqual((1, ""), (done.returncode, done.stdout))
+        self.assertIn("<a.tcl>:1:6: error: unknown pin 'a.in7' [no-such-pin]", done.stderr)
+        self.assertTrue(done.stderr.endswith(f"\n    (file \"{self.folder}/a.tcl\" line 2)\nhalrun: '{self.folder}/a.tcl' ended with exit status 1\n"), done.stderr)
+
+    @unittest.skipUnless(shutil.which("tclsh"), "tclsh is not installed")
+    def test_lines_of_tcl_after_a_file(self):
+        done = self.halrun("-T", self.write("a.hal", SERVO), given="foreach n {0 1} {\n puts [getp adder.in$n]\n}\nsetp adder.in0 5+1\ngetp adder.in0\nnonsense\n")
+        self.assertEqual((0, "2\n3\n6\n", 'invalid command name "nonsense"\n'), (done.returncode, done.stdout, done.stderr))
+
     def test_wrong_files(self):
-        self.assertIn("Tcl is not supported", self.halrun("x.tcl").stderr)
-        self.assertIn("Tcl is not supported", self.halrun("-T").stderr)
-        self.assertIn("must end with .hal or .ini", self.halrun("x.txt").stderr)
+        self.assertIn("must end with .hal, .tcl or .ini", self.halrun("x.txt").stderr)
         self.assertIn("nowhere.hal", self.halrun("nowhere.hal").stderr)
 
 

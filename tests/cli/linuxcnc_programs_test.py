@@ -5,6 +5,7 @@ LinuxCNC is not needed (tests/peers runs its own)."""
 import shutil
 import signal
 import subprocess
+import sys
 import unittest
 from pathlib import Path
 
@@ -38,6 +39,29 @@ class LinuxcncPrograms(harness.Case):
 
     def machine(self, text=NETLIST):
         return self.start("run", self.write("m.hal", text))
+
+    def test_a_library_that_follows_pointers_ends_with_a_sentence_and_what_only_tests_them_works(self):
+        library = self.programs / "walking.so"
+        subprocess.run([CC, "-O1", "-shared", "-fPIC", "-o", str(library), str(SOURCES / "linuxcnc_programs/walking_library.c"), f"-L{LIBRARY}", "-l:liblinuxcnchal.so.0"],
+                       check=True)
+        self.machine()
+        self.say("newsig", "x", "float")
+        load = f"import ctypes; it = ctypes.CDLL('{library}'); "
+
+        def python(script):
+            self.write("walk.py", load + script + "\n")
+            done = self.shell("loadusr", "-w", "-i", sys.executable, "walk.py")
+            return done.stdout + done.stderr
+        self.assertEqual("0 0 1\n", python("print(it.has_memory(), it.begin(), it.has_memory())"))
+        self.assertEqual("1 0 0\n", python("it.begin(); print(it.exists(b'sum2'), it.exists(b'sum'), it.exists(b'nothing'))"))
+        self.assertEqual("0\n", python("it.begin(); print(it.connects(b'adder.in1', b'x'))"))
+        self.assertIn("adder.in1", self.say("show", "sig", "x"))
+        for call in ("it.is_ready(b'sum2')", "it.first_pin()"):
+            self.assertRegex(python(f"it.begin(); print({call})"),
+                             r"\A.*: this program reads LinuxCNC's memory directly, which a machine of Halcyon does not have. In its place: Python's and Tcl's hal "
+                             r"of Halcyon, which loadusr and hal linuxcnc find first where they are built\n\Z")
+        self.write("walk.py", load + "it.begin(); ctypes.string_at(0)\n")
+        self.assertIn("SIGSEGV", self.shell("loadusr", "-w", sys.executable, "walk.py").stderr)  # another address: a crash like any other
 
     # --- what works ------------------------------------------------------------------------------------------------------
 

@@ -3,6 +3,7 @@
 """hal linuxcnc: the order in which everything starts and ends, its environment, and what goes wrong."""
 import os
 import signal
+import time
 import unittest
 from pathlib import Path
 
@@ -142,6 +143,70 @@ class Linuxcnc(LinuxcncCase):
         self.assertRegex(err, r"\Ahal linuxcnc: 'halui' died at [\d:]+ \(SIGKILL\); the machine ends\n\Z")
         self.assertEqual(["milltask ends", "linuxcncsvr ends", "io ends"], self.logged()[-3:])
 
+    def stops(self, component, rest=""):
+        """Standard error of the machine after a program of it was stopped."""
+        self.display("touch shown; exec sleep 1000")
+        machine = self.runs(self.ini(PLAIN + "HALUI = halui\n" + rest))
+        os.kill(self.pid(component), signal.SIGSTOP)
+        _, err = machine.communicate(timeout=TIMEOUT)
+        self.assertEqual(1, machine.returncode)
+        return prompt(err)
+
+    def test_when_task_is_stopped_the_outputs_are_safe_and_the_machine_ends(self):
+        self.assertRegex(self.stops("inihal"), r"\Ahal linuxcnc: 'milltask' \(component inihal, process \d+\) is stopped by a signal for 1 s; "
+                                               r"the outputs have their safe values, the machine ends\n\Z")
+
+    def test_when_another_program_is_stopped_the_machine_ends(self):
+        self.assertRegex(self.stops("halui"), r"\Ahal linuxcnc: 'halui' \(component halui, process \d+\) is stopped by a signal for 1 s; the machine ends\n\Z")
+        self.assertEqual(["milltask ends", "linuxcncsvr ends", "io ends"], [line for line in self.logged() if line.endswith("ends") and line != "halui ends"])
+
+    def test_when_tasks_heartbeat_is_missing_the_outputs_are_safe_and_the_machine_ends(self):
+        key = 0x48000000 + os.getpid()
+        self.environment["STANDIN_STATUS_KEY"] = str(key)
+        self.write("test.nml", f"B emcCommand SHMEM localhost 8192 0 0 1 16 {key + 1} TCP=5005 xdr queue\nB emcStatus SHMEM localhost 20480 0 0 2 16 {key} TCP=5005 xdr\n")
+        self.display("touch shown; exec sleep 1000")
+        text = INI.replace("[EMC]\n", "[EMC]\nNML_FILE = test.nml\n")
+        machine = self.runs(self.ini(PLAIN + "[HALCYON]\nTASK_TIMEOUT = 2\n", text))
+        (self.folder / "hang").touch()
+        _, err = machine.communicate(timeout=TIMEOUT)
+        self.assertEqual(1, machine.returncode)
+        self.assertRegex(prompt(err), r"\Ahal linuxcnc: 'milltask' has ended no cycle for 2\.\d+ s \(\[HALCYON\]TASK_TIMEOUT 2 s\); the outputs have their safe "
+                                      r"values, the machine ends\n\Z")
+
+    # --- a time without CPU ------------------------------------------------------------------------------------------------
+
+    def stalled(self, limit):
+        """A machine that had no CPU for half a second."""
+        self.display("touch shown; exec sleep 1000")
+        machine = self.runs(self.ini(PLAIN + f"[HALCYON]\nMAX_CPU_GAP = {limit}\n"))
+        wait_until(lambda: self.value("servo.threadbeat") not in ("", "0"), "the thread runs")
+        machine.send_signal(signal.SIGSTOP)
+        time.sleep(0.5)
+        machine.send_signal(signal.SIGCONT)
+        return machine
+
+    def test_a_gap_ends_the_machine_that_tolerates_none(self):
+        machine = self.stalled(0)
+        _, err = machine.communicate(timeout=TIMEOUT)
+        self.assertEqual(1, machine.returncode)
+        end = prompt(err).splitlines()[-1]
+        self.assertRegex(end, r"\Ahal linuxcnc: servo: .*(no CPU time|no cycle) for .*limit 100 ms\) at cycle [\d ]+; the outputs have their safe values, the machine ends\Z")
+
+    def test_a_gap_is_reported_and_the_machine_goes_on(self):
+        machine = self.stalled("30s")
+        before = int(self.value("servo.threadbeat"))
+        wait_until(lambda: int(self.value("servo.threadbeat")) > before + 200, "the thread runs on")
+        self.comes("adder.out", "2")
+        time.sleep(0.3)
+        _, err = self.end(machine)
+        self.assertEqual(0, machine.returncode)
+        self.assertRegex(err, r"\A(hal linuxcnc: servo: no CPU time for \d+ ms; the machine goes on \(\[HALCYON\]MAX_CPU_GAP 30 s\); see: hal doctor\n)+\Z")
+
+    def test_bad_limits(self):
+        for key in ("MAX_CPU_GAP", "TASK_TIMEOUT"):
+            self.assertEqual(f"hal linuxcnc: CONFIG/machine.ini: [HALCYON]{key} is 'never', not a time; write 500ms, 2s or 0\n",
+                             self.linuxcnc(self.ini(PLAIN + f"[HALCYON]\n{key} = never\n"), status=1)[1])
+
     def test_when_the_nml_server_is_killed_everything_ends(self):
         self.write("end.hal", "")
         self.display("touch shown; exec sleep 1000")
@@ -225,12 +290,28 @@ CONFIG/machine.ini [TASK]TASK:1:20: error: 'milltask' ended before a component '
         self.end(machine)
 
     def test_a_launcher_that_was_killed_leaves_nothing_to_the_next(self):
+        self.environment["STANDIN_LINGERS"] = "linuxcncsvr milltask"
         self.display("touch shown; exec sleep 1000")
         machine = self.runs(self.ini())
+        self.environment["STANDIN_LINGERS"] = ""
         machine.kill()
         machine.wait(TIMEOUT)  # the server still has its standard output
         self.display("exit 0")
         self.assertEqual(("", ""), self.linuxcnc(self.ini()))
+        log = self.logged()
+        starts = [i for i, line in enumerate(log) if line == "linuxcncsvr -ini CONFIG/machine.ini"]
+        self.assertIn("linuxcncsvr ends", log[starts[0]:starts[1]])  # it has ended before its successor starts
+        self.assertIn("milltask ends", log[starts[0]:starts[1]])
+
+    def test_a_program_of_a_killed_launcher_that_ignores_sigterm_is_killed(self):
+        self.display("trap '' TERM; touch shown; note $$; while :; do sleep 1; done")
+        machine = self.runs(self.ini())
+        machine.kill()
+        machine.wait(TIMEOUT)
+        display = next(int(line.split()[1]) for line in self.logged() if line.startswith("note "))
+        self.display("exit 0")
+        self.assertEqual(("", ""), self.linuxcnc(self.ini()))
+        self.assertFalse(Path(f"/proc/{display}").exists())
 
 
 if __name__ == "__main__":

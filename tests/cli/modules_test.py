@@ -276,9 +276,16 @@ getp follow.position
     def test_values_that_do_not_fit(self):
         self.build("gain")
         for given, why in (("count=x", "count=x is not a whole number"), ("count=1.5", "count=1.5 is not a whole number"), ("count=3000000000", "count=3000000000 is not a whole number"),
-                           ("steps=1,2,3,4,5", "steps=1,2,3,4,5 has more than 4 values"), ("steps=1,,2", "steps= is not a whole number")):
+                           ("steps=1,2,3,4,5", "steps=1,2,3,4,5 has more than 4 values")):
             with self.subTest(given):
                 self.assertIn(f"error: component 'gain': {why} [bad-argument]", self.error(f"loadrt gain {given}\n"))
+
+    def test_an_empty_number_is_0_and_integers_are_read_as_in_c(self):
+        self.build("gain")
+        netlist = ("newthread t 1000000\nloadrt gain count=0x2 steps=3,,\naddf gain.0 t\naddf gain.1 t\nstart\nadvance 2 cycles\n"
+                   "getp gain.0.cycles\ngetp gain.1.cycles\n")
+        done = self.run_program("sim", "--quiet", self.write("m.hal", netlist))
+        self.assertEqual(("6\n0\n", ""), (done.stdout, done.stderr))
 
     def test_a_failed_main_leaves_nothing_and_its_messages_are_lines_before_the_error(self):
         self.build("gain", "troubled")

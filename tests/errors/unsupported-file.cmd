@@ -1,1 +1,1 @@
-hal sim unsupported-file.tcl
+hal check unsupported-file.tcl

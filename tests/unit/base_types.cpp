@@ -30,7 +30,8 @@ TEST(Types, are_found_by_the_names_of_both_dialects) {
     EXPECT_EQ(hal::type_named("sint"), HAL_TYPE_S64);
     EXPECT_EQ(hal::type_named("u64"), HAL_TYPE_U64);
     EXPECT_EQ(hal::type_named("port"), HAL_TYPE_PORT);
-    EXPECT_EQ(hal::type_named("BIT"), std::nullopt);
+    EXPECT_EQ(hal::type_named("BIT"), HAL_TYPE_BIT);
+    EXPECT_EQ(hal::type_named("Float"), HAL_TYPE_FLOAT);
     EXPECT_EQ(hal::type_named(""), std::nullopt);
 }
 
@@ -82,6 +83,33 @@ TEST(Integer_value, is_refused_when_it_is_not_one) {
     EXPECT_EQ(problem(HAL_TYPE_S32, "08"), "'08' is not a whole number (a leading 0 means octal)");
     for (const char* text : {"", "-", "+", "0x", "--1", "+-1", "1 ", " 1", "12a", "0xg", "TRUE"})
         EXPECT_EQ(problem(HAL_TYPE_U64, text), "'" + std::string(text) + "' is not a whole number");
+}
+
+TEST(Integer_value, in_a_record_has_leading_zeros_without_a_meaning) {
+    for (const auto& [text, expected] : {std::pair("010", 10), std::pair("-08", -8), std::pair("0x10", 16)})
+        EXPECT_EQ(hal::parse_value(HAL_TYPE_S32, text, hal::LeadingZero::decimal).value.s32, expected) << text;
+}
+
+TEST(Integer_value, of_setp_keeps_its_low_bits) {
+    const auto s32 = [](const char* text) { return hal::parse_wrapping(HAL_TYPE_S32, text); };
+    const auto u32 = [](const char* text) { return hal::parse_wrapping(HAL_TYPE_U32, text); };
+    EXPECT_EQ(s32("0xFFFFFFFF").value.s32, -1);
+    EXPECT_EQ(s32("0xFFFFFFFF").warning, "");
+    EXPECT_EQ(s32("3000000000").value.s32, -1294967296);
+    EXPECT_EQ(s32("3000000000").warning, "3000000000 is out of range for s32 (-2147483648 to 2147483647)");
+    EXPECT_EQ(s32("-3000000000").value.s32, 1294967296);
+    EXPECT_EQ(s32("0x1FFFFFFFF").value.s32, -1);
+    EXPECT_NE(s32("0x1FFFFFFFF").warning, "");
+    EXPECT_EQ(u32("-1").value.u32, 4294967295u);
+    EXPECT_EQ(u32("-1").warning, "");
+    EXPECT_EQ(u32("-4294967297").value.u32, 4294967295u);
+    EXPECT_NE(u32("-4294967297").warning, "");
+    EXPECT_EQ(u32("4294967296").value.u32, 0u);
+    EXPECT_EQ(hal::parse_wrapping(HAL_TYPE_U64, "-1").value.u64, std::numeric_limits<std::uint64_t>::max());
+    EXPECT_NE(hal::parse_wrapping(HAL_TYPE_S64, "9223372036854775808").problem, "");
+    EXPECT_EQ(s32("99999999999999999999").problem, "99999999999999999999 is out of range for s32 (-2147483648 to 2147483647)");
+    EXPECT_EQ(s32("1.5").problem, "'1.5' is not a whole number");
+    EXPECT_EQ(hal::parse_wrapping(HAL_TYPE_BIT, "yes").problem, "");
 }
 
 TEST(Value, is_cut_in_a_message_when_it_is_a_book) {

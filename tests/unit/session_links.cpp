@@ -262,14 +262,20 @@ TEST_F(Links, An_alias_is_a_second_name_for_every_command) {
     EXPECT_EQ(machine.get("x.s32-in"), "5");
 }
 
-TEST_F(Links, Aliases_are_unique_and_one_per_pin) {
+TEST_F(Links, Aliases_are_unique_and_a_second_one_replaces_the_first) {
     machine.must("alias pin x.s32-in speed\nalias param x.float-param gain\nnewsig sig bit");
-    machine.rejected("alias pin x.s32-in other", "alias-taken");
+    machine.must("alias pin x.s32-in other\nalias pin other third");
+    EXPECT_EQ(machine.get("speed"), "?");
+    EXPECT_EQ(machine.get("other"), "?");
+    EXPECT_EQ(machine.get("third"), "5");
+    machine.must("alias pin third speed");
+    machine.rejected("alias pin x.s32-in speed", "name-taken");
     machine.rejected("alias pin y.s32-in speed", "name-taken");
     machine.rejected("alias pin y.s32-in y.bit-in", "name-taken");
     machine.rejected("alias pin y.s32-in sig", "name-taken");
     machine.rejected("alias signal sig other", "wrong-arguments");
-    machine.rejected("unalias pin y.s32-in", "no-alias");
+    machine.must("unalias pin y.s32-in\nunalias pin y.s32-in");
+    machine.rejected("unalias pin nowhere", "no-such-pin");
     machine.rejected("alias pin nowhere other", "no-such-pin");
     machine.rejected("newsig speed bit", "signal-named-like-pin");
 }

@@ -120,7 +120,11 @@ TEST_F(Comp, rejects_contradicting_declarations) {
               "3:51 the C code does not define function 'two' | write: FUNCTION(two) { … }\n"
               "3:63 the C code has no EXTRA_SETUP for this option | write: EXTRA_SETUP() { … return 0; }\n");
     EXPECT_EQ(mistakes(head + "function _;\noption tpmod;\n" + code),
-              "4:8 unsupported: this is part of LinuxCNC's motion controller | only components that depend on nothing but HAL can be compiled\n");
+              "4:8 a trajectory planner includes sources of LinuxCNC's motion controller, and cannot be compiled here | a compiled module works: build this file with "
+              "LinuxCNC's own halcompile --install (package linuxcnc-uspace-dev), then write [TRAJ]TPMOD = x in the INI file, or type: hal linuxcnc -t x FILE.ini\n");
+    EXPECT_EQ(mistakes(head + "function _;\noption homemod;\n" + code),
+              "4:8 a homing module includes sources of LinuxCNC's motion controller, and cannot be compiled here | a compiled module works: build this file with "
+              "LinuxCNC's own halcompile --install (package linuxcnc-uspace-dev), then write [EMCMOT]HOMEMOD = x in the INI file, or type: hal linuxcnc -m x FILE.ini\n");
 }
 
 TEST_F(Comp, warns_of_options_without_effect) {

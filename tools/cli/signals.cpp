@@ -6,6 +6,8 @@
 #include <chrono>
 #include <csignal>
 #include <cstdint>
+#include <cstring>
+#include <fmt/core.h>
 #include <poll.h>
 #include <sys/eventfd.h>
 #include <sys/signalfd.h>
@@ -33,6 +35,13 @@ void ignore_unexpected() {
 }
 
 }  // namespace
+
+std::string end_description(int status) {
+    if (status == 0) return "ended";
+    if (status <= 128) return fmt::format("ended with exit status {}", status);
+    const char* const name = ::sigabbrev_np(status - 128);
+    return name ? fmt::format("was terminated by SIG{}", name) : fmt::format("was terminated by signal {}", status - 128);
+}
 
 StopRequest::StopRequest() {
     ignore_unexpected();

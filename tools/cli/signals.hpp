@@ -5,9 +5,13 @@
 #include <atomic>
 #include <functional>
 #include <mutex>
+#include <string>
 #include <thread>
 
 namespace hal::tools {
+
+/// How a program has ended whose exit status this is (128 + N: signal N): "ended with exit status 3", "was terminated by SIGKILL".
+std::string end_description(int status);
 
 /// Handles the signals that end a run, during its lifetime: SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGXCPU and SIGPWR. Construct it before any other
 /// thread. Signals whose default action would end the process without a report (SIGUSR1, SIGALRM, SIGIO, real-time signals ...) are

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // One function per rule about a whole file.
 #include <algorithm>
+#include <fmt/format.h>
 #include <map>
 
 #include "comp/syntax.hpp"
@@ -224,10 +225,16 @@ void features_are_supported(const Checking& c) {
     const auto reject = [&](const char* option, bool asked, std::string why, std::string help) {
         if (asked) c.found.error("unsupported-component", c.tree.option(option)->name.span, std::move(why), "", std::move(help));
     };
-    reject("homemod", c.tree.has("homemod"), "unsupported: this is part of LinuxCNC's motion controller",
-           "only components that depend on nothing but HAL can be compiled");
-    reject("tpmod", c.tree.has("tpmod"), "unsupported: this is part of LinuxCNC's motion controller",
-           "only components that depend on nothing but HAL can be compiled");
+    const std::string name = c.tree.name.text;
+    const auto compiled = [&](const char* key, const char* option) {
+        return fmt::format("a compiled module works: build this file with LinuxCNC's own halcompile --install (package linuxcnc-uspace-dev), then write {} = {} in the "
+                           "INI file, or type: hal linuxcnc {} {} FILE.ini",
+                           key, name, option, name);
+    };
+    reject("homemod", c.tree.has("homemod"), "a homing module includes sources of LinuxCNC's motion controller, and cannot be compiled here",
+           compiled("[EMCMOT]HOMEMOD", "-m"));
+    reject("tpmod", c.tree.has("tpmod"), "a trajectory planner includes sources of LinuxCNC's motion controller, and cannot be compiled here",
+           compiled("[TRAJ]TPMOD", "-t"));
 }
 
 }  // namespace

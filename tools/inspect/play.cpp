@@ -47,7 +47,7 @@ bool header(const std::string& line, const std::vector<std::string>& fields, con
     if (fields.size() > stream.types.size()) return leading_columns(fields) == fields.size() - stream.types.size();
     if (fields.size() < stream.types.size()) return false;
     for (std::size_t i = 0; i < fields.size(); ++i)
-        if (parse_value(stream.types[i], fields[i]).problem.empty()) return false;
+        if (parse_value(stream.types[i], fields[i], LeadingZero::decimal).problem.empty()) return false;
     return true;
 }
 
@@ -56,7 +56,7 @@ std::string problem_of(const std::vector<std::string>& fields, const Stream& str
     if (fields.size() != stream.types.size())
         return fmt::format("{} values, but '{}' has {} pins", fields.size(), stream.name, stream.types.size());
     for (std::size_t i = 0; i < fields.size(); ++i)
-        if (const Parsed value = parse_value(stream.types[i], fields[i]); !value.problem.empty())
+        if (const Parsed value = parse_value(stream.types[i], fields[i], LeadingZero::decimal); !value.problem.empty())
             return fmt::format("value {} ({}): {}", i + 1, name(stream.types[i]), value.problem);
     return {};
 }

@@ -135,7 +135,8 @@ bool read_ini(const RemoteShellOptions& options, Client::Options& how) {
     Diagnostics diagnostics;
     const Ini ini = Ini::read(sources, options.ini, diagnostics);
     write_all(STDERR_FILENO, render(diagnostics, sources, colours(STDERR_FILENO)));
-    for (const Ini::Entry& entry : ini.entries()) how.ini.push_back({entry.section, entry.key, entry.value});
+    for (const Ini::Entry& entry : ini.entries())
+        how.ini.push_back({entry.section, entry.key, entry.value, sources.location(entry.at, false)});
     return !diagnostics.failed();
 }
 

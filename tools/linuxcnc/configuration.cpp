@@ -10,6 +10,8 @@
 
 #include "cli/output.hpp"
 #include "commands/files.hpp"
+#include "commands/ini_version.hpp"
+#include "linuxcnc/leftovers.hpp"
 #include "machine/spawner.hpp"
 #include "text/characters.hpp"
 #include "text/diagnostic.hpp"
@@ -92,16 +94,14 @@ public:
                        "[DISPLAY]DISPLAY is missing: the machine runs as long as its display does; write DISPLAY = axis, linuxcncrsh, "
                        "./my-ui.py or dummy"),
                    false;
-        return delay() && programs();
+        return delay() && watchdogs() && programs();
     }
 
 private:
     bool version() {
-        const auto version = to_.ini.get("EMC", "VERSION");
-        if (version == "1.1") return true;
-        complain(fmt::format("[EMC]VERSION is {}, not 1.1: the file is from an older LinuxCNC; type: update_ini {}",
-                             version ? *version : "missing", to_.given));
-        return false;
+        const std::string problem = ini_version_problem(to_.ini);
+        if (!problem.empty()) complain(fmt::format("{}; type: update_ini {}", problem, to_.given));
+        return problem.empty();
     }
 
     bool delay() {
@@ -113,10 +113,31 @@ private:
         return true;
     }
 
+    /// Keys of our own: what is not tolerated of task and of the CPU.
+    bool watchdogs() {
+        constexpr std::int64_t usual_task_timeout_ns = 5'000'000'000;
+        constexpr std::int64_t usual_gap_ns = 2'000'000'000;  // of threads without a real-time priority, which others may delay at any time
+        const bool declared = to_.ini.get("HALCYON", "MAX_CPU_GAP").has_value();
+        to_.max_gap_ns = usual_gap_ns;
+        to_.task_timeout_ns = usual_task_timeout_ns;
+        if (!limit("MAX_CPU_GAP", to_.max_gap_ns) || !limit("TASK_TIMEOUT", to_.task_timeout_ns)) return false;
+        if (declared) to_.max_gap_realtime_ns = to_.max_gap_ns;
+        return true;
+    }
+
+    bool limit(const char* key, std::int64_t& ns) {
+        const auto text = to_.ini.get("HALCYON", key);
+        if (!text) return true;
+        const auto given = parse_duration_ns(*text);
+        if (!given) complain(fmt::format("[HALCYON]{} is '{}', not a time; write 500ms, 2s or 0", key, *text));
+        ns = given.value_or(0);
+        return given.has_value();
+    }
+
     /// The programs of LinuxCNC, and the display.
     bool programs() {
         for (const std::string& name : {std::string("linuxcncsvr"), to_.io.empty() ? "" : to_.io[0], to_.task[0]})
-            if (!name.empty() && find_program(to_, name).empty())
+            if (!name.empty() && find_part(name).empty())
                 return fail(options_, to_.linuxcnc.libraries.empty()
                                           ? fmt::format("'{}' is not installed; type: sudo apt-get install linuxcnc-uspace", name)
                                           : fmt::format("'{}' is missing in the source tree {}, which LINUXCNC_HOME names; build it there", name, to_.linuxcnc.home)),
@@ -127,6 +148,17 @@ private:
         for (const Words& application : to_.applications)
             if (!application.empty() && find_program(to_, application[0]).empty()) return missing("[APPLICATIONS]APP", application[0]);
         return true;
+    }
+
+    /// A source tree has its own programs: those of a LinuxCNC that is installed as well, which PATH leads to, are of another version.
+    std::string find_part(const std::string& name) {
+        const bool own = name == "linuxcncsvr" || name == "io" || name == "milltask";
+        if (to_.linuxcnc.libraries.empty() || !own) return find_program(to_, name);
+        std::vector<std::string> folders = to_.linuxcnc.programs;
+        folders.insert(folders.begin(), to_.folder + "/bin");
+        for (const std::string& folder : folders)
+            if (executable(folder + "/" + name)) return folder + "/" + name;
+        return {};
     }
 
     bool missing(const char* key, const std::string& program) {
@@ -221,6 +253,7 @@ void remove_expanded(const Configuration& configuration) {
 void export_configuration(const Configuration& configuration, const LinuxcncOptions& options) {
     const Installation& of = configuration.linuxcnc;
     set_variable("INI_FILE_NAME", configuration.file);
+    set_variable(launcher_variable, std::to_string(::getpid()));
     set_variable("CONFIG_DIR", configuration.folder);
     set_variable("NMLFILE", configuration.nml);
     if (options.linuxcnc_modules) set_variable("HALCYON_MODULES", "linuxcnc");

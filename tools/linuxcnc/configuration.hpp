@@ -28,6 +28,8 @@ struct Configuration {
     std::vector<Words> applications;
     std::int64_t applications_delay_ns = 0;
     std::string shutdown;            ///< [HAL]SHUTDOWN; may be empty
+    std::int64_t task_timeout_ns = 0;  ///< [HALCYON]TASK_TIMEOUT: longest time between two cycles of task; 0: not watched
+    std::int64_t max_gap_ns = 0, max_gap_realtime_ns = 0;  ///< [HALCYON]MAX_CPU_GAP, of SessionOptions
 
     /// A name, as the messages have it: "machine.ini".
     std::string given;

@@ -4,7 +4,6 @@
 #include <atomic>
 #include <chrono>
 #include <csignal>
-#include <cstring>
 #include <filesystem>
 #include <fmt/format.h>
 #include <thread>
@@ -12,7 +11,6 @@
 
 #include "cli/output.hpp"
 #include "commands/files.hpp"
-#include "linuxcnc/tcl.hpp"
 #include "machine/programs.hpp"
 #include "run/fault_lines.hpp"
 #include "run/report.hpp"
@@ -23,14 +21,6 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// "ended with exit status 3", "was terminated by SIGKILL".
-std::string how_it_ended(int status) {
-    if (status == 0) return "ended";
-    if (status <= 128) return fmt::format("ended with exit status {}", status);
-    const char* const name = ::sigabbrev_np(status - 128);
-    return name ? fmt::format("was terminated by SIG{}", name) : fmt::format("was terminated by signal {}", status - 128);
-}
-
 Words with_ini(const Words& program, const std::string& ini) {
     Words words = program;
     words.insert(words.end(), {"-ini", ini});
@@ -40,9 +30,12 @@ Words with_ini(const Words& program, const std::string& ini) {
 }  // namespace
 
 Launch::Launch(const LinuxcncOptions& options, const Configuration& configuration, HostedMachine& machine, MachineLock& lock)
-    : options_(options), configuration_(configuration), machine_(machine), lock_(lock) {
-    machine_.shell.run_scripts_with(
-        [this](const std::string& path, const Words& arguments, Pass pass, Output&) { return run_netlist_in_tcl(path, arguments, pass); });
+    : options_(options),
+      configuration_(configuration),
+      machine_(machine),
+      lock_(lock),
+      task_watch_(configuration.nml, configuration.task_timeout_ns) {
+    machine_.ini_path = configuration.file;
 }
 
 int Launch::run() {
@@ -100,7 +93,7 @@ bool Launch::start_server() {
     const auto status = wait_for(pid, 10'000'000'000);  // it ends once its successor, adopted by this process, has the buffers ready
     if (machine_.stop.requested()) return false;
     if (status && *status != 0)
-        return fail(options_, fmt::format("linuxcncsvr {}: another one may be using its TCP port or NML buffers", how_it_ended(*status))),
+        return fail(options_, fmt::format("linuxcncsvr {}: another one may be using its TCP port or NML buffers", end_description(*status))),
                false;
     const auto running = servers();
     if (running.empty()) return fail(options_, "linuxcncsvr has ended; the NML buffers need it"), false;
@@ -128,19 +121,6 @@ bool Launch::load_netlists() {
     if (!step("load the netlists of [HAL]HALFILE")) return false;
     const int status = machine_.shell.run_halfiles(configuration_.given, output_);
     return (status == 0 || options_.keep_going) && !machine_.stop.requested();
-}
-
-int Launch::run_netlist_in_tcl(const std::string& path, const Words& arguments, Pass pass) {
-    std::string problem;
-    const TclScript script{path, arguments, configuration_.file, &configuration_.ini, pass};
-    const int status = run_tcl(script, [this, &path](const Words& words) {
-        TextOutput text;
-        const int done = machine_.shell.execute(words, text, "<" + std::filesystem::path(path).filename().string() + ">");
-        return TclAnswer{done, std::move(text.out_text), std::move(text.err_text)};
-    }, machine_.stop.fd(), problem);
-    if (status < 0) return fail(options_, fmt::format("'{}' cannot be run: {}", path, problem));
-    if (status != 0 && !machine_.stop.requested()) fail(options_, fmt::format("'{}' {}", path, how_it_ended(status)));
-    return status == 0 ? 0 : 1;
 }
 
 bool Launch::start_threads() {
@@ -230,7 +210,8 @@ bool Launch::start_display() {
 }
 
 void Launch::watch() {
-    std::string found;
+    Failure found;
+    unsigned looks = 0;
     for (std::chrono::steady_clock::time_point since{};;) {
         if (machine_.stop.requested()) return void(status_ = 0);
         if (display_.pid != 0) {
@@ -238,20 +219,20 @@ void Launch::watch() {
                 // What ends all its programs, such as Ctrl-C in the terminal, is about to arrive here too.
                 if (*status > 128 && machine_.stop.wait_ns(200'000'000)) return void(status_ = 0);
                 status_ = *status;
-                if (*status != 0) fail(options_, fmt::format("the display '{}' {}", display_.name, how_it_ended(*status)));
+                if (*status != 0) fail(options_, fmt::format("the display '{}' {}", display_.name, end_description(*status)));
                 return;
             }
         } else if (line_typed()) {
             return void(status_ = 0);
         }
-        if (found.empty()) {
-            found = death();
+        if (++looks % 5 == 0) report_gaps();
+        if (found.sentence.empty()) {
+            found = failure(looks % 5 == 0);
             since = std::chrono::steady_clock::now();
         } else if (std::chrono::steady_clock::now() - since > 200ms) {
-            const bool task = runs("inihal");
-            if (!task) stop_threads();
+            if (!found.task_works) stop_threads();
             status_ = 1;
-            fail(options_, found + (task ? "; the machine ends" : "; the outputs have their safe values, the machine ends"));
+            fail(options_, found.sentence + (found.task_works ? "; the machine ends" : "; the outputs have their safe values, the machine ends"));
             return;
         }
         machine_.stop.wait_ns(20'000'000);

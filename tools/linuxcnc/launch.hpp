@@ -3,11 +3,16 @@
 #pragma once
 
 #include <chrono>
+#include <map>
 #include <optional>
 #include <string>
+#include <unistd.h>
 
+#include "cli/output.hpp"
+#include "hal/message_log.hpp"
 #include "linuxcnc/configuration.hpp"
 #include "linuxcnc/leftovers.hpp"
+#include "linuxcnc/task_watch.hpp"
 #include "run/hosted_machine.hpp"
 
 namespace hal::tools {
@@ -35,13 +40,19 @@ private:
     bool start_task();     ///< of 2.9, with the threads
     bool start_applications();
     bool start_display();
-    /// Waits for the first of: the display ends, a program dies, the end is requested. Sets status_.
+    /// Waits for the first of: the display ends, a program dies or hangs, a fault stops a thread, the end is requested. Sets status_.
     void watch();
+    /// What ends the machine: the sentence, and whether task still commands motion until the end.
+    struct Failure {
+        std::string sentence;
+        bool task_works = true;
+    };
+    Failure failure(bool look_at_threads);
+    void report_gaps();  ///< the times without CPU that did not stop a thread
     void end();
 
     bool step(const std::string& sentence);  ///< prints it with -v; false when the end was requested
     bool command(const Words& words, const std::string& source);
-    int run_netlist_in_tcl(const std::string& path, const Words& arguments, Pass);
     /// Starts a program that is not a component. Returns 0 after printing why it failed.
     pid_t start(const std::string& key, const Words& words, bool terminal = false);
     /// The exit status, or 128 + signal, of a program that was started by start(); none: it runs.
@@ -50,6 +61,10 @@ private:
     /// Returns the sentence about a death among the programs that the machine needs, or "".
     std::string death();
     std::string death_of(const std::string& component, const std::string& program);
+    /// Returns the sentence about a program that a signal has stopped, or a task whose heartbeat is missing, or "".
+    std::string hang(bool& of_task);
+    /// Returns the sentence about a thread that a fault has stopped, or "".
+    std::string stopped_thread();
     /// The processes of linuxcncsvr. It makes itself a daemon, which this process adopts.
     std::vector<pid_t> servers();
     /// Returns true when the program of that component runs.
@@ -71,6 +86,10 @@ private:
     std::vector<std::pair<std::string, std::string>> components_;  ///< name and program of those that must not die
     int status_ = 1;
     std::chrono::steady_clock::time_point looked_{};  ///< when death() last looked for linuxcncsvr
+    TaskWatch task_watch_;
+    std::map<std::string, int> stopped_looks_;  ///< by component: looks in a row that found its program stopped
+    std::map<std::string, std::uint64_t> gaps_;  ///< by thread: gaps that were reported
+    MessageLog gap_log_{"hal linuxcnc", [](const std::string& line) { write_all(STDERR_FILENO, line); }};
 };
 
 }  // namespace hal::tools

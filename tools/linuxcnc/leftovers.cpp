@@ -101,12 +101,51 @@ void MachineLock::note_server(pid_t pid) {
     if (::ftruncate(file_, 0) == 0 && ::pwrite(file_, text.data(), text.size(), 0) < 0 && pid == 0) problem_ = std::strerror(errno);
 }
 
-/// The launcher that wrote the file was killed. Ends the server it has noted.
+namespace {
+
+bool has_variable(pid_t pid, const std::string& assignment) {
+    std::ifstream file("/proc/" + std::to_string(pid) + "/environ", std::ios::binary);
+    for (std::string entry; std::getline(file, entry, '\0');)
+        if (entry == assignment) return true;
+    return false;
+}
+
+/// The programs that a launcher has left behind, wherever they have put themselves; `server` is the NML server that it has noted.
+std::vector<pid_t> left_by(pid_t launcher, pid_t server) {
+    const std::string assignment = fmt::format("{}={}", launcher_variable, launcher);
+    std::vector<pid_t> all;
+    for (const Process& process : processes()) {
+        if (process.state == 'Z' || process.pid == ::getpid()) continue;
+        const bool noted = server > 0 && process.pid == server && process.name == "linuxcncsvr";
+        if (noted || has_variable(process.pid, assignment)) all.push_back(process.pid);
+    }
+    return all;
+}
+
+}  // namespace
+
+/// The launcher that wrote the file was killed. Ends its programs and waits for them: a server that still has the port and the NML buffers, or
+/// a task that still has motion's memory, would be in the way of those that start next.
 void MachineLock::take_over(const std::string& noted) {
+    constexpr int wait_us = 10'000, most_waits = 500;
     pid_t launcher = 0, server = 0;
     std::istringstream(noted) >> launcher >> server;
-    for (const Process& process : processes())
-        if (server > 0 && process.pid == server && process.name == "linuxcncsvr") ::kill(server, SIGTERM);
+    if (launcher <= 0) return;
+    std::vector<pid_t> left = left_by(launcher, server);
+    took_over_ = true;
+    for (const int number : {SIGTERM, SIGKILL}) {
+        for (const pid_t pid : left) {
+            ::kill(pid, number);
+            ::kill(pid, SIGCONT);  // one that is stopped would never see it
+        }
+        for (int waited = 0; waited < most_waits && !left.empty(); ++waited) {
+            ::usleep(wait_us);
+            std::erase_if(left, [](pid_t pid) { return state_of(pid) == 0 || state_of(pid) == 'Z'; });
+        }
+        if (left.empty()) left = left_by(launcher, server);  // what they have started meanwhile
+    }
+    if (left.empty()) return;
+    problem_ = fmt::format("process {} of a machine whose launcher was killed does not end; end it first", left.front());
 }
 
 MachineLock::~MachineLock() {
@@ -136,6 +175,17 @@ void remove_segments(const Configuration& configuration) {
         const int set = key == static_cast<key_t>(motion.value_or(0)) ? -1 : ::semget(key, 0, 0);
         if (set >= 0 && ::semctl(set, 0, IPC_STAT, &semaphores) == 0 && semaphores.sem_perm.uid == ::geteuid()) ::semctl(set, 0, IPC_RMID);
     }
+}
+
+char state_of(pid_t pid) {
+    char content[1024];
+    const int file = ::open(fmt::format("/proc/{}/stat", pid).c_str(), O_RDONLY | O_CLOEXEC);
+    if (file < 0) return 0;
+    const ssize_t length = ::read(file, content, sizeof content);
+    ::close(file);
+    const std::string_view text(content, length > 0 ? static_cast<std::size_t>(length) : 0);
+    const auto end = text.rfind(')');
+    return end == text.npos || end + 2 >= text.size() ? '\0' : text[end + 2];
 }
 
 void adopt_orphans() { ::prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0); }

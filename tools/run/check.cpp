@@ -18,6 +18,7 @@ int run_check(const CheckOptions& options) {
     for (const std::string& name : options.assume) session.absences().assume(name);
     ShellOptions how;
     how.check = how.keep_going = how.notes = true;
+    how.linuxcnc = options.linuxcnc;
     how.color = colours(STDERR_FILENO);
     Shell shell(session, how);
     ErrorsOnly output;

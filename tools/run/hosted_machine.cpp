@@ -9,18 +9,22 @@
 #include <unistd.h>
 
 #include "cli/output.hpp"
+#include "commands/files.hpp"
 #include "machine/address.hpp"
 #include "machine/source_tree.hpp"
+#include "tcl/tcl.hpp"
 
 namespace hal::tools {
 
 namespace {
 
-SessionOptions session_options(const std::string& name, bool virtual_clock, ExitObserver* observer) {
+SessionOptions session_options(const NetlistOptions& of, const std::string& name, bool virtual_clock, ExitObserver* observer) {
     SessionOptions options;
     options.observer = observer;
     options.name = name;
     options.virtual_clock = virtual_clock;
+    options.max_gap_ns = of.max_gap_ns;
+    options.max_gap_realtime_ns = of.max_gap_realtime_ns;
     return options;
 }
 
@@ -88,10 +92,12 @@ std::string own_name(const NetlistOptions& options) {
 
 HostedMachine::HostedMachine(const NetlistOptions& options, const std::string& name, bool virtual_clock)
     : observer_(virtual_clock ? nullptr : std::make_unique<ExitObserver>(name)),
-      session(session_options(name, virtual_clock, observer_.get())), shell(session, shell_options(options)), options_(options) {
+      session(session_options(options, name, virtual_clock, observer_.get())), shell(session, shell_options(options)), options_(options) {
     export_variables(options, name);
     if (!virtual_clock)  // a machine that is stopped from the terminal would leave its outputs as they are
         for (const int number : {SIGTSTP, SIGTTIN, SIGTTOU}) std::signal(number, SIG_IGN);
+    shell.run_scripts_with(
+        [this](const std::string& path, const std::vector<std::string>& arguments, Pass pass, Output&) { return run_script(path, arguments, pass); });
     if (virtual_clock) cycle_guard_.begin(options.cycle_limit_ns);
     stop.when_signalled([this, virtual_clock] {
         shell.cancel();
@@ -129,13 +135,36 @@ bool HostedMachine::serve(bool needed) {
 int HostedMachine::load(Output* output) {
     Output& to = output != nullptr ? *output : output_;
     if (!options_.ini.empty() && shell.read_ini(options_.ini, to) != 0) return 1;
+    if (!options_.ini.empty()) ini_path = absolute_path(options_.ini);
     int status = 0;
     for (const std::string& path : options_.words) {
         if (stop.requested()) return 1;
-        status = std::max(status, shell.run_file(path, to));
+        if (path.ends_with(".ini")) ini_path = absolute_path(path);
+        status = std::max(status, path.ends_with(".tcl") ? run_script(path, options_.arguments, Pass::both) : shell.run_file(path, to));
         if (status != 0 && !options_.keep_going) return status;
     }
     return status;
+}
+
+int HostedMachine::run_script(const std::string& path, const std::vector<std::string>& arguments, Pass pass) {
+    const std::string name = path.empty() ? "<haltcl>" : "<" + std::filesystem::path(path).filename().string() + ">";
+    TclScript script;
+    script.path = path;
+    script.directory = shell.options.directory;
+    script.arguments = arguments;
+    script.ini_path = ini_path;
+    script.ini = &session.ini;
+    script.pass = pass;
+    const TclCommand execute = [this, &name](const std::vector<std::string>& words) {
+        TextOutput text;
+        const int status = shell.execute(words, text, name);
+        return TclAnswer{status, std::move(text.out_text), std::move(text.err_text)};
+    };
+    std::string problem;
+    const int status = run_tcl(script, execute, stop.fd(), problem);
+    if (status < 0) return fail(options_, fmt::format("'{}' cannot be run: {}", path.empty() ? "Tcl" : path, problem));
+    if (status != 0 && !stop.requested() && !path.empty()) fail(options_, fmt::format("'{}' {}", path, end_description(status)));
+    return status == 0 ? 0 : 1;
 }
 
 void HostedMachine::start_threads() {

@@ -4,6 +4,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "cli/prompt_loop.hpp"
 #include "cli/signals.hpp"
@@ -28,6 +29,8 @@ public:
     bool serve(bool needed);
     /// Runs the files; their output goes to `output`, by default to the process's own. Returns the exit status.
     int load(Output* output = nullptr);
+    /// Runs a netlist in Tcl; an empty path: lines from standard input. Returns 0, or 1 after printing why it failed.
+    int run_script(const std::string& path, const std::vector<std::string>& arguments, Pass pass);
     /// Executes `start`, unless the threads are running.
     void start_threads();
     /// Opens the interactive shell until quit or the end. Returns the exit status.
@@ -45,6 +48,7 @@ public:
     StopRequest stop;
     Session session;
     Shell shell;
+    std::string ini_path;  ///< absolute: $EMC_INIFILE of scripts; set by load() and `hal linuxcnc`
 
 private:
     const NetlistOptions& options_;

@@ -11,6 +11,7 @@ namespace hal::tools {
 
 struct NetlistOptions : ExecutionOptions {
     std::string part;                 ///< --node: the node to load
+    std::int64_t max_gap_ns = 0, max_gap_realtime_ns = 0;  ///< `hal linuxcnc`: of SessionOptions
     std::int64_t cycle_limit_ns = 0;  ///< sim --cycle-limit: of one cycle, in wall time; 0: not given
 
 protected:

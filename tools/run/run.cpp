@@ -26,7 +26,10 @@ namespace {
 int run_classic(HostedMachine& machine, const RunOptions& options) {
     const int status = machine.load();
     if ((status != 0 && !options.keep_going) || machine.stop.requested()) return status;
-    const int said = options.interactive || options.words.empty() ? machine.converse({"halcmd: ", "halcmd+: "}) : 0;
+    const bool converses = options.interactive || options.words.empty();
+    int said = 0;
+    if (options.tcl) said = machine.run_script("", {}, Pass::both);
+    else if (converses) said = machine.converse({"halcmd: ", "halcmd+: "});
     return std::max({status, said, machine.faulted() ? 1 : 0});
 }
 

@@ -13,9 +13,10 @@ struct RunOptions : NetlistOptions {
     std::string watchdog;      ///< a device of the Linux watchdog API
     std::string dds;           ///< arguments of the DDS participant: "interfaces=10.0.0.1 domain=3"
     bool interactive = false, no_picture = false;
+    bool tcl = false;          ///< halrun -T: reads lines of Tcl after the files
 
     void declare(OptionSet& set) override {
-        set.words("FILE", "netlists (.hal), or an INI file with [HAL]HALFILE", false);
+        set.words("FILE", "netlists (.hal or .tcl), or an INI file with [HAL]HALFILE", false);
         set.flag("-I,--interactive", interactive, "open the shell after loading; leaving it ends the run");
         set.for_how_long(for_ns, "stop after 10s, 250ms, 2min …; default: run until Ctrl-C");
         set.value("-N,--name", name, "NAME", "name of this instance, when several run on one machine (default: default)");

@@ -109,6 +109,7 @@ char halcyon_program_prefix[256];
 
 int hal_init(const char *name) {
     if (!name || !*name || strlen(name) > HAL_NAME_LEN) return -EINVAL;
+    if (halcyon_begins) halcyon_begins();
     const locale_t before = halcyon_lock();
     struct halcyon_program *of = NULL;
     bool others = false, again = false;

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """Stands in for LinuxCNC's programs; its name is whose part it plays. What happens is written to the file in STANDIN_LOG."""
+import ctypes
 import os
 import signal
 import sys
@@ -16,6 +17,8 @@ def log(text):
 
 
 def ends(*_):
+    if NAME in os.environ.get("STANDIN_LINGERS", "").split():
+        time.sleep(1)
     log(f"{NAME} ends")
     sys.exit(0)
 
@@ -45,8 +48,22 @@ def component():
         time.sleep(60)
     it.ready()
     it["speed"] = 1.5
+    if NAME == "milltask" and "STANDIN_STATUS_KEY" in os.environ:
+        beat(int(os.environ["STANDIN_STATUS_KEY"]))
     while True:
         time.sleep(1)
+
+
+def beat(key):
+    """Counts the writes of the status buffer as task does in each cycle, until a file `hang` appears: behind 32 bytes and a long."""
+    libc = ctypes.CDLL(None)
+    libc.shmat.restype = ctypes.c_void_p
+    memory = libc.shmat(libc.shmget(key, 20480, 0o1600), None, 0)
+    writes = ctypes.c_long.from_address(memory + 40)
+    while True:
+        if not os.path.exists("hang"):
+            writes.value += 1
+        time.sleep(0.01)
 
 
 with open("/proc/self/comm", "w") as file:  # a script is python3 to the kernel

@@ -43,6 +43,14 @@ foreach halcyon::name $halcyon::commands {
     if {[info commands ::$halcyon::name] eq ""} {interp alias {} $halcyon::name {} hal $halcyon::name}
 }
 
+# As in LinuxCNC's haltcl, a value is an expression, and a table is printed; `hal setp` and `hal show` take the words as they are, and return.
+foreach halcyon::name {setp sets} {
+    interp alias {} $halcyon::name {}
+    proc $halcyon::name {name value} "hal $halcyon::name \$name \[uplevel 1 \[::list expr \$value\]\]"
+}
+interp alias {} show {}
+proc show {args} {puts [hal show {*}$args]}
+
 proc halcyon::run {file} {
     if {![catch {uplevel #0 [::list source $file]} message options]} return
     set lines [split [dict get $options -errorinfo] \n]

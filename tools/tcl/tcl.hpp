@@ -13,6 +13,7 @@ namespace hal::tools {
 
 struct TclScript {
     std::string path;                        ///< empty: lines from standard input
+    std::string directory = {};              ///< to run in; empty: this process's
     std::vector<std::string> arguments = {};
     std::string ini_path = {};               ///< what $EMC_INIFILE is; empty: no INI file
     const Ini* ini = nullptr;                ///< its values are in arrays: $::SECTION(KEY), a list of all values of the key

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "linuxcnc/tcl.hpp"
+#include "tcl/tcl.hpp"
 
 #include <algorithm>
 #include <cerrno>
@@ -19,7 +19,7 @@
 #include "cli/output.hpp"
 #include "commands/table.hpp"
 #include "comp/toolchain.hpp"
-#include "linuxcnc/tcl_prelude.hpp"
+#include "tcl/prelude.hpp"
 
 namespace hal::tools {
 
@@ -92,7 +92,11 @@ public:
         ::posix_spawnattr_setflags(&how, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
         std::string words[] = {"tclsh", "-encoding", "utf-8", prelude};
         char* const arguments[] = {words[0].data(), words[1].data(), words[2].data(), words[3].data(), nullptr};
-        const int error = ::posix_spawnp(&pid_, "tclsh", nullptr, &how, arguments, environ);
+        posix_spawn_file_actions_t actions;
+        ::posix_spawn_file_actions_init(&actions);
+        if (!script.directory.empty()) ::posix_spawn_file_actions_addchdir_np(&actions, script.directory.c_str());
+        const int error = ::posix_spawnp(&pid_, "tclsh", &actions, &how, arguments, environ);
+        ::posix_spawn_file_actions_destroy(&actions);
         ::posix_spawnattr_destroy(&how);
         if (error == 0) return true;
         pid_ = 0;

@@ -7,7 +7,7 @@
 
 #include "cli/output.hpp"
 #include "control/client.hpp"
-#include "linuxcnc/tcl.hpp"
+#include "tcl/tcl.hpp"
 #include "text/diagnostic.hpp"
 
 namespace hal::tools {
@@ -50,7 +50,8 @@ int haltcl(int argc, char** argv) {
     Client::Options how;
     std::error_code unknown;
     how.directory = std::filesystem::current_path(unknown).string();
-    for (const Ini::Entry& entry : ini.entries()) how.ini.push_back({entry.section, entry.key, entry.value});
+    for (const Ini::Entry& entry : ini.entries())
+        how.ini.push_back({entry.section, entry.key, entry.value, sources.location(entry.at, false)});
     if (!client->set_options(how)) return fail(options, fmt::format("instance '{}' does not respond", client->instance()));
     const int status = run_tcl(script, [&](const std::vector<std::string>& words) {
         Client::Answer answer = client->run(words, "<haltcl>");

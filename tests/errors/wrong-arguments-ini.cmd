@@ -1,0 +1,1 @@
+hal check --ini wrong-arguments-ini.ini wrong-arguments-ini.hal

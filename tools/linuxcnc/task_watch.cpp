@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: MIT
+#include "linuxcnc/task_watch.hpp"
+
+#include <algorithm>
+#include <fstream>
+#include <iterator>
+#include <sstream>
+#include <sys/ipc.h>
+#include <sys/shm.h>
+#include <vector>
+
+#include "text/numbers.hpp"
+
+namespace hal::tools {
+
+namespace {
+
+constexpr std::int64_t longest_step_ns = 100'000'000;  // a longer one is a time without CPU, which task may not have had either
+
+// A buffer begins with its name in 32 bytes, then a header of three `long`: read since the last write, number of writes, size.
+constexpr std::size_t name_bytes = 32, writes_offset = name_bytes + sizeof(std::int64_t);
+
+}  // namespace
+
+key_t nml_key(const std::string& nml, const std::string& buffer) {
+    std::ifstream file(nml);
+    for (std::string line; std::getline(file, line);) {  // B NAME SHMEM HOST SIZE 0 0 NUMBER PROCESSES KEY …
+        std::istringstream in(line);
+        const std::vector<std::string> words{std::istream_iterator<std::string>(in), {}};
+        if (words.size() < 10 || words[0] != "B" || words[1] != buffer || words[2] != "SHMEM") continue;
+        const auto key = parse_natural(words[9]);
+        return key ? static_cast<key_t>(*key) : -1;
+    }
+    return -1;
+}
+
+TaskWatch::~TaskWatch() {
+    if (memory_) ::shmdt(memory_);
+}
+
+void TaskWatch::attach() {
+    using namespace std::chrono_literals;
+    if (Clock::now() - attached_ < 500ms) return;
+    attached_ = Clock::now();
+    const key_t key = nml_key(nml_, "emcStatus");
+    const int id = key == -1 ? -1 : ::shmget(key, 0, 0);
+    shmid_ds segment{};
+    if (id < 0 || ::shmctl(id, IPC_STAT, &segment) != 0 || segment.shm_segsz < writes_offset + sizeof(std::int64_t)) return;
+    void* const memory = ::shmat(id, nullptr, SHM_RDONLY);
+    if (memory == reinterpret_cast<void*>(-1)) return;
+    memory_ = memory;
+    writes_ = reinterpret_cast<const volatile std::int64_t*>(static_cast<const char*>(memory) + writes_offset);
+    seen_ = *writes_;
+    looked_ = Clock::now();
+}
+
+std::int64_t TaskWatch::silent_ns() {
+    if (timeout_ns_ == 0) return 0;
+    if (!writes_) attach();
+    if (!writes_) return 0;
+    const Clock::time_point now = Clock::now();
+    silent_ns_ += std::min(std::chrono::nanoseconds(now - looked_).count(), longest_step_ns);
+    looked_ = now;
+    if (const std::int64_t writes = *writes_; writes != seen_) {
+        seen_ = writes;
+        silent_ns_ = 0;
+        beats_ = true;
+    }
+    return beats_ && silent_ns_ > timeout_ns_ ? silent_ns_ : 0;
+}
+
+}  // namespace hal::tools
