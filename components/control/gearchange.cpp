@@ -1,14 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
+#include "hal/corrected.hpp"
 
 namespace {
-
-/// A parameter that the component may correct.
-class CorrectedParam : public hal::Param<double> {
-public:
-    using Param::Param;
-    void correct(double value) noexcept { put(value); }
-};
 
 struct Gearchange : hal::Component {
     using Component::Component;
@@ -21,7 +15,7 @@ struct Gearchange : hal::Component {
     hal::Param<double> max1{*this, "max1", "highest speed in gear 1", {.initial = 100000.0}};
     hal::Param<double> min2{*this, "min2", "lowest speed in gear 2"};
     hal::Param<double> max2{*this, "max2", "highest speed in gear 2", {.initial = 100000.0}};
-    CorrectedParam     scale2{*this, "scale2", "ratio of the spindle speeds in gear 2 and gear 1; at least 1", {.initial = 1.0}};
+    hal::CorrectedParam<double> scale2{*this, "scale2", "ratio of the spindle speeds in gear 2 and gear 1; at least 1", {.initial = 1.0}};
     hal::Param<bool>   reverse{*this, "reverse", "TRUE: gear 2 reverses the direction of the spindle"};
     hal::Function      run{*this, "", &Gearchange::update, "computes speed-out and dir-out"};
 

@@ -20,8 +20,8 @@ struct TorchHeight : hal::Component {
     hal::In<double>    z_pos_in{*this, "z-pos-in", "commanded Z position"};
     hal::Out<double>   z_pos_out{*this, "z-pos-out", "commanded Z position with the correction"};
     hal::Out<double>   z_fb_out{*this, "z-fb-out", "Z position feedback for motion, without the correction"};
-    hal::Out<bool>     vel_status{*this, "vel-status", "TRUE while enabled and at the requested velocity"};
-    hal::Param<double> velocity_tol{*this, "velocity-tol", "maximum deviation from the requested velocity for a correction", {.unit = "%"}};
+    hal::Out<bool>     vel_status{*this, "vel-status", "TRUE while enabled, moving, and not slower than requested"};
+    hal::Param<double> velocity_tol{*this, "velocity-tol", "how much slower than requested a corrected motion may be", {.unit = "%"}};
     hal::Param<double> correction_vel{*this, "correction-vel", "change of the correction per cycle"};
 
 protected:
@@ -32,7 +32,8 @@ protected:
     bool control(Direction direction) noexcept {
         const double z = z_pos_in, up = z - last_z_;
         // In a corner the velocity drops, and the arc voltage no longer measures the height.
-        const bool steady = enable && std::fabs(current_vel - requested_vel) <= std::fabs(requested_vel) * velocity_tol / 100.0;
+        const double min_vel = requested_vel - requested_vel * (velocity_tol * 0.01);
+        const bool steady = enable && current_vel > 0.0 && current_vel >= min_vel;
         bool removing = false;
         if (!enable) offset_ = 0.0;
         else if (!torch_on) {
