@@ -14,6 +14,7 @@ struct Thc : TorchHeight {
     hal::Param<double> vel_scale{*this, "vel-scale", "volts per unit of encoder-vel"};
     hal::Param<double> scale_offset{*this, "scale-offset", "encoder-vel at 0 V"};
     hal::Param<double> voltage_tol{*this, "voltage-tol", "deadband around volts-requested", {.unit = "V"}};
+    hal::Param<double> correction_vel{*this, "correction-vel", "change of the correction per cycle"};
     hal::Function      run{*this, "", &Thc::update, "computes the arc voltage and corrects Z"};
 
     void update(hal::Cycle) noexcept {
@@ -23,7 +24,7 @@ struct Thc : TorchHeight {
             const bool too_low = volts - voltage_tol < volts_requested;
             const bool too_high = volts + voltage_tol > volts_requested;
             return int{too_low} - int{too_high};  // both: within the tolerance
-        });
+        }, correction_vel);
         offset_value = offset();
     }
 };

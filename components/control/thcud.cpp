@@ -10,10 +10,11 @@ struct Thcud : TorchHeight {
     hal::In<bool>    torch_down{*this, "torch-down", "request to lower the torch"};
     hal::Out<double> cur_offset{*this, "cur-offset", "current correction"};
     hal::Out<bool>   removing_offset{*this, "removing-offset", "TRUE while the torch is off and the correction is being removed"};
+    hal::In<double>  correction_vel{*this, "correction-vel", "change of the correction per cycle"};
     hal::Function    run{*this, "", &Thcud::update, "corrects Z"};
 
     void update(hal::Cycle) noexcept {
-        removing_offset = control([&] { return int{torch_up.get()} - int{torch_down.get()}; });
+        removing_offset = control([&] { return int{torch_up.get()} - int{torch_down.get()}; }, correction_vel);
         cur_offset = offset();
     }
 };
@@ -28,7 +29,8 @@ cycle changes the correction by `correction-vel`, up or down according to the in
 Z removes the correction, by at most the distance Z moves up in the cycle, so the torch never drops when the arc ends. While disabled, Z passes through.
 
 **Differences from LinuxCNC:** LinuxCNC's `thcud` removes the whole correction in one cycle, and its `cur-offset` remains 0, unlike its
-documentation. Halcyon implements the documented behaviour. `vel-status` is FALSE while `enable` is FALSE (LinuxCNC: keeps its value).
+documentation. Halcyon implements the documented behaviour. `correction-vel` is an input as in 2.9.10 and 2.10 (in 2.9.0 it
+is a parameter). `vel-status` is FALSE while `enable` is FALSE (LinuxCNC: keeps its value).
 
     loadrt thcud
     addf thcud servo

@@ -22,14 +22,13 @@ struct TorchHeight : hal::Component {
     hal::Out<double>   z_fb_out{*this, "z-fb-out", "Z position feedback for motion, without the correction"};
     hal::Out<bool>     vel_status{*this, "vel-status", "TRUE while enabled, moving, and not slower than requested"};
     hal::Param<double> velocity_tol{*this, "velocity-tol", "how much slower than requested a corrected motion may be", {.unit = "%"}};
-    hal::Param<double> correction_vel{*this, "correction-vel", "change of the correction per cycle"};
 
 protected:
     /// Updates the correction and the shared outputs. `direction()` returns above 0 to raise the torch, below 0 to lower it, 0 to
-    /// hold; it is asked only while a correction is allowed. Returns true while the torch is off and the correction is being
+    /// hold; it is asked only while a correction is allowed. `step` is the change of the correction per cycle. Returns true while the torch is off and the correction is being
     /// removed. [realtime]
     template <class Direction>
-    bool control(Direction direction) noexcept {
+    bool control(Direction direction, double step) noexcept {
         const double z = z_pos_in, up = z - last_z_;
         // In a corner the velocity drops, and the arc voltage no longer measures the height.
         const double min_vel = requested_vel - requested_vel * (velocity_tol * 0.01);
@@ -41,7 +40,7 @@ protected:
             if (up > 0.0) offset_ -= std::clamp(offset_, -up, up);
         } else if (arc_ok && steady) {
             const int sign = direction();
-            const double next = offset_ + (sign > 0 ? correction_vel : sign < 0 ? -correction_vel : 0.0);
+            const double next = offset_ + sign * step;
             if (std::fabs(next) <= 1e9) offset_ = next;  // FALSE for NaN, too
         }
         last_z_ = z;
