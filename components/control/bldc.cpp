@@ -297,6 +297,10 @@ found, the outputs are 0. Link `rawcounts` to the encoder's pin of that name.
 **Hall patterns** 0..47 (25: 60 degrees, 26: its reverse, 0: 30 degrees, 17: 120 degrees). `hall-error` is TRUE after a code outside of the
 pattern, which also sets all outputs to 0, and after a skipped state. A `pattern` above 47 is set to 0.
 
+**Differences from LinuxCNC:** the first cycle sets the outputs (LinuxCNC: they remain 0). A trapezoid follows `phase-angle` (LinuxCNC: `rotor-angle`,
+without `lead-angle`). A code outside of the Hall pattern sets the outputs to 0 (LinuxCNC keeps driving). The angle is extrapolated by fractions of a
+count (LinuxCNC: whole counts). `in-type` and `out-type` have other numbers.
+
     loadrt bldc cfg=qh names=spindle
     addf spindle servo
     setp spindle.scale 4000

@@ -25,7 +25,8 @@ struct Integ : hal::Component {
 
 HAL_COMPONENT(Integ, "integ", "Integrator with gain, reset and limits", R"(
 `out = out + gain * in * period`, limited to `min` and `max`, which also prevents wind-up. If they exclude 0, `reset` sets `out` to
-the nearer one. NaN and infinite inputs are ignored (LinuxCNC: `out` remains NaN).
+the nearer one. NaN and infinite inputs are ignored (LinuxCNC: `out` remains NaN). In LinuxCNC 2.10~pre1
+`reset` has no effect; this is the `reset` of 2.9.
 
     loadrt integ names=distance
     addf distance servo
