@@ -21,10 +21,10 @@ struct Biquad : hal::Component {
     using Component::Component;
     hal::In<double>        in{*this, "in", "input"};
     hal::Out<double>       out{*this, "out", "filtered input"};
-    hal::In<bool>          enable{*this, "enable", "a rising edge designs and clears the filter; FALSE copies in to out"};
+    hal::In<bool>          enable{*this, "enable", "a rising edge designs the filter; FALSE copies in to out"};
     hal::Out<bool>         valid{*this, "valid", "TRUE: the parameters are valid; FALSE: in is copied to out"};
     hal::In<std::uint32_t> type{*this, "type", "0: user-defined by n0 to d2; 1: low pass; 2: notch"};
-    hal::In<double>        f0{*this, "f0", "corner or notch frequency, below half the rate of the thread",
+    hal::In<double>        f0{*this, "f0", "corner or notch frequency, at most half the rate of the thread",
                               {.initial = 250.0, .unit = "Hz"}};
     hal::In<double>        q{*this, "Q", "quality of the filter, 0.5 to 2", {.initial = 0.7071}};
     hal::Out<double>       s1{*this, "s1", "state for the next cycle"};
@@ -37,10 +37,7 @@ struct Biquad : hal::Component {
     hal::Function          run{*this, "", &Biquad::update, "filters"};
 
     void update(hal::Cycle cycle) noexcept {
-        if (enable && !was_enabled_) {
-            valid = design(cycle.seconds());
-            clear();
-        }
+        if (enable && !was_enabled_) valid = design(cycle.seconds());
         was_enabled_ = enable;
         const double x = in;
         if (!enable || !valid) {
@@ -64,7 +61,7 @@ private:
 
     bool design(double dt) noexcept {
         if (type == 0) return std::isfinite(n0 + n1 + n2 + d1 + d2);
-        if (type > 2 || !(f0 > 0.0 && f0 * dt < 0.5) || !(q >= 0.5 && q <= 2.0)) return false;
+        if (type > 2 || !(f0 > 0.0 && f0 * dt <= 0.5) || !(q >= 0.5 && q <= 2.0)) return false;
         const double w = 2.0 * std::numbers::pi * f0 * dt, cosine = std::cos(w), s = std::sin(w) / (2.0 * q), a = 1.0 + s;
         const double outer = type == 1 ? (1.0 - cosine) / 2.0 : 1.0, middle = type == 1 ? 1.0 - cosine : -2.0 * cosine;
         n0.set(outer / a);
@@ -72,6 +69,7 @@ private:
         n2.set(outer / a);
         d1.set(-2.0 * cosine / a);
         d2.set((1.0 - s) / a);
+        clear();
         return true;
     }
 
@@ -83,10 +81,11 @@ private:
 HAL_COMPONENT(Biquad, "biquad", "Second-order filter: low pass, notch or user-defined", R"(
     H(z) = (n0 + n1/z + n2/z²) / (1 + d1/z + d2/z²)
 
-A rising edge of `enable` designs the filter: `type` 1 (low pass) and 2 (notch) compute the parameters from `f0` and `Q`; `type` 0 uses the parameters
-as they are. `f0` must be above 0 and below half the rate of the thread, `Q` in 0.5..2; otherwise
-`valid` is FALSE and `in` is copied to `out`. (LinuxCNC's manual page gives the limit as "f0 > sampleRate / 2".) While the input is NaN or infinite,
-`out` keeps its value; a filter that diverges is cleared.
+A rising edge of `enable` designs the filter: `type` 1 (low pass) and 2 (notch) compute the parameters from `f0` and `Q` and clear `s1` and `s2`;
+`type` 0 uses the parameters and the state as they are. `f0` must be above 0 and at most half the rate of the thread, `Q` in 0.5..2; otherwise
+`valid` is FALSE and `in` is copied to `out`. While the input is NaN or infinite, `out` keeps its value; a filter that diverges is cleared.
+
+**Differences from LinuxCNC:** an `f0` of 0 or below is invalid (LinuxCNC: the filter diverges), and so are NaN parameters; `out` recovers from NaN.
 
     # remove the 50 Hz hum of a force sensor
     loadrt biquad names=no-hum

@@ -7,6 +7,7 @@
 
 #include "bldc_angles.hpp"
 #include "hal/component.hpp"
+#include "hal/corrected.hpp"
 
 namespace {
 
@@ -76,7 +77,7 @@ struct Bldc : hal::Component {
     hal::Outs<std::int32_t> offset_measured{*this, "offset-measured", has.counting, "counts at the motor's zero, as found"};
     hal::Param<double> drive_offset{*this, "drive-offset", "offset that the drive adds to rotor-angle; used while aligning", {.unit = "deg"}};
     hal::Params<std::uint32_t> output_pattern{*this, "output-pattern", has.hall_out, "Hall pattern to emulate, 0 to 47", {.initial = 25}};
-    hal::Params<std::uint32_t> pattern{*this, "pattern", has.hall, "Hall pattern of the motor, 0 to 47", {.initial = 25}};
+    hal::Pins<hal::CorrectedParam<std::uint32_t>, std::uint32_t> pattern{*this, "pattern", has.hall, "Hall pattern of the motor, 0 to 47", {.initial = 25}};
 
     hal::Function run{*this, "", &Bldc::update, "computes angles and phases"};
 
@@ -145,6 +146,7 @@ private:
     double from_hall() noexcept {
         source_ = 1;
         trapezoid_ = true;
+        if (pattern[0] >= bldc::pattern_count) pattern[0].correct(0);
         if (pattern[0] != used_pattern_) used_pattern_ = pattern[0], hall_state_ = -1, error_ = false;
         const unsigned code = (hall[0] ? 4u : 0u) | (hall[1] ? 2u : 0u) | (hall[2] ? 1u : 0u);
         const int state = bldc::state_of(code, used_pattern_);
@@ -293,7 +295,11 @@ the index, which is `encoder-offset` counts before zero. *qi*: a rising edge of 
 found, the outputs are 0. Link `rawcounts` to the encoder's pin of that name.
 
 **Hall patterns** 0..47 (25: 60 degrees, 26: its reverse, 0: 30 degrees, 17: 120 degrees). `hall-error` is TRUE after a code outside of the
-pattern, which also sets all outputs to 0, and after a skipped state.
+pattern, which also sets all outputs to 0, and after a skipped state. A `pattern` above 47 is set to 0.
+
+**Differences from LinuxCNC:** the first cycle sets the outputs (LinuxCNC: they remain 0). A trapezoid follows `phase-angle` (LinuxCNC: `rotor-angle`,
+without `lead-angle`). A code outside of the Hall pattern sets the outputs to 0 (LinuxCNC keeps driving). The angle is extrapolated by fractions of a
+count (LinuxCNC: whole counts). `in-type` and `out-type` have other numbers.
 
     loadrt bldc cfg=qh names=spindle
     addf spindle servo

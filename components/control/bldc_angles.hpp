@@ -12,7 +12,8 @@ namespace bldc {
 
 /// The codes H1 H2 H3 (as 4 2 1) in the order of the excitations B-A C-A C-B A-B A-C B-C (source - sink), per pattern.
 /// Excitation number s fits a rotor around (s + 1) / 6 of a turn.
-inline constexpr const char* patterns[48] = {
+inline constexpr std::uint32_t pattern_count = 48;
+inline constexpr const char* patterns[pattern_count] = {
     "013764", "102675", "023754", "132645", "231546", "320457", "201576", "310467",
     "015762", "104673", "026751", "137640", "237540", "326451", "204573", "315462",
     "045732", "154623", "046731", "157620", "267510", "376401", "264513", "375402",
@@ -27,7 +28,7 @@ inline double fraction(double angle) noexcept {
     return rest >= 0.0 && rest < 1.0 ? rest : 0.0;
 }
 
-inline const char* codes(std::uint32_t pattern) noexcept { return patterns[pattern < 48 ? pattern : 25]; }
+inline const char* codes(std::uint32_t pattern) noexcept { return patterns[pattern < pattern_count ? pattern : 25]; }
 
 /// Returns the number of the state with this code, 0..5, or -1 if the pattern does not contain it. [realtime]
 inline int state_of(unsigned code, std::uint32_t pattern) noexcept {

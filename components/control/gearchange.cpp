@@ -1,15 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
+#include "hal/corrected.hpp"
 #include "hal/limit.hpp"
 
 namespace {
-
-/// A parameter that the component may correct.
-class CorrectedParam : public hal::Param<double> {
-public:
-    using Param::Param;
-    void correct(double value) noexcept { put(value); }
-};
 
 struct Gearchange : hal::Component {
     using Component::Component;
@@ -22,24 +16,28 @@ struct Gearchange : hal::Component {
     hal::LimitParam    max1{*this, "max1", "highest speed in gear 1", {.initial = 100000.0}};
     hal::LimitParam    min2{*this, "min2", "lowest speed in gear 2"};
     hal::LimitParam    max2{*this, "max2", "highest speed in gear 2", {.initial = 100000.0}};
-    CorrectedParam     scale2{*this, "scale2", "ratio of the spindle speeds in gear 2 and gear 1; at least 1", {.initial = 1.0}};
+    hal::CorrectedParam<double> scale2{*this, "scale2", "ratio of the spindle speeds in gear 2 and gear 1; at least 1", {.initial = 1.0}};
     hal::Param<bool>   reverse{*this, "reverse", "TRUE: gear 2 reverses the direction of the spindle"};
     hal::Function      run{*this, "", &Gearchange::update, "computes speed-out and dir-out"};
 
     void update(hal::Cycle) noexcept {
         if (!(scale2 >= 1.0)) scale2.correct(1.0);
         if (sel) {
-            speed_out = within(speed_in, min2, max2) / scale2;
+            speed_out = within(speed_in, min2, max2, scale2);
             dir_out = dir_in != reverse;
         } else {
-            speed_out = within(speed_in, min1, max1);
+            speed_out = within(speed_in, min1, max1, 1.0);
             dir_out = dir_in;
         }
     }
 
 private:
-    static double within(double speed, double min, double max) noexcept {  // limits of the magnitude, for both directions
-        return std::copysign(std::min(std::max(min, std::fabs(speed)), max), speed);
+    /// Returns `speed` with its magnitude between `min` and `max`, divided by `ratio`.
+    static double within(double speed, double min, double max, double ratio) noexcept {
+        const double magnitude = std::fabs(speed);
+        const double upper = magnitude > max ? max : magnitude;
+        const double limited = magnitude >= min ? upper : min;  // also for NaN
+        return (speed < 0.0 ? -limited : limited) / ratio;
     }
 };
 
@@ -53,7 +51,7 @@ HAL_COMPONENT(Gearchange, "gearchange", "Scales and limits a spindle speed for o
 
 Scale the drive for gear 1; `scale2` is the ratio of the spindle speeds in gear 2 and gear 1 at the same drive speed. Gear 2 is the high
 gear: a `scale2` below 1 is set to 1. The limits are spindle speeds in either direction: a negative `speed-in` is limited to the range from
--max to -min. If a minimum is above its maximum, the maximum applies; while `speed-in` is NaN, the minimum applies.
+-max to -min. Below the minimum, the minimum applies, even if it is above the maximum. While `speed-in` is NaN, the minimum applies (LinuxCNC: NaN).
 
     loadrt gearchange names=gears
     addf gears servo

@@ -67,9 +67,9 @@ private:
 
 public:
     hal::Io<bool>            tune_start{*this, "tune-start", "TRUE starts auto-tuning; cleared when it ends"};
-    hal::Param<std::uint32_t> tune_type{*this, "tune-type", "0 finds Pgain, Igain, Dgain; 1 finds Pgain, Igain, FF1"};
-    hal::Param<std::uint32_t> tune_cycles{*this, "tune-cycles", "half cycles of the oscillation to average over", {.initial = 50}};
-    hal::Param<double>       tune_effort{*this, "tune-effort", "amplitude of the output's oscillation around bias", {.initial = 0.5}};
+    hal::Io<std::uint32_t>   tune_type{*this, "tune-type", "0 finds Pgain, Igain, Dgain; 1 finds Pgain, Igain, FF1"};
+    hal::Io<std::uint32_t>   tune_cycles{*this, "tune-cycles", "half cycles of the oscillation to average over", {.initial = 50}};
+    hal::Io<double>          tune_effort{*this, "tune-effort", "amplitude of the output's oscillation around bias", {.initial = 0.5}};
 
     hal::Outs<double> error_i_out{*this, "errorI", debug, "integral of the error, limited by maxerrorI, before Igain; 0 while not enabled"};
     hal::Outs<double> error_d_out{*this, "errorD", debug, "derivative of the error"};

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+#include <limits>
+
 #include "hal/component.hpp"
 #include "hal/limit.hpp"
 
@@ -8,12 +10,12 @@ struct Spindle : hal::Component {
     using Component::Component;
     hal::Argument gears{*this, "numgears", 1, "number of gears", {.min = 1, .max = 16}};
 
-    hal::In<std::uint32_t> select_gear{*this, "select-gear", "number of the gear while select.1 and higher are FALSE"};
+    hal::In<std::uint32_t> select_gear{*this, "select-gear", "number of the gear; 0: as selected by select.0 and higher"};
     hal::In<double>  commanded_speed{*this, "commanded-speed", "commanded speed; negative: reverse", {.unit = "rpm"}};
     hal::In<double>  actual_speed{*this, "actual-speed", "speed measured by an encoder", {.unit = "turn/s"}};
     hal::In<bool>    simulate_encoder{*this, "simulate-encoder", "TRUE simulates the speed of a spindle without encoder"};
     hal::In<bool>    enable{*this, "enable", "FALSE decelerates the spindle to 0"};
-    hal::In<double>  lpf{*this, "spindle-lpf", "cycles over which spindle-rpm-abs is smoothed while at speed; 0: no smoothing"};
+    hal::In<double>  lpf{*this, "spindle-lpf", "gain per second of the filter of spindle-rpm-abs while at speed; 0: no filter"};
     hal::Out<double> rpm{*this, "spindle-rpm", "speed, measured or simulated", {.unit = "rpm"}};
     hal::Out<double> rpm_abs{*this, "spindle-rpm-abs", "magnitude of spindle-rpm, for a display", {.unit = "rpm"}};
     hal::Out<double> output{*this, "output", "command for the drive: (speed + offset) * scale"};
@@ -23,17 +25,18 @@ struct Spindle : hal::Component {
     hal::Out<bool>   reverse{*this, "reverse", "TRUE: the drive turns backward", {.safe = false}};
     hal::Out<bool>   brake{*this, "brake", "TRUE while the spindle must decelerate"};
     hal::Out<bool>   zero_speed{*this, "zero-speed", "TRUE while the speed is within zero-tolerance of 0"};
-    hal::Out<bool>   limited{*this, "limited", "TRUE while commanded-speed is above max, or not 0 and below min"};
+    hal::Out<bool>   limited{*this, "limited", "TRUE while commanded-speed is above max, or not 0 and below min, and enabled"};
 
     hal::Ins<double> scale{*this, "scale.#", gears, "scale of output in gear #; a negative scale inverts the output", {.initial = 1.0}};
     hal::Limits      min{*this, "min.#", gears, "lowest speed in gear #", {.unit = "rpm"}};
-    hal::OptionalLimits max{*this, "max.#", gears, "highest speed in gear #", {.unit = "rpm"}};
-    hal::OptionalLimits accel{*this, "accel.#", gears, "acceleration: rpm per second without encoder; with an encoder, lead of the output over the speed in rpm"};
+    hal::OptionalLimits max{*this, "max.#", gears, "highest speed in gear #; 0: no limit", {.unit = "rpm"}};
+    hal::OptionalLimits accel{*this, "accel.#", gears,
+        "acceleration: rpm per second without encoder; with an encoder, lead of the output over the speed in rpm; 0: no limit"};
     hal::OptionalLimits decel{*this, "decel.#", gears, "deceleration, like accel"};
     hal::Ins<double> speed_tolerance{*this, "speed-tolerance.#", gears, "tolerance of at-speed", {.initial = 20.0, .unit = "rpm"}};
     hal::Ins<double> zero_tolerance{*this, "zero-tolerance.#", gears, "tolerance of zero-speed", {.initial = 20.0, .unit = "rpm"}};
     hal::Ins<double> offset{*this, "offset.#", gears, "offset added to the speed for output in gear #", {.unit = "rpm"}};
-    hal::In<bool>    select_first{*this, "select.0", "TRUE: gear 0, the default when no other is selected", {.initial = true}};
+    hal::In<bool>    select_first{*this, "select.0", "TRUE: gear 0, the default when no other is selected", {.initial = gears == 1}};
     hal::Pins<hal::In<bool>, bool> select{*this, "select.#", gears - 1, 1, "TRUE: gear #; the highest selected gear takes precedence"};
 
     hal::Function run{*this, "", &Spindle::update, "computes the drive's speed and direction"};
@@ -41,38 +44,49 @@ struct Spindle : hal::Component {
     void update(hal::Cycle cycle) noexcept {
         const std::size_t gear = chosen_gear();
         current_gear = static_cast<std::uint32_t>(gear);
-        const double command = std::isfinite(commanded_speed) ? commanded_speed.get() : 0.0, magnitude = std::fabs(command);
-        const double low = bound(min[gear]), high = bound(max[gear]);
-        limited = magnitude > high || (magnitude > 0.0 && magnitude < low);
-        const double wanted = enable && magnitude > 0.0 ? std::copysign(std::min(std::max(magnitude, low), high), command) : 0.0;
-
         const bool simulated = simulate_encoder;
-        const double measured = actual_speed * 60.0;
-        const double speed = simulated ? drive_ : std::isfinite(measured) ? measured : 0.0;
-        const double up = bound(accel[gear]) * (simulated ? cycle.seconds() : 1.0);
-        const double down = bound(decel[gear]) * (simulated ? cycle.seconds() : 1.0);
-        drive_ = next(simulated || std::fabs(speed) > zero_tolerance[gear] ? speed : 0.0, wanted, up, down);
+        const double command = enable && std::isfinite(commanded_speed) ? commanded_speed.get() : 0.0;
+        const double wanted = within_range(command, gear);
+        limited = wanted != command;
 
-        const double turning = simulated ? drive_ : speed;
+        const double measured = actual_speed * 60.0;
+        const double speed = simulated ? rpm.get() : std::isfinite(measured) ? measured : 0.0;
+        const double magnitude = std::fabs(speed);
+        show(magnitude, cycle.seconds());
+        zero_speed = magnitude <= zero_tolerance[gear];
+        at_speed = speed_tolerance[gear] > 0.0 && std::fabs(command - speed) <= speed_tolerance[gear] && command * speed >= 0.0;
+
+        const double period_s = simulated ? cycle.seconds() : 1.0;
+        const double up = limit_or_none(accel[gear]) * period_s;
+        const double down = limit_or_none(decel[gear]) * period_s;
+        const double drive = at_speed ? wanted : next(speed, wanted, up, down);
+        const double turning = simulated ? drive : speed;
+        rpm = turning + 0.0;  // never -0
         const bool too_fast = wanted * turning <= 0.0 || std::fabs(turning) > std::fabs(wanted) + speed_tolerance[gear];
         brake = too_fast && !(std::fabs(turning) <= zero_tolerance[gear]);
-        output = (std::fabs(drive_) + offset[gear]) * scale[gear];
-        forward = enable && drive_ > 0.0;
-        reverse = enable && drive_ < 0.0;
-        rpm = turning + 0.0;  // never -0
-        at_speed = std::fabs(turning - (enable ? command : 0.0)) < speed_tolerance[gear];
-        zero_speed = std::fabs(turning) <= zero_tolerance[gear];
-        shown_ = at_speed && lpf > 0.0 ? shown_ + (std::fabs(turning) - shown_) / (1.0 + lpf) : std::fabs(turning);
-        rpm_abs = shown_;
+        forward = drive > 0.0 && (wanted != 0.0 || forward);  // a spindle turned by hand does not switch the drive on
+        reverse = drive < 0.0 && (wanted != 0.0 || reverse);
+        output = (std::fabs(drive) + offset[gear]) * scale[gear];
     }
 
 private:
-    static double bound(double value) noexcept { return value > 0.0 ? std::min(value, 1e9) : 0.0; }
+    /// Returns a limit that must be above 0 to have an effect. [realtime]
+    static double limit_or_none(double limit) noexcept { return limit > 0.0 ? limit : std::numeric_limits<double>::infinity(); }
 
     std::size_t chosen_gear() const noexcept {
-        for (std::size_t i = select.size(); i > 0; --i)
+        const std::size_t last = scale.size() - 1;
+        if (select_gear != 0) return std::min<std::size_t>(select_gear, last);
+        for (std::size_t i = select.size(); i > 0; --i) {
             if (select[i - 1]) return i;
-        return std::min<std::size_t>(select_gear, scale.size() - 1);
+        }
+        return 0;
+    }
+
+    /// Returns `command` with its magnitude limited to the range of the gear; 0 stays 0.
+    double within_range(double command, std::size_t gear) const noexcept {
+        if (command == 0.0) return 0.0;
+        const double low = min[gear] > 0.0 ? min[gear].get() : 0.0;
+        return std::copysign(std::min(std::max(std::fabs(command), low), limit_or_none(max[gear])), command);
     }
 
     /// One step from `speed` towards `wanted`; a change of direction stops at 0 for a cycle.
@@ -81,8 +95,11 @@ private:
         const double from = std::fabs(speed), to = sign * wanted > 0.0 ? std::fabs(wanted) : 0.0;
         return std::copysign(from < to ? std::min(from + up, to) : std::max(from - down, to), sign);
     }
-    double drive_ = 0.0;  // speed commanded to the drive
-    double shown_ = 0.0;
+
+    void show(double magnitude, double period_s) noexcept {
+        const bool smooth = lpf > 0.0 && at_speed;
+        rpm_abs = smooth ? rpm_abs + (magnitude - rpm_abs) * std::min(lpf * period_s, 1.0) : magnitude;
+    }
 };
 
 }  // namespace
@@ -90,15 +107,20 @@ private:
 HAL_COMPONENT(Spindle, "spindle", "Spindle with acceleration and deceleration, brake and up to 16 gears", R"(
 For a drive with inputs for speed and direction. The target is `commanded-speed` with its magnitude limited to `min` and `max` of the
 gear (`min` does not apply at 0), or 0 while `enable` is FALSE. `output` is the magnitude of the speed commanded to the drive, plus
-`offset`, times `scale`; `forward` and `reverse` are its direction, both FALSE at 0 and while disabled. To change direction the
-spindle first decelerates to 0.
+`offset`, times `scale`; `forward` and `reverse` are its direction, both FALSE at 0. To change direction the spindle first decelerates to 0.
+`max`, `accel` and `decel` have no effect while they are 0, the default.
 
 With `simulate-encoder` the commanded speed changes by `accel` and `decel` rpm per second and counts as the speed of the spindle. With an
-encoder it is the measured speed plus `accel`, or minus `decel`, up to the target, so a loaded spindle gets more time.
+encoder it is the measured speed plus `accel`, or minus `decel`, up to the target, so a loaded spindle gets more time. While `at-speed` is TRUE
+it is the target. `at-speed` compares the speed at the beginning of the cycle with `commanded-speed` before `min` and `max`.
 
-`brake` is TRUE while the spindle turns (above `zero-tolerance`) too fast or in the wrong direction; LinuxCNC's always leaves it FALSE.
-`numgears=N` gives N gears with a pin of each kind; the highest `select.N` that is TRUE is the gear, else the number in `select-gear`.
-`spindle-rpm-abs` is smoothed by r += (speed - r) / (1 + spindle-lpf) while at speed.
+`brake` is TRUE while the spindle turns (above `zero-tolerance`) too fast or in the wrong direction. `numgears=N` gives N gears with a pin of
+each kind; `select-gear` is the gear, or, while it is 0, the highest `select.N` that is TRUE. `spindle-rpm-abs` is filtered by
+r += (speed - r) * spindle-lpf * period while at speed.
+
+**Differences from LinuxCNC:** `brake` is set as documented (LinuxCNC: always FALSE). `reverse` remains TRUE while a spindle that turns backwards
+decelerates to a stop, like `forward` (LinuxCNC: it becomes FALSE at once, and the spindle coasts). A `select-gear` beyond the last gear is the
+last one (LinuxCNC reads pins that do not exist). A NaN or infinite speed counts as 0 (LinuxCNC: the outputs remain NaN).
 
     loadrt spindle names=router
     addf router servo

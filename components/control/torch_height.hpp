@@ -20,19 +20,19 @@ struct TorchHeight : hal::Component {
     hal::In<double>    z_pos_in{*this, "z-pos-in", "commanded Z position"};
     hal::Out<double>   z_pos_out{*this, "z-pos-out", "commanded Z position with the correction"};
     hal::Out<double>   z_fb_out{*this, "z-fb-out", "Z position feedback for motion, without the correction"};
-    hal::Out<bool>     vel_status{*this, "vel-status", "TRUE while enabled and at the requested velocity"};
-    hal::Param<double> velocity_tol{*this, "velocity-tol", "maximum deviation from the requested velocity for a correction", {.unit = "%"}};
-    hal::Param<double> correction_vel{*this, "correction-vel", "change of the correction per cycle"};
+    hal::Out<bool>     vel_status{*this, "vel-status", "TRUE while enabled, moving, and not slower than requested"};
+    hal::Param<double> velocity_tol{*this, "velocity-tol", "how much slower than requested a corrected motion may be", {.unit = "%"}};
 
 protected:
     /// Updates the correction and the shared outputs. `direction()` returns above 0 to raise the torch, below 0 to lower it, 0 to
-    /// hold; it is asked only while a correction is allowed. Returns true while the torch is off and the correction is being
+    /// hold; it is asked only while a correction is allowed. `step` is the change of the correction per cycle. Returns true while the torch is off and the correction is being
     /// removed. [realtime]
     template <class Direction>
-    bool control(Direction direction) noexcept {
+    bool control(Direction direction, double step) noexcept {
         const double z = z_pos_in, up = z - last_z_;
         // In a corner the velocity drops, and the arc voltage no longer measures the height.
-        const bool steady = enable && std::fabs(current_vel - requested_vel) <= std::fabs(requested_vel) * velocity_tol / 100.0;
+        const double min_vel = requested_vel - requested_vel * (velocity_tol * 0.01);
+        const bool steady = enable && current_vel > 0.0 && current_vel >= min_vel;
         bool removing = false;
         if (!enable) offset_ = 0.0;
         else if (!torch_on) {
@@ -40,7 +40,7 @@ protected:
             if (up > 0.0) offset_ -= std::clamp(offset_, -up, up);
         } else if (arc_ok && steady) {
             const int sign = direction();
-            const double next = offset_ + (sign > 0 ? correction_vel : sign < 0 ? -correction_vel : 0.0);
+            const double next = offset_ + sign * step;
             if (std::fabs(next) <= 1e9) offset_ = next;  // FALSE for NaN, too
         }
         last_z_ = z;

@@ -11,7 +11,7 @@ constexpr std::int32_t most = 200;
 
 struct Histobins : hal::Component {
     using Component::Component;
-    hal::In<std::uint32_t> pintype{*this, "pintype", "input to use: 0 input, 1 input-s32, 2 input-u32, 3 input-bit"};
+    hal::In<std::uint32_t> pintype{*this, "pintype", "input to use: 1 input-s32, 2 input-u32, 3 input-bit, otherwise input"};
     hal::In<double>        input{*this, "input", "value to count, of type float"};
     hal::In<std::int32_t>  input_s32{*this, "input-s32", "value to count, of type s32"};
     hal::In<std::uint32_t> input_u32{*this, "input-u32", "value to count, of type u32"};
@@ -38,9 +38,9 @@ struct Histobins : hal::Component {
     void update(hal::Cycle) noexcept {
         const double value = chosen();
         const bool bins = nbins >= 1 && nbins <= most && binsize > 0.0 && std::isfinite(binsize) && std::isfinite(minvalue);
-        const bool valid = bins && pintype <= 3 && std::fabs(value) <= 1e150;
-        if (reset) clear();
-        else if (valid) count(value);
+        const bool valid = bins && std::fabs(value) <= 1e150;
+        if (reset || has_new_bins()) clear();
+        if (!reset && valid) count(value);
         input_error = !valid;
         const bool inside = index >= 0 && index < most && static_cast<std::uint32_t>(index) < nbins;
         check = index.get();
@@ -64,6 +64,13 @@ private:
         default: return input;
         }
     }
+    bool has_new_bins() noexcept {
+        const bool changed = nbins != last_nbins_ || binsize != last_binsize_ || minvalue != last_minvalue_;
+        last_nbins_ = nbins;
+        last_binsize_ = binsize;
+        last_minvalue_ = minvalue;
+        return changed;
+    }
     void clear() noexcept {
         bins_.fill(0.0);
         above_ = below_ = smallest_ = largest_ = 0.0;
@@ -82,14 +89,20 @@ private:
     measure::Statistics statistics_;
     std::array<double, most> bins_{};
     double above_ = 0.0, below_ = 0.0, smallest_ = 0.0, largest_ = 0.0;
+    std::uint32_t last_nbins_ = 0;
+    double last_binsize_ = 0.0, last_minvalue_ = 0.0;
 };
 
 }  // namespace
 
 HAL_COMPONENT(Histobins, "histobins", "Histogram of a value", R"(
 Counts the value of each cycle in one of `nbins` bins: bin i is from `minvalue` + i `binsize` up to, but not including, the next.
-Set `index` and, once `check` is equal to it, read `binvalue`. Set `reset` after a change of the bins. The variance is the sample variance, with the
-divisor `nsamples` - 1. The first value is counted, too (LinuxCNC omits it from the bins).
+Set `index` and, once `check` is equal to it, read `binvalue`. A change of `nbins`, `binsize` or `minvalue` clears the histogram, as `reset` does. The
+variance is the sample variance, with the divisor `nsamples` - 1.
+
+**Differences from LinuxCNC:** the first value after a reset is counted like the others (LinuxCNC: in no bin, and as 0 in mean and variance), the
+value during `reset` is not (LinuxCNC: in `nsamples`). A value at the upper edge of the last bin is above it (LinuxCNC writes beyond its
+memory). Invalid values and a `binsize` of 0 or below set `input-error` (LinuxCNC: only an invalid `nbins`).
 
     loadrt histobins names=errors
     addf errors servo

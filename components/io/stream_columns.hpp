@@ -23,7 +23,7 @@ using AnyIn = std::variant<std::monostate, hal::In<bool>, hal::In<double>, hal::
 using AnyOut = std::variant<std::monostate, hal::Out<bool>, hal::Out<double>, hal::Out<std::int32_t>, hal::Out<std::uint32_t>,
                             hal::Out<std::int64_t>, hal::Out<std::uint64_t>>;
 
-/// The pins `pin.0`, `pin.1` … one per letter of cfg, and the memory of the FIFO.
+/// The pins `pin.0`, `pin.1` … one per letter of cfg, and the memory of the FIFO. As in LinuxCNC, a FIFO of depth N holds N - 1 records.
 template <class AnyPin>
 class Columns {
 public:
@@ -34,19 +34,22 @@ public:
         if (static_cast<std::size_t>(depth) > most_values / (cfg.size() + 1)) 
             throw hal::ArgumentError("depth", "depth=" + std::to_string(depth) + " records of this cfg need more than 512 MB");
         for (const char letter : cfg) add(component, letter, doc);
-        values_.resize(static_cast<std::size_t>(depth) * (cfg.size() + 1));
+        const std::int64_t capacity = depth - 1;
+        values_.resize(static_cast<std::size_t>(capacity) * (cfg.size() + 1));
         fifo_.size = sizeof fifo_;
         fifo_.columns = static_cast<std::uint32_t>(cfg.size());
-        fifo_.depth = static_cast<std::uint32_t>(depth);
+        fifo_.depth = static_cast<std::uint32_t>(capacity);
         fifo_.to_machine = to_machine ? 1 : 0;
         fifo_.types = types_.c_str();
         fifo_.data = values_.data();
     }
 
-    /// The records carry a time each: the producer writes it to time() before it moves the head. In the constructor. [setup]
+    /// Each record carries a time and the number of losses: the producer calls stamp() before it moves the head. In the constructor. [setup]
     void keep_times() {
         times_.resize(fifo_.depth);
+        losses_.resize(fifo_.depth);
         timed_.times = times_.data();
+        timed_.losses = losses_.data();
         fifo_.size = sizeof timed_;
     }
 
@@ -59,7 +62,11 @@ public:
 
     hal_stream& fifo() noexcept { return fifo_; }
     std::deque<AnyPin>& pins() noexcept { return pins_; }
-    std::int64_t& time(std::uint64_t number) noexcept { return times_[number % fifo_.depth]; }
+    /// Notes when a record was made and how many records had been lost by then. [realtime]
+    void stamp(std::uint64_t number, std::int64_t time_ns) noexcept {
+        times_[number % fifo_.depth] = time_ns;
+        losses_[number % fifo_.depth] = fifo_.lost;
+    }
     /// The record with a running number: a value per column, then the sample number. [realtime]
     hal_value* record(std::uint64_t number) noexcept { return &fifo_.data[number % fifo_.depth * (fifo_.columns + 1)]; }
 
@@ -84,6 +91,7 @@ private:
     std::string types_;
     std::vector<hal_value> values_;
     std::vector<std::int64_t> times_;
+    std::vector<std::uint64_t> losses_;
     hal_timed_stream timed_{};
     hal_stream& fifo_ = timed_.stream;
 };

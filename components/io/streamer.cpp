@@ -6,16 +6,16 @@ namespace {
 
 struct Streamer : hal::Component {
     using Component::Component;
-    enum ClockMode { free_running, falling, rising, both };
+    enum ClockMode { falling = 1, rising, both };
 
     hal::TextArgument cfg{*this, "cfg", "f", "one letter per pin: b bit, f float, s s32, u u32, l s64, k u64", {.per_instance = true}};
-    hal::Argument depth{*this, "depth", 4000, "capacity of the FIFO in records", {.per_instance = true, .min = 1, .max = 1 << 26}};
+    hal::Argument depth{*this, "depth", 4000, "slots of the FIFO; it holds one record less", {.per_instance = true, .min = 2, .max = 1 << 26}};
 
     stream::Columns<stream::AnyOut> columns{*this, cfg.get(), depth, true, "value of the newest record"};
     hal::In<bool> enable{*this, "enable", "FALSE holds the pins", {.initial = true}};
     hal::In<bool> clock{*this, "clock", "clock for the next record; see clock-mode"};
-    hal::In<std::int32_t> clock_mode{*this, "clock-mode", "0: one record per cycle; one per edge of clock: 1 falling, 2 rising, 3 both"};
-    hal::Out<std::int32_t> waiting{*this, "curr-depth", "records in the FIFO"};
+    hal::In<std::int32_t> clock_mode{*this, "clock-mode", "one record per edge of clock: 1 falling, 2 rising, 3 both; otherwise one per cycle"};
+    hal::Out<std::int32_t> waiting{*this, "curr-depth", "records in the FIFO at the beginning of the cycle"};
     hal::Out<bool> empty{*this, "empty", "TRUE: no record was available for this cycle", {.initial = true}};
     hal::Io<std::int32_t> underruns{*this, "underruns", "times a record was due but not available; may be set"};
 
@@ -27,19 +27,18 @@ struct Streamer : hal::Component {
     void play(hal::Cycle) noexcept {
         hal_stream& fifo = columns.fifo();
         const std::uint64_t tail = fifo.tail;
-        std::uint64_t held = __atomic_load_n(&fifo.head, __ATOMIC_ACQUIRE) - tail;
+        const std::uint64_t held = __atomic_load_n(&fifo.head, __ATOMIC_ACQUIRE) - tail;
+        waiting = static_cast<std::int32_t>(held);
         empty = held == 0;
         if (due() && enable) {
             if (held > 0) {
                 read(columns.record(tail));
                 __atomic_store_n(&fifo.tail, tail + 1, __ATOMIC_RELEASE);
-                --held;
             } else {
                 underruns = static_cast<std::int32_t>(static_cast<std::uint32_t>(underruns.get()) + 1);
                 __atomic_store_n(&fifo.lost, fifo.lost + 1, __ATOMIC_RELAXED);
             }
         }
-        waiting = static_cast<std::int32_t>(held);
     }
 
 private:
@@ -47,11 +46,10 @@ private:
         const bool level = clock, before = was_clock_;
         was_clock_ = level;
         switch (clock_mode) {
-            case free_running: return true;
             case falling: return before && !level;
             case rising: return level && !before;
             case both: return level != before;
-            default: return false;
+            default: return true;
         }
     }
 
@@ -72,7 +70,7 @@ private:
 HAL_COMPONENT(Streamer, "streamer", "Plays records that external programs write to a FIFO", R"(
 In each cycle in which a record is due, the next one is copied from the FIFO to the pins; if there is none, the pins are held and
 `underruns` increases. `clock-mode` selects when a record is due: 0 in every cycle, 1 at falling, 2 at rising, 3 at both edges of `clock`.
-The number of pins is not limited.
+A FIFO of `depth=N` holds N - 1 records. The number of pins is not limited.
 
     loadrt streamer depth=2000 cfg=fb
     loadrt pid

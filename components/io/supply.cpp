@@ -6,14 +6,14 @@ namespace {
 struct Supply : hal::Component {
     using Component::Component;
 
-    hal::Param<bool> d{*this, "d", "source of q and _q"};
-    hal::Param<double> value{*this, "value", "source of variable and _variable"};
+    hal::Io<bool> d{*this, "d", "source of q and _q"};
+    hal::Io<double> value{*this, "value", "source of variable and _variable"};
     hal::Out<bool> q{*this, "q", "d"};
-    hal::Out<bool> not_q{*this, "_q", "inverse of d"};
+    hal::Out<bool> not_q{*this, "_q", "inverse of d", {.initial = true}};
     hal::Out<double> variable{*this, "variable", "value"};
     hal::Out<double> negative{*this, "_variable", "-value"};
 
-    hal::Function run{*this, "update", &Supply::update, "copies the parameters to the outputs"};
+    hal::Function run{*this, "update", &Supply::update, "copies d and value to the outputs"};
 
     void update(hal::Cycle) noexcept {
         q = d;

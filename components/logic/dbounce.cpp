@@ -11,22 +11,21 @@ struct Dbounce : hal::Component {
     hal::Function          run{*this, "", hal::step<&Dbounce::update>, "samples the input"};
 
     void update(hal::Cycle) noexcept {
-        if (in == out) differs_ -= differs_ > 0 ? 1 : 0;
-        else if (++differs_ > delay) {
-            out = in.get();
-            differs_ = 0;
-        }
+        const bool level = in;
+        const bool settled = level ? count_ >= delay : count_ == 0;
+        if (settled) out = level;
+        else count_ += level ? 1 : -1;
     }
 
 private:
-    std::uint32_t differs_ = 0;  // cycles in which in differed from out, minus those in which it did not
+    std::uint32_t count_ = 0;  // cycles in which in was TRUE, minus those in which it was not: 0 to delay
 };
 
 }  // namespace
 
 HAL_COMPONENT(Dbounce, "dbounce", "Filters a noisy digital input", R"(
 `out` follows `in` once it has been stable for `delay` cycles after the cycle of the change. While it bounces, cycles with the new state
-count up and cycles with the old state count down. Unlike `debounce` it has a delay pin for each input.
+count up and cycles with the old state count down, as in `debounce`. Unlike `debounce` it has a delay pin for each input.
 
     loadrt dbounce names=home-filter
     addf home-filter servo

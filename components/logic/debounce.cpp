@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
+#include "hal/corrected.hpp"
 
 namespace {
 
@@ -7,7 +8,7 @@ struct Debounce : hal::Component {
     hal::Argument             size{*this, "cfg", 4, "number of filters, for each group", {.per_instance = true, .min = 1, .max = 100'000}};
     hal::Ins<bool>            in{*this, "#.in", size, "noisy input of filter #"};
     hal::Outs<bool>           out{*this, "#.out", size, "debounced input of filter #"};
-    hal::Param<std::int32_t>  delay{*this, "delay", "cycles for which an input must be stable before its output follows; 0 and 1 disable the filter", {.initial = 5}};
+    hal::CorrectedParam<std::int32_t> delay{*this, "delay", "cycles for which an input must be stable after a change; 0 copies it to its output", {.initial = 5}};
     hal::Function             run{*this, "", hal::step<&Debounce::update>, "samples all inputs of the group"};
 
     explicit Debounce(const hal_host* host)
@@ -16,12 +17,13 @@ struct Debounce : hal::Component {
     }
 
     void update(hal::Cycle) noexcept {
-        const std::int32_t threshold = std::max(delay.get(), 1);
+        if (delay < 0) delay.correct(1);
         for (std::size_t i = 0; i < in.size(); ++i) {
+            const bool level = in[i];
             std::int32_t& count = counts_[i];
-            count = in[i] ? std::min(count, threshold - 1) + 1 : std::max(std::min(count, threshold) - 1, 0);
-            if (count == threshold) out[i] = true;
-            if (count == 0) out[i] = false;
+            const bool settled = level ? count >= delay : count <= 0;
+            if (settled) out[i] = level;
+            else count += level ? 1 : -1;
         }
     }
 
@@ -32,8 +34,9 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Debounce, "debounce", "Filters groups of noisy digital inputs", R"(
-A filter counts up while its input is TRUE and down while it is FALSE, between 0 and `delay`. At `delay` the output
-becomes TRUE, at 0 FALSE; between the two it keeps its state. `cfg=2,3` creates two groups, `debounce.0` with two filters
+A filter counts up while its input is TRUE and down while it is FALSE, between 0 and `delay`. An input that is TRUE with the count at
+`delay` sets the output, one that is FALSE with the count at 0 clears it; so the output follows `delay` cycles after a clean change. A
+negative `delay` is set to 1. `cfg=2,3` creates two groups, `debounce.0` with two filters
 and `debounce.1` with three; a group has one function and one `delay`.
 
     loadrt debounce cfg=2

@@ -7,7 +7,7 @@ struct Edge : hal::Component {
     using Component::Component;
     hal::In<bool>            in{*this, "in", "the input"};
     hal::Out<bool>           out{*this, "out", "TRUE during the pulse after an edge"};
-    hal::Out<bool>           out_invert{*this, "out-invert", "inverse of out", {.initial = true}};
+    hal::Out<bool>           out_invert{*this, "out-invert", "inverse of out"};
     hal::Param<bool>         both{*this, "both", "TRUE detects both edges, regardless of in-edge"};
     hal::Param<bool>         in_edge{*this, "in-edge", "edge to detect: TRUE is falling, FALSE is rising", {.initial = true}};
     hal::Param<std::int32_t> width_ns{*this, "out-width-ns", "duration of the output pulse; 0 is one cycle", {.unit = "ns"}};

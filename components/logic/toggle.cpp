@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
+#include "hal/corrected.hpp"
 
 namespace {
 
@@ -7,30 +8,33 @@ struct Toggle : hal::Component {
     using Component::Component;
     hal::In<bool>             in{*this, "in", "button"};
     hal::Io<bool>             out{*this, "out", "inverted by each press; other components may write it, too"};
-    hal::Param<std::uint32_t> debounce{*this, "debounce", "cycles for which a new state of the button must be stable; 0 and 1: immediate",
-                                       {.initial = 2}};
+    hal::CorrectedParam<std::uint32_t> debounce{*this, "debounce", "cycles for which a new state of the button must be stable, 1..10000",
+                                                {.initial = 2}};
     hal::Function             run{*this, "", hal::step<&Toggle::update>, "reads the button and toggles out"};
 
     void update(hal::Cycle) noexcept {
-        if (in == pressed_) {
-            held_ = 0;
-        } else if (++held_ >= debounce) {
-            held_ = 0;
-            pressed_ = !pressed_;
-            if (pressed_) out = !out;
+        if (debounce < 1 || debounce > 10'000) debounce.correct(2);
+        if (!in) {
+            if (count_ > 0) --count_;
+            if (count_ == 0) pressed_ = false;
+            return;
         }
+        count_ = std::min(count_ + 1, debounce.get());
+        if (count_ < debounce) return;
+        if (!pressed_) out = !out;
+        pressed_ = true;
     }
 
 private:
-    bool pressed_ = false;    // debounced state of the button
-    std::uint32_t held_ = 0;  // cycles for which in has differed from it
+    bool pressed_ = false;     // debounced state of the button
+    std::uint32_t count_ = 0;  // cycles in which in was TRUE, minus those in which it was not: 0 to debounce
 };
 
 }  // namespace
 
 HAL_COMPONENT(Toggle, "toggle", "Push on, push off", R"(
-A press that is stable for `debounce` cycles inverts `out`; the release must be stable as long before the next press counts. `out` is an
-io pin: the next press inverts the value of the signal, even if another component wrote it.
+A press that is stable for `debounce` cycles inverts `out`; the release must be stable as long before the next press counts. While the button
+bounces, the cycles in which it is pressed count up and the others count down. A `debounce` of 0 or above 10000 is set to 2. `out` is an io pin: the next press inverts the value of the signal, even if another component wrote it.
 
     loadrt toggle names=lamp-button
     addf lamp-button servo

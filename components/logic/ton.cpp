@@ -7,28 +7,29 @@ struct Ton : hal::Component {
     using Component::Component;
     hal::In<bool>      in{*this, "in", "the input"};
     hal::Out<bool>     q{*this, "q", "TRUE after in has been TRUE for pt"};
-    hal::Out<double>   et{*this, "et", "time since the rising edge, up to pt", {.unit = "s"}};
-    hal::Param<double> pt{*this, "pt", "delay", {.unit = "s"}};
+    hal::Out<double>   et{*this, "et", "time for which in has been TRUE, until q is TRUE", {.unit = "s"}};
+    iec::PresetTime    pt{*this, "pt", "delay", {.unit = "s"}};
     hal::Function      run{*this, "", hal::step<&Ton::update>, "measures the time"};
 
     void update(hal::Cycle cycle) noexcept {
-        if (in && was_in_) elapsed_.advance(cycle.period_ns());
-        else elapsed_.restart();
-        was_in_ = in;
-        q = in && elapsed_.reached(pt);
-        et = elapsed_.limited(pt);
+        pt.correct_sign();
+        if (!in) {
+            q = false;
+            et = 0.0;
+        } else if (!(et < pt)) {
+            q = true;
+        } else {
+            et = et + cycle.seconds();
+        }
     }
-
-private:
-    iec::Elapsed elapsed_;
-    bool was_in_ = false;
 };
 
 }  // namespace
 
 HAL_COMPONENT(Ton, "ton", "IEC timer: on-delay", R"(
-`q` becomes TRUE after `in` has been TRUE for `pt` seconds, and FALSE with `in`. The time starts in the cycle of the rising edge, in which
-`et` is 0; the time of `timedelay` includes that cycle, so it switches one cycle earlier.
+`q` becomes TRUE after `in` has been TRUE for `pt` seconds, and FALSE with `in`. `et` includes the cycle of the rising edge; `q` follows in
+the cycle after the one in which `et` reaches `pt` (`timedelay` switches in that cycle). A negative `pt` is set to 0.
+A NaN `pt` counts as 0 (LinuxCNC: `q` remains FALSE).
 
     loadrt ton names=spin-up
     addf spin-up servo

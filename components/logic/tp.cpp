@@ -7,29 +7,31 @@ struct Tp : hal::Component {
     using Component::Component;
     hal::In<bool>      in{*this, "in", "a rising edge starts the pulse"};
     hal::Out<bool>     q{*this, "q", "TRUE during the pulse"};
-    hal::Out<double>   et{*this, "et", "time since the start of the pulse, up to pt", {.unit = "s"}};
-    hal::Param<double> pt{*this, "pt", "duration of the pulse", {.unit = "s"}};
+    hal::Out<double>   et{*this, "et", "time since the start of the pulse", {.unit = "s"}};
+    iec::PresetTime    pt{*this, "pt", "duration of the pulse", {.unit = "s"}};
     hal::Function      run{*this, "", hal::step<&Tp::update>, "measures the time"};
 
     void update(hal::Cycle cycle) noexcept {
-        if (q) elapsed_.advance(cycle.period_ns());
-        else if (in && !was_in_) started_ = true, elapsed_.restart();
+        pt.correct_sign();
+        const bool rising_edge = in && !was_in_;
         was_in_ = in;
-        q = started_ && !elapsed_.reached(pt);
-        if (!q && !in) started_ = false, elapsed_.restart();
-        et = started_ ? elapsed_.limited(pt) : 0.0;
+        if (!q && !rising_edge) {
+            et = 0.0;
+            return;
+        }
+        q = et < pt;
+        if (q) et = et + cycle.seconds();
     }
 
 private:
-    iec::Elapsed elapsed_;
-    bool was_in_ = false, started_ = false;
+    bool was_in_ = false;
 };
 
 }  // namespace
 
 HAL_COMPONENT(Tp, "tp", "IEC timer: pulse", R"(
-A rising edge of `in` sets `q` for `pt` seconds, regardless of further changes of `in`. After the pulse `et` remains at `pt` until
-`in` is FALSE.
+A rising edge of `in` sets `q` for `pt` seconds, regardless of further changes of `in`. `et` includes the current cycle; it returns to 0 in
+the second cycle after the pulse. An edge in the first one is ignored, as in LinuxCNC. A negative `pt` is set to 0.
 
     loadrt tp names=lubricate
     addf lubricate servo

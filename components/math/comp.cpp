@@ -13,23 +13,20 @@ struct Comp : hal::Component {
     hal::Function      run{*this, "", hal::step<&Comp::update>, "compares"};
 
     void update(hal::Cycle) noexcept {
-        const double difference = in1 - in0, half = 0.5 * std::fabs(hyst);
-        if (difference > half) above_ = true;
-        else if (difference <= -half) above_ = false;
-        out = above_;
-        equal = std::fabs(difference) <= half;
+        const double difference = in1 - in0;
+        const double half = 0.5 * hyst;
+        const bool below = difference < -half;
+        const bool above = difference > half && !below;
+        if (below || above) out = above;
+        equal = !below && !above && !std::isnan(difference);
     }
-
-private:
-    bool above_ = false;
 };
 
 }  // namespace
 
 HAL_COMPONENT(Comp, "comp", "Compares two values, with hysteresis", R"(
-`out` becomes TRUE when `in1` rises above `in0 + hyst/2` and FALSE when it falls to `in0 - hyst/2`. With `hyst` 0 `out` is
-`in1 > in0`. Set `hyst` to use `equal`: measured values are hardly ever exactly equal. While an input is NaN,
-`out` keeps its value and `equal` is FALSE.
+`out` becomes TRUE when `in1` rises above `in0 + hyst/2` and FALSE when it falls below `in0 - hyst/2`; between the two, and at equal
+inputs with `hyst` 0, it keeps its value. Set `hyst` to use `equal`: measured values are hardly ever exactly equal. While an input is NaN, `out` keeps its value and `equal` is FALSE (LinuxCNC: TRUE).
 
     loadrt comp names=too-hot
     addf too-hot servo

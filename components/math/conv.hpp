@@ -72,27 +72,42 @@ HAL does not convert between types implicitly; link this component between two s
 )";
 };
 
+/// Returns true if `converted` is exactly `value`: in range and without a lost fraction; false for NaN. [any]
+template <class To, class From>
+constexpr bool exact(From value, To converted) noexcept {
+    return fits<To>(value) && static_cast<From>(converted) == value;
+}
+
 /// A conversion to a smaller range.
 template <class From, class To>
 struct Narrowing : hal::Component {
     using Component::Component;
     hal::In<From>    in{*this, "in", "value to convert"};
     hal::Out<To>     out{*this, "out", "converted value"};
-    hal::Out<bool>   out_of_range{*this, "out-of-range", "TRUE while in is outside of the range of out"};
+    hal::Out<bool>   out_of_range{*this, "out-of-range", "clamp: TRUE while in is outside of the range of out; else: TRUE since a value was not converted exactly"};
     hal::Param<bool> clamp{*this, "clamp", "TRUE limits values to the range of out; FALSE wraps them around"};
     hal::Function    run{*this, "", hal::step<&Narrowing::update>, "converts"};
 
     void update(hal::Cycle) noexcept {
         const From value = in;
-        out_of_range = !fits<To>(value);
-        out = convert<To>(value, clamp);
+        const To converted = convert<To>(value, clamp);
+        out = converted;
+        if (clamp) out_of_range = !fits<To>(value);
+        else if (!exact(value, converted)) out_of_range = true;
     }
 
     static constexpr const char* manual = R"(
 HAL does not convert between types implicitly; link this component between two signals. The fraction of a float is truncated
-(1.9 becomes 1, -1.9 becomes -1). A value out of range sets `out-of-range` and wraps around (modulo
-2^32 or 2^64; a bit is TRUE for all but 0), or, with `clamp`, is set to the nearest limit of the range. A NaN input
-gives 0. For example:
+(1.9 becomes 1, -1.9 becomes -1). A value out of range wraps around (modulo 2^32 or 2^64; a bit is TRUE for all but 0), or, with `clamp`, is
+set to the nearest limit of the range. With `clamp`, `out-of-range` is TRUE while the input is outside of the range. Without, it becomes TRUE
+with the first input that is not converted exactly, a fraction included, and remains TRUE until a cycle with `clamp`. A NaN input gives 0 and
+sets `out-of-range`.
+
+**Differences from LinuxCNC:** an integer that wraps around sets `out-of-range` (LinuxCNC: not between signed and unsigned integers of the
+same width). A float wraps around and NaN gives 0 (LinuxCNC: what the processor's conversion gives, on x86 the lowest number). With `clamp`,
+NaN sets `out-of-range`.
+
+For example:
 
     loadrt conv_float_s32
     addf conv-float-s32.0 servo

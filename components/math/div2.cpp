@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
+#include "hal/corrected.hpp"
 
 namespace {
 
@@ -8,13 +9,14 @@ struct Div2 : hal::Component {
     hal::In<double>    in0{*this, "in0", "dividend"};
     hal::In<double>    in1{*this, "in1", "divisor"};
     hal::Out<double>   out{*this, "out", "in0 / in1"};
-    hal::Param<double> deadband{*this, "deadband", "smallest absolute value of the divisor; a smaller one counts as this"};
+    hal::CorrectedParam<double> deadband{*this, "deadband", "smallest absolute value of the divisor, at least 1e-12; a smaller one counts as this"};
     hal::Function      run{*this, "", hal::step<&Div2::update>, "divides"};
 
     void update(hal::Cycle) noexcept {
-        const double smallest = std::fabs(deadband);
-        const double divisor = std::fabs(in1) < smallest ? (in1 < 0.0 ? -smallest : smallest) : in1.get();
-        out = divisor == 0.0 ? 0.0 : in0 / divisor;
+        constexpr double min_deadband = 1e-12;
+        if (deadband < min_deadband) deadband.correct(min_deadband);
+        const double smallest = in1 < 0.0 ? -deadband : deadband;
+        out = in0 / (std::fabs(in1) < deadband ? smallest : in1);
     }
 };
 
@@ -22,7 +24,8 @@ struct Div2 : hal::Component {
 
 HAL_COMPONENT(Div2, "div2", "Quotient of two numbers", R"(
 A divisor between -`deadband` and +`deadband` counts as -`deadband` below 0 and as +`deadband` from 0 on, which limits `out`.
-(LinuxCNC's manual page documents an `out` of 0 there; its component behaves as described here.) With a `deadband` of 0 a divisor of 0 gives 0.
+(LinuxCNC's manual page documents an `out` of 0 there; its component behaves as described here.) A `deadband` below 1e-12
+is set to 1e-12. LinuxCNC prints a message at a divisor within the deadband.
 
     loadrt div2 names=power-factor
     addf power-factor servo

@@ -1,25 +1,31 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
+#include "hal/corrected.hpp"
 
 namespace {
 
 struct Invert : hal::Component {
     using Component::Component;
     hal::In<double>    in{*this, "in", "the input"};
-    hal::Out<double>   out{*this, "out", "1 / in, or 0 close to 0"};
-    hal::Param<double> deadband{*this, "deadband", "out is 0 while in is between -deadband and deadband"};
+    hal::Out<double>   out{*this, "out", "1 / in, limited close to 0"};
+    hal::CorrectedParam<double> deadband{*this, "deadband", "smallest absolute value of the divisor, at least 1e-12; a smaller one counts as this"};
     hal::Function      run{*this, "", hal::step<&Invert::update>, "computes out"};
 
     void update(hal::Cycle) noexcept {
+        constexpr double min_deadband = 1e-12;
+        if (deadband < min_deadband) deadband.correct(min_deadband);
         const double value = in;
-        out = std::fabs(value) <= std::fabs(deadband) ? 0.0 : 1.0 / value;
+        const double smallest = value < 0.0 ? -deadband : deadband;
+        out = 1.0 / (std::fabs(value) < deadband ? smallest : value);
     }
 };
 
 }  // namespace
 
 HAL_COMPONENT(Invert, "invert", "Reciprocal", R"(
-`out = 1 / in`, and 0 while `|in| <= deadband`, so an input of 0 gives 0 and not infinity.
+`out = 1 / in`. An input between -`deadband` and +`deadband` counts as -`deadband` below 0 and as +`deadband` from 0 on, which limits `out`:
+an input of 0 gives 1e12 with the default. A `deadband` below 1e-12 is set to 1e-12. (LinuxCNC's manual page documents an `out` of 0 within
+the deadband; its component behaves as described here.)
 
     loadrt invert names=period
     addf period servo

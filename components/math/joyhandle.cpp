@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
+#include "hal/corrected.hpp"
 
 namespace {
 
@@ -11,14 +12,17 @@ struct Joyhandle : hal::Component {
     using Component::Component;
     hal::In<double>    in{*this, "in", "position of the joystick, -1..1"};
     hal::Out<double>   out{*this, "out", "shaped value"};
-    hal::Param<double> power{*this, "power", "exponent of the curve, at least 1", {.initial = 2.0}};
-    hal::Param<double> deadband{*this, "deadband", "positions within ±deadband give 0; 0..0.99"};
+    hal::CorrectedParam<double> power{*this, "power", "exponent of the curve, at least 1", {.initial = 2.0}};
+    hal::CorrectedParam<double> deadband{*this, "deadband", "positions within ±deadband give 0; 0..0.99"};
     hal::Param<double> scale{*this, "scale", "value of the curve at full deflection", {.initial = 1.0}};
     hal::Param<double> offset{*this, "offset", "added to the absolute value of the curve outside the deadband"};
     hal::Param<bool>   inverse{*this, "inverse", "TRUE: steep at the centre and flat at full deflection"};
     hal::Function      run{*this, "", hal::step<&Joyhandle::update>, "shapes the value"};
 
     void update(hal::Cycle) noexcept {
+        if (power < 1.0) power.correct(1.0);
+        if (deadband > 0.99) deadband.correct(0.99);
+        if (deadband < 0.0) deadband.correct(0.0);
         const double x = std::fmin(std::fabs(in), 1.0), d = std::fmin(std::fmax(deadband, 0.0), 0.99);
         if (!(std::fabs(in) >= d) || in == 0.0) {
             out = 0.0;
@@ -46,7 +50,7 @@ HAL_COMPONENT(Joyhandle, "joyhandle", "Shapes the movement of a joystick", R"(
 
 `a` and `b` are such that the curve starts at `deadband` with `offset` and ends at 1 with `scale + offset`; above 1 it is constant.
 `inverse` rotates the curve by half a turn, in contrast to LinuxCNC for both directions of the stick. A `power` below 1
-counts as 1, a `deadband` below 0 as 0 and above 0.99 as 0.99. A NaN input gives 0.
+is set to 1, a `deadband` below 0 to 0 and above 0.99 to 0.99. A NaN input gives 0.
 
     loadrt joyhandle names=stick-x
     addf stick-x servo

@@ -27,11 +27,12 @@ struct Config {
         ways = digits.empty() || digits.size() > 4 ? 0 : std::stol(digits);
         if (ways < 1 || ways > 1024) refuse("has no number of channels in 1..1024; write it as in fu12");
     }
-    /// Returns the number of selection bits: log2 of the channels if these are a power of two, else 0.
+    /// Returns the number of selection bits: log2 of the channels if these are a power of two or one more, as in LinuxCNC; else 0.
     std::int64_t select_bits() const noexcept {
         std::int64_t bits = 0;
-        while ((std::int64_t{1} << bits) < ways) ++bits;
-        return (std::int64_t{1} << bits) == ways ? bits : 0;
+        while ((std::int64_t{2} << bits) <= ways) ++bits;
+        const std::int64_t beyond = ways - (std::int64_t{1} << bits);
+        return beyond <= 1 ? bits : 0;
     }
 };
 
@@ -83,27 +84,25 @@ public:
     Choice(hal::Component& component, const Config& config)
         : ways(static_cast<std::uint64_t>(config.ways)),
           keep{component, "suppress-no-input", "TRUE ignores the selection 0; channel 00 cannot be selected"},
-          debounce_us{component, "debounce-us", "time for which a new selection must be stable", {.unit = "us"}},
+          debounce_us{component, "debounce-us", "time from a new selection until it is in use", {.unit = "us"}},
           bit{component, "sel-bit-##", config.select_bits(), "bit # of the selection"},
           number{component, "sel-int", "number added to that of the sel-bit pins"},
-          elapsed{component, "elapsed", "time for which the selection has been stable", {.unit = "us"}},
+          elapsed{component, "elapsed", "time since the selection differs from selected", {.unit = "us"}},
           selected{component, "selected", "selection in use"} {}
 
-    /// Returns the selected channel, the last one for a selection above it; the number of channels if no channel was selected yet or if
-    /// the selection 0 is suppressed. [realtime]
+    /// Returns the selected channel, the last one for a selection above it; the number of channels if the outputs are held: while a new
+    /// selection is debounced, and while the selection 0 is suppressed. [realtime]
     std::uint64_t update(const hal::Cycle& cycle) noexcept {
-        std::uint64_t wanted = number;
-        for (std::size_t i = 0; i < bit.size(); ++i) wanted += bit[i] ? std::uint64_t{1} << i : 0;
-        held_ns_ = wanted == wanted_ ? held_ns_ + (held_ns_ < (std::int64_t{1} << 62) ? cycle.period_ns() : 0) : 0;
-        wanted_ = wanted;
-        elapsed = static_cast<std::uint32_t>(std::min<std::int64_t>(held_ns_ / 1000, UINT32_MAX));
+        std::uint32_t wanted = number;
+        for (std::size_t i = 0; i < bit.size(); ++i) wanted += bit[i] ? std::uint32_t{1} << i : 0;
         if (keep && wanted == 0) return ways;
-        if (held_ns_ >= std::int64_t{debounce_us} * 1000) {
-            chosen_ = std::min(wanted, ways - 1);
-            any_ = true;
-            selected = static_cast<std::uint32_t>(chosen_);
+        if (wanted != selected && elapsed < debounce_us) {
+            elapsed = elapsed + static_cast<std::uint32_t>(cycle.period_ns() / 1000);
+            return ways;
         }
-        return any_ ? chosen_ : ways;
+        selected = wanted;
+        elapsed = 0;
+        return std::min<std::uint64_t>(wanted, ways - 1);
     }
 
     const std::uint64_t ways;
@@ -114,9 +113,6 @@ private:
     hal::Ins<bool> bit;
     hal::In<std::uint32_t> number;
     hal::Out<std::uint32_t> elapsed, selected;
-    std::uint64_t wanted_ = 0, chosen_ = 0;
-    std::int64_t held_ns_ = 0;
-    bool any_ = false;
 };
 
 }  // namespace routed

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <numbers>
 
-#include "axis_planner.hpp"
 #include "hal/component.hpp"
 #include "hal/limit.hpp"
 
@@ -13,7 +14,7 @@ struct Anglejog : hal::Component {
     hal::In<bool>          enable_in{*this, "enable-in", "TRUE: counts move the axes; FALSE: a new angle and scale are accepted"};
     hal::In<std::int32_t>  counts_in{*this, "counts-in", "counts of the handwheel"};
     hal::In<double>        angle_in{*this, "angle-degrees-in", "direction of the motion", {.unit = "deg"}};
-    hal::In<std::int32_t>  factor_in{*this, "iscale-factor", "output counts per input count; at least 1", {.initial = 10000}};
+    hal::In<std::int32_t>  factor_in{*this, "iscale-factor", "output counts per input count, 10..100000", {.initial = 10000}};
     hal::In<double>        scale_in{*this, "scale-in", "distance per count"};
     hal::Limit             max_velocity{*this, "max-vel", "largest speed along the direction"};
     hal::Limit             max_acceleration{*this, "max-accel", "largest acceleration along the direction"};
@@ -28,49 +29,95 @@ struct Anglejog : hal::Component {
     hal::Out<bool>         active{*this, "active", "TRUE while moving"};
     hal::Out<double>       current_angle{*this, "current-angle-degrees", "direction in use", {.unit = "deg"}};
     hal::Out<double>       current_magnitude{*this, "current-mag", "distance along the direction"};
-    hal::Out<double>       current_velocity{*this, "current-vel", "speed along the direction"};
+    hal::Out<double>       current_velocity{*this, "current-vel", "speed along the direction, signed"};
     hal::Function          run{*this, "", &Anglejog::update, "computes the counts of both axes"};
 
     void update(hal::Cycle cycle) noexcept {
-        const std::int32_t now = counts_in;
-        if (!enable_in) {
-            angle_ = std::isfinite(angle_in) ? angle_in.get() : angle_;
-            scale_ = std::fabs(scale_in) <= 1e9 ? scale_in.get() : scale_;
-            factor_ = std::max(factor_in.get(), 1);
-            way_.stop_at_once();
-            goal_ = way_.position();
-        } else {
-            const auto turned = static_cast<std::int32_t>(static_cast<std::uint32_t>(now) - static_cast<std::uint32_t>(last_counts_));
-            goal_ = std::clamp(goal_ + static_cast<double>(turned) * scale_, -1e12, 1e12);
-            way_.step(&goal_, max_velocity, max_acceleration, cycle.seconds());
+        const bool enabled = enable_in;
+        if (!started_) adopt();
+        started_ = true;
+        const std::int64_t now = std::int64_t{factor_} * counts_in;
+        if (enabled && !was_enabled_) {
+            last_counts_ = now;
+            waiting_ = true;
+            commanded_counts_ = counts_at(magnitude_);
         }
+        const std::int64_t turned = now - last_counts_;
         last_counts_ = now;
+        was_enabled_ = enabled;
+        if (turned != 0) waiting_ = false;
+        if (enabled) commanded_counts_ += turned;
+        else adopt();
 
-        const double direction = std::remainder(angle_, 360.0) * (std::numbers::pi / 180.0);
-        const double cosine = std::cos(direction), sine = std::sin(direction);
-        const double unit = scale_ / static_cast<double>(factor_);
-        cosine_counts = counts(way_.position() * cosine, unit);
-        sine_counts = counts(way_.position() * sine, unit);
-        cosine_fraction = std::fabs(cosine) * accel_fraction;
-        sine_fraction = std::fabs(sine) * accel_fraction;
-        enable_out = enable_in.get();
-        current_scale = scale_;
-        scale_out = unit;
-        current_angle = angle_;
-        current_magnitude = way_.position();
-        current_velocity = std::fabs(way_.velocity());
-        active = enable_in && (!way_.resting() || !way_.at(goal_));
+        const double distance = static_cast<double>(commanded_counts_) * unit_ - magnitude_;
+        active = move(enabled && !waiting_ ? distance : 0.0, cycle.seconds());
+        enable_out = enabled;
+        publish();
     }
 
 private:
-    static std::int32_t counts(double way, double unit) noexcept {
-        if (unit == 0.0) return 0;
-        const double exact = way / unit;  // 1e-6 of a count is added: 3 must not become 2.9999999999 and then 2
-        return static_cast<std::int32_t>(std::clamp(std::trunc(exact + std::copysign(1e-6, exact)), -2147483648.0, 2147483647.0));
+    static constexpr std::int32_t min_factor = 10;
+    static constexpr std::int32_t max_factor = 100'000;
+    static constexpr double huge = 1e20;  // beyond it sums would lose all digits, or overflow
+
+    static double at_least_0(double limit) noexcept { return limit > 0.0 ? std::min(limit, huge) : 0.0; }
+
+    /// Accepts the angle, the scale and the factor. NaN and a factor out of range change nothing.
+    void adopt() noexcept {
+        if (std::isfinite(angle_in)) angle_ = angle_in;
+        const bool valid = factor_in >= min_factor && factor_in <= max_factor;
+        if (valid) factor_ = factor_in;
+        if (std::fabs(scale_in) <= 1e9) scale_ = scale_in;
+        unit_ = scale_ / static_cast<double>(factor_);
+        commanded_counts_ = counts_at(magnitude_);
     }
-    plan::Axis way_;
-    double goal_ = 0.0, angle_ = 0.0, scale_ = 0.0;
-    std::int32_t factor_ = 10000, last_counts_ = 0;
+
+    /// Moves for one cycle to a point `distance` ahead, or brakes to a stop if that is 0. Returns true while it moves.
+    bool move(double distance, double period_s) noexcept {
+        const double acceleration = at_least_0(max_acceleration);
+        const double change = acceleration * period_s;
+        const double negligible = change * period_s * 0.001;
+        const bool going = std::fabs(distance) > negligible;
+        // The speed v from which braking by `change` in each cycle ends at the distance d: v * v + 2 v change = 2 a d.
+        const double braking = std::sqrt(2.0 * acceleration * std::fabs(distance) + change * change) - change;
+        const double speed = going ? std::min(braking, at_least_0(max_velocity)) : 0.0;
+        velocity_ = std::clamp(std::copysign(speed, distance), velocity_ - change, velocity_ + change);
+        magnitude_ += velocity_ * period_s;
+        return going || velocity_ != 0.0;
+    }
+
+    void publish() noexcept {
+        const double direction = angle_ * (std::numbers::pi / 180.0);
+        const double cosine = std::cos(direction);
+        const double sine = std::sin(direction);
+        cosine_counts = static_cast<std::int32_t>(counts_at(magnitude_ * cosine));
+        sine_counts = static_cast<std::int32_t>(counts_at(magnitude_ * sine));
+        cosine_fraction = std::fabs(cosine) * accel_fraction;
+        sine_fraction = std::fabs(sine) * accel_fraction;
+        current_scale = scale_;
+        scale_out = unit_;
+        current_angle = angle_;
+        current_magnitude = magnitude_;
+        current_velocity = velocity_ + 0.0;  // never -0
+    }
+
+    /// Returns `distance` in output counts, truncated, within s32.
+    std::int64_t counts_at(double distance) const noexcept {
+        if (unit_ == 0.0) return 0;
+        return static_cast<std::int64_t>(std::clamp(distance / unit_, -2147483648.0, 2147483647.0));
+    }
+
+    bool started_ = false;
+    bool was_enabled_ = false;
+    bool waiting_ = false;  // for the first count since enable-in became TRUE
+    double angle_ = 0.0;
+    double scale_ = 0.0;
+    double unit_ = 0.0;  // distance per output count
+    double magnitude_ = 0.0;
+    double velocity_ = 0.0;
+    std::int32_t factor_ = 10000;
+    std::int64_t last_counts_ = 0;
+    std::int64_t commanded_counts_ = 0;
 };
 
 }  // namespace
@@ -78,8 +125,13 @@ private:
 HAL_COMPONENT(Anglejog, "anglejog", "Jogs two axes at an angle with one handwheel", R"(
 `counts-in` times `scale-in` is a distance along `angle-degrees-in`, covered with at most `max-vel` and `max-accel`. Its cosine component is
 `coscounts` for the first axis, its sine component `sincounts` for the second, in units of `current-scale-out` =
-scale / `iscale-factor`. New values of angle, scale and factor are accepted while `enable-in` is FALSE, which also discards the remaining distance.
+scale / `iscale-factor`. New values of angle, scale and factor are accepted while `enable-in` is FALSE, which also discards the remaining distance:
+the motion brakes with `max-accel`. It stops within a thousandth of the distance of the first cycle of an acceleration.
 Set `max-vel` and `max-accel` no higher than either axis allows.
+
+**Differences from LinuxCNC:** the acceleration fractions are positive in all directions (LinuxCNC: with the sign of cosine and sine, and the
+motion controller takes a negative one as 1). Disabled and enabled again while it brakes, the motion goes on braking (LinuxCNC: the speed is held
+until the wheel turns). NaN inputs and a factor out of range change nothing; negative limits count as 0 (LinuxCNC: NaN).
 
     loadrt anglejog names=aj
     addf aj servo

@@ -296,6 +296,9 @@ With `align-dc` the carousel stops at the marker for `decel-time`, moves back sl
 `rev-pulse` it is then driven in reverse against its lock for that time. At standstill `motor-vel` is `hold-dc`. `jog-fwd` and `jog-rev` move by
 one pocket while the carousel is stopped and disabled.
 
+**Differences from LinuxCNC:** the states have other numbers. `enable` FALSE stops a move at once (LinuxCNC: with `rev-pulse`, `decel-time` and
+`align-dc`, as at the pocket).
+
 All arguments are lists with an element per carousel (`pockets=10,10,8`); missing elements have the default value (LinuxCNC repeats
 the last element).
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "edge_count.hpp"
+#include "hal/corrected.hpp"
 
 namespace {
 
@@ -24,7 +25,7 @@ struct Encoder : hal::Component {
     hal::Io<bool> index_enable{*this, capture, "index-enable", "TRUE: the next rising edge of phase-Z sets counts and position to 0 and this pin to FALSE"};
     hal::In<bool> reset{*this, capture, "reset", "TRUE holds counts and position at 0"};
     hal::Io<double> position_scale{*this, capture, "position-scale", "counts per position unit", {.initial = 1.0}};
-    hal::In<double> min_speed{*this, capture, "min-speed-estimate", "below this speed velocity is 0 and position-interpolated equals position", {.initial = 1.0}};
+    hal::CorrectedIn<double> min_speed{*this, capture, "min-speed-estimate", "below this speed velocity is 0 and position-interpolated equals position", {.initial = 1.0}};
     hal::Out<std::int32_t> counts{*this, capture, "counts", "position in counts"};
     hal::Out<std::int32_t> counts_latched{*this, capture, "counts-latched", "counts at the newest edge of latch-input"};
     hal::Out<double> position{*this, capture, "position", "counts / position-scale"};
@@ -53,6 +54,7 @@ struct Encoder : hal::Component {
         const auto& now = count_.capture(index_enable, reset);
         const std::int64_t zero = count_.zero();
         const double scale = edge_count::valid_scale(position_scale);
+        if (min_speed == 0.0) min_speed.correct(1.0);
 
         if (now.latches != latches_) {
             latches_ = now.latches;

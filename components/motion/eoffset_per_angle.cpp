@@ -25,36 +25,71 @@ struct EoffsetPerAngle : hal::Component {
     hal::Out<std::int32_t> kcounts{*this, "kcounts", "the offset in counts, for axis.L.eoffset-counts"};
     hal::Out<double>       kreciprocal{*this, "kreciprocal", "1 / k, for axis.L.eoffset-scale"};
     hal::Out<double>       eoffset{*this, "eoffset-dbg", "the offset"};
-    hal::Out<std::uint32_t> state{*this, "state-dbg", "1 waiting for enable-in, 2 computing, 3 removing the offset"};
+    hal::Out<std::uint32_t> state{*this, "state-dbg", "0 off, 1 ready, 2 running, 3 stopping, 4 finish; of the previous cycle"};
     hal::Function          run{*this, "", &EoffsetPerAngle::update, "computes the offset"};
 
     void update(hal::Cycle) noexcept {
-        const double per_unit = k != 0 ? static_cast<double>(k) : 10000.0;
-        const bool called = enable_in && !was_enabled_;
-        was_enabled_ = enable_in;
-        if (!is_on) state_ = waits;
-        else if (state_ == waits && called) state_ = computes;
-        else if (state_ == computes && !enable_in) state_ = returns;
-        else if (state_ == returns && !active) state_ = waits;
-
-        double offset = 0.0;
-        if (state_ == computes) {
-            if (const auto shape = value()) offset = *shape;
-            else state_ = returns;
-        }
-        const double exact = offset * per_unit;  // 1e-6 is added: 2500 must not become 2499.9999999999 and then 2499
-        const double counts = std::clamp(std::trunc(exact + std::copysign(1e-6, exact)), -2147483648.0, 2147483647.0);
+        state = static_cast<std::uint32_t>(state_);
         is_off = !is_on;
-        enable_out = state_ != waits;
-        clear = state_ == returns;
-        kcounts = static_cast<std::int32_t>(counts);
-        kreciprocal = 1.0 / per_unit;
-        eoffset = counts / per_unit;
-        state = state_;
+        kreciprocal = 1.0 / counts_per_unit();
+        if (!is_on) {
+            enable_out = false;
+            clear = false;
+            command(0.0);
+            state_ = State::off;
+            return;
+        }
+        switch (state_) {
+        case State::off:
+            if (!enable_in) become(State::ready);
+            break;
+        case State::ready:
+            if (enable_in) become(State::running);
+            break;
+        case State::running: follow(); break;
+        case State::stopping:
+            if (!active) state_ = State::finish;
+            break;
+        case State::finish:
+            enable_out = false;
+            clear = false;
+            state_ = failed_ ? State::off : State::ready;
+            break;
+        }
     }
 
 private:
-    static constexpr std::uint32_t waits = 1, computes = 2, returns = 3;
+    enum class State : std::uint32_t { off, ready, running, stopping, finish };
+
+    double counts_per_unit() const noexcept { return k != 0 ? static_cast<double>(k) : 10000.0; }
+
+    void command(double offset) noexcept {
+        const double exact = offset * counts_per_unit();  // 1e-6 is added: 2500 must not become 2499.9999999999 and then 2499
+        const double counts = std::clamp(std::trunc(exact + std::copysign(1e-6, exact)), -2147483648.0, 2147483647.0);
+        kcounts = static_cast<std::int32_t>(counts);
+        eoffset = counts / counts_per_unit();
+    }
+
+    void become(State next) noexcept {
+        command(0.0);
+        failed_ = false;
+        state_ = next;
+    }
+
+    void follow() noexcept {
+        if (!enable_in) {
+            clear = true;
+            become(State::stopping);
+            return;
+        }
+        enable_out = true;
+        if (const auto shape = value()) {
+            command(*shape);
+            return;
+        }
+        become(State::stopping);
+        failed_ = true;
+    }
 
     /// Returns the offset at this angle, or nothing for an impossible shape.
     std::optional<double> value() const noexcept {
@@ -63,14 +98,14 @@ private:
         const double part = wave - std::floor(wave);  // of a wave, or of a side
         if (fnum == 2) return 0.5 * amplitude * (1.0 - std::cos(2.0 * std::numbers::pi * part));
         if (fnum == 3) return part >= 0.25 && part <= 0.75 ? amplitude : 0.0;
-        if (fmult < 3.0) return {};
+        if (fmult <= 2.0) return {};
         // A side is straight: its distance from the centre is that of its middle, divided by the cosine of the angle from there.
         const double turn = 2.0 * std::numbers::pi / fmult, outer = radius_ref + amplitude;
         const double middle = fnum == 1 ? outer * std::cos(0.5 * turn) : outer;
         return middle / std::cos((part < 0.5 ? part : part - 1.0) * turn) - radius_ref;
     }
-    std::uint32_t state_ = waits;
-    bool was_enabled_ = false;
+    State state_ = State::off;
+    bool failed_ = false;  // the shape was impossible
 };
 
 }  // namespace
@@ -85,9 +120,12 @@ With a = `radius-ref` * `rfraction` and t the angle since `start-angle`:
 | 2 | a / 2 * (1 - cos(fmult t)) | sine |
 | 3 | a in the middle half of each wave, else 0 | square wave |
 
-A polygon needs an `fmult` of 3 or more. `kcounts` is the offset times `k`, truncated. A rising edge of `enable-in` starts the offset;
-after its falling edge `clear` is TRUE until `active` is FALSE. If the shape is impossible, the offset is removed, and
-`enable-in` must rise again.
+A polygon needs an `fmult` above 2. `kcounts` is the offset times `k`, truncated. While the machine is on, `enable-in` starts the offset once
+it has been FALSE; after its falling edge `clear` is TRUE until `active` is FALSE. If the shape is impossible, `kcounts` becomes 0, and once `active` is FALSE,
+`enable-in` must be FALSE before the offset starts again. Each change of state takes a cycle.
+
+**Differences from LinuxCNC:** a polygon has the same shape at negative angles (LinuxCNC: another one), `kcounts` is rounded up where it is within
+1e-6 of the next count, `clear` becomes FALSE when the machine is switched off, and nothing is printed.
 
     loadrt eoffset_per_angle names=opa
     addf opa servo

@@ -14,14 +14,15 @@ struct Gantry : hal::Component {
     hal::Ins<bool>    joint_home{*this, "joint.##.home", personality, "home switch of joint ##"};
     hal::Outs<double> offset{*this, "joint.##.offset", personality, "position-cmd - pos-cmd of joint ##, found while homing"};
     hal::In<double>   position_cmd{*this, "position-cmd", "commanded position"};
-    hal::Out<double>  position_fb{*this, "position-fb", "position, from joint 0"};
+    hal::Out<double>  position_fb{*this, "position-fb", "position, from a joint that moves"};
     hal::Out<bool>    home{*this, "home", "TRUE after all home switches were on, until all are off again"};
     hal::Out<bool>    limit{*this, "limit", "TRUE while any home switch is on"};
     hal::In<double>   search_vel{*this, "search-vel", "search velocity; its sign is the direction of the home switches"};
 
     void read_joints(hal::Cycle) noexcept {
         watch_switches();
-        position_fb = pos_fb[0] + offset[0];
+        if (!home && joint_home[feedback_joint_]) feedback_joint_ = moving_joint();
+        position_fb = pos_fb[feedback_joint_] + offset[feedback_joint_];
     }
 
     void write_joints(hal::Cycle) noexcept {
@@ -48,8 +49,18 @@ private:
         home = all || (any && home);
         limit = any;
     }
+
+    /// Returns the first joint that is not stopped by its home switch, or the one in use.
+    std::size_t moving_joint() const noexcept {
+        for (std::size_t joint = 0; joint < joint_home.size(); ++joint) {
+            if (!joint_home[joint]) return joint;
+        }
+        return feedback_joint_;
+    }
+
     double last_command_ = 0.0;
     bool started_ = false;
+    std::size_t feedback_joint_ = 0;
 };
 
 }  // namespace
@@ -60,8 +71,12 @@ direction of `search-vel` and some but not all home switches are on, the joints 
 the motion. Once the last switch is on, the offsets are known and all joints move together, until all switches have
 been off. Joints stop without a ramp, so home slowly, and use the same sign for HOME_SEARCH_VEL and HOME_LATCH_VEL.
 
-`personality` is the number of joints, 2 by default. `position-fb` is the feedback of joint 0 plus its offset. While an input is NaN,
-the last command is held.
+`personality` is the number of joints, 2 by default. `position-fb` is the feedback of a joint plus its offset: of joint 0, and, from when its
+home switch stops it, of the first joint that still moves, so that it does not jump. While an input is NaN, the last command is held.
+
+**Differences from LinuxCNC:** `home` waits for all joints (LinuxCNC, with more than two: not for the last ones). The first command is not a
+motion (LinuxCNC: from 0). Offsets have double precision (LinuxCNC: single). Without `personality` there are two joints (LinuxCNC 2.10: an
+error; 2.9 crashes).
 
     loadrt gantry names=y personality=2
     addf y.read servo

@@ -11,35 +11,40 @@ struct Orient : hal::Component {
     hal::In<double>       angle{*this, "angle", "target angle", {.unit = "deg"}};
     hal::Out<double>      command{*this, "command", "commanded position", {.unit = "turn"}};
     hal::Out<double>      poserr{*this, "poserr", "position - command", {.unit = "deg"}};
-    hal::Out<bool>        is_oriented{*this, "is-oriented", "TRUE while enabled and within tolerance"};
+    hal::Out<bool>        is_oriented{*this, "is-oriented", "TRUE while enabled, after 101 cycles within tolerance"};
     hal::In<double>       tolerance{*this, "tolerance", "maximum error for is-oriented", {.initial = 0.5, .unit = "deg"}};
     hal::Function         run{*this, "", &Orient::update, "computes command and the error"};
 
     void update(hal::Cycle) noexcept {
-        if (enable && !was_enabled_) choose();
+        if (enable && !was_enabled_) {
+            choose();
+            settled_cycles_ = 0;
+        }
         was_enabled_ = enable;
         if (!enable) {
             is_oriented = false;
             return;
         }
         poserr = (position - command) * 360.0;
-        is_oriented = std::fabs(poserr) < tolerance;
+        if (settled_cycles_ < required_cycles && std::fabs(poserr) < tolerance) ++settled_cycles_;
+        is_oriented = settled_cycles_ >= required_cycles;
     }
 
 private:
     void choose() noexcept {
-        const double target = angle / 360.0, turn = target - std::floor(target);
-        const double there = std::floor(position) + turn;
-        if (!std::isfinite(there)) return;
-        const double up = there >= position ? there : there + 1.0, down = there <= position ? there : there - 1.0;
+        const double target = angle / 360.0;
+        if (!std::isfinite(position + target)) return;
         switch (mode) {
-        case 0: command = up - position < position - down ? up : down; break;
-        case 1: command = up; break;
-        case 2: command = down; break;
+        case 0: command = std::floor(position + 0.5 - target) + target; break;
+        case 1: command = std::ceil(position - target) + target; break;
+        case 2: command = std::floor(position - target) + target; break;
         default: break;  // invalid mode: hold the last command
         }
     }
+
+    static constexpr int required_cycles = 101;
     bool was_enabled_ = false;
+    int settled_cycles_ = 0;  // since the rising edge of enable, within the tolerance
 };
 
 }  // namespace
@@ -49,12 +54,15 @@ A rising edge of `enable` sets the command to a position whose fraction of a tur
 
 | mode | command |
 | --- | --- |
-| 0 | the nearest; of two equally near, the smaller one |
+| 0 | the nearest; of two equally near, the larger one |
 | 1 | the next at or above `position` (clockwise) |
 | 2 | the next at or below `position` (counterclockwise) |
 
-In any other mode, or if position or angle is NaN or infinite, the command is held. `angle` may be any number of degrees; whole turns
-are ignored. While enabled, `poserr` is `position` - `command` in degrees, and `is-oriented` is TRUE while it is within `tolerance`.
+In any other mode the command is held. `angle` may be any number of degrees; whole turns are ignored. While enabled, `poserr` is
+`position` - `command` in degrees. `is-oriented` becomes TRUE in the 101st cycle in which it is within `tolerance` and remains TRUE until
+`enable` is FALSE, so that a spindle that passes the angle is not reported.
+
+**Differences from LinuxCNC:** if position or angle is NaN or infinite, the command is held (LinuxCNC: NaN).
 
     loadrt orient names=orient
     loadrt pid names=orient-pid

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "hal/component.hpp"
+#include "hal/corrected.hpp"
 #include "hal/limit.hpp"
 #include "hal/queue.hpp"
 
@@ -62,12 +63,12 @@ struct Stepgen : hal::Component {
     hal::Function run{*this, "update-freq", &Stepgen::update_freq, "reads the command; belongs in the servo thread, after the controller", {.shared = true}};
     hal::In<bool> enable{*this, run, "enable", "FALSE stops the generator"};
     std::optional<hal::In<double>> position_cmd, velocity_cmd;
-    hal::Param<double> position_scale{*this, run, "position-scale", "steps per length unit; 0 counts as 1", {.initial = 1.0}};
-    hal::OptionalLimitParam max_velocity{*this, run, "maxvel", "limit on the speed in length units per second; 0: limited by the pulse timing only"};
-    hal::OptionalLimitParam max_acceleration{*this, run, "maxaccel", "limit on the acceleration in length units per second squared; 0: no limit"};
+    hal::CorrectedParam<double> position_scale{*this, run, "position-scale", "steps per length unit; 0 is set to 1", {.initial = 1.0}};
+    hal::OptionalCorrectedLimitParam max_velocity{*this, run, "maxvel", "limit on the speed in length units per second; 0: limited by the pulse timing only"};
+    hal::OptionalCorrectedLimitParam max_acceleration{*this, run, "maxaccel", "limit on the acceleration in length units per second squared; 0: no limit"};
     hal::Out<double> frequency{*this, run, "frequency", "current step rate", {.unit = "Hz"}};
-    hal::Param<std::uint32_t> step_length{*this, run, "steplen", "length of a step pulse, or minimum time in a state", {.initial = 1, .unit = "ns"}};
-    std::optional<hal::Param<std::uint32_t>> step_space, dir_hold, dir_setup, dir_delay;
+    hal::CorrectedParam<std::uint32_t> step_length{*this, run, "steplen", "length of a step pulse, or minimum time in a state", {.initial = 1, .unit = "ns"}};
+    std::optional<hal::CorrectedParam<std::uint32_t>> step_space, dir_hold, dir_setup, dir_delay;
 
     explicit Stepgen(const hal_host* host) : Component(host) {
         if (control.get() != "p" && control.get() != "v") throw hal::ArgumentError("ctrl_type", "ctrl_type=" + control.get() + " is neither p nor v");
@@ -125,8 +126,11 @@ struct Stepgen : hal::Component {
     }
 
     void update_freq(hal::Cycle cycle) noexcept {
-        scale_.store(position_scale != 0.0 && std::isfinite(position_scale) ? position_scale : 1.0, std::memory_order_relaxed);
+        if (std::fabs(position_scale) < 1e-20) position_scale.correct(1.0);
+        scale_.store(std::isfinite(position_scale) ? position_scale.get() : 1.0, std::memory_order_relaxed);
         const std::int64_t known_ns = tick_ns_.load(std::memory_order_relaxed), tick_ns = known_ns > 0 ? known_ns : cycle.period_ns();
+        if (known_ns > 0) correct_times(known_ns);
+        if (enable) correct_limits(highest_rate(tick_ns), cycle.seconds());
         const double wanted = enable ? limited(command(cycle.seconds()), tick_ns, cycle.seconds()) : 0.0;
         if (!enable && position_cmd) last_command_ = *position_cmd * scale();
         frequency = wanted;
@@ -160,12 +164,41 @@ private:
         return own + std::copysign(std::min(closing, std::fabs(distance) / dt), left);
     }
 
+    /// Returns `time_ns` rounded up to whole periods of make-pulses.
+    static std::uint32_t whole_periods(std::uint32_t time_ns, std::int64_t period_ns) noexcept {
+        const std::int64_t periods = (std::int64_t{time_ns} + period_ns - 1) / period_ns;
+        return static_cast<std::uint32_t>(std::min(periods, std::int64_t{UINT32_MAX} / period_ns) * period_ns);
+    }
+
+    void correct_times(std::int64_t period_ns) noexcept {
+        step_length.correct(whole_periods(std::max(step_length.get(), 1u), period_ns));
+        if (type == step_dir && *dir_hold == 0 && *dir_setup == 0) dir_hold->correct(1);
+        if (type == up_down && *dir_delay == 0) dir_delay->correct(1);
+        for (auto* time : {&step_space, &dir_hold, &dir_setup, &dir_delay}) {
+            if (*time) (*time)->correct(whole_periods(**time, period_ns));
+        }
+    }
+
+    /// Sets negative limits to 0, and limits that have no effect to the highest one that has.
+    void correct_limits(double highest, double dt) noexcept {
+        const double steps = std::fabs(scale());
+        if (max_velocity < 0.0) max_velocity.correct(0.0);
+        if (max_velocity * steps > highest) max_velocity.correct(highest / steps);
+        if (max_velocity > 0.0) highest = std::min(highest, max_velocity * steps);
+        if (max_acceleration < 0.0) max_acceleration.correct(0.0);
+        if (max_acceleration * steps > highest / dt) max_acceleration.correct(highest / dt / steps);
+    }
+
+    /// Returns the highest step rate that the times permit, Hz.
+    double highest_rate(std::int64_t tick_ns) const noexcept {
+        const auto ticks = [&](std::int64_t ns) { return (ns + tick_ns - 1) / tick_ns; };  // times are rounded up to whole periods
+        const std::int64_t pause = step_space ? ticks(*step_space) : 0;
+        return 1e9 / static_cast<double>(std::max<std::int64_t>(1, ticks(step_length) + pause) * tick_ns);
+    }
+
     double limited(double wanted, std::int64_t tick_ns, double dt) noexcept {
         if (!std::isfinite(wanted)) return 0.0;
-        const auto ticks = [&](std::int64_t ns) { return (ns + tick_ns - 1) / tick_ns; };  // times are rounded up to whole periods
-        const std::int64_t shortest = type <= up_down ? std::max<std::int64_t>(1, ticks(step_length) + (*step_space > 0 ? ticks(*step_space) : 0))
-                                                      : std::max<std::int64_t>(1, ticks(step_length));
-        double highest = 1e9 / static_cast<double>(shortest * tick_ns);
+        double highest = highest_rate(tick_ns);
         if (const double asked = std::fabs(max_velocity * scale()); asked > 0.0) highest = std::min(highest, asked);
         if (const double a = acceleration(); a > 0.0) wanted = std::clamp(wanted, frequency - a * dt, frequency + a * dt);
         return std::clamp(wanted, -highest, highest);
@@ -263,7 +296,9 @@ wait for one of the times below is delayed, never lost. A step occurs when the p
 | 13, 14 | five phases, half step: one or two on, two or three on | steplen, dirdelay |
 | 15 | defined by `user_step_type`: a number per state, bit 0 is phase A | steplen, dirdelay |
 
-All times are in nanoseconds and rounded up to whole periods of the fast thread. With `stepspace` 0 a pulse may occur in every period,
+All times are in nanoseconds; the parameters are rounded up to whole periods of the fast thread. A `steplen` of 0, and a `dirdelay` or both
+`dirhold` and `dirsetup` of 0 with step types 0 and 1, are one period. A negative `maxvel` or `maxaccel` is set to 0; one that is above what
+the pulse timing permits (for `maxaccel`: from 0 to the highest speed in one update) is set to that. With `stepspace` 0 a pulse may occur in every period,
 for ports that reset the pulse themselves.
 
 **Differences from LinuxCNC:** steps occur in different periods. A command with constant speed is followed with a lag of one update (LinuxCNC:

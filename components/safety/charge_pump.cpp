@@ -17,10 +17,10 @@ struct ChargePump : hal::Component {
     hal::Function run{*this, "", &ChargePump::update, "generates the next half wave"};
 
     void update(hal::Cycle) noexcept {
-        phase_ = enable ? phase_ + 1 : 0;
-        out = (phase_ & 1) != 0;
-        half = (phase_ & 2) != 0;
-        quarter = (phase_ & 4) != 0;
+        if (enable) ++phase_;
+        out = enable && (phase_ & 1) != 0;
+        half = enable && (phase_ & 2) != 0;
+        quarter = enable && (phase_ & 4) != 0;
     }
 
 private:
@@ -32,7 +32,8 @@ private:
 HAL_COMPONENT(ChargePump, "charge_pump", "Square waves that show that the thread runs", R"(
 A charge pump in an output stage keeps a relay closed only while its input is a square wave: when the thread stops, the machine enters the safe
 state, regardless of the last output level. `out` has half the frequency of the thread, `out-2` and
-`out-4` a half and a quarter of that. `enable` FALSE stops the waves.
+`out-4` a half and a quarter of that. While `enable` is FALSE
+the outputs are FALSE; the waves then go on where they stopped.
 
     loadrt charge_pump
     addf charge-pump servo-thread

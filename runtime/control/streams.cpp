@@ -22,6 +22,12 @@ hal_value* record_at(const hal_stream& stream, std::uint64_t count) {
     return stream.data + (count % stream.depth) * (stream.columns + 1);
 }
 
+/// Returns the losses of each record, or nullptr if the component does not publish them.
+const std::uint64_t* losses_of(const hal_stream& stream) {
+    if (stream.size < sizeof(hal_timed_stream)) return nullptr;
+    return reinterpret_cast<const hal_timed_stream&>(stream).losses;
+}
+
 }  // namespace
 
 void describe_stream(const hal_stream& stream, std::string& to) {
@@ -29,7 +35,7 @@ void describe_stream(const hal_stream& stream, std::string& to) {
     json_quote(to += ",\"types\":", stream.types);
     to += ",\"depth\":" + std::to_string(stream.depth) + ",\"waiting\":" + std::to_string(head - tail) +
           ",\"lost\":" + std::to_string(__atomic_load_n(&stream.lost, __ATOMIC_RELAXED));
-    if (stream.size >= sizeof(hal_timed_stream)) to += ",\"timed\":true";
+    if (stream.size >= HAL_TIMED_STREAM_SIZE_1) to += ",\"timed\":true";
 }
 
 bool take_records(hal_stream& stream, std::uint64_t most, std::string& to, std::string& why) {
@@ -40,7 +46,9 @@ bool take_records(hal_stream& stream, std::uint64_t most, std::string& to, std::
     const auto columns = column_types(stream);
     const std::uint64_t head = __atomic_load_n(&stream.head, __ATOMIC_ACQUIRE), begin = stream.tail;
     const std::uint64_t end = begin + std::min(most, head - begin);
-    const auto* const timed = stream.size >= sizeof(hal_timed_stream) ? reinterpret_cast<const hal_timed_stream*>(&stream) : nullptr;
+    const auto* const timed = stream.size >= HAL_TIMED_STREAM_SIZE_1 ? reinterpret_cast<const hal_timed_stream*>(&stream) : nullptr;
+    const std::uint64_t* const losses = losses_of(stream);
+    std::string lost_before = losses ? "],\"lost_before\":[" : "";
     std::string numbers = ",\"numbers\":[", records = "],\"records\":[", times = timed ? "],\"times_ns\":[" : "";
     for (std::uint64_t i = begin; i < end; ++i) {
         const hal_value* const values = record_at(stream, i);
@@ -48,8 +56,10 @@ bool take_records(hal_stream& stream, std::uint64_t most, std::string& to, std::
             numbers += ',';
             records += ',';
             if (timed) times += ',';
+            if (losses) lost_before += ',';
         }
         if (timed) times += std::to_string(timed->times[i % stream.depth]);
+        if (losses) lost_before += std::to_string(losses[i % stream.depth]);
         numbers += std::to_string(values[stream.columns].s64);
         records += '[';
         for (std::uint32_t c = 0; c < stream.columns; ++c) {
@@ -59,7 +69,7 @@ bool take_records(hal_stream& stream, std::uint64_t most, std::string& to, std::
         records += ']';
     }
     __atomic_store_n(&stream.tail, end, __ATOMIC_RELEASE);
-    to += numbers + records + times + "]";
+    to += numbers + records + times + lost_before + "]";
     return true;
 }
 

@@ -140,7 +140,6 @@ int hal_stream_read(halcyon_stream* stream, halcyon_stream_value* to, unsigned* 
 
 int hal_stream_write(halcyon_stream* stream, halcyon_stream_value* from) {
     Header& of = header(stream);
-    const std::uint32_t number = ++of.number;  // of the first record 1, as halsampler expects it; lost ones count
     if (!hal_stream_writable(stream)) {
         of.overruns.fetch_add(1, std::memory_order_relaxed);
         return -ENOSPC;
@@ -148,7 +147,7 @@ int hal_stream_write(halcyon_stream* stream, halcyon_stream_value* from) {
     const std::uint32_t index = of.in.load(std::memory_order_relaxed);
     halcyon_stream_value* const to = record(stream, index);
     std::memcpy(to, from, static_cast<std::size_t>(of.pins) * sizeof *to);
-    to[of.pins].raw = number;
+    to[of.pins].raw = ++of.number;  // 1 for the first record, as halsampler expects; lost records have no number
     of.in.store(next(of, index), std::memory_order_release);
     return 0;
 }

@@ -170,8 +170,8 @@ getp follow.position
         self.assertEqual([["0", "0", "0", "FALSE", "0", "0", "0", "2", "0", "0"],
                           ["-28", "0", "0", "FALSE", "0", "0", "0", "3", "2", "0"],
                           ["-28", "0", "1", "FALSE", "-2", "4000000002", "2", "1", "2", "0"],
-                          ["0", "0", "4.5", "TRUE", "-9", "4000000009", "7", "1", "2", "0"],
-                          ["0", "-28", "5", "FALSE", "-10", "4000000010", "8", "0", "2", "1"]], [words[i:i + len(names)] for i in range(0, len(words), len(names))])
+                          ["0", "0", "4.5", "TRUE", "-9", "4000000009", "5", "1", "2", "0"],
+                          ["0", "-28", "5", "FALSE", "-10", "4000000010", "6", "0", "2", "1"]], [words[i:i + len(names)] for i in range(0, len(words), len(names))])
 
     def test_firmware_is_read_from_its_folder_only(self):
         self.build("firmware")

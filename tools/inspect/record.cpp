@@ -64,15 +64,17 @@ class Lines {
 public:
     Lines(const Stream& stream, const RecordOptions& options) : types_(stream.types), csv_(options.csv), tag_(options.tag), timed_(stream.timed) {}
 
-    /// The records of a reply as lines. A gap in the sample numbers is a line `overrun`; CSV shows it by the numbers only.
+    /// Writes the records of a reply as lines. A line `overrun` marks lost records; CSV shows them by its times only.
     bool write(const json& reply, RecordFile& file) {
         const json& records = reply.at("records");
+        const json losses = reply.value("lost_before", json::array());
         for (std::size_t i = 0; i < records.size(); ++i) {
             const auto number = reply.at("numbers").at(i).get<std::int64_t>();
+            const std::uint64_t lost = i < losses.size() ? losses[i].get<std::uint64_t>() : 0;
             std::string text;
-            if (!csv_ && known_ && number != next_) text += "overrun\n";
+            if (!csv_ && known_ && lost != lost_) text += "overrun\n";
             known_ = true;
-            next_ = number + 1;
+            lost_ = lost;
             if (tag_) text += fmt::format("{}{}", number, csv_ ? "" : " ");
             if (csv_ && timed_) {
                 const auto ns = reply.at("times_ns").at(i).get<std::int64_t>();
@@ -91,7 +93,7 @@ public:
 private:
     const std::vector<hal_type>& types_;
     bool csv_, tag_, timed_, known_ = false;
-    std::int64_t next_ = 0;
+    std::uint64_t lost_ = 0;  // before the newest record
 };
 
 /// Takes records until the count is reached or the command is ended. Returns the exit code.

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "hal/component.hpp"
+#include "hal/corrected.hpp"
 
 namespace hal {
 
@@ -67,10 +68,12 @@ private:
 
 using Limit = LimitPin<In<double>>;
 using LimitParam = LimitPin<Param<double>>;
+using CorrectedLimitParam = LimitPin<CorrectedParam<double>>;
 using LimitIo = LimitPin<Io<double>>;
 using Limits = Pins<Limit, double>;
 using OptionalLimit = LimitPin<In<double>, ZeroLimit::disables>;
 using OptionalLimitParam = LimitPin<Param<double>, ZeroLimit::disables>;
+using OptionalCorrectedLimitParam = LimitPin<CorrectedParam<double>, ZeroLimit::disables>;
 using OptionalLimits = Pins<OptionalLimit, double>;
 
 }  // namespace hal

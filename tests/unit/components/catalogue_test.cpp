@@ -37,7 +37,9 @@ TEST(Catalogue, Names_ways_and_labels_as_the_arguments_say) {
     EXPECT_TRUE(mux.has_pin("in-u32-02"));
     EXPECT_FALSE(mux.has_pin("in-u32-03"));
     EXPECT_TRUE(mux.has_pin("out-s32"));
-    EXPECT_FALSE(mux.has_pin("sel-bit-00"));  // three is not a power of two
+    EXPECT_TRUE(mux.has_pin("sel-bit-00"));  // a power of two plus one
+    EXPECT_FALSE(mux.has_pin("sel-bit-01"));
+    EXPECT_FALSE(Instance("mux_generic", {{"config", "U6S"}}).has_pin("sel-bit-00"));
     Instance code("enum", {{"enums", "E;a;;c"}});
     EXPECT_EQ(code.get<std::uint32_t>("c-val"), 2u);
     EXPECT_TRUE(code.has_pin("a-in"));

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <concepts>
 #include <limits>
 
 #include "unit/components/component_host.hpp"
@@ -27,12 +29,16 @@ template <class From, class To>
 void check(const std::string& component, std::initializer_list<Case<From, To>> cases) {
     Instance converter(component);
     for (const auto& c : cases) {
+        converter.set("in", From{});
+        converter.set("clamp", true);
+        converter.run();  // clears out-of-range
         converter.set("in", c.in);
+        const bool has_fraction = std::same_as<From, double> && std::trunc(static_cast<double>(c.in)) != static_cast<double>(c.in);
         for (const bool clamp : {false, true}) {
             converter.set("clamp", clamp);
             converter.run();
             EXPECT_EQ(converter.get<To>("out"), clamp ? c.clamped : c.wrapped) << component << " of " << c.in << (clamp ? " clamped" : "");
-            EXPECT_EQ(converter.get<bool>("out-of-range"), !c.fits) << component << " of " << c.in;
+            EXPECT_EQ(converter.get<bool>("out-of-range"), !c.fits || (has_fraction && !clamp)) << component << " of " << c.in;
         }
     }
 }
@@ -83,6 +89,23 @@ TEST(Conv, Of_a_float_cuts_the_fraction_and_wraps_or_clamps) {
                                           {9223372036854775808.0, INT64_MIN, INT64_MAX, false}, {18446744073709551616.0, 0, INT64_MAX, false}, {nan, 0, 0, false}});
     check<double, u64>("conv_float_u64", {{18446744073709549568.0, 18446744073709549568u, 18446744073709549568u, true}, {18446744073709551616.0, 0, UINT64_MAX, false},
                                           {-2.5, UINT64_MAX - 1, 0, false}, {infinity, 0, UINT64_MAX, false}});
+}
+
+TEST(Conv, Without_clamp_out_of_range_remains_set) {
+    Instance converter("conv_float_s32");
+    const auto out_of_range = [&](double in) {
+        converter.set("in", in);
+        converter.run();
+        return converter.get<bool>("out-of-range");
+    };
+    EXPECT_FALSE(out_of_range(1.0));
+    EXPECT_TRUE(out_of_range(1.5));
+    EXPECT_TRUE(out_of_range(2.0));
+    converter.set("clamp", true);
+    EXPECT_FALSE(out_of_range(2.5));
+    EXPECT_TRUE(out_of_range(3e9));
+    converter.set("clamp", false);
+    EXPECT_TRUE(out_of_range(1.0));
 }
 
 TEST(Conv, Between_integers_wraps_or_clamps) {

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: MIT
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cstdint>
 #include <limits>
 #include <string>
 #include <thread>
 
+#include "hal/stream_times.h"
 #include "unit/components/component_host.hpp"
 
 namespace {
@@ -33,7 +35,7 @@ TEST(Sampler, Records_every_type_with_its_number) {
     EXPECT_EQ(published_as, "");  // the instance's own name
     EXPECT_STREQ(s.fifo.types, "bfsulk");
     EXPECT_EQ(s.fifo.columns, 6u);
-    EXPECT_EQ(s.fifo.depth, 4u);
+    EXPECT_EQ(s.fifo.depth, 3u);  // records of a FIFO of 4 slots
     EXPECT_EQ(s.fifo.to_machine, 0u);
     s.set("pin.0", true);
     s.set("pin.1", -1.5);
@@ -61,19 +63,22 @@ TEST(Sampler, A_full_fifo_loses_the_new_record_and_counts_it) {
         s.set("pin.0", i);
         s.run(1);
         EXPECT_EQ(s.get<bool>("full"), i >= 2);
+        EXPECT_EQ(s.get<std::int32_t>("curr-depth"), std::min(i + 1, 3));
     }
-    EXPECT_EQ(s.get<std::int32_t>("overruns"), 2);
-    EXPECT_EQ(s.fifo.lost, 2u);
-    EXPECT_EQ(s.get<std::int32_t>("curr-depth"), 3);
+    EXPECT_EQ(s.get<std::int32_t>("overruns"), 3);
+    EXPECT_EQ(s.fifo.lost, 3u);
     EXPECT_EQ(s.value(0, 0).real, 0.0);
     s.fifo.tail = 1;  // the reader takes one: its place is used again
     s.set("pin.0", 9);
     s.run(1);
-    EXPECT_EQ(s.fifo.head, 4u);
-    EXPECT_EQ(s.value(3, 0).real, 9.0);
-    EXPECT_EQ(s.value(3, 1).s64, 5);  // the gap in the numbers shows the loss
+    EXPECT_EQ(s.fifo.head, 3u);
+    EXPECT_EQ(s.value(2, 0).real, 9.0);
+    EXPECT_EQ(s.value(2, 1).s64, 2);  // the numbers have no gap; the losses show it
+    const auto& timed = reinterpret_cast<const hal_timed_stream&>(s.fifo);
+    EXPECT_EQ(timed.losses[1], 0u);
+    EXPECT_EQ(timed.losses[0], 3u);  // of record 2
     s.set("overruns", 0);
-    s.fifo.tail = 4;
+    s.fifo.tail = 3;
     s.run(1);
     EXPECT_EQ(s.get<std::int32_t>("overruns"), 0);
     EXPECT_FALSE(s.get<bool>("full"));
@@ -120,8 +125,8 @@ TEST(Sampler, A_reader_on_another_processor_sees_whole_records_in_order) {
             std::this_thread::yield();
             continue;
         }
-        whole = whole && s.value(tail, 0).s32 == s.value(tail, 1).s32 && s.value(tail, 0).s32 == s.value(tail, 2).s64 && s.value(tail, 2).s64 > last;
-        last = s.value(tail, 2).s64;
+        whole = whole && s.value(tail, 0).s32 == s.value(tail, 1).s32 && s.value(tail, 0).s32 > last && s.value(tail, 2).u64 == tail;
+        last = s.value(tail, 0).s32;
         __atomic_store_n(&s.fifo.tail, ++tail, __ATOMIC_RELEASE);
     }
     done = true;
@@ -131,7 +136,7 @@ TEST(Sampler, A_reader_on_another_processor_sees_whole_records_in_order) {
 }
 
 struct Player : Streaming {
-    Player() : Streaming("streamer", {{"cfg", "fb"}, {"depth", "4"}}) {}
+    Player() : Streaming("streamer", {{"cfg", "fb"}, {"depth", "5"}}) {}
     void feed(double real, bool bit) {
         value(fifo.head, 0).real = real;
         value(fifo.head, 1).raw = bit ? 1 : 0;
@@ -147,7 +152,7 @@ TEST(Streamer, Plays_a_record_per_cycle_then_keeps_the_last) {
         p.run(1);
         EXPECT_EQ(p.get<double>("pin.0"), i);
         EXPECT_EQ(p.get<bool>("pin.1"), i == 2);
-        EXPECT_EQ(p.get<std::int32_t>("curr-depth"), 3 - i);
+        EXPECT_EQ(p.get<std::int32_t>("curr-depth"), 4 - i);
         EXPECT_FALSE(p.get<bool>("empty"));
     }
     p.run(2);
@@ -160,7 +165,7 @@ TEST(Streamer, Plays_a_record_per_cycle_then_keeps_the_last) {
 
 TEST(Streamer, Clock_mode_chooses_the_edges) {
     struct Case { int mode; double after_rise, after_fall; };
-    for (const Case c : {Case{0, 2, 3}, Case{1, 0, 1}, Case{2, 1, 1}, Case{3, 1, 2}, Case{7, 0, 0}}) {
+    for (const Case c : {Case{0, 2, 3}, Case{1, 0, 1}, Case{2, 1, 1}, Case{3, 1, 2}, Case{7, 2, 3}}) {
         Player p;
         for (int i = 1; i <= 4; ++i) p.feed(i, false);
         p.set("clock-mode", c.mode);

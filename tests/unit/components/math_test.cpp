@@ -73,7 +73,7 @@ TEST(Abs, Gives_the_magnitude_and_the_sign) {
 TEST(Comp, Without_hysteresis_compares) {
     Instance comp("comp");
     comp.set("in0", 5.0);
-    for (const auto& [in1, out, equal] : {std::tuple{4.9, false, false}, {5.1, true, false}, {5.0, false, true}, {5.1, true, false}, {-5.0, false, false}}) {
+    for (const auto& [in1, out, equal] : {std::tuple{4.9, false, false}, {5.0, false, true}, {5.1, true, false}, {5.0, true, true}, {-5.0, false, false}}) {
         comp.set("in1", in1);
         comp.run();
         EXPECT_EQ(comp.get<bool>("out"), out) << in1;
@@ -176,14 +176,14 @@ TEST(Hypot, Is_the_length_of_the_vector) {
     EXPECT_NEAR(after(hypot, 0.0, "in2") / 5e200, 1.0, 1e-12);
 }
 
-TEST(Minmax, Keeps_the_extremes_since_the_reset) {
+TEST(Minmax, Keeps_the_extremes_since_the_start_or_the_reset) {
     Instance minmax("minmax");
     const auto feed = [&](double in) {
         minmax.set("in", in);
         minmax.run();
         return std::pair{minmax.get<double>("min"), minmax.get<double>("max")};
     };
-    EXPECT_EQ(feed(5.0), std::pair(5.0, 5.0));
+    EXPECT_EQ(feed(5.0), std::pair(0.0, 5.0));
     EXPECT_EQ(feed(-1.0), std::pair(-1.0, 5.0));
     EXPECT_EQ(feed(nan), std::pair(-1.0, 5.0));
     EXPECT_EQ(feed(7.0), std::pair(-1.0, 7.0));
@@ -193,27 +193,29 @@ TEST(Minmax, Keeps_the_extremes_since_the_reset) {
     EXPECT_EQ(feed(3.0), std::pair(2.0, 3.0));
 }
 
-TEST(Deadzone, Replaces_what_is_near_the_centre) {
+TEST(Deadzone, Subtracts_half_of_the_threshold_outside_of_the_zone) {
     Instance zone("deadzone");
     zone.set("center", 2.0);
-    for (const auto& [in, out] : {std::pair{2.4, 2.0}, {2.5, 2.0}, {2.6, 2.6}, {1.5, 2.0}, {1.4, 1.4}}) EXPECT_EQ(after(zone, in), out) << in;
+    for (const auto& [in, out] : {std::pair{2.25, 2.0}, {2.5, 2.0}, {3.0, 2.5}, {1.5, 2.0}, {1.0, 1.5}, {nan, 2.0}}) EXPECT_EQ(after(zone, in), out) << in;
 }
 
 TEST(Blend, Interpolates_and_limits_unless_open) {
     Instance blend("blend");
-    blend.set("in0", 10.0);
+    blend.set("in2", 10.0);
     blend.set("in1", 20.0);
     for (const auto& [select, out] : {std::pair{0.0, 10.0}, {0.25, 12.5}, {1.0, 20.0}, {1.5, 20.0}, {-1.0, 10.0}}) EXPECT_EQ(after(blend, select, "select"), out);
     blend.set("open", true);
     for (const auto& [select, out] : {std::pair{1.5, 25.0}, {-1.0, 0.0}}) EXPECT_EQ(after(blend, select, "select"), out);
 }
 
-TEST(Invert, Is_zero_near_zero) {
+TEST(Invert, Is_limited_near_zero) {
     Instance invert("invert");
     EXPECT_EQ(after(invert, 4.0), 0.25);
-    EXPECT_EQ(after(invert, 0.0), 0.0);
+    EXPECT_EQ(after(invert, 0.0), 1e12);
+    EXPECT_EQ(after(invert, -1e-20), -1e12);
+    EXPECT_EQ(invert.get<double>("deadband"), 1e-12);
     invert.set("deadband", 0.5);
-    EXPECT_EQ(after(invert, -0.5), 0.0);
+    EXPECT_EQ(after(invert, -0.25), -2.0);
     EXPECT_EQ(after(invert, -2.0), -0.5);
 }
 

@@ -26,8 +26,8 @@ TEST(Siggen, Waves_have_their_shape_and_phase) {
     Instance siggen("siggen");
     for (std::size_t sample = 0; sample < 24; ++sample) {
         siggen.run("update", eighth);
-        for (const auto& [wave, values] : one_period) EXPECT_NEAR(siggen.get<double>(wave), values[sample % 8], 1e-12) << wave << " " << sample;
-        EXPECT_EQ(siggen.get<bool>("clock"), one_period.at("square")[sample % 8] > 0.0);
+        for (const auto& [wave, values] : one_period) EXPECT_NEAR(siggen.get<double>(wave), values[(sample + 1) % 8], 1e-12) << wave << " " << sample;
+        EXPECT_EQ(siggen.get<bool>("clock"), one_period.at("square")[(sample + 1) % 8] > 0.0);
     }
 }
 
@@ -38,7 +38,7 @@ TEST(Siggen, Amplitude_offset_and_frequency_apply) {
     siggen.set("frequency", 2.0);
     for (std::size_t sample = 0; sample < 8; ++sample) {
         siggen.run("update", eighth);
-        for (const auto& [wave, values] : one_period) EXPECT_NEAR(siggen.get<double>(wave), 10.0 + 3.0 * values[2 * sample % 8], 1e-12) << wave << " " << sample;
+        for (const auto& [wave, values] : one_period) EXPECT_NEAR(siggen.get<double>(wave), 10.0 + 3.0 * values[2 * (sample + 1) % 8], 1e-12) << wave << " " << sample;
     }
 }
 
@@ -64,7 +64,6 @@ TEST(Siggen, Runs_backwards_and_survives_any_frequency) {
     Instance siggen("siggen");
     siggen.set("frequency", -1.0);
     siggen.run("update", eighth);
-    siggen.run("update", eighth);
     EXPECT_NEAR(siggen.get<double>("sine"), -root, 1e-12);
     for (const double bad : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), -1e-20, 1e300}) {
         siggen.set("frequency", bad);
@@ -75,6 +74,14 @@ TEST(Siggen, Runs_backwards_and_survives_any_frequency) {
     siggen.set("frequency", 1.0);
     siggen.run("update", eighth);
     EXPECT_TRUE(std::isfinite(siggen.get<double>("cosine")));
+}
+
+TEST(Siggen, Limits_the_frequency_to_half_the_rate_and_shows_it) {
+    Instance siggen("siggen");
+    siggen.set("frequency", 5.0);
+    siggen.run("update", eighth);
+    EXPECT_EQ(siggen.get<double>("frequency"), 4.0);
+    EXPECT_EQ(siggen.get<double>("sawtooth"), 0.0);
 }
 
 TEST(Siggen, A_phase_just_below_zero_does_not_round_up_to_a_whole_period) {
