@@ -253,7 +253,7 @@ bool Supervisor::in_gap(const Watched& watched, std::int64_t now_ns, std::int64_
     if (core.max_gap_ns == 0 || silent_ns > core.max_gap_ns) return false;
     if (2 * gap_ns > silent_ns) return true;
     Stall found;
-    find_cause(watched, found, now_ns);
+    find_cause(watched, found);
     return found.cause == Stall::Cause::starved;
 }
 
