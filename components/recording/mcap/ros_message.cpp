@@ -62,7 +62,7 @@ struct Line {
 using Definitions = std::map<std::string, std::vector<Line>>;
 
 void add_definitions(Definitions& definitions, std::string name, std::string_view text) {
-    bool begins = name.empty();  // the line after the separator names the message
+    bool               begins = name.empty();  // the line after the separator names the message
     std::vector<Line>* fields = begins ? nullptr : &definitions[name];
     while (!text.empty()) {
         std::string_view       line = next_line(text);
@@ -171,12 +171,9 @@ private:
         field.kind = Field::Kind::message;
         std::string message = short_name(element);
         if (message == "time" || message == "Time") message = resolve("builtin_interfaces/Time", package + "/" + message);
-        else if (message == "duration" || message == "Duration")
-            message = resolve("builtin_interfaces/Duration", package + "/" + message);
-        else if (message == "Header")
-            message = resolve("std_msgs/Header", package + "/Header");
-        else if (message.find('/') == message.npos)
-            message.insert(0, package + "/");
+        else if (message == "duration" || message == "Duration") message = resolve("builtin_interfaces/Duration", package + "/" + message);
+        else if (message == "Header") message = resolve("std_msgs/Header", package + "/Header");
+        else if (message.find('/') == message.npos) message.insert(0, package + "/");
         return add(message, depth + 1, field.fields);
     }
     std::string resolve(const char* usual, const std::string& own) const { return definitions_.contains(own) ? own : usual; }
@@ -193,7 +190,7 @@ public:
     explicit Cursor(std::string_view payload) {
         constexpr std::size_t head = 4;
         if (payload.size() < head || payload[0] != 0) return;
-        const unsigned encoding = static_cast<unsigned char>(payload[1]);
+        const unsigned     encoding = static_cast<unsigned char>(payload[1]);
         constexpr unsigned cdr2 = 6;  // of XCDR2, which aligns to 4 bytes at most
         if (encoding > 1 && encoding != cdr2 && encoding != cdr2 + 1) return;
         big_endian_ = (encoding & 1) == 0;
@@ -275,7 +272,7 @@ bool RosMessage::open(std::string_view name, std::string_view definition) {
     numbers_.clear();
     skipped_.clear();
     problem_.clear();
-    Definitions definitions;
+    Definitions       definitions;
     const std::string own = name.empty() ? "message" : short_name(name);
     add_definitions(definitions, own, definition);
     add_definitions(definitions, "", well_known);
@@ -287,7 +284,8 @@ bool RosMessage::open(std::string_view name, std::string_view definition) {
     if (!fits) problem_ = "it has more than " + std::to_string(max_fields) + " fields";
     if (!fits) return false;
     if (!builder.rest().empty()) skipped_.push_back(builder.rest());
-    if (numbers_.empty()) problem_ = "its schema has no number: " + (skipped_.empty() ? "its messages are empty" : skipped_.front() + " is skipped");
+    if (numbers_.empty())
+        problem_ = "its schema has no number: " + (skipped_.empty() ? "its messages are empty" : skipped_.front() + " is skipped");
     return problem_.empty();
 }
 
@@ -311,8 +309,7 @@ bool RosMessage::list_array(Field& field, const std::string& path) {
     for (std::size_t i = 0; i < field.length; ++i) {
         const std::string name = field.count == Field::Count::one ? path : path + "." + std::to_string(i);
         if (field.kind == Field::Kind::number) numbers_.push_back({name, field.word});
-        else if (!list(field.fields, name + "."))
-            return false;
+        else if (!list(field.fields, name + ".")) return false;
         if (numbers_.size() + skipped_.size() > max_fields) return false;
     }
     return true;

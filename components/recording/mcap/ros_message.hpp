@@ -41,11 +41,11 @@ public:
         Kind               kind = Kind::number;
         Count              count = Count::one;
         std::size_t        length = 1;  ///< of a fixed array
-        std::size_t        bytes = 1;   ///< of a number
+        std::size_t        bytes = 1;  ///< of a number
         bool               is_signed = false, is_float = false;
         hal_type           word = HAL_TYPE_FLOAT;
         bool               has_values = false;  ///< else it is skipped
-        std::vector<Field> fields = {};         ///< of a message
+        std::vector<Field> fields = {};  ///< of a message
     };
 
 private:

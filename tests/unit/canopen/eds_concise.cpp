@@ -37,6 +37,20 @@ TEST(EdsConcise, Only_what_differs_is_written) {
     EXPECT_EQ(written(configuration_of(d, 0, true)), "2000:0=10 00; 2001:0=02 00; ");
 }
 
+TEST(EdsConcise, A_dcf_is_for_its_node_and_its_bit_rate) {
+    DeviceDescription d = *read_eds(motor(node_5)).description;
+    d.commissioning->baud_rate = 250;
+    EXPECT_EQ(misfit(d, 5, 250'000), "");
+    EXPECT_EQ(misfit(d, 5, 0), "") << "an unknown bit rate";
+    EXPECT_EQ(misfit(d, 6, 250'000), "it is for node 5, not for node 6");
+    EXPECT_EQ(misfit(d, 5, 1'000'000), "it is for a bus of 250 kbit/s, not of 1000 kbit/s");
+    d.commissioning->baud_rate = 0;
+    d.commissioning->node_id = 0;
+    EXPECT_EQ(misfit(d, 6, 1'000'000), "") << "neither is stated";
+    d.commissioning.reset();
+    EXPECT_EQ(misfit(d, 6, 1'000'000), "") << "an EDS";
+}
+
 TEST(EdsConcise, A_pdo_is_switched_off_while_it_changes) {
     const DeviceDescription d = *read_eds(motor(node_5 + tpdo("", "ParameterValue=0x10000020\n"), "1800 1A00")).description;
     EXPECT_EQ(written(configuration_of(d)),

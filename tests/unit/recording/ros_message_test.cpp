@@ -37,7 +37,8 @@ TEST(RosMessage, Texts_arrays_and_messages_are_skipped_with_their_alignment) {
                                                 "\2\0\0\0\1\0\0\0"    // c[1], padding, one element of d
                                                 "\2\0\0\0x\0\5\0"     // its t and n
                                                 "\1\0\0\0\0\6\0\0"    // e: t and n, padding
-                                                "\0\0\xc0\x3f", 4 + 8 * 5 + 4));
+                                                "\0\0\xc0\x3f",
+                                                4 + 8 * 5 + 4));
     EXPECT_EQ(all.names, (std::vector<std::string>{"c.0", "c.1", "e.n", "f"}));
     EXPECT_EQ(all.skipped, (std::vector<std::string>{"a (string)", "b (uint8[])", "d (Y[])", "e.t (string)"}));
     ASSERT_TRUE(all.good);

@@ -4,7 +4,7 @@
 #include <charconv>
 #include <fmt/core.h>
 
-#include "bus/can/transfer_progress.hpp"
+#include "bus/transfer_progress.hpp"
 #include "cli/output.hpp"
 
 namespace hal::tools {

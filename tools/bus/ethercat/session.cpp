@@ -3,6 +3,7 @@
 
 #include <fmt/core.h>
 
+#include "bus/transfer_progress.hpp"
 #include "cli/output.hpp"
 #include "hal/clock.hpp"
 
@@ -129,10 +130,17 @@ bool EthercatSession::run(master::MailboxRequest& request) {
     const auto moved = [&] {
         return request.progress == nullptr ? 0U : request.progress->bytes + (std::uint32_t{request.progress->done} << 16);
     };
+    const master::BusSlave* const slave = find(request.slave);
+    TransferProgress shown(fmt::format("slave {}, file '{}'", slave != nullptr ? slave->position : 0, request.name));
+    const std::size_t total = request.kind == master::MailboxRequest::Kind::foe_write ? request.data.size() : 0;
+    const auto finished = [&] {
+        if (request.progress != nullptr) shown.update(request.progress->bytes, total);
+        return requests_.finished(request);
+    };
     std::uint32_t before = 0;
     do {  // a file may take minutes, as long as it goes on
         before = moved();
-        if (until([&] { return requests_.finished(request); }, 60 * second)) return true;
+        if (until(finished, 60 * second)) return true;
     } while (moved() != before);
     server_.stop();  // the request is on the caller's stack
     return false;

@@ -21,8 +21,8 @@ public:
     void update(std::size_t done, std::size_t total);
 
 private:
-    std::string  what_;
-    bool         terminal_ = false, shown_ = false;
+    std::string what_;
+    bool terminal_ = false, shown_ = false;
     std::int64_t began_ns_ = 0, next_ns_ = 0;
 };
 

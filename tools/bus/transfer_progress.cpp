@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "bus/can/transfer_progress.hpp"
+#include "bus/transfer_progress.hpp"
 
 #include <cmath>
 #include <fmt/core.h>
@@ -15,7 +15,9 @@ namespace {
 constexpr std::int64_t first_after_ns = 500'000'000, between_ns = 200'000'000;
 constexpr const char* clear_line = "\r\x1b[K";
 
-std::string amount(double bytes, double largest) { return largest < 1e6 ? fmt::format("{:.1f}", bytes / 1e3) : fmt::format("{:.1f}", bytes / 1e6); }
+std::string amount(double bytes, double largest) {
+    return largest < 1e6 ? fmt::format("{:.1f}", bytes / 1e3) : fmt::format("{:.1f}", bytes / 1e6);
+}
 
 }  // namespace
 
@@ -25,7 +27,8 @@ std::string progress_text(std::size_t done, std::size_t total, std::int64_t elap
     const double largest = total != 0 ? all : so_far;
     const char* const unit = largest < 1e6 ? "kB" : "MB";
     if (total == 0) return fmt::format("{} {}", amount(so_far, largest), unit);
-    std::string text = fmt::format("{} of {} {}, {:.0f} %", amount(so_far, largest), amount(all, largest), unit, std::floor(100 * so_far / all));
+    std::string text =
+        fmt::format("{} of {} {}, {:.0f} %", amount(so_far, largest), amount(all, largest), unit, std::floor(100 * so_far / all));
     if (done == 0 || done > total) return text;
     return text + fmt::format(", {:.0f} s left", std::ceil(elapsed_s * (all - so_far) / so_far));
 }
