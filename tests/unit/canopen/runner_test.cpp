@@ -312,7 +312,9 @@ TEST(Runner, What_came_while_no_cycles_ran_is_dropped) {
     w.node->turn(w.now);
     w.runner.receive(w.now);
     for (const Slot& s : w.runner.slots())
-        if (!s.to_node) EXPECT_NE(Dictionary::value<std::uint64_t>(*s.entry), 0x0237U);
+        if (!s.to_node) {
+            EXPECT_NE(Dictionary::value<std::uint64_t>(*s.entry), 0x0237U);
+        }
     for (int n = 0; n < 5000 && !w.runner.operational(0); ++n) w.step();
     EXPECT_TRUE(w.runner.operational(0));
 }
