@@ -145,7 +145,7 @@ class Live(Case):
         process.wait(60)
 
     def switch_on(self, enable, *axes):
-        """As the READMEs say; again where a busy host lost a drive in between."""
+        """Switches on as the READMEs describe, and again where a busy host lost a drive in between."""
         def are_on():
             self.say("sets", enable, "FALSE")
             self.say("sets", enable, "TRUE")
