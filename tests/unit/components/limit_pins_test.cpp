@@ -94,7 +94,7 @@ const std::vector<Row> rows{
      enabled({{"simulate-encoder", 1}, {"commanded-speed", 1}, {"max.0", 1000}, {"accel.0", 1e7}, {"decel.0", 1e7}})},
     {"noise", "limit", 2, Bound::magnitude, "noise", enabled({{"amplitude", 100}, {"type", 1}})},
     {"dc_motor", "current-limit", 0.5, Bound::magnitude, "current", enabled({{"voltage", 24}}), 4, {"update"}},
-    {"furuta", "current-limit", 0.5, Bound::magnitude, "current", {{"voltage", 24}}, 4, {"update"}},
+    {"furuta", "current-limit", 0.5, Bound::magnitude, "motor-current", {{"voltage", 24}}, 4, {"update"}},
     {"simple_tp", "maxvel", 2, Bound::magnitude, "current-vel", enabled({{"target-pos", 1e6}, {"maxaccel", 1e6}}), 0, {"update"}},
     {"simple_tp", "maxaccel", 2, Bound::rate, "current-vel", enabled({{"target-pos", 1e6}, {"maxvel", 1e6}}), 0, {"update"}},
     {"anglejog", "max-vel", 2, Bound::magnitude, "current-vel", {{"scale-in", 1}, {"max-accel", 1e6}}, 0, {""}, {},
@@ -133,7 +133,7 @@ const std::vector<Row> rows{
      {{"plant", "sampled"}, {"a", "0,1;0,0"}, {"b", "0;0.5"}, {"q", "100,0;0,1"}, {"r", "0.01"}}},
     {"furuta_control", "max-torque", 0.01, Bound::magnitude, "torque", enabled({{"pendulum-angle", 0.5}, {"pendulum-velocity", 3}}), 0.2708,
      {"update"}},
-    {"drive_to", "max-speed", 0.1, Bound::magnitude, "linear", enabled({{"target-x", 100}}), 0.5, {"update"}},
+    {"drive_to", "max-speed", 0.1, Bound::magnitude, "linear", enabled({{"target-x", 100}}), 0.5},
     {"drive_around", "max-speed", 0.1, Bound::magnitude, "linear", enabled({{"target-x", 100}}), 0.5, {"update"}},
     {"drive_around", "max-turn", 0.1, Bound::magnitude, "angular", enabled({{"target-y", 100}}), 1.5, {"update"}},
 };
