@@ -16,11 +16,12 @@ using Object = nlohmann::ordered_json;
 /// Appends an array of the objects that `row` returns, and writes each before the next is built: a hundred thousand at once would take
 /// several times the memory of their text.
 template <class Range, class Row>
-void array(std::string& to, const Range& range, Row&& row) {
+void array(std::string& to, const Session& session, const Range& range, Row&& row) {
     to += '[';
     bool first = true;
     std::size_t i = 0;
     for (const auto& each : range) {
+        if (session.ending()) break;
         if (!std::exchange(first, false)) to += ',';
         to += json_text(row(each, i++));
     }
@@ -43,7 +44,7 @@ void describe_pins(std::string& to, Session& session, bool parameters, const Pat
     auto pins = pins_by_name(session.model(), parameters, patterns);
     keep_type(pins, type);
     const auto values = session.values().read_pins(pins);
-    array(to, pins, [&](const Pin* pin, std::size_t i) {
+    array(to, session, pins, [&](const Pin* pin, std::size_t i) {
         Object object;
         object["name"] = pin->name;
         if (!pin->alias.empty()) object["alias"] = pin->alias;
@@ -65,7 +66,7 @@ void describe_signals(std::string& to, Session& session, const Patterns& pattern
     auto signals = signals_by_name(session.model(), patterns);
     keep_type(signals, type);
     const auto values = session.values().read_signals(signals);
-    array(to, signals, [&](const Signal* signal, std::size_t i) {
+    array(to, session, signals, [&](const Signal* signal, std::size_t i) {
         Object object;
         object["name"] = signal->name;
         object["type"] = name(signal->type);
@@ -77,7 +78,7 @@ void describe_signals(std::string& to, Session& session, const Patterns& pattern
 }
 
 void describe_components(std::string& to, Session& session, const Patterns& patterns) {
-    array(to, components_newest_first(session.model(), patterns), [&](const LoadedComponent* component, std::size_t) {
+    array(to, session, components_newest_first(session.model(), patterns), [&](const LoadedComponent* component, std::size_t) {
         Object object;
         object["name"] = component->name;
         if (component->process) {
@@ -99,7 +100,7 @@ void describe_components(std::string& to, Session& session, const Patterns& patt
 }
 
 void describe_functions(std::string& to, Session& session, const Patterns& patterns) {
-    array(to, functions_by_name(session.model(), patterns), [&](const LoadedFunction* function, std::size_t) {
+    array(to, session, functions_by_name(session.model(), patterns), [&](const LoadedFunction* function, std::size_t) {
         Object object;
         object["name"] = function->name;
         object["component"] = function->component->name;
@@ -114,7 +115,7 @@ void describe_functions(std::string& to, Session& session, const Patterns& patte
 
 void describe_threads(std::string& to, Session& session, const Patterns& patterns) {
     const auto clock = session.reports().clock();
-    array(to, threads_slowest_first(session.model(), patterns), [&](const Thread* thread, std::size_t) {
+    array(to, session, threads_slowest_first(session.model(), patterns), [&](const Thread* thread, std::size_t) {
         const ThreadReport report = session.reports().thread(*thread);
         Object object;
         object["name"] = thread->name;
@@ -154,7 +155,7 @@ void describe_aliases(std::string& to, Session& session, const Patterns& pattern
     for (const bool parameters : {false, true})
         for (const Pin* const pin : pins_by_name(session.model(), parameters, patterns))
             if (!pin->alias.empty()) aliased.push_back(pin);
-    array(to, aliased, [&](const Pin* pin, std::size_t) {
+    array(to, session, aliased, [&](const Pin* pin, std::size_t) {
         Object object;
         object["name"] = pin->name;
         object["alias"] = pin->alias;

@@ -59,7 +59,7 @@ void memory_status(std::string& text, const Model& model) {
 
 std::string status_json(const Session& session) {
     const Counts c = count(session.model());
-    return json_text({{"instance", session.options().name}, {"running", session.threads().running()}, {"lock", session.locked},
+    return json_text({{"instance", session.options().name}, {"running", session.threads().running()}, {"lock", session.locked.load()},
                       {"faults", session.reports().fault_count()}, {"components", c.components}, {"instances", c.instances}, {"pins", c.pins},
                       {"parameters", c.parameters}, {"aliases", c.aliases}, {"signals", c.signals}, {"functions", c.functions},
                       {"threads", c.threads}}) +

@@ -29,7 +29,23 @@ Script::Script(Shell& shell, Shell::State& state, Output& output)
       lock_(state.session.lock()),
       collected_before_(state.collected.size()) {}
 
-Script::~Script() = default;
+Script::~Script() {
+    transaction_.reset();
+    Sources& sources = session_.sources;
+    for (const std::uint32_t text : texts_) {
+        sources.release(text);
+        if (!text_is_kept_ && !shell_.options.check) sources.drop(text);
+    }
+    session_.sweep_texts();
+}
+
+std::uint32_t Script::add_text(std::string name, std::string text, std::uint32_t first_line) {
+    texts_.reserve(texts_.size() + 1);
+    const std::uint32_t source = session_.sources.add(std::move(name), std::move(text), first_line);
+    session_.sources.hold(source);
+    texts_.push_back(source);
+    return source;
+}
 
 std::string Script::own_path(std::uint32_t source) const {
     const std::string& name = session_.sources.get(source).name;
@@ -121,7 +137,7 @@ void Script::run_commands(std::uint32_t source) {
     rows_.push_back({&parsed.commands, 0, parsed.commands.size()});
     for (const Command& command : parsed.commands) {
         take_problems_before(command.span.begin);
-        if (stop()) break;
+        if (stop() || ended(command)) break;
         ++rows_.back().next;
         run_line(command);
         if (separately()) finish();
@@ -134,6 +150,7 @@ void Script::run_commands(std::uint32_t source) {
 void Script::run_row(const std::vector<Command>& commands, std::size_t from, std::size_t to) {
     rows_.push_back({&commands, from, to});
     while (rows_.back().next < to && !stop()) {
+        if (ended(commands[rows_.back().next])) break;
         run_line(commands[rows_.back().next++]);
         if (separately()) finish();
     }
@@ -185,7 +202,7 @@ void Script::defer(const Command& command, const CommandRow& row) {
     lines_.push_back(command.span);
     if (!check_lock(row, command, locks(), session_.model(), pending_)) return;
     ++edits_;
-    if (!locks_) locks_ = session_.locked;
+    if (!locks_) locks_ = session_.locked.load();
     Context context{*this, shell_, session_, session_.programs(), output_, row, command, pending_, lock_, &transaction(), &*locks_};
     row.function.act(context);
 }
@@ -252,6 +269,7 @@ bool Script::collect(const Command& command, const CommandRow& row) {
         }
         if (checked_begin_) return false;
         state_.collected.push_back(command);
+        session_.sources.hold(command.span.source);
         text_is_kept_ = true;
         return true;
     }
@@ -264,7 +282,11 @@ bool Script::collect(const Command& command, const CommandRow& row) {
 }
 
 void Script::forget_collected(std::size_t from) {
-    for (; state_.collected.size() > from; state_.collected.pop_back()) idle_.push_back(state_.collected.back().span);
+    for (; state_.collected.size() > from; state_.collected.pop_back()) {
+        const Span span = state_.collected.back().span;
+        session_.sources.release(span.source);
+        idle_.push_back(span);
+    }
 }
 
 void Script::group(const Command& command) {
@@ -286,7 +308,9 @@ void Script::group(const Command& command) {
         forget_collected(0);
     } else {
         state_.collecting = false;
-        for (Command& one : std::exchange(state_.collected, {})) {
+        std::vector<Command> collected = std::exchange(state_.collected, {});
+        for (const Command& one : collected) session_.sources.release(one.span.source);  // no text is freed before this one is done
+        for (Command& one : collected) {
             if (!one.name.span.known()) resolve_set(session_.model(), one);
             const CommandRow& row = *row_of(one);
             if (row.edits()) edit(one, row);
@@ -315,12 +339,12 @@ void Script::source(Context& context) {
         if (open->path != canonical) continue;
         Diagnostic found{
             Severity::error, "recursive-source", "'" + given + "' includes itself", {{context.span(0), "included again"}}, {}};
-        for (auto inner = open + 1; inner != files_.end(); ++inner) found.labels.push_back({inner->at, "included from here"});
+        const std::string included = "included from here";
+        for (auto inner = open + 1; inner != files_.end(); ++inner) found.labels.push_back({inner->at, included});
         context.diagnostics.add(std::move(found));
         return;
     }
-    text_is_kept_ = true;
-    const std::uint32_t source = session_.sources.add(path, std::move(text));
+    const std::uint32_t source = add_text(path, std::move(text));
     const bool collecting = state_.collecting;
     const std::size_t collected = state_.collected.size();
     files_.push_back({canonical, context.command.span});

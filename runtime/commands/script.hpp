@@ -10,6 +10,7 @@
 
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -40,8 +41,8 @@ public:
     /// True when Shell::cancel was called; reports it once.
     bool interrupted(Context& context);
     bool quit_seen() const { return ended_; }
-    /// True when nothing in the model points into the text that was run.
-    bool text_can_go() const { return !text_is_kept_; }
+    /// Adds a text to the session's sources for as long as this object lives, and longer when something made by it points into it.
+    std::uint32_t add_text(std::string name, std::string text, std::uint32_t first_line = 1);
 
 private:
     struct Parsed {
@@ -72,6 +73,9 @@ private:
     void take_lock();
     /// Ends the transaction: commits, prints. Sets failed_ and, without -k, stopped_.
     void finish();
+    void look_up_names(Diagnostics& found);
+    /// True after Session::interrupt(); then the transaction is rolled back, and `command` and those after it are not executed.
+    bool ended(const Command& command);
     void report(Diagnostics& found, std::size_t edits, bool took_effect);
     /// The diagnostic with the places in the INI file of the values that the words at its main place have.
     Diagnostic with_values(Diagnostic diagnostic) const;
@@ -90,6 +94,7 @@ private:
     Diagnostics pending_;           ///< of the open transaction
     std::size_t edits_ = 0;         ///< in it
     std::optional<unsigned> locks_; ///< Session::locked when it has taken effect, if it has `lock` or `unlock`
+    std::set<std::shared_ptr<const NameIndex>> names_;  ///< that messages have offered: kept for those to come
     std::vector<Span> lines_;       ///< in it
     std::vector<Span> effective_;   ///< lines that took effect
     std::vector<Span> idle_;        ///< lines that had none: of transactions that failed, or were forgotten by `abort`
@@ -107,6 +112,7 @@ private:
         std::string path;           ///< canonical
         Span at;                    ///< of the `source` command, in the file before
     };
+    std::vector<std::uint32_t> texts_;  ///< of add_text()
     std::vector<Open> files_;       ///< being read, the outermost first
 };
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 // The end of a transaction of a text, and what is printed about it.
+#include <algorithm>
 #include <map>
+#include <new>
 #include <set>
 #include <utility>
 
@@ -82,6 +84,7 @@ void Script::finish() {
 void Script::report(Diagnostics& found, std::size_t edits, bool took_effect) {
     const ShellOptions& options = shell_.options;
     if (options.level == Level::nothing) return;
+    look_up_names(found);
     Diagnostics shown;
     for (const Diagnostic& one : found.all())
         if (one.severity != Severity::note || options.notes || options.level >= Level::results) shown.add(with_values(one));
@@ -119,6 +122,21 @@ Diagnostic Script::with_values(Diagnostic diagnostic) const {
     return diagnostic;
 }
 
+/// Many similar names take long to find: meanwhile others use the machine. No transaction is open here.
+void Script::look_up_names(Diagnostics& found) {
+    const auto unknown = [](const Diagnostic& one) { return one.unknown.has_value(); };
+    if (std::none_of(found.all().begin(), found.all().end(), unknown)) return;
+    session_.offer_names(found);
+    for (const Diagnostic& one : found.all())
+        if (one.unknown && one.unknown->among) names_.insert(one.unknown->among);
+    lock_.unlock();
+    try {
+        found.look_up();
+    } catch (const std::bad_alloc&) {  // then no names are offered
+    }
+    lock_.lock();
+}
+
 std::string Script::outcome(bool edited) const {
     std::vector<Span> without = idle_;
     for (std::size_t i = collected_before_; i < state_.collected.size(); ++i) without.push_back(state_.collected[i].span);
@@ -140,8 +158,16 @@ std::string Script::outcome(bool edited) const {
     return text;
 }
 
+bool Script::ended(const Command& command) {
+    if (!session_.ending()) return false;
+    if (!pending_.failed()) pending_.error("interrupted", command.span, "'" + command.name.text + "' was interrupted: the machine ends");
+    finish();
+    stopped_ = true;
+    return true;
+}
+
 bool Script::interrupted(Context& context) {
-    if (!state_.cancelled.load(std::memory_order_relaxed)) return false;
+    if (!state_.cancelled.load(std::memory_order_relaxed) && !session_.ending()) return false;
     if (!context.diagnostics.failed())
         context.diagnostics.error("interrupted", context.command.span, "'" + context.command.name.text + "' was interrupted");
     return true;

@@ -48,6 +48,8 @@ bool Script::merge_load(const Command& command) {
     if (command.args.empty() || (!asked && usual_origin(command.args[0].text) != Origin::linuxcnc)) return false;
     const auto name_of = [](const Command& load) { return load.args[load.args[0].text == "--linuxcnc" ? 1 : 0].text; };
     text_is_kept_ = true;
+    state_.module_load_texts.push_back(command.span.source);
+    session_.sources.hold(command.span.source);
     for (Command& load : *state_.module_loads) {
         if (name_of(load) != name_of(command)) continue;
         for (std::size_t i = asked ? 2 : 1; i < command.args.size(); ++i) merge_argument(load, command.args[i]);
@@ -78,7 +80,7 @@ int Script::run_two_pass(const std::vector<std::uint32_t>& texts, Pass pass) {
                     continue;
                 }
                 files_.push_back({canonical_path(path), command.span});
-                self(self, session_.sources.add(path, std::move(content)));
+                self(self, add_text(path, std::move(content)));
                 files_.pop_back();
             } else rest.push_back(std::move(command));
         }

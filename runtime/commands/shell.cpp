@@ -56,7 +56,11 @@ Shell::Shell(Session& session, ShellOptions o)
 Shell::Shell(Shell& sibling, ShellOptions o)
     : options(std::move(o)), state_(new State{.session = sibling.session(), .latencies = sibling.state_->latencies}) {}
 
-Shell::~Shell() = default;
+Shell::~Shell() {
+    if (state_->collected.empty()) return;
+    const auto lock = state_->session.lock();
+    for (const Command& one : state_->collected) state_->session.sources.release(one.span.source);
+}
 
 Session& Shell::session() const { return state_->session; }
 bool Shell::collecting() const { return state_->collecting; }
@@ -88,38 +92,30 @@ int Shell::execute(const std::vector<std::string>& words, Output& output, std::s
 
 int Shell::execute(const std::vector<std::vector<std::string>>& all, Output& output, std::string_view name) {
     Script script(*this, *state_, output);
-    Sources& sources = state_->session.sources;
     std::vector<Command> commands;
     std::string text;
     for (const auto& words : all) commands.push_back(command_of(words, 0, text));
-    const std::uint32_t source = sources.add(std::string(name), std::move(text));
+    const std::uint32_t source = script.add_text(std::string(name), std::move(text));
     for (Command& command : commands) {
         command.span.source = command.name.span.source = source;
         for (Token& word : command.args) word.span.source = source;
     }
     const int status = script.run(commands);
     if (script.quit_seen()) state_->quit = true;
-    if (script.text_can_go()) sources.drop(source);
     return status;
 }
 
 int Shell::execute(std::string_view line, Output& output, std::string_view name, std::uint32_t number) {
     Script script(*this, *state_, output);
-    Session& session = state_->session;
-    const std::uint32_t source = session.sources.add(std::string(name), std::string(line), number);
+    const std::uint32_t source = script.add_text(std::string(name), std::string(line), number);
     const int status = script.run(source);
     if (script.quit_seen()) state_->quit = true;
-    if (script.text_can_go()) session.sources.drop(source);
     return status;
 }
 
 int Shell::run_text(std::string name, std::string text, Output& output) {
     Script script(*this, *state_, output);
-    Session& session = state_->session;
-    const std::uint32_t source = session.sources.add(std::move(name), std::move(text));
-    const int status = script.run(source);
-    if (script.text_can_go()) session.sources.drop(source);
-    return status;
+    return script.run(script.add_text(std::move(name), std::move(text)));
 }
 
 namespace {
@@ -267,13 +263,15 @@ int Shell::run_taken(std::vector<HalFile>& files, bool& quit, Output& output) {
             }
             Script script(*this, *state_, output);
             std::vector<std::uint32_t> sources;
-            for (; file != files.end() && !file->script; ++file) sources.push_back(state_->session.sources.add(file->name, file->text));
+            for (; file != files.end() && !file->script; ++file) sources.push_back(script.add_text(file->name, file->text));
             status |= script.run_two_pass(sources, pass);
             quit = quit || script.quit_seen();
         }
         state_->module_loads = nullptr;
         if (pass == Pass::loads && !over()) status |= Script(*this, *state_, output).run(module_loads);
     }
+    const auto lock = state_->session.lock();
+    for (const std::uint32_t text : std::exchange(state_->module_load_texts, {})) state_->session.sources.release(text);
     return status;
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <atomic>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -28,6 +29,7 @@ struct Shell::State {
     LinuxcncCheck linuxcnc_check = {};     ///< `hal check --linuxcnc`
     /// With TWOPASS, while the loads are gathered: one `loadrt` for each LinuxCNC module, which is loaded once; else nullptr.
     std::vector<Command>* module_loads = nullptr;
+    std::vector<std::uint32_t> module_load_texts = {};  ///< of the session's sources, held for them
     std::optional<Ini> ini = {};           ///< what [SECTION]KEY means to this shell, when it is not the session's INI file
 };
 

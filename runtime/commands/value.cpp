@@ -6,18 +6,19 @@
 #include "commands/table.hpp"
 #include "commands/json_text.hpp"
 #include "commands/listing.hpp"
+#include "model/names.hpp"
 
 namespace hal {
 namespace {
 
+UnknownName unknown(const std::string& name, NameGroup group) { return {.name = name, .group = static_cast<std::uint32_t>(group)}; }
+
 const Pin* pin_named(Context& context) {
     const auto& name = context.argument(0);
     if (const Pin* const pin = context.session.model().find_pin(name)) return pin;
-    std::vector<std::string> names;
-    for (const auto& [key, pin] : context.session.model().pin) names.emplace_back(key);
     const bool signal = context.session.model().find_signal(name) != nullptr;
     const char* const other = context.command.name.text == "getp" ? "gets" : "stype";
-    context.diagnostics.error("no-such-pin", context.span(0), "unknown pin or parameter '" + name + "'", did_you_mean(name, names),
+    context.diagnostics.error("no-such-pin", context.span(0), "unknown pin or parameter '" + name + "'", unknown(name, NameGroup::pins),
                               signal ? "it is a signal: " + std::string(other) + " " + name : "");
     return nullptr;
 }
@@ -25,11 +26,9 @@ const Pin* pin_named(Context& context) {
 const Signal* signal_named(Context& context) {
     const auto& name = context.argument(0);
     if (const Signal* const signal = context.session.model().find_signal(name)) return signal;
-    std::vector<std::string> names;
-    for (const auto& [key, signal] : context.session.model().signal) names.emplace_back(key);
     const bool pin = context.session.model().find_pin(name) != nullptr;
     const char* const other = context.command.name.text == "gets" ? "getp" : "ptype";
-    context.diagnostics.error("no-such-signal", context.span(0), "unknown signal '" + name + "'", did_you_mean(name, names),
+    context.diagnostics.error("no-such-signal", context.span(0), "unknown signal '" + name + "'", unknown(name, NameGroup::signals),
                               pin ? "it is a pin: " + std::string(other) + " " + name : "");
     return nullptr;
 }

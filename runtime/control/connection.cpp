@@ -112,8 +112,11 @@ void Connection::on_event(std::function<void(std::string)> take) { state_->event
 
 bool Connection::idle() const {
     if (state_->engaged || !state_->subscriptions.empty() || !state_->probes.empty() || state_->traces.on()) return false;
-    const auto lock = state_->session.lock();
-    return !state_->session.programs().answers(state_->owner);
+    if (!state_->has_component) return true;
+    const auto lock = state_->session.try_lock();
+    if (!lock || state_->session.programs().answers(state_->owner)) return false;
+    state_->has_component = false;
+    return true;
 }
 
 std::string Connection::hello() const {
@@ -145,6 +148,7 @@ Connection::Handled Connection::handle(std::string_view line, std::string& repli
     const std::size_t before = replies.size();
     try {
         const Verb& verb = verb_of(body);
+        if (state.session.ending() && verb.handle != &State::end) return refuse("the machine ends");
         const bool script = verb.handle == &State::script;
         if (!may_wait && (verb.handle == &State::run || script)) {
             const Json& text = body[script ? "script" : "run"];
@@ -164,6 +168,56 @@ Connection::Handled Connection::handle(std::string_view line, std::string& repli
         return refuse("not enough memory for this request");
     }
     return std::exchange(state.stop, false) ? Handled::stop : Handled::done;
+}
+
+namespace {
+
+constexpr std::size_t longest_urgent = std::size_t{64} << 10;
+
+/// True for `stop` and ["stop"].
+bool is_stop(const Json& command) {
+    if (command.is_array()) return command.size() == 1 && command[0] == "stop";
+    if (!command.is_string()) return false;
+    const std::string& text = command.get_ref<const std::string&>();
+    const auto first = text.find_first_not_of(" \t"), last = text.find_last_not_of(" \t");
+    return first != text.npos && std::string_view(text).substr(first, last - first + 1) == "stop";
+}
+
+}  // namespace
+
+Connection::Urgent Connection::execute_urgent(std::string_view line, std::string& reply) {
+    State& state = *state_;
+    const bool stops = line.find("stop") != line.npos;
+    if (line.size() > longest_urgent || (!stops && line.find("\"options\"") == line.npos) || too_deep(line)) return Urgent::no;
+    const Json body = Json::parse(line.begin(), line.end(), nullptr, false);
+    if (!body.is_object()) return Urgent::no;
+    try {
+        const auto handle = verb_of(body).handle;
+        if (handle == &State::options || handle == &State::end)
+            return this->handle(line, reply) == Handled::stop ? Urgent::stop : Urgent::done;
+        const bool locked = (state.session.locked & static_cast<unsigned>(Lock::run)) != 0;
+        const bool plain = !locked && !state.shell.collecting() && !state.shell.options.echo && !state.session.options().virtual_clock;
+        if (handle != &State::run || !plain || !is_stop(body["run"])) return Urgent::no;
+    } catch (const RequestError&) {
+        return Urgent::no;  // handle() reports it
+    }
+    state.halt_ticket = state.session.threads().halt();
+    return halted(line, reply);
+}
+
+Connection::Urgent Connection::halted(std::string_view line, std::string& reply) {
+    State& state = *state_;
+    switch (state.session.threads().halted(state.halt_ticket)) {
+    case ThreadControl::Halt::pending: return Urgent::halting;
+    case ThreadControl::Halt::hung: return Urgent::lost;
+    case ThreadControl::Halt::done: break;
+    }
+    state.session.journal().note("command", "stop");
+    ++state.requests;
+    const Json id = Json::parse(line.begin(), line.end(), nullptr, false).value("id", Json());
+    const bool echoed = id.is_number() || (id.is_string() && id.get_ref<const std::string&>().size() <= 200);
+    reply += "{\"id\":" + (echoed ? dumped(id) : "null") + ",\"ok\":true,\"status\":0,\"out\":\"\",\"err\":\"\"}\n";
+    return Urgent::done;
 }
 
 bool Connection::cancels(std::string_view line) {

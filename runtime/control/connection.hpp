@@ -37,6 +37,19 @@ public:
     };
     /// Executes one request line (without its end of line) and appends the reply. Whatever the line is, there is one.
     Handled handle(std::string_view line, std::string& replies, bool may_wait = false);
+    /// What execute_urgent() did with a line.
+    enum class Urgent {
+        no,       ///< nothing: handle() it
+        done,     ///< the reply was appended
+        stop,     ///< the same, and the instance is to end
+        halting,  ///< the functions of all threads have been told to stop: ask halted() until it replies
+        lost      ///< a thread does not stop: handle() reports which
+    };
+    /// Executes a request that must not wait behind those of other clients: `stop` (the command and the verb) and `options`. Takes no lock.
+    /// Not while another thread is in handle().
+    Urgent execute_urgent(std::string_view line, std::string& reply);
+    /// After execute_urgent() has returned `halting` for this line: `done` once the outputs of all threads have their safe values.
+    Urgent halted(std::string_view line, std::string& reply);
     /// True for a request to cancel the command that is being executed; then it has been cancelled. To be asked about
     /// lines that come in while another thread is in handle(). [any]
     bool cancels(std::string_view line);
@@ -44,8 +57,8 @@ public:
 
     /// Where lines go that a command which waits has for the client meanwhile; called in the thread that is in handle().
     void on_event(std::function<void(std::string line)> take);
-    /// True while nothing depends on this connection: no request being executed, no subscription, no component, no open `begin`. Takes
-    /// the session's lock. [any]
+    /// True while nothing depends on this connection: no request being executed, no subscription, no component, no open `begin`. Never
+    /// waits; may be false while the session's lock is held. [any]
     bool idle() const;
 
     /// When the next subscription is due, on the steady clock; INT64_MAX without a subscription. [any]

@@ -35,10 +35,12 @@ struct Connection::State {
     ProbeFeeds probes{session};
     TraceFeed traces{session};
     std::atomic<std::uint64_t> requests{0}, rubbish{0};
+    std::atomic<bool> has_component{false};  ///< the client has declared one since idle() last found none
     std::atomic<bool> engaged{false};  ///< a request is being executed, or `begin` is open since the last one
     // What follows, and the shell's members beside cancel(), belong to the thread in handle().
     std::map<std::string, std::string> environment;  ///< what $NAME is in the request being executed
     bool stop = false;
+    std::uint64_t halt_ticket = 0;
     std::function<void(std::string)> event;
 
     // Each appends the members of its reply after "ok":true, beginning with a comma, or throws RequestError before anything.
@@ -58,6 +60,7 @@ struct Connection::State {
     void complete(const Json& body, std::string& reply);
     void component(const Json& body, std::string& reply) {
         no_begin("component");
+        has_component = true;
         declare_component({shell, session, peer, owner}, body, reply);
     }
     void exchange(const Json& body, std::string& reply) { exchange_values({shell, session, peer, owner}, body, reply); }

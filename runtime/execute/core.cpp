@@ -101,6 +101,8 @@ void Core::cycle(std::int64_t grid_ns, std::int64_t due_ns, std::int64_t woke_ns
         answer();
         if (tracing_) [[unlikely]]
             tracing_->put(TraceEvent::cycle, woke_ns, monotonic_ns(), info_.number, static_cast<std::uint64_t>(std::max<std::int64_t>(woke_ns - due_ns, 0)));
+    } else {
+        halt_seen_.store(halt_asked_.load(std::memory_order_acquire), std::memory_order_release);  // it has no outputs yet
     }
     ++info_.number;
     finished_.store(end_ns, std::memory_order_release);
@@ -111,19 +113,23 @@ void Core::cycle(std::int64_t grid_ns, std::int64_t due_ns, std::int64_t woke_ns
 void Core::service() noexcept {
     const Current current(this);
     take_over();
+    const std::uint64_t asked = halt_asked_.load(std::memory_order_acquire);  // before running_ is read: who asks has stopped it before
     if (int free = nobody; !live() && !safe_ && turn_.compare_exchange_strong(free, thread, std::memory_order_acq_rel)) {
         make_safe();
         turn_.store(nobody, std::memory_order_release);
     }
+    halt_seen_.store(asked, std::memory_order_release);
     if (plan_) answer();
 }
 
 void Core::output() noexcept {
     int free = nobody;
     if (!turn_.compare_exchange_strong(free, thread, std::memory_order_acq_rel)) return;
+    const std::uint64_t asked = halt_asked_.load(std::memory_order_acquire);  // before running_ is read: who asks has stopped it before
     if (!live() && !safe_) make_safe();
     publish(*plan_);
     turn_.store(nobody, std::memory_order_release);
+    halt_seen_.store(asked, std::memory_order_release);
 }
 
 // After a millisecond of other work neither the instances nor the code are in a near cache, and waiting for memory is

@@ -135,6 +135,11 @@ public:
         const void *owner, *key;
     };
     Condition condition(const FaultEvent& event) const noexcept;
+    /// Asks the thread to confirm that it has seen a stop: `ticket` is larger than those before. The thread confirms it when its outputs
+    /// have their safe values. [any], one caller at a time
+    void ask_halted(std::uint64_t ticket) noexcept { halt_asked_.store(ticket, std::memory_order_release); }
+    /// Returns true when the thread has confirmed this ticket or a later one. [any]
+    bool confirmed_halt(std::uint64_t ticket) const noexcept { return halt_seen_.load(std::memory_order_acquire) >= ticket; }
 
     /// Returns the mark that the thread was given; nullptr: it has one of its own.
     const CycleMark* mark() const { return mark_ == &own_mark_ ? nullptr : mark_; }
@@ -199,6 +204,8 @@ private:
     std::atomic<Observation*> observation_{nullptr};  // written by the session, emptied by the thread
     std::atomic<bool> stopped_{false};                // set by the thread and the supervisor, cleared by the session
     std::atomic<bool> passed_{false};                 // set by the thread
+    std::atomic<std::uint64_t> halt_asked_{0};        // written by who stops the machine
+    std::atomic<std::uint64_t> halt_seen_{0};         // written by the thread
     std::atomic<std::int64_t> busy_since_{0};         // written by the thread
     std::atomic<std::int64_t> due_{0}, finished_{0};  // of the newest cycle: when it was due and when it ended; written by the thread
     std::atomic<std::int64_t> excused_{0};            // written by the supervisor

@@ -20,6 +20,7 @@ Executor::Executor(bool virtual_clock) : virtual_(virtual_clock), background_(vi
 Executor::~Executor() {
     while (!runners_.empty()) {
         if (remove(runners_.back()->core, 2'000'000'000)) continue;
+        const std::scoped_lock own(runners_mutex_);
         keep_for_good(std::move(runners_.back()));  // a thread that hangs in a component still uses it
         runners_.pop_back();
     }
@@ -31,12 +32,37 @@ Runner& Executor::runner(const Core& core) const {
     std::abort();
 }
 
+std::uint64_t Executor::halt() {
+    stop();
+    const std::scoped_lock own(runners_mutex_);
+    const std::uint64_t ticket = ++halt_tickets_;
+    for (const auto& runner : runners_) {
+        runner->core.ask_halted(ticket);
+        if (!virtual_) runner->call();
+    }
+    return ticket;
+}
+
+Executor::Halt Executor::halted(std::uint64_t ticket) const {
+    const std::scoped_lock own(runners_mutex_);
+    bool all = true;
+    for (const auto& runner : runners_) {
+        if (runner->core.hung()) return Halt::hung;
+        all = all && runner->core.confirmed_halt(ticket);
+    }
+    return all ? Halt::done : Halt::pending;
+}
+
 Core& Executor::add(const CoreOptions& options, ThreadPins pins) {
     auto owned = std::make_unique<Runner>(next_id_++, options, pins, board_, timeline_, running_, !virtual_, epoch_ns_);
     Runner& runner = *owned;
     const auto place = std::upper_bound(runners_.begin(), runners_.end(), options.period_ns,
                                         [](std::int64_t period, const auto& other) { return period < other->options.period_ns; });
-    runners_.insert(place, std::move(owned));
+    {
+        const std::scoped_lock own(runners_mutex_);
+        runner.core.ask_halted(halt_tickets_);
+        runners_.insert(place, std::move(owned));
+    }
     list_core(runner.core);
     timeline_.bound(runners_.front()->options.period_ns);
     if (virtual_) {
@@ -56,7 +82,10 @@ Core& Executor::add(const CoreOptions& options, ThreadPins pins) {
 
 void Executor::forget(const Runner& leaving) {
     unlist_core(leaving.core);
-    std::erase_if(runners_, [&](const auto& one) { return one.get() == &leaving; });
+    {
+        const std::scoped_lock own(runners_mutex_);
+        std::erase_if(runners_, [&](const auto& one) { return one.get() == &leaving; });
+    }
     timeline_.bound(runners_.empty() ? 0 : runners_.front()->options.period_ns);
 }
 

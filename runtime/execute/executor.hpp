@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <vector>
 
@@ -35,6 +36,11 @@ public:
     void start() { running_.store(true, std::memory_order_release); }
     void stop() { running_.store(false, std::memory_order_release); }
     bool running() const { return running_.load(std::memory_order_acquire); }
+    /// Does the same as stop(), from any thread, and wakes slow threads. Returns a ticket for halted(). [any]
+    std::uint64_t halt();
+    enum class Halt { pending, done, hung };
+    /// Returns whether the outputs of all threads have had their safe values since halt() returned the ticket. [any]
+    Halt halted(std::uint64_t ticket) const;
 
     /// Returns the threads that hang, or do not end their current cycle within the timeout. Called before an edit, so that
     /// a hung thread rejects it before any other thread has taken its part.
@@ -85,7 +91,9 @@ private:
     Supervisor supervisor_{board_};
     Timeline timeline_;
     Background background_;
+    mutable std::mutex runners_mutex_;              // held while runners_ changes, and by halt() and halted(), which need no session
     std::vector<std::unique_ptr<Runner>> runners_;  // fastest first
+    std::uint64_t halt_tickets_ = 0;                // guarded by runners_mutex_
     VirtualClock clock_{runners_, timeline_, background_, supervisor_};
     const std::int64_t epoch_ns_;    // all positions of the grid are epoch + k * period
     std::uint32_t next_id_ = 1;

@@ -41,10 +41,10 @@ void Journal::append(JournalEntry entry) {
     if (entries_.size() > kept) entries_.pop_front();
 }
 
-void Journal::message(std::string_view line) noexcept {
+void Journal::note(const char* kind, std::string_view line) noexcept {
     if (!wanted()) return;
     try {
-        JournalEntry entry{state_.executor->now_ns(), "message", std::string(line)};
+        JournalEntry entry{state_.executor->now_ns(), kind, std::string(line)};
         const std::scoped_lock own(messages_mutex_);
         if (messages_.size() < kept) messages_.push_back(std::move(entry));
         else ++messages_lost_;

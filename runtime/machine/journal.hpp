@@ -42,7 +42,9 @@ public:
     void add(const char* kind, std::string text);
     bool wanted() const { return listeners_ > 0; }
     /// Adds a line of an instance. Needs no lock of the session. [any]
-    void message(std::string_view line) noexcept;
+    void message(std::string_view line) noexcept { note("message", line); }
+    /// Does the same as add() without the lock of the session; lost when memory is exhausted or nobody reads. [any]
+    void note(const char* kind, std::string_view line) noexcept;
     /// Returns the same as the extension that plugins use.
     const hal_messages& for_plugins() const { return for_plugins_; }
 

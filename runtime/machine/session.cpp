@@ -73,6 +73,21 @@ Transaction Session::begin() {
     return Transaction(*this);
 }
 
+void Session::offer_names(Diagnostics& diagnostics) { state_->offer_names(diagnostics); }
+
+void Session::sweep_texts() noexcept {
+    if (state_->open || state_->options.check_only || !sources.worth_sweeping()) return;
+    try {
+        std::vector<bool> in_use;
+        state_->model.sweep(in_use);
+        const std::uint32_t advance = threads().first_advance().source;
+        if (advance >= in_use.size()) in_use.resize(advance + 1);
+        in_use[advance] = true;
+        sources.sweep(in_use);
+    } catch (const std::bad_alloc&) {  // then it is done another time
+    }
+}
+
 bool Session::in_transaction() const { return state_->open; }
 void Session::when_committed(std::function<void()> action) {
     if (state_->open) state_->when_committed.push_back(std::move(action));

@@ -12,6 +12,7 @@
 // Every member of the session and of its parts is [setup] and is called with lock() held, unless it is marked otherwise.
 #pragma once
 
+#include <atomic>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -73,6 +74,14 @@ public:
     bool in_transaction() const;
     /// As Transaction::when_committed(), for what is destroyed at the end of the open transaction. Forgotten when none is open.
     void when_committed(std::function<void()> action);
+    /// Offers the names of the model to diagnostics about unknown ones. To be called before Diagnostics::look_up(), which needs no lock.
+    void offer_names(Diagnostics& diagnostics);
+    /// Frees texts of `sources` that nothing refers to any more, when that is worth the time. Not while a transaction is open.
+    void sweep_texts() noexcept;
+    /// Interrupts what other threads do with this session: the commands of a text end at the next line, and queries end early. Used
+    /// before shut_down(), which would wait for them. [any]
+    void interrupt() noexcept { ending_.store(true, std::memory_order_release); }
+    bool ending() const noexcept { return ending_.load(std::memory_order_acquire); }  ///< after interrupt() [any]
     /// Rolls back an open transaction, stops the threads with safe outputs, and stops and destroys all instances. Idempotent.
     void shut_down();
 
@@ -94,11 +103,12 @@ public:
 
     Sources sources;                 ///< the texts that spans of the model refer to
     Ini ini;                         ///< values of [SECTION]KEY
-    unsigned locked = 0;             ///< command groups that are locked: bits of Lock
+    std::atomic<unsigned> locked{0}; ///< may be read without the session's lock; command groups that are locked: bits of Lock
 
 private:
     friend class Transaction;
     mutable std::mutex mutex_;
+    std::atomic<bool> ending_{false};
     std::unique_ptr<SessionState> state_;
     ThreadControl threads_;
     LiveValues values_;

@@ -13,6 +13,7 @@
 #include "execute/executor.hpp"
 #include "hal/status.h"
 #include "model/compile.hpp"
+#include "model/names.hpp"
 #include "machine/elaborate.hpp"
 #include "machine/fault_log.hpp"
 #include "machine/journal.hpp"
@@ -41,10 +42,11 @@ struct SessionState {
     std::unique_ptr<Edit> edit;              ///< what it has edited; made by its first edit
     std::vector<std::function<void()>> when_committed;
     bool needs_threads = false;              ///< the open transaction does not take effect while a thread hangs
+    ModelNames names;
     Absences absences;                       ///< of `hal check`: of all texts so far
     std::vector<AutoOrder> auto_orders;
     std::size_t commands = 0;                ///< in the open transaction
-    std::set<std::string> reported;          ///< warnings and notes that were printed before
+    std::map<std::string, bool> reported;    ///< warnings and notes that were printed before and still hold; TRUE: of a check of a whole text
 
     /// What the open transaction put in place of, should it be withdrawn after a thread has taken it.
     struct {
@@ -88,6 +90,9 @@ struct SessionState {
     bool start_replaced(Diagnostics& diagnostics);
     void restart_replaced(Diagnostics& diagnostics);
     void retire();
+    void forget_reported(const Diagnostics& found, bool whole);
+    /// As Session::offer_names().
+    void offer_names(Diagnostics& diagnostics);
     /// The transaction is over: what is no longer in the model is destroyed.
     void close_edit();
     /// The faults of an instance that was stopped or destroyed do not last any more.

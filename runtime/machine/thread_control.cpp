@@ -80,6 +80,17 @@ bool ThreadControl::stop(Diagnostics* diagnostics) {
     return false;
 }
 
+std::uint64_t ThreadControl::halt() { return state_.executor->halt(); }
+
+ThreadControl::Halt ThreadControl::halted(std::uint64_t ticket) const {
+    switch (state_.executor->halted(ticket)) {
+    case Executor::Halt::pending: return Halt::pending;
+    case Executor::Halt::done: return Halt::done;
+    case Executor::Halt::hung: break;
+    }
+    return Halt::hung;
+}
+
 bool ThreadControl::running() const { return state_.executor->running(); }
 
 void ThreadControl::advance_ns(std::int64_t ns) { state_.executor->advance(ns); }

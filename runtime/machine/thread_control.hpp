@@ -36,6 +36,16 @@ public:
     }
     /// Returns the first command that was noted, or an unknown span.
     Span first_advance() const { return first_advance_; }
+    /// Stops the functions as stop() does, but waits for nothing and nobody: needs no lock of the session. Returns a ticket for
+    /// halted(). [any]
+    std::uint64_t halt();
+    enum class Halt {
+        pending,
+        done,    ///< the outputs of all threads have their safe values
+        hung     ///< a thread hangs: stop() reports it
+    };
+    /// Returns how far the halt with this ticket is. Needs no lock of the session. [any]
+    Halt halted(std::uint64_t ticket) const;
 
     /// Virtual clock: runs the threads for `ns`. Real clock: waits for `ns`.
     void advance_ns(std::int64_t ns);

@@ -57,6 +57,13 @@ void Transaction::apply(const EditForm& form, const Command& command, Diagnostic
     }
 }
 
+void SessionState::offer_names(Diagnostics& diagnostics) {
+    try {
+        diagnostics.offer([this](std::uint32_t group) { return names.get(model, static_cast<NameGroup>(group)); });
+    } catch (const std::bad_alloc&) {  // then no names are offered
+    }
+}
+
 void Transaction::when_committed(std::function<void()> action) { session_->state_->when_committed.push_back(std::move(action)); }
 
 void Transaction::needs_threads() { session_->state_->needs_threads = true; }
@@ -101,6 +108,7 @@ bool Transaction::commit(Diagnostics& diagnostics) {
     } catch (const std::bad_alloc&) {
         s.out_of_memory(diagnostics);
     }
+    s.offer_names(diagnostics);  // also those that are rolled back now
     // Nothing runs under `hal check`: what could be made stays, so that the texts after this one are checked against it.
     if (!good && s.edit && s.options.check_only) s.close_edit();
     else if (!good && s.edit) s.withdraw(&diagnostics);
@@ -111,6 +119,14 @@ bool Transaction::commit(Diagnostics& diagnostics) {
     return good;
 }
 
+/// Forgets the messages that this check would have found but did not: they no longer hold.
+void SessionState::forget_reported(const Diagnostics& found, bool whole) {
+    if (reported.empty()) return;
+    std::set<std::string_view> messages;
+    for (const Diagnostic& one : found.all()) messages.insert(one.message);
+    std::erase_if(reported, [&](const auto& entry) { return (whole || !entry.second) && !messages.contains(entry.first); });
+}
+
 bool SessionState::carry_out(Diagnostics& diagnostics) {
     if (!edit->structural() && edit->pin_values.size() + edit->signal_values.size() <= Core::most_writes / 2) {
         if (!write_values(edit->pin_values, edit->signal_values, diagnostics)) return false;
@@ -119,10 +135,12 @@ bool SessionState::carry_out(Diagnostics& diagnostics) {
     }
     apply_auto_order(model, *edit, auto_orders, diagnostics);
     Diagnostics found;
-    check_all(model, commands > 1, options.check_only, edit->absences().open(), found);
+    const bool whole = commands > 1;
+    check_all(model, whole, options.check_only, edit->absences().open(), found);
+    forget_reported(found, whole);
     for (const Diagnostic& one : found.all()) {
         // a warning is printed once, not with every later edit
-        if (reported.insert(one.message).second || (one.severity == Severity::error && !options.check_only)) diagnostics.add(one);
+        if (reported.emplace(one.message, whole).second || (one.severity == Severity::error && !options.check_only)) diagnostics.add(one);
     }
     if (diagnostics.failed()) return false;
     if (options.check_only) {  // no thread takes them

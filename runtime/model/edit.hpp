@@ -16,6 +16,7 @@
 #include "text/diagnostic.hpp"
 #include "model/absence.hpp"
 #include "model/model.hpp"
+#include "model/names.hpp"
 
 namespace hal {
 
@@ -140,6 +141,7 @@ public:
 private:
     void change_alias(Pin& pin, std::string alias);
     void warn_of_wrap(Word value, hal_type type, const Parsed& parsed);
+    bool unknown_name(Code code, Word name, const char* what, NameGroup group, std::string help);
     bool fail(Code code, Span at, std::string message, std::string label = "", std::string help = "");
     bool name_free(std::string_view name, Span at, const char* what);
     bool names_free(const Instance& of, const std::vector<std::unique_ptr<Pin>>& pins, const std::vector<std::unique_ptr<LoadedFunction>>& functions);

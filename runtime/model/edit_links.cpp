@@ -40,6 +40,12 @@ std::string conversion(hal_type from, hal_type to) {
     return {};
 }
 
+bool Edit::unknown_name(Code code, Word name, const char* what, NameGroup group, std::string help) {
+    UnknownName unknown{.name = std::string(name.text), .group = static_cast<std::uint32_t>(group), .before = model_.next_id};
+    diagnostics->error(code, name.span, std::string("unknown ") + what + " " + quoted(name.text), std::move(unknown), std::move(help));
+    return false;
+}
+
 bool Edit::fail(Code code, Span at, std::string message, std::string label, std::string help) {
     diagnostics->error(code, at, std::move(message), std::move(label), std::move(help));
     return false;
@@ -52,17 +58,17 @@ Pin* Edit::pin(Word name) {
     if (model_.find_signal(name.text))
         help = quoted(name.text) + " is a signal; gets and sets take signals, net takes one signal and then pins";
     if (help.empty() && model_.pin.empty()) help = nothing_yet("pin") + "; loadrt creates instances with pins";
-    fail("no-such-pin", name.span, "unknown pin " + quoted(name.text), did_you_mean(name.text, names(model_.pin)), help);
+    unknown_name("no-such-pin", name, "pin", NameGroup::pins, std::move(help));
     return nullptr;
 }
 
 Signal* Edit::signal(Word name) {
     if (Signal* const found = model_.find_signal(name.text)) return found;
     if (is_absent(name.text, Absences::Kind::signal)) return nullptr;
-    const std::string help = model_.find_pin(name.text) ? quoted(name.text) + " is a pin; getp, setp and unlinkp take pins"
+    std::string help = model_.find_pin(name.text) ? quoted(name.text) + " is a pin; getp, setp and unlinkp take pins"
                              : model_.signal.empty()    ? nothing_yet("signal") + "; net creates signals"
                                                         : "";
-    fail("no-such-signal", name.span, "unknown signal " + quoted(name.text), did_you_mean(name.text, names(model_.signal)), help);
+    unknown_name("no-such-signal", name, "signal", NameGroup::signals, std::move(help));
     return nullptr;
 }
 
@@ -75,7 +81,7 @@ LoadedFunction* Edit::function(Word name) {
         for (const LoadedFunction* function : instance->functions) own.push_back(function->name);
         if (!own.empty()) help = "functions of " + instance->name + ": " + listed(own);
     }
-    fail("no-such-function", name.span, "unknown function " + quoted(name.text), did_you_mean(name.text, names(model_.function)), help);
+    unknown_name("no-such-function", name, "function", NameGroup::functions, std::move(help));
     return nullptr;
 }
 
@@ -109,6 +115,7 @@ Signal* Edit::add_signal(Word name, hal_type type, Span typed_at) {
     made->typed = typed_at.known() ? typed_at : name.span;
     made->slot = &made->value;
     made->index = model_.signals.size();
+    made->id = model_.next_id++;
     make_room(model_.signals);
     on_undo([this, made] {
         model_.signal.erase(made->name);

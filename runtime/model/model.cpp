@@ -76,6 +76,33 @@ const char* Model::keep(std::string_view text) {
     return texts_->all.emplace(text).first->c_str();
 }
 
+void Model::sweep(std::vector<bool>& in_use) {
+    std::unordered_set<const char*> used;
+    const auto mark = [&](Span span) {
+        if (span.source >= in_use.size()) in_use.resize(span.source + 1);
+        in_use[span.source] = true;
+    };
+    for (const auto& [name, one] : pin) {
+        mark(one->linked_at);
+        used.insert(one->doc);
+        used.insert(one->unit);
+    }
+    for (const auto& one : signals) {
+        mark(one->made);
+        mark(one->typed);
+    }
+    for (const auto& [name, one] : function) {
+        mark(one->added);
+        used.insert(one->doc);
+    }
+    for (const auto& one : threads) mark(one->made);
+    for (const auto& loaded : components) {
+        mark(loaded->loaded);
+        for (const auto& one : loaded->instances) mark(one->loaded);
+    }
+    if (texts_) std::erase_if(texts_->all, [&](const std::string& text) { return !used.contains(text.c_str()); });
+}
+
 Model Model::beside() {
     keep("");
     Model other;

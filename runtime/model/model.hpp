@@ -59,6 +59,7 @@ struct Signal {
     std::unique_ptr<hal_port, void (*)(hal_port*)> port{nullptr, [](hal_port*) {}};
     Span made, typed;                ///< who made it; what gave it its type
     std::size_t index = 0;           ///< in Model::signals
+    std::uint32_t id = 0;
     // Where it is now.
     Thread* home = nullptr;          ///< the writing thread, or nullptr
     hal_value* slot = nullptr;       ///< in home's image, a shared cell, or the session's own (&value)
@@ -210,10 +211,12 @@ struct Model {
 
     /// Keeps a text for as long as the model lives; equal texts share.
     const char* keep(std::string_view text);
+    /// Forgets the texts of keep() that no object uses any more, and marks in `in_use` the numbers of the sources of all spans.
+    void sweep(std::vector<bool>& in_use);
     /// An empty model that shares the pool of texts and goes on with the numbers: what is made in it can move here.
     Model beside();
 
-    std::uint32_t next_id = 1;            ///< of pins and functions, for fault records
+    std::uint32_t next_id = 1;            ///< of pins and functions, for fault records, and of signals; also increased by new aliases
     std::uint32_t next_component_id = 7;  ///< `show comp` numbers them as LinuxCNC does: real-time modules take every third
 
 private:

@@ -17,7 +17,11 @@ constexpr int deepest_include = 16, most_includes = 1000;
 
 std::optional<std::uint32_t> read_source(Sources& sources, const std::string& path, Span asked, Diagnostics& diagnostics) {
     std::string text;
-    if (read_regular_file(path, largest_file, text)) return sources.add(path, std::move(text));
+    if (read_regular_file(path, largest_file, text)) {
+        const std::uint32_t source = sources.add(path, std::move(text));
+        sources.hold(source);  // its values may be used at any time
+        return source;
+    }
     diagnostics.error("unreadable-file", asked, "cannot read '" + path + "': " + text);
     return std::nullopt;
 }

@@ -2,6 +2,9 @@
 #include "text/diagnostic.hpp"
 
 #include <iterator>
+#include <map>
+
+#include "text/rendered_order.hpp"
 
 namespace hal {
 
@@ -32,6 +35,31 @@ void Diagnostics::warning(Code code, Span at, std::string message, std::string l
 
 void Diagnostics::note(Code code, Span at, std::string message, std::string label, std::string help) {
     add(simple(Severity::note, code, at, std::move(message), std::move(label), std::move(help)));
+}
+
+void Diagnostics::error(Code code, Span at, std::string message, UnknownName unknown, std::string help) {
+    Diagnostic made = simple(Severity::error, code, at, std::move(message), "", std::move(help));
+    made.unknown = std::move(unknown);
+    add(std::move(made));
+}
+
+void Diagnostics::offer(const std::function<std::shared_ptr<const NameIndex>(std::uint32_t)>& names) {
+    std::map<std::uint32_t, std::shared_ptr<const NameIndex>> offered;
+    for (Diagnostic& one : all_) {
+        if (!one.unknown || one.unknown->among) continue;
+        auto& among = offered[one.unknown->group];
+        if (!among) among = names(one.unknown->group);
+        one.unknown->among = among;
+    }
+}
+
+void Diagnostics::look_up() {
+    for (const std::size_t i : rendered_order(*this)) {
+        Diagnostic& one = all_[i];
+        if (!one.unknown || !one.unknown->among) continue;
+        one.labels[0].text = did_you_mean(one.unknown->name, *one.unknown->among, one.unknown->before);
+        one.unknown.reset();
+    }
 }
 
 void Diagnostics::clear() {

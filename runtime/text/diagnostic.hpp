@@ -2,6 +2,10 @@
 // What went wrong, where, and what to type (docs/design.md, Errors). Formatted where it arises, rendered in one place.
 #pragma once
 
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -19,12 +23,21 @@ struct Label {
     std::string text;
 };
 
+/// An unknown name, for which a diagnostic offers similar ones: they are looked up when it is rendered and stand beside the main place.
+struct UnknownName {
+    std::string name;
+    std::uint32_t group = 0;                   ///< which names it may be one of: a number that means something to who offers them
+    std::uint32_t before = NameIndex::all;     ///< only names with a number below this one existed
+    std::shared_ptr<const NameIndex> among = {};  ///< nullptr: not offered yet
+};
+
 struct Diagnostic {
     Severity severity = Severity::error;
     Code code;
     std::string message;  ///< one sentence, no final stop, names quoted '…' as the user wrote them
     std::vector<Label> labels = {};
     std::vector<std::string> help = {};
+    std::optional<UnknownName> unknown = {};
 };
 
 /// Collects what a transaction finds. Not synchronised.
@@ -34,6 +47,12 @@ public:
     void error(Code code, Span at, std::string message, std::string label = "", std::string help = "");
     void warning(Code code, Span at, std::string message, std::string label = "", std::string help = "");
     void note(Code code, Span at, std::string message, std::string label = "", std::string help = "");
+    /// An error about a name for which similar ones are looked up later.
+    void error(Code code, Span at, std::string message, UnknownName unknown, std::string help = "");
+    /// Offers names to the diagnostics whose unknown name has none yet; `names` is called once for each group among them.
+    void offer(const std::function<std::shared_ptr<const NameIndex>(std::uint32_t group)>& names);
+    /// Looks up similar names for what render() prints. Takes time, but uses nothing but this object and the names that were offered.
+    void look_up();
     std::size_t errors() const { return errors_; }
     std::size_t warnings() const { return warnings_; }
     std::size_t notes() const { return all_.size() - errors_ - warnings_; }

@@ -4,6 +4,7 @@
 
 #include "text/diagnostic.hpp"
 #include "text/glyphs.hpp"
+#include "text/rendered_order.hpp"
 
 namespace hal {
 
@@ -215,31 +216,43 @@ private:
 }  // namespace
 
 std::string render(const Diagnostic& diagnostic, const Sources& sources, bool color) {
+    if (diagnostic.unknown && diagnostic.unknown->among) {
+        Diagnostics one;
+        one.add(diagnostic);
+        one.look_up();
+        return Renderer(one.all()[0], sources, color ? colored : plain).render();
+    }
     return Renderer(diagnostic, sources, color ? colored : plain).render();
 }
 
-std::string render(const Diagnostics& diagnostics, const Sources& sources, bool color) {
-    constexpr std::size_t most_rendered = 100;
+std::vector<std::size_t> rendered_order(const Diagnostics& diagnostics) {
     const auto place = [](const Diagnostic& d) { return d.labels.empty() ? Span{} : d.labels[0].span; };
     std::vector<std::uint32_t> files;  // in order of first mention
     struct Entry {
         std::size_t file;
         std::uint32_t begin;
-        const Diagnostic* diagnostic;
+        std::size_t index;
     };
     std::vector<Entry> entries;
-    for (const Diagnostic& one : diagnostics.all()) {
-        const Span at = place(one);
+    for (std::size_t i = 0; i < diagnostics.all().size(); ++i) {
+        const Span at = place(diagnostics.all()[i]);
         auto file = std::find(files.begin(), files.end(), at.source);
         if (file == files.end()) file = files.insert(files.end(), at.source);
-        entries.push_back({static_cast<std::size_t>(file - files.begin()), at.known() ? at.begin : 0, &one});
+        entries.push_back({static_cast<std::size_t>(file - files.begin()), at.known() ? at.begin : 0, i});
     }
     std::stable_sort(entries.begin(), entries.end(),
                      [](const Entry& a, const Entry& b) { return a.file != b.file ? a.file < b.file : a.begin < b.begin; });
+    std::vector<std::size_t> order;
+    for (std::size_t i = 0; i < std::min(entries.size(), max_rendered); ++i) order.push_back(entries[i].index);
+    return order;
+}
+
+std::string render(const Diagnostics& diagnostics, const Sources& sources, bool color) {
     std::string out;
-    for (std::size_t i = 0; i < std::min(entries.size(), most_rendered); ++i)
-        out += (out.empty() ? "" : "\n") + render(*entries[i].diagnostic, sources, color);
-    if (entries.size() > most_rendered) out += "\nand " + std::to_string(entries.size() - most_rendered) + " more not shown; fix these first\n";
+    const std::size_t all = diagnostics.all().size();
+    const std::vector<std::size_t> order = rendered_order(diagnostics);
+    for (const std::size_t i : order) out += (out.empty() ? "" : "\n") + render(diagnostics.all()[i], sources, color);
+    if (all > order.size()) out += "\nand " + std::to_string(all - order.size()) + " more not shown; fix these first\n";
     return out;
 }
 

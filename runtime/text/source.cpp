@@ -13,12 +13,55 @@ std::size_t mark_bytes(std::string_view text) { return text.starts_with("\xEF\xB
 }  // namespace
 
 std::uint32_t Sources::add(std::string name, std::string text, std::uint32_t first_line) {
-    sources_.push_back({.name = std::move(name), .text = std::move(text), .first_line = first_line});
-    return static_cast<std::uint32_t>(sources_.size());
+    const std::size_t size = text.size();
+    Source made{.name = std::move(name), .text = std::move(text), .first_line = first_line};
+    std::uint32_t number = 0;
+    if (free_.empty()) {
+        sources_.push_back(std::move(made));
+        number = static_cast<std::uint32_t>(sources_.size());
+        if (free_.capacity() < sources_.size()) free_.reserve(2 * sources_.size());  // so that freeing a text never allocates
+    } else {
+        number = free_.back();
+        free_.pop_back();
+        sources_[number - 1] = std::move(made);
+    }
+    bytes_ += size;
+    return number;
+}
+
+void Sources::hold(std::uint32_t source) {
+    if (source != 0) ++sources_[source - 1].holders;
+}
+
+void Sources::release(std::uint32_t source) {
+    if (source != 0) --sources_[source - 1].holders;
 }
 
 void Sources::drop(std::uint32_t source) {
-    if (source != 0 && source == sources_.size()) sources_.pop_back();
+    if (source != 0 && sources_[source - 1].holders == 0) free(source);
+}
+
+bool Sources::worth_sweeping() const {
+    constexpr std::size_t min_count = 1000, min_bytes = std::size_t{1} << 20;
+    return count() > 2 * swept_count_ + min_count || bytes_ > 2 * swept_bytes_ + min_bytes;
+}
+
+void Sources::sweep(const std::vector<bool>& in_use) {
+    for (std::uint32_t number = 1; number <= sources_.size(); ++number) {
+        const bool used = number < in_use.size() && in_use[number];
+        if (!used && sources_[number - 1].holders == 0) free(number);
+    }
+    swept_count_ = count();
+    swept_bytes_ = bytes_;
+}
+
+void Sources::free(std::uint32_t source) {
+    Source& leaving = sources_[source - 1];
+    if (leaving.free) return;
+    bytes_ -= leaving.text.size();
+    leaving = Source{};
+    leaving.free = true;
+    free_.push_back(source);
 }
 
 const Sources::Source& Sources::get(std::uint32_t source) const {

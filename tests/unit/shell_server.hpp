@@ -25,7 +25,11 @@ using Json = nlohmann::json;
 /// A raw connection: what a badly behaved program would do.
 class Wire {
 public:
+    /// Makes a socket, and connects it unless the path is empty.
     explicit Wire(const std::string& path) : fd_(socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
+        if (!path.empty()) connect_to(path);
+    }
+    void connect_to(const std::string& path) {
         sockaddr_un address{};
         address.sun_family = AF_UNIX;
         path.copy(address.sun_path, sizeof address.sun_path - 1);

@@ -102,7 +102,9 @@ HostedMachine::HostedMachine(const NetlistOptions& options, const std::string& n
     stop.when_signalled([this, virtual_clock] {
         shell.cancel();
         if (virtual_clock) cycle_guard_.end_soon();
-        if (stop.requested()) setup_guard_.end_soon();
+        if (!stop.requested()) return;
+        end_now();
+        setup_guard_.end_soon();
     });
 }
 
@@ -111,6 +113,12 @@ HostedMachine::~HostedMachine() {
     ExitObserver::silence();  // outputs are safe: a second Ctrl-C ends the process at once from here on
     stop.release();  // it calls the shell, which goes now
     server_.reset();
+}
+
+void HostedMachine::end_now() {
+    if (!stops_at_once_) return;
+    session.interrupt();
+    session.threads().halt();
 }
 
 bool HostedMachine::serve(bool needed) {
@@ -123,6 +131,7 @@ bool HostedMachine::serve(bool needed) {
     how.stop = [this] {
         stop.request();
         shell.cancel();
+        end_now();
     };
     server_ = std::make_unique<Server>(shell, std::move(how));
     Diagnostics diagnostics;

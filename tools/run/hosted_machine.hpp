@@ -2,6 +2,7 @@
 // A session with its shell and its control socket: common to `hal run`, `hal sim` and `halrun`.
 #pragma once
 
+#include <atomic>
 #include <memory>
 #include <string>
 #include <vector>
@@ -37,6 +38,8 @@ public:
     int converse(const Prompt& prompt);
     /// Advances the virtual clock; returns early when the end is requested.
     void advance(std::int64_t ns, std::uint64_t cycles);
+    /// From now on a request to end the run stops the threads at once and interrupts what clients do, before the caller shuts down.
+    void stop_at_once() { stops_at_once_ = true; }
     /// Ends the run: sets outputs to their safe values.
     void shut_down();
     /// Returns true when a fault has stopped a thread, or a thread has hung.
@@ -51,7 +54,10 @@ public:
     std::string ini_path;  ///< absolute: $EMC_INIFILE of scripts; set by load() and `hal linuxcnc`
 
 private:
+    void end_now();
+
     const NetlistOptions& options_;
+    std::atomic<bool> stops_at_once_{false};
     ProcessOutput output_;
     std::unique_ptr<Server> server_;
     CycleGuard cycle_guard_;

@@ -101,6 +101,7 @@ int run_run(const RunOptions& options) {
     if (!nodes) return 1;
     ServiceNotifier service;  // before there are other threads, because it changes the environment
     HostedMachine machine(options, own_name(options), false);
+    machine.stop_at_once();
     if (!machine.serve(true)) return 1;
     return options.classic ? run_classic(machine, options) : run_plain(machine, options, *nodes, service);
 }

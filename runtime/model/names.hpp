@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: MIT
+// The names of a model, indexed for messages that offer similar ones.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+
+#include "text/suggest.hpp"
+
+namespace hal {
+
+struct Model;
+
+/// Which names: UnknownName::group of diagnostics about a model.
+enum class NameGroup : std::uint32_t { pins, signals, functions };
+
+/// Indexes the names of a model once, for as long as somebody holds the index and no name is added or removed. [setup]
+class ModelNames {
+public:
+    std::shared_ptr<const NameIndex> get(const Model& model, NameGroup group);
+
+private:
+    struct Taken {
+        std::weak_ptr<const NameIndex> index;
+        std::size_t size = 0;       // of the names, and the model's next number, when it was made
+        std::uint32_t next_id = 0;
+    };
+    std::array<Taken, 3> taken_;
+};
+
+}  // namespace hal
