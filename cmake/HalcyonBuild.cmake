@@ -64,6 +64,15 @@ foreach(variable IN LISTS variables)
     endif()
 endforeach()
 
+# halcyon_needs(NAME PACKAGE...): states the optional Debian packages that a component or a program is built with. The script `hal` reads them
+# from components/packages in the build tree, and installs those of what it builds.
+function(halcyon_needs name)
+    if(ARGN)
+        list(JOIN ARGN " " packages)
+        set_property(GLOBAL APPEND_STRING PROPERTY HALCYON_NEEDS "${name} ${packages}\n")
+    endif()
+endfunction()
+
 # halcyon_unity(TARGET [ALONE SOURCE...]): compiles the sources of a target eight at a time: without optimisation most of the time goes into
 # reading the same headers. Two sources of such a target must not define the same name differently, not even in anonymous namespaces;
 # ALONE lists those that do: they are compiled one by one, as are those that cmake/alone.awk finds. For sources without optimisation; for the
@@ -101,11 +110,14 @@ endfunction()
 
 find_program(HALCYON_CCACHE ccache)
 if(HALCYON_CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
-    set(HALCYON_LAUNCHER sh "${CMAKE_CURRENT_LIST_DIR}/cached_compile.sh" "${HALCYON_CCACHE}")
+    set(HALCYON_LAUNCHER sh "${CMAKE_CURRENT_LIST_DIR}/cached_compile.sh" "${HALCYON_CCACHE}" "${PROJECT_SOURCE_DIR}")
     set(CMAKE_C_COMPILER_LAUNCHER ${HALCYON_LAUNCHER})
     set(CMAKE_CXX_COMPILER_LAUNCHER ${HALCYON_LAUNCHER})
     if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
         add_compile_options(-fpch-preprocess)  # lets ccache see through a precompiled header
+        if(HALCYON_SANITIZE)
+            add_compile_options("-ffile-prefix-map=${PROJECT_SOURCE_DIR}=.")  # debugging information is the same in any folder
+        endif()
     endif()
 endif()
 find_program(HALCYON_MOLD mold)

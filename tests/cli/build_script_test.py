@@ -22,6 +22,7 @@ echo "CMAKE_HOME_DIRECTORY:INTERNAL=$source" >build/release/CMakeCache.txt
 touch build/release/build.ninja
 for file in "$source"/components/*/*.cpp; do name=${file##*/}; echo "${name%.cpp} math A component"; done >build/release/components/groups
 echo "seeing libseeing-dev" >build/release/components/absent
+printf '%s\n' "lqr libsolving-dev" "panel libplain-dev" >build/release/components/packages
 """
 NINJA = """#!/bin/sh
 case "$*" in *query*) exit 0 ;; build.ninja) exit 0 ;; esac
@@ -56,7 +57,7 @@ class Script(unittest.TestCase):
         self.tools.mkdir()
         shutil.copy(ROOT / "hal", self.tree)
         shutil.copy(ROOT / "cmake/needs.awk", self.tree / "cmake")
-        (self.tree / "cmake/optional").write_text(f"libsolving-dev {self.tools}/solving.h components/solve\nlibplain-dev {self.tools}/plain.h\n")
+        (self.tree / "cmake/optional").write_text(f"libsolving-dev {self.tools}/solving.h\nlibplain-dev {self.tools}/plain.h\n")
         for name in ("CMakeLists.txt", "CMakePresets.json"):
             (self.tree / name).write_text("")
         for name in ("math/sum2", "math/scale", "math/pid", "solve/lqr"):
