@@ -7,13 +7,12 @@
 #include <getopt.h>
 #include <vector>
 
+#include "classic_streams.hpp"
 #include "classic_views.hpp"
 #include "cli/output.hpp"
 #include "commands.hpp"
 #include "comp/halcompile.hpp"
 #include "control/client.hpp"
-#include "inspect/play.hpp"
-#include "inspect/record.hpp"
 #include "inspect/shell.hpp"
 #include "machine/address.hpp"
 #include "run/run.hpp"
@@ -141,44 +140,6 @@ int halrun(int argc, char** argv) {
     return run_run(options);
 }
 
-/// Reads the options of halsampler or halstreamer: -c and -n are numbers; `take` handles the letters of one of them.
-template <class O>
-int sampler_or_streamer(int argc, char** argv, const char* program, const char* letters, bool (*take)(int letter, std::uint64_t number, O&),
-                        int (*run)(const O&)) {
-    O options;
-    options.program = program;
-    options.classic = true;
-    options.line.assign(argv, argv + argc);
-    for (int letter; (letter = ::getopt(argc, argv, letters)) != -1;) {
-        char* end = nullptr;
-        const std::uint64_t number = ::optarg ? std::strtoull(::optarg, &end, 10) : 0;
-        if ((letter == 'c' || letter == 'n') && (*::optarg < '0' || *::optarg > '9' || *end != '\0'))
-            return fail(options, fmt::format("-{} {}: not a number", static_cast<char>(letter), ::optarg));
-        switch (letter) {
-        case 'c': options.channel = ::optarg; break;
-        case 'N': options.name_as_component = ::optarg; break;
-        default:
-            if (!take(letter, number, options)) return 1;
-        }
-    }
-    take_words(options, argc, argv);
-    if (options.words.size() > 1) return fail(options, fmt::format("unexpected second file '{}'", options.words[1]));
-    return run(options);
-}
-
-bool take_sampler_letter(int letter, std::uint64_t number, RecordOptions& options) {
-    switch (letter) {
-    case 'n': options.count = number; return true;
-    case 't': options.tag = true; return true;
-    default: return false;
-    }
-}
-
-bool take_streamer_letter(int, std::uint64_t, PlayOptions&) { return false; }
-
-int halsampler(int argc, char** argv) { return sampler_or_streamer(argc, argv, "halsampler", "c:n:tN:", take_sampler_letter, run_record); }
-int halstreamer(int argc, char** argv) { return sampler_or_streamer(argc, argv, "halstreamer", "c:N:", take_streamer_letter, run_play); }
-
 /// The configuration program of LinuxCNC's EtherCAT component.
 int lcec_conf(int argc, char** argv) {
     std::string hal = "hal", group = "ethercat", command = "lcec-conf";
@@ -189,9 +150,18 @@ int lcec_conf(int argc, char** argv) {
     return run_command_line(words, line.data());
 }
 
-constexpr Classic table[] = {{"halcmd", halcmd},         {"halcompile", halcompile}, {"halmeter", halmeter}, {"halrun", halrun},
-                             {"halsampler", halsampler}, {"halscope", halscope},     {"halshow", halshow},   {"halstreamer", halstreamer},
-                             {"haltcl", haltcl},         {"lcec_conf", lcec_conf}};
+constexpr Classic table[] = {
+    {"halcmd", Part::core, halcmd},
+    {"halrun", Part::core, halrun},
+    {"halmeter", Part::core, halmeter},
+    {"halscope", Part::core, halscope},
+    {"halshow", Part::core, halshow},
+    {"lcec_conf", Part::core, lcec_conf},
+    {"halcompile", Part::tools, IN_TOOLS(halcompile)::run},
+    {"halsampler", Part::tools, IN_TOOLS(halsampler)::run},
+    {"halstreamer", Part::tools, IN_TOOLS(halstreamer)::run},
+    {"haltcl", Part::core, haltcl},
+};
 
 }  // namespace
 

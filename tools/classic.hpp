@@ -4,11 +4,14 @@
 
 #include <string_view>
 
+#include "part.hpp"
+
 namespace hal::tools {
 
 struct Classic {
     const char* name;
-    int (*run)(int argc, char** argv);
+    Part part;
+    int (*run)(int argc, char** argv);  ///< nullptr: in another program
 };
 
 /// Returns the row of a program name, or nullptr.

@@ -3,14 +3,10 @@
 #include "commands.hpp"
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
-#include <filesystem>
 #include <fmt/format.h>
 #include <memory>
 #include <optional>
 #include <type_traits>
-#include <unistd.h>
 
 #include "bus/can/dcf.hpp"
 #include "bus/can/drive.hpp"
@@ -35,7 +31,6 @@
 #include "bus/ethercat/options.hpp"
 #include "bus/node/ethercat_line.hpp"
 #include "bus/node/kinds.hpp"
-#include "cli/capabilities.hpp"
 #include "cli/option_set.hpp"
 #include "cli/output.hpp"
 #include "commands/table.hpp"
@@ -53,8 +48,9 @@
 #include "inspect/tdma_status.hpp"
 #include "inspect/top.hpp"
 #include "linuxcnc/linuxcnc.hpp"
-#include "machine/source_tree.hpp"
+#include "other_program.hpp"
 #include "panel/panel.hpp"
+#include "part.hpp"
 #include "paths.hpp"
 #include "record/plot.hpp"
 #include "run/replay.hpp"
@@ -62,6 +58,7 @@
 #include "run/fmt.hpp"
 #include "run/run.hpp"
 #include "run/sim.hpp"
+#include "run/sim_record.hpp"
 #include "scope/meter.hpp"
 #include "scope/scope.hpp"
 #include "scope/watch.hpp"
@@ -77,47 +74,49 @@ struct Subcommand {
     const char* usage;    ///< what may follow the name
     const char* summary;
     std::unique_ptr<Options> (*make_options)();
-    int (*run)(const Options&);  ///< nullptr: in hal-bus or hal-panel
+    Part part;
+    int (*run)(const Options&);  ///< nullptr: in another program
     bool verbatim;               ///< from the first word on, everything counts as words, including `-1` and `--`
+    bool (*needs_tools)(const Options&) = nullptr;  ///< whether these options need hal-tools, although `hal` has the command
 };
 
-/// Makes a row. `run` takes the command's own options, O; nullptr: the command is in another program.
-template <class O, auto run>
+/// Makes a row. `Where` is an In, whose function takes the command's own options, O.
+template <class O, class Where>
 constexpr Subcommand command(const char* name, const char* usage, const char* summary, bool verbatim = false) {
-    Subcommand row{name, usage, summary, []() -> std::unique_ptr<Options> { return std::make_unique<O>(); }, nullptr, verbatim};
-    if constexpr (!std::is_null_pointer_v<decltype(run)>) row.run = [](const Options& options) { return run(static_cast<const O&>(options)); };
+    const auto make = []() -> std::unique_ptr<Options> { return std::make_unique<O>(); };
+    Subcommand row{name, usage, summary, make, Where::part, nullptr, verbatim, nullptr};
+    if constexpr (!std::is_null_pointer_v<std::remove_const_t<decltype(Where::run)>>)
+        row.run = [](const Options& options) { return Where::run(static_cast<const O&>(options)); };
     return row;
 }
 
-// The bus tools are a third of the code and need other libraries. They are in the program hal-bus, which `hal` replaces itself with.
-// The web page is in the program hal-panel in the same way. This source is compiled for all three.
-#ifdef HALCYON_BUS_PROGRAM
-#define ON_BUS(run) run
+constexpr Subcommand sim_command() {
+    Subcommand row = command<SimOptions, IN_CORE(run_sim)>(
+        "sim", "FILE… [--for TIME] [-- ARG…]", "run netlists on a virtual clock: deterministic, as fast as possible");
+#ifdef HALCYON_TOOLS_PROGRAM
+    row.run = [](const Options& options) { return run_recorded_sim(static_cast<const SimOptions&>(options)); };
 #else
-#define ON_BUS(run) nullptr
+    row.needs_tools = [](const Options& options) { return !static_cast<const SimOptions&>(options).record.empty(); };
 #endif
-#ifdef HALCYON_PANEL_PROGRAM
-#define ON_PANEL(run) run
-#else
-#define ON_PANEL(run) nullptr
-#endif
+    return row;
+}
 
 constexpr Subcommand table[] = {
-    command<RunOptions, run_run>("run", "FILE… [-- ARG…]", "load netlists and run them in real-time threads"),
-    command<SimOptions, run_sim>("sim", "FILE… [--for TIME] [-- ARG…]", "run netlists on a virtual clock: deterministic, as fast as possible"),
-    command<LinuxcncOptions, run_linuxcnc>("linuxcnc", "FILE.ini [-- ARG…]", "run a LinuxCNC configuration: its netlists, task, I/O and display, until the display ends"),
-    command<RemoteShellOptions, run_shell>("shell", "[COMMAND…]", "command a running instance: one command, a file of commands, or interactively", true),
-    command<CheckOptions, run_check>("check", "FILE… [--assume NAME]", "check netlists without running them"),
-    command<FmtOptions, run_fmt>("fmt", "FILE…", "format netlists"),
-    command<GraphOptions, run_graph>("graph", "FILE… [-o OUT] [--cluster KIND] [--around NAME [--depth N]]", "draw netlists"),
-    command<DocOptions, run_doc>("doc", "[COMPONENT…] [--all --output DIR]", "print the manual page of a component"),
-    command<NewOptions, run_new>("new", "component NAME [--folder DIR]", "create a component to start from: source, CMakeLists.txt, test"),
-    command<CompileOptions, run_compile>("compile", "FILE… [--output DIR] [--check-rt [-- ARGUMENT=VALUE…]]", "build a plugin from one source file and install it"),
-    command<ExplainOptions, run_explain>("explain", "[CODE]", "explain a diagnostic code and what to do about it"),
-    command<RecordOptions, run_record>("record", "FILE NAME… [--last TIME] | [CHANNEL] [FILE]", "record any values of a running instance to MCAP or CSV, or the samples of a sampler"),
-    command<PlotOptions, run_plot>("plot", "FILE [NAME…] [-o OUT.svg]", "draw values of a recording"),
-    command<ReplayOptions, run_replay>("replay", "FILE NETLIST… [--tolerance X]", "drive a netlist with a recording on a virtual clock, and compare"),
-    command<PlayOptions, run_play>("play", "[CHANNEL] [FILE]", "feed a streamer"),
+    command<RunOptions, IN_CORE(run_run)>("run", "FILE… [-- ARG…]", "load netlists and run them in real-time threads"),
+    sim_command(),
+    command<LinuxcncOptions, IN_TOOLS(run_linuxcnc)>("linuxcnc", "FILE.ini [-- ARG…]", "run a LinuxCNC configuration: its netlists, task, I/O and display, until the display ends"),
+    command<RemoteShellOptions, IN_CORE(run_shell)>("shell", "[COMMAND…]", "command a running instance: one command, a file of commands, or interactively", true),
+    command<CheckOptions, IN_CORE(run_check)>("check", "FILE… [--assume NAME]", "check netlists without running them"),
+    command<FmtOptions, IN_CORE(run_fmt)>("fmt", "FILE…", "format netlists"),
+    command<GraphOptions, IN_TOOLS(run_graph)>("graph", "FILE… [-o OUT] [--cluster KIND] [--around NAME [--depth N]]", "draw netlists"),
+    command<DocOptions, IN_TOOLS(run_doc)>("doc", "[COMPONENT…] [--all --output DIR]", "print the manual page of a component"),
+    command<NewOptions, IN_TOOLS(run_new)>("new", "component NAME [--folder DIR]", "create a component to start from: source, CMakeLists.txt, test"),
+    command<CompileOptions, IN_TOOLS(run_compile)>("compile", "FILE… [--output DIR] [--check-rt [-- ARGUMENT=VALUE…]]", "build a plugin from one source file and install it"),
+    command<ExplainOptions, IN_TOOLS(run_explain)>("explain", "[CODE]", "explain a diagnostic code and what to do about it"),
+    command<RecordOptions, IN_TOOLS(run_record)>("record", "FILE NAME… [--last TIME] | [CHANNEL] [FILE]", "record any values of a running instance to MCAP or CSV, or the samples of a sampler"),
+    command<PlotOptions, IN_TOOLS(run_plot)>("plot", "FILE [NAME…] [-o OUT.svg]", "draw values of a recording"),
+    command<ReplayOptions, IN_TOOLS(run_replay)>("replay", "FILE NETLIST… [--tolerance X]", "drive a netlist with a recording on a virtual clock, and compare"),
+    command<PlayOptions, IN_TOOLS(run_play)>("play", "[CHANNEL] [FILE]", "feed a streamer"),
     command<DumpOptions, ON_BUS(run_can_dump)>("can dump", "ADDRESS… [--filter ID[/MASK]] [--time relative|delta|absolute] [--for TIME] [--count N] [--json]", "print and decode the frames of a CAN bus"),
     command<SendOptions, ON_BUS(run_can_send)>("can send", "ADDRESS FRAME… [--every TIME [--for TIME]]", "send frames: 123#1122AABB"),
     command<CanRecordOptions, ON_BUS(run_can_record)>("can record", "ADDRESS FILE.log|FILE.pcapng [--for TIME]", "record the frames of a bus to a file"),
@@ -173,8 +172,8 @@ constexpr Subcommand table[] = {
 #endif
     command<ScocanPlanOptions, ON_BUS(run_scocan_plan)>("scocan plan", "FILE [--mode MODE] [--json | --svg FILE]", "print the slots of a CAN bus as a timeline, its load and the worst-case latency of each message"),
     command<TdmaPlanOptions, ON_BUS(run_tdma_plan)>("tdma plan", "FILE [--json | --svg FILE]", "print the slots of an Ethernet segment as a timeline, its load and its input-to-output latency"),
-    command<TdmaStatusOptions, run_tdma_status>("tdma status", "[--name NAME] [--json]", "print the stations of a segment as a running machine receives them"),
-    command<TdmaPingOptions, run_tdma_ping>("tdma ping", "STATION [-c COUNT] [--from COMPONENT] [--name NAME]", "measure the round-trip time to a station of a segment"),
+    command<TdmaStatusOptions, IN_TOOLS(run_tdma_status)>("tdma status", "[--name NAME] [--json]", "print the stations of a segment as a running machine receives them"),
+    command<TdmaPingOptions, IN_TOOLS(run_tdma_ping)>("tdma ping", "STATION [-c COUNT] [--from COMPONENT] [--name NAME]", "measure the round-trip time to a station of a segment"),
     command<DriveNodeOptions, ON_BUS(run_node_drive)>("node drive", "--link ADDRESS --id N [--axes N] [--motor NAME:VALUE] [--fault FAULT] | --eds", "simulate a CiA 402 drive with up to eight axes"),
     command<IoNodeOptions, ON_BUS(run_node_io)>("node io", "--link ADDRESS --id N [--inputs N] [--outputs N] [--fault FAULT] | --eds", "simulate a CiA 401 I/O node"),
     command<AxisIoNodeOptions, ON_BUS(run_node_axis_io)>("node axis-io", "--link ADDRESS --id N [--plant axis|furuta] [--tdma FILE] [--skew PPM] [--fault FAULT] | --eds", "simulate an axis whose control loop is closed over the bus"),
@@ -183,14 +182,14 @@ constexpr Subcommand table[] = {
     command<BootloaderNodeOptions, ON_BUS(run_node_bootloader)>("node bootloader", "--link ADDRESS --id N [--flash FILE] [--fault FAULT] | --make-image VERSION | --eds", "simulate a device with a boot loader"),
     command<EthercatLineOptions, ON_BUS(run_node_ethercat)>("node ethercat", "FILE --link ADDRESS [--backup ADDRESS] [--for TIME]", "emulate a line of EtherCAT slaves on a network interface"),
     command<Options, ON_BUS(run_node_faults)>("node faults", "", "list the faults that simulated devices can inject"),
-    command<TopOptions, run_top>("top", "", "show all instances on this machine and the network, their threads and faults"),
-    command<WatchOptions, run_watch>("watch", "NAME… [--for TIME] [--once]", "show values of a running instance live, with minimum, maximum and rate"),
-    command<MeterOptions, run_meter>("meter", "NAME [--for TIME]", "show one value of a running instance in large digits"),
-    command<ScopeOptions, run_scope>("scope", "NAME… [--trigger TRIGGER] [--pre TIME] [--post TIME] [--svg FILE] [--csv FILE] [--png FILE]", "show signals of a running instance over time, with trigger and measurements"),
-    command<TraceOptions, run_trace>("trace", "FILE [--for TIME] [--on-overrun|--on-fault [--keep TIME]] [--sched]", "record what the threads of a running instance run, as a Perfetto timeline"),
+    command<TopOptions, IN_TOOLS(run_top)>("top", "", "show all instances on this machine and the network, their threads and faults"),
+    command<WatchOptions, IN_TOOLS(run_watch)>("watch", "NAME… [--for TIME] [--once]", "show values of a running instance live, with minimum, maximum and rate"),
+    command<MeterOptions, IN_TOOLS(run_meter)>("meter", "NAME [--for TIME]", "show one value of a running instance in large digits"),
+    command<ScopeOptions, IN_TOOLS(run_scope)>("scope", "NAME… [--trigger TRIGGER] [--pre TIME] [--post TIME] [--svg FILE] [--csv FILE] [--png FILE]", "show signals of a running instance over time, with trigger and measurements"),
+    command<TraceOptions, IN_TOOLS(run_trace)>("trace", "FILE [--for TIME] [--on-overrun|--on-fault [--keep TIME]] [--sched]", "record what the threads of a running instance run, as a Perfetto timeline"),
     command<PanelOptions, ON_PANEL(run_panel)>("panel", "[FILE] [--write] [--listen ADDRESS]", "show a running machine in a web browser: values, graph, scope, user panels"),
-    command<DoctorOptions, run_doctor>("doctor", "", "check whether this machine is fit for real time"),
-    command<CompletionOptions, run_completion>("completion", "SHELL", "print a completion script: source <(hal completion bash)"),
+    command<DoctorOptions, IN_TOOLS(run_doctor)>("doctor", "", "check whether this machine is fit for real time"),
+    command<CompletionOptions, IN_CORE(run_completion)>("completion", "SHELL", "print a completion script: source <(hal completion bash)"),
 };
 
 /// Commands of two and more words have a first word in common.
@@ -328,21 +327,6 @@ std::optional<int> read(const Subcommand& row, std::vector<std::string> argument
     return std::nullopt;
 }
 
-/// Replaces this process with hal-bus or hal-panel. Returns only when that cannot be started.
-int become_other_program(const Subcommand& row, char** argv) {
-    const std::string part = std::string_view(row.name) == "panel" ? "panel" : "bus";
-    if (part == "bus") pass_on_capabilities();
-    const auto program = std::filesystem::read_symlink("/proc/self/exe").replace_filename("hal-" + part);
-    ::execv(program.c_str(), argv);
-    if (errno == ENOENT && build_on_demand(part)) ::execv(program.c_str(), argv);
-    if (part == "panel")
-        return fail(Options{}, fmt::format("cannot start {}: {}; this Halcyon was built without libwebsockets or pugixml; type: sudo apt install "
-                                           "libwebsockets-dev libpugixml-dev, and build again (./hal build panel)",
-                                           program.string(), std::strerror(errno)));
-    return fail(Options{}, fmt::format("cannot start {}: {}; it must be in the folder of hal: type ./hal build bus in the source tree, or reinstall Halcyon",
-                                       program.string(), std::strerror(errno)));
-}
-
 }  // namespace
 
 int run_command_line(int argc, char** argv) {
@@ -353,10 +337,11 @@ int run_command_line(int argc, char** argv) {
     const auto [row, name_words] = find(all);
     if (!row && find_group(all[0]) && (all.size() == 1 || all[1] == "help" || all[1] == "--help" || all[1] == "-h")) return help({all[0]});
     if (!row) return no_such_command(all);
-    if (!row->run) return become_other_program(*row, argv);
+    if (!row->run) return become_program(program_of(row->part), argv);
     const auto options = row->make_options();
     options->program = fmt::format("hal {}", row->name);
     if (const auto end = read(*row, {all.begin() + static_cast<std::ptrdiff_t>(name_words), all.end()}, *options)) return *end;
+    if (row->needs_tools && row->needs_tools(*options)) return become_program(program_of(Part::tools), argv);
     return row->run(*options);
 }
 

@@ -12,6 +12,7 @@
 #include "cli/standard_streams.hpp"
 #include "commands.hpp"
 #include "execute/process_setup.hpp"
+#include "other_program.hpp"
 
 namespace {
 
@@ -23,6 +24,12 @@ void end_with_machine() {
     if (pid <= 0 || ::getppid() != pid) return;
     ::prctl(PR_SET_PDEATHSIG, static_cast<unsigned long>(SIGTERM));
     if (::getppid() != pid) std::raise(SIGTERM);  // it ended meanwhile
+}
+
+int run(const hal::tools::Classic* classic, int argc, char** argv) {
+    if (!classic) return hal::tools::run_command_line(argc, argv);
+    if (!classic->run) return hal::tools::become_program(hal::tools::program_of(classic->part), argv);
+    return classic->run(argc, argv);
 }
 
 }  // namespace
@@ -38,6 +45,6 @@ int main(int argc, char** argv) {
     std::string_view program = argc > 0 ? argv[0] : "hal";
     program.remove_prefix(program.find_last_of('/') + 1);
     const hal::tools::Classic* const classic = hal::tools::find_classic(program);
-    const int status = classic ? classic->run(argc, argv) : hal::tools::run_command_line(argc, argv);
+    const int status = run(classic, argc, argv);
     return status == 0 && (std::ferror(stdout) != 0 || hal::tools::print_failed()) ? 1 : status;
 }

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "machine/linuxcnc_home.hpp"
+#include "machine/source_tree.hpp"
 #include "modules/module_host.hpp"
 #include "paths.hpp"
 
@@ -25,10 +26,15 @@ struct Library {
 // Never closed: modules are bound to it. RTLD_GLOBAL: they find its symbols in the global scope.
 std::atomic<const halcyon_modules*> opened{nullptr};  // for signal handlers
 
-Library open_library() {
+std::string library_name() {
+    return "libhalcyon_modules.so." + std::string(paths::version.substr(0, paths::version.rfind('.')));
+}
+
+/// Opens the library where it is beside this program, or was built or installed; no host and no problem: it is nowhere.
+Library find_library() {
     std::error_code none;
     const fs::path program = fs::read_symlink("/proc/self/exe", none).parent_path();
-    const std::string name = "libhalcyon_modules.so." + std::string(paths::version.substr(0, paths::version.rfind('.')));
+    const std::string name = library_name();
     // beside the program's own libraries, or, for other programs such as python3, where this was built or installed
     const fs::path folders[] = {program / paths::libraries_from_programs, program / "../lib", fs::path(paths::build_components) / "../lib",
                                 fs::path(paths::install_components) / "../.."};
@@ -43,7 +49,15 @@ Library open_library() {
         opened = entry();
         return {entry(), ""};
     }
-    return {nullptr, name + ", which runs LinuxCNC's modules, is missing beside this program"};
+    return {};
+}
+
+Library open_library() {
+    Library found = find_library();
+    const auto missing = [&] { return !found.host && found.problem.empty(); };
+    if (missing() && build_on_demand("modules")) found = find_library();
+    if (missing()) found.problem = library_name() + ", which runs LinuxCNC's modules, is missing beside this program";
+    return found;
 }
 
 const Library& library() {
@@ -91,7 +105,7 @@ std::optional<Plugin> open_module(const std::string& name, Span at, Diagnostics&
     if (name == "hal_lib") return bad("it is LinuxCNC's own HAL, whose place this runtime takes", "other modules need no loadrt hal_lib");
     if (!library().host) {
         diagnostics.error("bad-plugin", at, "'" + path + "' cannot be loaded: " + library().problem, "",
-                          "type ./hal build in the source tree, or reinstall Halcyon");
+                          "type ./hal build modules in the source tree, or reinstall Halcyon");
         return {};
     }
     halcyon_module_problem problem{};

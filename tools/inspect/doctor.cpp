@@ -52,12 +52,6 @@ std::string first_line(const std::string& path) {
     return line;
 }
 
-std::string own_path() {
-    std::error_code problem;
-    const auto path = std::filesystem::read_symlink("/proc/self/exe", problem);
-    return problem ? "hal" : path.string();
-}
-
 /// Returns the alternative to file capabilities for scheduling and memory locking: limits for a group of users, which Halcyon's package has.
 std::string limits_of_a_group() {
     if (::access("/etc/security/limits.d/halcyon-realtime.conf", F_OK) == 0) return "sudo usermod -aG realtime $USER, then log in again";
@@ -145,7 +139,7 @@ Finding memory() {
 }
 
 Finding capabilities() {
-    const std::string path = own_path();
+    const std::string path = privilege::program();
     const bool on_file = ::getxattr(path.c_str(), "security.capability", nullptr, 0) > 0;
     if (capable(cap_sys_nice) && capable(cap_ipc_lock) && capable(cap_net_raw))
         return {Verdict::good, "capabilities", on_file ? "granted to the program file" : "all present (by user)"};

@@ -11,13 +11,14 @@
 #include <sys/signalfd.h>
 #include <sys/stat.h>
 #include <unistd.h>
+#include <vector>
 
 #include "cli/editor.hpp"
 #include "cli/output.hpp"
 #include "cli/prompt_loop.hpp"
 #include "control/client.hpp"
-#include "scope/watch.hpp"
 #include "netlist/netlist.hpp"
+#include "other_program.hpp"
 #include "text/diagnostic.hpp"
 
 namespace hal::tools {
@@ -33,16 +34,16 @@ int show(const Client::Answer& answer) {
 
 constexpr std::string_view watch_help = "watch NAME…            show values live, with minimum, maximum and rate; q ends it\n";
 
-/// `watch NAME…` is a command of this program, which reads the values as `hal watch` does. Returns nothing for another command.
+/// `watch NAME…` is a command of this program, which is `hal watch` with the same names. Returns nothing for another command.
 std::optional<int> run_own(const RemoteShellOptions& options, const Client& client, std::string_view line) {
     std::istringstream words{std::string(line)};
     std::string first;
     if (options.classic || !(words >> first) || first != "watch") return std::nullopt;
-    WatchOptions watch;
-    watch.program = options.program;
-    watch.name = client.instance();
-    for (std::string name; words >> name;) watch.words.push_back(name);
-    return watch.words.empty() ? fail(options, "missing name; type: watch NAME") : run_watch(watch);
+    std::vector<std::string> arguments{"watch", "--name", client.instance()};
+    const std::size_t own = arguments.size();
+    for (std::string name; words >> name;) arguments.push_back(name);
+    if (arguments.size() == own) return fail(options, "missing name; type: watch NAME");
+    return run_tool(std::move(arguments));
 }
 
 class RemoteShell final : public LineExecutor {

@@ -13,7 +13,6 @@
 #include "run/cell_netlists.hpp"
 #include "run/hosted_machine.hpp"
 #include "run/report.hpp"
-#include "run/sim_record.hpp"
 #include "run/sim_summary.hpp"
 #include "text/diagnostic.hpp"
 
@@ -87,7 +86,9 @@ std::string simulated_for(std::int64_t virtual_ns, std::chrono::steady_clock::du
 
 bool summary_wanted(const SimOptions& options, bool printed) { return !options.quiet && (!printed || ::isatty(STDERR_FILENO) != 0); }
 
-int run_sim(const SimOptions& options) {
+int run_sim(const SimOptions& options) { return simulate(options, nullptr); }
+
+int simulate(const SimOptions& options, const SimRecorder* recorder) {
     const bool advance = options.for_ns >= 0 || options.cycles != 0;
     if (!options.record.empty() && !advance) return fail(options, "--record needs --for TIME or --cycles N");
     if (!options.values.empty() && options.record.empty()) return fail(options, "--values needs --record FILE");
@@ -96,7 +97,7 @@ int run_sim(const SimOptions& options) {
     auto nodes = requested_nodes(options);
     if (!nodes) return 1;
     if (!nodes->empty() && !options.record.empty()) return fail(options, "--record records one machine; add --node NAME");
-    if (!options.record.empty() && check_recording(options) != 0) return 1;
+    if (recorder && !options.record.empty() && recorder->check(options) != 0) return 1;
     if (!nodes->empty()) return sim_cell(options, std::move(*nodes));
     HostedMachine machine(options, options.name.empty() ? fmt::format("sim-{}", ::getpid()) : options.name, true);
     if (!machine.serve(!options.name.empty())) return 1;
@@ -106,7 +107,8 @@ int run_sim(const SimOptions& options) {
     const bool loaded = status == 0;
     if (loaded && advance) {
         machine.start_threads();
-        status = options.record.empty() ? (machine.advance(options.for_ns, options.cycles), 0) : record_advance(options, machine);
+        if (recorder && !options.record.empty()) status = recorder->advance(options, machine);
+        else machine.advance(options.for_ns, options.cycles);
     }
     const auto wall = std::chrono::steady_clock::now() - begun;
     for (const std::string& command : options.execute)

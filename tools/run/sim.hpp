@@ -38,7 +38,18 @@ struct SimOptions : NetlistOptions {
     }
 };
 
-/// Runs `hal sim`. Returns the exit code.
-int run_sim(const SimOptions&);
+class HostedMachine;
+
+/// What --record does, which is in the program hal-tools.
+struct SimRecorder {
+    int (*check)(const SimOptions&);                    ///< states what speaks against the file, before anything is loaded; an exit status
+    int (*advance)(const SimOptions&, HostedMachine&);  ///< advances by --for or --cycles and records meanwhile; an exit status
+};
+
+/// Runs `hal sim`, without --record. Returns the exit status.
+int run_sim(const SimOptions& options);
+
+/// Runs `hal sim`; nullptr: without --record. Returns the exit status.
+int simulate(const SimOptions& options, const SimRecorder* recorder);
 
 }  // namespace hal::tools

@@ -10,6 +10,7 @@
 #include "paths.hpp"
 #include "record/sink.hpp"
 #include "recording/mcap/held_file.hpp"
+#include "run/hosted_machine.hpp"
 #include "run/sim_summary.hpp"
 #include "text/quoting.hpp"
 #include "text/suggest.hpp"
@@ -61,8 +62,6 @@ bool add_rows(Sink& sink, const ProbeRows& rows, ProbeLayout& layout, std::uint6
     batch.bytes = rows.bytes;
     return add_batch(sink, batch, 0, INT64_MAX, count);
 }
-
-}  // namespace
 
 int check_recording(const SimOptions& options) {
     if (!options.record.ends_with(".mcap") && !options.record.ends_with(".csv"))
@@ -117,6 +116,13 @@ int record_advance(const SimOptions& options, HostedMachine& machine) {
     if (!options.quiet)
         write_all(2, fmt::format("{}: {} of {}\n", options.record, counted(rows, "row"), counted(Probes::columns(*probe).size(), "value")));
     return 0;
+}
+
+}  // namespace
+
+int run_recorded_sim(const SimOptions& options) {
+    constexpr SimRecorder recorder{check_recording, record_advance};
+    return simulate(options, &recorder);
 }
 
 }  // namespace hal::tools

@@ -1,15 +1,11 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include "run/hosted_machine.hpp"
 #include "run/sim.hpp"
 
 namespace hal::tools {
 
-/// States what speaks against the file of --record, before anything is loaded. Returns the exit status.
-int check_recording(const SimOptions& options);
-
-/// Advances by --for or --cycles and records meanwhile: the same netlist gives the same file. Returns the exit status.
-int record_advance(const SimOptions& options, HostedMachine& machine);
+/// Runs `hal sim`, with --record too: the same netlist gives the same file. Returns the exit status.
+int run_recorded_sim(const SimOptions& options);
 
 }  // namespace hal::tools

@@ -44,9 +44,11 @@ inline std::string program() {
     std::array<char, 4096> path{};
     const ssize_t size = readlink("/proc/self/exe", path.data(), path.size());
     std::string name = size > 0 ? std::string(path.data(), static_cast<std::size_t>(size)) : "hal";
-    constexpr std::string_view deleted = " (deleted)", helper = "/hal-bus";
+    constexpr std::string_view deleted = " (deleted)";
+    constexpr std::array<std::string_view, 2> helpers = {"/hal-bus", "/hal-tools"};  // `hal` passes its capabilities on to them
     if (name.ends_with(deleted)) name.resize(name.size() - deleted.size());  // rebuilt since it was started
-    if (name.ends_with(helper)) name.resize(name.size() - helper.size() + 4);  // `hal` passes its capabilities on to it
+    for (const std::string_view helper : helpers)
+        if (name.ends_with(helper)) name.resize(name.size() - helper.size() + std::string_view("/hal").size());
     return name;
 }
 
