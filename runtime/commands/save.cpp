@@ -82,8 +82,10 @@ void save_sig(Context& context, Text& text) {
 
 void save_sigu(Context& context, Text& text) {
     text.add("# signals\n");
-    for (const Signal* const signal : signals_by_name(context.session.model(), {}))
+    for (const Signal* const signal : signals_by_name(context.session.model(), {})) {
+        if (context.session.ending()) return;
         if (signal->pins.empty()) new_signal(text, *signal);
+    }
 }
 
 void save_links(Context& context, Text& text, bool arrows) {
@@ -116,6 +118,7 @@ void save_neta(Context& context, Text& text) { save_nets(context, text, true); }
 void save_netl(Context& context, Text& text) {
     text.add("# nets\n");
     for (const Signal* const signal : signals_by_name(context.session.model(), {})) {
+        if (context.session.ending()) return;
         if (signal->pins.empty()) continue;
         text.add("net {}", signal->name);
         for (const Pin* const pin : by_name(*signal)) text.add(" {}", shown_name(*pin));
@@ -127,6 +130,7 @@ void save_netl(Context& context, Text& text) {
 void save_netla(Context& context, Text& text) {
     text.add("# nets\n");
     for (const Signal* const signal : signals_by_name(context.session.model(), {})) {
+        if (context.session.ending()) return;
         if (signal->pins.empty()) continue;
         text.add("net {}", signal->name);
         const auto pins = by_name(*signal);
@@ -223,6 +227,7 @@ void command_save(Context& context) {
                                                : wanted == section.name || (!section.also.empty() && wanted == section.also);
         if (!chosen) continue;
         section.save(context, text);
+        if (context.session.ending()) return;
         known = true;
     }
     if (!known) {

@@ -15,6 +15,13 @@ namespace {
 
 constexpr std::size_t most_labels = 5;  // of a diagnostic, those of values included
 
+Diagnostics without_names(Diagnostic one) {
+    one.unknown.reset();
+    Diagnostics single;
+    single.add(std::move(one));
+    return single;
+}
+
 std::string summary(std::size_t errors, std::size_t warnings, std::size_t notes) {
     std::string text;
     const auto add = [&](std::size_t number, const char* noun) {
@@ -122,6 +129,24 @@ Diagnostic Script::with_values(Diagnostic diagnostic) const {
     return diagnostic;
 }
 
+namespace {
+
+/// Returns the same diagnostics with the similar names of the first ones, one after the other, so that the end of the machine interrupts it.
+Diagnostics looked_up(const Diagnostics& found, const Session& session) {
+    constexpr std::size_t max_count = 100;  // as many as are rendered
+    Diagnostics all;
+    for (const Diagnostic& one : found.all()) {
+        Diagnostics single;
+        single.add(one);
+        if (session.ending()) single = without_names(one);
+        else if (all.all().size() < max_count) single.look_up();
+        all.take(single);
+    }
+    return all;
+}
+
+}  // namespace
+
 /// Many similar names take long to find: meanwhile others use the machine. No transaction is open here.
 void Script::look_up_names(Diagnostics& found) {
     const auto unknown = [](const Diagnostic& one) { return one.unknown.has_value(); };
@@ -131,8 +156,8 @@ void Script::look_up_names(Diagnostics& found) {
         if (one.unknown && one.unknown->among) names_.insert(one.unknown->among);
     lock_.unlock();
     try {
-        found.look_up();
-    } catch (const std::bad_alloc&) {  // then no names are offered
+        found = looked_up(found, session_);
+    } catch (const std::bad_alloc&) {  // render() looks them up
     }
     lock_.lock();
 }

@@ -30,8 +30,8 @@ namespace hal {
 namespace {
 
 constexpr std::size_t read_at_once = 65536;
-constexpr std::int64_t no_files_ns = 20'000'000;           // before accept is tried again after the system had no file left
-constexpr std::int64_t urgent_ns = 50'000'000;             // how long a client without a place has at least for an urgent request
+constexpr std::int64_t no_files_ns = 5'000'000;            // before accept is tried again after the system had no file left
+constexpr std::int64_t urgent_ns = 20'000'000;             // how long a client without a place has at least for an urgent request
 constexpr std::int64_t halt_poll_ns = 500'000;             // between two looks whether the threads have stopped
 constexpr std::int64_t halt_timeout_ns = 1'000'000'000;    // before the ordinary `stop` says which thread does not
 constexpr std::int64_t give_up_ns = 5'000'000'000;         // a client without a place waits so long for one

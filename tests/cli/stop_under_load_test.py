@@ -22,6 +22,7 @@ class Wire:
 
     def __init__(self, case):
         self.socket = socket.socket(socket.AF_UNIX)
+        case.addCleanup(self.close)
         self.socket.settimeout(2 * TIMEOUT)
         self.socket.connect(str(case.folder / "halcyon" / "default.sock"))
         self.lines = self.socket.makefile("rb")
@@ -72,12 +73,13 @@ class StopUnderLoad(Case):
         over = threading.Event()
 
         def go():
+            wire = Wire(self)
             try:
-                wire = Wire(self)
                 while not over.is_set():
                     wire.ask(**request)
             except (OSError, ValueError):
                 pass  # the machine has ended
+            wire.close()
 
         threads = [threading.Thread(target=go, daemon=True) for _ in range(count)]
         for thread in threads:
@@ -89,7 +91,6 @@ class StopUnderLoad(Case):
                 thread.join(TIMEOUT)
 
         self.addCleanup(end)
-        return replies
 
     def test_a_file_with_a_thousand_wrong_names(self):
         machine = self.machine(f"loadrt pid num_chan={INSTANCES}\n")
