@@ -274,6 +274,31 @@ TEST(Station, whose_thread_stays_out_of_phase_reports_it_once) {
     EXPECT_GT(s.last_value[Event::out_of_step], 100'000);
 }
 
+TEST(Station, names_both_stations_that_were_given_one_block) {
+    Bed bed;
+    StationSetup setup = master();
+    setup.others = {{.mac = {}, .role = Role::slave, .slots = slave(300'000).slots, .index = 1}};
+    Machine& leader = bed.add(1, setup);
+    Machine& a = bed.add(2, slave(300'000));
+    const auto send = [](Machine& m) {
+        const Frame f = encode(mac(9), m.port.address(), Request{});
+        std::vector<std::uint8_t> frame(f.begin(), f.end());
+        std::fill_n(frame.begin(), 6, std::uint8_t{0xff});
+        m.station.send(frame, 0, 0);
+    };
+    a.in_cycle = send;
+    bed.run(600 * ms);
+    ASSERT_TRUE(a.station.ready());
+    EXPECT_EQ(0, leader.events[Event::duplicate_slot]);
+    Machine& b = bed.add(3, slave(300'000));
+    b.in_cycle = send;
+    bed.run(900 * ms);
+    EXPECT_EQ(1, leader.events[Event::duplicate_slot]);
+    EXPECT_EQ(mac(3), leader.last_who[Event::duplicate_slot]);
+    EXPECT_EQ(mac(2), duplicate_address(leader.last_value[Event::duplicate_slot]));
+    EXPECT_EQ(1, duplicate_index(leader.last_value[Event::duplicate_slot]));
+}
+
 TEST(Station, reports_another_one_in_its_slot) {
     Bed bed;
     bed.add(1, master());
