@@ -148,6 +148,8 @@ class Live(Case):
         """Switches on as the READMEs describe, and again where a busy host lost a drive in between."""
         def are_on():
             self.say("sets", enable, "FALSE")
+            beat = int(self.value("servo-thread.threadbeat"))
+            wait_until(lambda: int(self.value("servo-thread.threadbeat")) > beat + 1, "a cycle sees it")
             self.say("sets", enable, "TRUE")
             for axis in axes:
                 wait_until(lambda: "TRUE" in (self.value(f"{axis}.active"), self.value(f"{axis}.fault")), f"{axis} is on, or reports why not")
