@@ -8,7 +8,7 @@ struct Faults : hal::Component {
     using Component::Component;
     static constexpr hal::Traits traits{.singleton = true};
 
-    hal::In<bool> reset{*this, "reset", "a rising edge acknowledges all faults that are over"};
+    hal::In<bool> reset{*this, "reset", "a rising edge acknowledges all faults; those that last, once they are over while it is TRUE"};
     hal::Out<bool> active{*this, "active", "TRUE while a fault is not acknowledged", {.safe = true}};
     hal::Out<bool> ok{*this, "ok", "inverse of active", {.safe = false}};
     hal::Out<std::uint64_t> count{*this, "count", "number of faults since the start"};
@@ -26,9 +26,8 @@ struct Faults : hal::Component {
 
     void update(hal::Cycle) noexcept {
         if (record_ == nullptr) return;
-        if (reset && !was_reset_) record_->clear(record_);
-        was_reset_ = reset;
         count = __atomic_load_n(&record_->count, __ATOMIC_ACQUIRE);
+        acknowledge();
         active = count != __atomic_load_n(&record_->cleared, __ATOMIC_ACQUIRE);
         ok = !active;
         last_code = __atomic_load_n(&record_->last_code, __ATOMIC_RELAXED);
@@ -40,9 +39,20 @@ struct Faults : hal::Component {
     }
 
 private:
+    // A button often resets drives by the same edge: their faults are over some cycles later. A fault that comes while the button is pressed is
+    // not acknowledged, and ends that.
+    void acknowledge() noexcept {
+        if (reset && !was_reset_) acknowledged_ = count;
+        was_reset_ = reset;
+        if (reset && active && acknowledged_ == count) record_->clear(record_);
+        else if (acknowledged_ != count) acknowledged_ = no_count;
+    }
+
+    static constexpr std::uint64_t no_count = UINT64_MAX;
     const hal_faults* record_ = nullptr;
     const hal_supervision* supervision_ = nullptr;
     std::uint64_t seen_ = 0;
+    std::uint64_t acknowledged_ = no_count;  // count at the last edge of reset
     bool was_reset_ = false;
 };
 
@@ -53,7 +63,8 @@ An exception in a component, NaN on an output declared finite, a cycle beyond it
 are faults; `show fault` describes them. This component provides them as pins: link `ok` into the emergency stop chain.
 
 A fault whose condition lasts cannot be acknowledged: a thread that hangs or that a fault stopped, a node that is offline, a cycle that still
-takes too long. Neither `reset` nor `fault clear` makes `ok` TRUE before it is over, and its end alone does not either.
+takes too long. Neither `reset` nor `fault clear` makes `ok` TRUE before it is over, and its end alone does not either: acknowledge it again, or hold
+`reset` until it is over.
 
 `alive` is for a watchdog: it toggles only while the thread supervisor runs and each thread has finished a
 cycle within its supervision limit. Add the function to the fastest thread and link `alive` to a watchdog input, or to a

@@ -69,7 +69,7 @@ Supervisor::~Supervisor() {
 void Supervisor::add(Core& core, pthread_t thread, int tid, int priority, int cpu) {
     {
         const Hold hold(mutex_);
-        watched_.push_back({&core, thread, tid, priority, cpu, false, {}, scheduler_usage(tid)});
+        watched_.push_back({.core = &core, .thread = thread, .tid = tid, .priority = priority, .cpu = cpu, .usage = scheduler_usage(tid)});
         core.expect(monotonic_ns());
         std::stable_sort(watched_.begin(), watched_.end(), [](const Watched& a, const Watched& b) { return a.priority > b.priority; });
     }
@@ -215,6 +215,7 @@ bool Supervisor::look(std::int64_t now_ns, std::int64_t gap_ns, std::int64_t sus
         core.sample();
         if (core.hung()) {  // what it goes on writing does not last
             core.stand_in(now_ns, false);
+            if (one.starved && uses_cpu(one)) declare_busy(one, now_ns);
             well = false;
             continue;
         }
@@ -268,6 +269,7 @@ void Supervisor::declare(Watched& watched, std::int64_t now_ns, std::int64_t gap
     stall.time_ns = now_ns;
     stall.cpu = watched.cpu;
     if (!core.declare_hung()) return;
+    watched.starved = false;
     core.stand_in(now_ns, true);  // outputs first
     if (suspended_ns > stall.limit_ns) {
         stall.cause = Stall::Cause::suspended;
@@ -278,14 +280,44 @@ void Supervisor::declare(Watched& watched, std::int64_t now_ns, std::int64_t gap
     } else {
         find_cause(watched, stall);
         name_starved(watched, stall, now_ns);  // before they run
-        if (stall.cause != Stall::Cause::starved && watched.priority > 0 && !watched.demoted) {
-            const sched_param ordinary{};
-            stall.demoted = watched.demoted = pthread_setschedparam(watched.thread, SCHED_OTHER, &ordinary) == 0;
-        }
+        watched.starved = stall.cause == Stall::Cause::starved;
+        if (!watched.starved) demote(watched, stall);
     }
-    board_.count({HAL_FAULT_SILENT_THREAD, stall.function, stall.cycle, now_ns, static_cast<double>(stall.silent_ns), nullptr, nullptr},
-                 core.id());
+    queue(stall);
+}
+
+void Supervisor::demote(Watched& watched, Stall& stall) noexcept {
+    if (watched.priority == 0 || watched.demoted) return;
+    const sched_param ordinary{};
+    stall.demoted = watched.demoted = pthread_setschedparam(watched.thread, SCHED_OTHER, &ordinary) == 0;
+}
+
+void Supervisor::queue(const Stall& stall) noexcept {
+    board_.count({HAL_FAULT_SILENT_THREAD, stall.function, stall.cycle, stall.time_ns, static_cast<double>(stall.silent_ns), nullptr, nullptr},
+                 stall.thread);
     stalls_.push(stall);
+}
+
+// A thread that seemed to be starved has got CPU time since, and its cycle does not end: its function is the cause after all.
+void Supervisor::declare_busy(Watched& watched, std::int64_t now_ns) {
+    const Core& core = *watched.core;
+    Stall stall;
+    stall.thread = core.id();
+    stall.function = core.hung_function();
+    stall.cycle = core.cycles;
+    stall.limit_ns = core.supervise_ns;
+    stall.silent_ns = now_ns - core.finished_ns();
+    stall.time_ns = now_ns;
+    stall.cpu = watched.cpu;
+    watched.starved = false;
+    demote(watched, stall);
+    queue(stall);
+}
+
+// As much CPU time since it was first seen late as a whole cycle may take.
+bool Supervisor::uses_cpu(const Watched& watched) noexcept {
+    const SchedulerUsage now = scheduler_usage(watched.tid);
+    return watched.mark.taken_ns != 0 && now.cpu_ns - watched.mark.cpu_ns > watched.core->supervise_ns;
 }
 
 // Less than a tenth since it was first seen late. A function that loops for ever on a busy host has used more than its limit soon.

@@ -82,6 +82,7 @@ private:
         pthread_t thread;
         int tid, priority, cpu;
         bool demoted = false;
+        bool starved = false;                         // declared hung because it got no CPU time
         SchedulerUsage mark{};                        // when it was first seen late
         SchedulerUsage usage{};                       // when it was last seen in time, read once a second
     };
@@ -91,7 +92,11 @@ private:
     bool in_gap(const Watched& watched, std::int64_t now_ns, std::int64_t gap_ns) const;
     void declare(Watched& watched, std::int64_t now_ns, std::int64_t gap_ns, std::int64_t suspended_ns);
     void name_starved(Watched& hog, Stall& stall, std::int64_t now_ns);
+    void declare_busy(Watched& watched, std::int64_t now_ns);
+    void demote(Watched& watched, Stall& stall) noexcept;
+    void queue(const Stall& stall) noexcept;
     static bool got_no_cpu(const Watched& watched) noexcept;
+    static bool uses_cpu(const Watched& watched) noexcept;
     void find_cause(const Watched& watched, Stall& stall) const;
     void settle_down();  // interval and CPUs, after the threads have changed
     void feed_watchdog(std::int64_t now_ns);

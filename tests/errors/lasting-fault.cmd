@@ -1,1 +1,0 @@
-hal sim lasting-fault.hal
