@@ -95,7 +95,7 @@ void Runner::start() {
     bind();
 }
 
-// From outside: a thread that binds itself to the CPU of a busy real-time process does not come back from that call.
+// From outside: a thread that binds itself to the CPU of a busy real-time process does not return from that call.
 void Runner::bind() noexcept {
     if (granted.policy == Granted::Policy::deadline) return;  // its affinity must stay the whole root domain
     const bool wants = options.priority > 0 || options.deadline;

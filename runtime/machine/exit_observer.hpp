@@ -33,7 +33,7 @@ public:
     /// Names the functions of the plan that the thread runs from now on. [setup]
     void describe(const CycleMark* mark, const Thread& thread, const plan::Plan& plan) noexcept;
 
-    /// The end of this process is reported by somebody else: the observers say nothing. async-signal-safe
+    /// The end of this process has been reported: the observer prints nothing. async-signal-safe
     static void silence() noexcept;
 
 private:

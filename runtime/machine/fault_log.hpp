@@ -16,10 +16,10 @@ struct LoadedFunction;
 struct Model;
 struct Stall;
 
-/// Why a thread could not run while it was silent, as far as it was not its own doing.
+/// Why a thread finished no cycle, when its functions are not the cause.
 struct Absence {
-    std::int64_t process_ns = 0;  ///< the whole process got no CPU time for so long
-    std::int64_t starved_ns = 0;  ///< the thread was ready to run without running for so long
+    std::int64_t process_ns = 0;  ///< duration without CPU time for the whole process
+    std::int64_t starved_ns = 0;  ///< duration for which the thread was ready to run without running
     int cpu = -1;                 ///< the thread is bound to; -1: to none
 };
 

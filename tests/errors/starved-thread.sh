@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-# the thread gets what is left of a CPU that another process uses; how long it waits differs from run to run
+# the thread gets the remaining time of a CPU that another process uses; how long it waits differs from run to run
 taskset -c 0 sh -c 'while :; do :; done' &
 busy=$!
 hal run starved-thread.hal 2>"$HOME/faults" >/dev/null &

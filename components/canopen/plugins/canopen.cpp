@@ -204,7 +204,7 @@ private:
         }
     }
 
-    /// Ends the faults whose end is no event: what is received again, and what has not been repeated. [realtime]
+    /// Ends faults that no event ends: what is received again, and what has not been repeated. [realtime]
     void end_faults(Time now) noexcept {
         constexpr Time repeated_within = 2 * second;
         if (foreign_fault_.lasts() && now - foreign_seen_ > repeated_within) foreign_fault_.end(faults_, this);

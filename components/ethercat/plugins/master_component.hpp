@@ -301,7 +301,7 @@ private:
         }
     }
 
-    /// Ends the faults whose end is no event. [realtime]
+    /// Ends faults that no event ends. [realtime]
     void end_faults() noexcept {
         constexpr std::int64_t repeated_within_ns = 3'000'000'000;
         if (other_fault_.lasts() && now_ns_ - other_seen_ns_ > repeated_within_ns) other_fault_.end(faults_, this);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Faults whose condition lasts. The host offers one record under both ids: faults.size of "hal.faults/1" tells whether it is this struct. */
+/* Faults whose condition lasts. The host offers one record under both ids: faults.size of "hal.faults/1" shows whether it is this struct. */
 #ifndef HAL_LASTING_FAULTS_H
 #define HAL_LASTING_FAULTS_H
 

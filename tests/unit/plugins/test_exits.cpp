@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Ends the process outside of the cycle, where its argument says.
+// Ends the process outside of the cycle, in the call that its argument names.
 #include <chrono>
 #include <cstdlib>
 #include <stdexcept>
