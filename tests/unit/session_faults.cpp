@@ -52,6 +52,10 @@ TEST_F(Faulty, A_function_that_throws_again_and_again_is_caught_again_and_again)
         ASSERT_EQ(machine.session.reports().fault_count(), static_cast<std::uint64_t>(i));
     }
     machine.session.reports().clear_faults();
+    EXPECT_EQ(machine.session.reports().fault_count(), 1u) << "its functions are stopped";
+    machine.must("setp f.throws 0");
+    machine.start();
+    machine.session.reports().clear_faults();
     EXPECT_EQ(machine.session.reports().fault_count(), 0u);
     EXPECT_TRUE(machine.session.reports().faults().empty());
 }
