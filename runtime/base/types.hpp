@@ -66,7 +66,7 @@ enum class LeadingZero { octal, decimal };
 /// Parses a value of `type`. On failure `problem` is the reason: "'abc' is not a number", "3000000000 is out of range for
 /// s32 (-2147483648 to 2147483647)".
 Parsed parse_value(hal_type type, std::string_view text, LeadingZero = LeadingZero::octal);
-/// As setp and sets of LinuxCNC 2.9 do: an integer that is out of range keeps its low bits, -1 is 4294967295 as u32. `warning` says so
+/// As setp and sets of LinuxCNC 2.9 do: an integer that is out of range keeps its low bits, -1 is 4294967295 as u32. `warning` reports it
 /// unless the text is a pattern of bits, as 0xFFFFFFFF is for s32.
 Parsed parse_wrapping(hal_type type, std::string_view text);
 

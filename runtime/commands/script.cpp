@@ -172,7 +172,10 @@ void Script::run_line(const Command& command) {
     if (session_.journal().wanted() && !only_looks(*row, command))
         session_.journal().add(row->edits() ? "edit" : "command", std::string(session_.sources.text(command.span)));
     if (!row->edits() && !check_arity(row->usage(), command.name, command.args, pending_)) return lines_.push_back(command.span);
-    if (row->flags & command_transaction) return group(command);
+    if (row->flags & command_transaction) {
+        if (!shell_.options.linuxcnc) group(command);  // else it was reported, and the whole file is to be looked at
+        return;
+    }
     if ((state_.collecting || checked_begin_) && collect(command, *row)) return;
     if (row->edits()) return edit(command, *row);
     if (row->flags & command_deferred) return defer(command, *row);

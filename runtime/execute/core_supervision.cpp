@@ -50,7 +50,7 @@ void Core::woke_late(std::int64_t due_ns, std::int64_t now_ns) noexcept {
     raise({HAL_FAULT_SILENT_THREAD, 0, info_.number, info_.start_ns, static_cast<double>(silent_ns), nullptr, nullptr});
 }
 
-// The thread was ready, or its cycle was under way, and the CPU was another's for so long.
+// The thread was ready, or its cycle was under way, while others had the CPU.
 bool Core::tolerate_gap(std::int64_t silent_ns) noexcept {
     if (silent_ns > max_gap_ns.load(std::memory_order_relaxed)) return false;
     newest_gap_ns.store(silent_ns, std::memory_order_relaxed);

@@ -38,6 +38,12 @@ class Sim(Case):
         self.write("in.txt", "1 1\n")
         self.assertRegex(self.sim("loadusr -w halstreamer in.txt", "start", "advance 1 cycles", "loadusr -w halsampler -n 1"), r"^2\.000000 1 0 \d+ 0 0 \n$")
 
+    def test_a_leading_0_of_an_integer_has_no_meaning(self):
+        self.write("in.txt", "010 -08\n0x10 1\n")
+        netlist = self.write("b.hal", "loadrt threads name1=servo period1=1000000\nloadrt streamer cfg=us depth=10\naddf streamer.0 servo\nloadusr -w halstreamer in.txt\nstart\n"
+                                      + "advance 1 cycles\ngetp streamer.0.pin.0\ngetp streamer.0.pin.1\n" * 2)
+        self.assertEqual("10\n-8\n16\n1\n", self.good("sim", "--quiet", netlist))
+
     def test_tag_is_the_sample_number(self):
         lines = self.sim("start", "advance 3 cycles", "loadusr -w halsampler -t -n 3").splitlines()
         self.assertEqual(["0", "1", "2"], [line.split()[0] for line in lines])

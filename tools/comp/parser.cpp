@@ -134,7 +134,7 @@ void Parser::doc(Text& doc) {
 bool Parser::type(Item& item) {
     const Text word = in_.word();
     std::optional<hal_type> type = type_named(word.text);
-    if (type && word != row(*type).name && word != row(*type).newer) type.reset();  // BIT is none for halcompile
+    if (type && word != row(*type).name && word != row(*type).newer) type.reset();  // halcompile rejects BIT
     if (word == "signed") type = HAL_TYPE_S32;
     if (word == "unsigned") type = HAL_TYPE_U32;
     if (!word.given() || !type) {

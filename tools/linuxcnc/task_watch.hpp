@@ -17,8 +17,8 @@ public:
     ~TaskWatch();
     TaskWatch(const TaskWatch&) = delete;
 
-    /// Looks at the heartbeat, to be called several times a second: while the caller itself has no CPU no time passes. Returns how long there was none, in ns, once that exceeds the timeout; else 0. A task that has never been seen to
-    /// beat is not watched.
+    /// Looks at the heartbeat, to be called several times a second: while the caller itself has no CPU no time passes. Returns how long there was none, in ns, once that exceeds the timeout; else 0. A task whose
+    /// count has never changed is not watched.
     std::int64_t silent_ns();
 
 private:
