@@ -28,18 +28,13 @@ struct Watchdog : hal::Component {
         if (!limits_known_.load(std::memory_order_acquire)) return;  // a rising edge of enable-in is not lost: it is detected later
         const bool restart = enable && !was_enabled_;
         was_enabled_ = enable;
-        bool healthy = enable && (ok || restart);
-        if (restart) tripped = -1;
-        for (std::size_t i = 0; i < input.size(); ++i) {
-            Watched& w = watched_[i];
-            if (restart || input[i] != w.level) w.silent_ns = 0;
-            else w.silent_ns += cycle.period_ns();
-            w.level = input[i];
-            if (w.silent_ns < w.limit_ns.load(std::memory_order_relaxed)) continue;
-            if (healthy) tripped = static_cast<std::int32_t>(i);
-            healthy = false;
+        if (!enable) {
+            ok = false;
+        } else if (restart) {
+            begin();
+        } else if (ok) {
+            check(cycle.period_ns());
         }
-        ok = healthy;
     }
 
     void set_timeouts(hal::Cycle) noexcept {
@@ -51,6 +46,30 @@ struct Watchdog : hal::Component {
     }
 
 private:
+    void begin() noexcept {
+        tripped = -1;
+        ok = true;
+        for (std::size_t i = 0; i < input.size(); ++i) {
+            watched_[i].silent_ns = 0;
+            if (watched_[i].limit_ns.load(std::memory_order_relaxed) == 0) trip(i);
+        }
+    }
+
+    void check(std::int64_t period_ns) noexcept {
+        for (std::size_t i = 0; i < input.size(); ++i) {
+            Watched& w = watched_[i];
+            const std::int64_t limit_ns = w.limit_ns.load(std::memory_order_relaxed);
+            w.silent_ns = input[i] == w.level ? w.silent_ns + period_ns : 0;
+            w.level = input[i];
+            if (limit_ns == 0 || w.silent_ns > limit_ns) trip(i);
+        }
+    }
+
+    void trip(std::size_t i) noexcept {
+        if (ok) tripped = static_cast<std::int32_t>(i);
+        ok = false;
+    }
+
     struct Watched {
         std::atomic<std::int64_t> limit_ns{0};  // set-timeouts writes, process reads
         std::int64_t silent_ns = 0;

@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: MIT
+"""The intended differences; see expected.py."""
+from .expected import behaviour, inventory
+
+LINKABLE = "as a read-only parameter it could not be linked; `getp` reads both"
+
+for component, names in {"axistest": "elapsed", "steptest": "elapsed", "carousel": "homing|motor-dir|state|timer", "edge": "last-in|time-left-ns", "mux16": "elapsed|selected",
+                         "mux_generic": "elapsed|selected", "stepgen": "frequency|rawcounts"}.items():
+    inventory(component, names, "output pin", "read-only parameter", LINKABLE)
+inventory("watchdog", "tripped-by", "the number of the input that timed out", "missing", "an addition")
+
+behaviour("wcomp", "out", lambda v: v.invalid("in", "min", "max"), "an input is NaN", "FALSE", "TRUE", "a value that is not a number is not inside a window",
+          ("wcomp", {"wcomp.0.in": [float("nan")], "wcomp.0.min": [-1.0], "wcomp.0.max": [1.0]}, {}))
+behaviour("watchdog", "ok-out", lambda v: not v["enable-in"] or v.cycle == 0 or min(v.all("timeout-0", "timeout-1")) <= 0 or v.invalid("timeout-0", "timeout-1"),
+          "`enable-in` is FALSE; a timeout is 0 or less; the first cycle, before `set-timeouts`", "FALSE",
+          "continues after `enable-in`; TRUE for a cycle", "a watchdog that is off or not configured must not report OK", lasts=True,
+          witness=("watchdog num_inputs=2", {"watchdog.enable-in": [True] * 20 + [False], "watchdog.input-0": [False, True] * 200, "watchdog.input-1": [False, True] * 200},
+                   {"watchdog.timeout-0": 0.01, "watchdog.timeout-1": 0.01}))
+behaviour("updown", "count", lambda v: (v["clamp"] or v["wrap"]) and v["max"] == 2147483647, "counting up at a `max` of 2147483647", "continues at `min`, or stays", "overflows",
+          "an overflow that the limits should prevent", lasts=True,
+          witness=("updown", {"updown.0.countdown": [False, True], "updown.0.countup": [False, False, False, True]}, {"updown.0.wrap": True}))
+behaviour("threadtest", "count", lambda v: True, "`reset` runs after `increment`", "the reset takes effect in the next run of `increment`", "in the same cycle",
+          "each function writes its own memory, so that both may be in different threads", ("threadtest", {}, {}))
+for component in ("steptest", "axistest"):
+    behaviour(component, "run-target", lambda v: True, "always", "the commanded position", "0", "the pin is documented in LinuxCNC, and never written",
+              (component, {f"{component}.0.run": [True], f"{component}.0.amplitude": [1.0]}, {}))
+behaviour("simple_tp", "active|current-pos|current-vel", lambda v: not (v["maxvel"] >= 0 and v["maxaccel"] >= 0) or v.beyond(1e12), "`maxvel` or `maxaccel` is negative or NaN",
+          "counts as 0", "NaN in `current-pos`, or motion away from the target", "a position must not become NaN", lasts=True,
+          witness=("simple_tp", {"simple-tp.0.enable": [True], "simple-tp.0.target-pos": [1.0], "simple-tp.0.maxvel": [1.0], "simple-tp.0.maxaccel": [-1.0]}, {}))
+behaviour("sim_spindle", "position-fb|index-enable", lambda v: v.invalid() or v.beyond(1e18), "the speed is NaN or infinite", "the position is held", "the position becomes NaN", "",
+          ("sim_spindle", {"sim-spindle.0.velocity-cmd": [1.0, float("nan"), 1.0]}, {}), lasts=True)
+behaviour("spindle_monitor", "spindle-underspeed", lambda v: v["spindle-command"] < 0 or v.invalid(), "a negative command; a NaN", "compared in the direction of the command; a NaN is an underspeed",
+          "-110 is an underspeed of -100, and -80 is not", "LinuxCNC's does not detect an underspeed in reverse", lasts=True,
+          witness=("spindle_monitor", {"spindle-monitor.0.spindle-is-on": [True], "spindle-monitor.0.spindle-command": [-100.0], "spindle-monitor.0.spindle-feedback": [-100.0] * 5 + [-80.0]},
+                   {"spindle-monitor.0.threshold": 5.0}))
+behaviour("sim_axis_hardware", "A(maxsw|minsw|bothsw)-homesw-out", lambda v: True, "always", "work", "FALSE", "LinuxCNC's does not write them",
+          ("sim_axis_hardware", {"sim-axis-hardware.0.Acurrent-pos": [1.0]}, {}))
+behaviour("sphereprobe", "probe-out", lambda v: v.beyond(1e9), "coordinates beyond ±1e9 counts", "exact", "differences overflow", "",
+          ("sphereprobe", {"sphereprobe.0.px": [2147483647], "sphereprobe.0.cx": [-2147483648], "sphereprobe.0.r": [5]}, {}))

@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: MIT
+"""The differences from LinuxCNC that are intended, each with its reason. docs/linuxcnc-compatibility.md has them as tables, written by
+`linuxcnc_components.py HAL --write-docs`; a test compares both.
+
+A difference of values is a Behaviour: a condition for the cycles in which it occurs. With `lasts` it remains after the first such cycle, because
+the component keeps something of it. `witness` is a stimulus that shows it: (variant, streams, settings). A stream is a list of values, the last of
+which continues. A Behaviour whose witness shows no difference is out of date, and fails.
+"""
+import re
+from dataclasses import dataclass
+from typing import Callable
+
+from .variants import Variant
+
+
+@dataclass(frozen=True)
+class Behaviour:
+    component: str
+    pins: str                    # a regular expression for the end of the name
+    when: Callable               # of a View
+    condition: str               # the same in words
+    ours: str
+    linuxcnc: str
+    why: str
+    witness: tuple
+    lasts: bool = False
+    versions: tuple = ("2.9", "2.10")
+
+    def concerns(self, component, name):
+        return component == self.component and re.search(rf"(?:^|\.)(?:{self.pins})$", name) is not None
+
+    def remaining(self, view, difference):
+        """What of the difference this behaviour does not explain, or None."""
+        if not self.lasts:
+            return difference.without(lambda cycle: bool(self.when(view.at(cycle))))
+        begin = next((cycle for cycle in range(difference.cycles[-1] + 1) if self.when(view.at(cycle))), None)
+        return difference if begin is None else difference.without(lambda cycle: cycle >= begin)
+
+
+@dataclass(frozen=True)
+class InInventory:
+    component: str
+    names: str                   # a regular expression for the end of the name
+    ours: str
+    linuxcnc: str
+    why: str
+    versions: tuple = ("2.9", "2.10")
+
+    def concerns(self, component, name):
+        return component == self.component and re.search(rf"(?:^|\.)(?:{self.names})$", name) is not None
+
+
+# Components whose outputs depend on the time of day, or on records of other programs: only their inventory is compared.
+INVENTORY_ONLY = {
+    "latencybins": "measures the computer's clock, which is simulated here",
+    "timedelta": "measures the computer's clock, which is simulated here",
+    "sampler": "its records are compared by tests/peers/linuxcnc_components/streams.py",
+    "streamer": "its records are compared by tests/peers/linuxcnc_components/streams.py",
+    "message": "prints",
+}
+
+# Components of which 2.10's behaviour is ours: what is newer.
+NEWER = {}
+# The version whose inventory inventory.json has for a component, if it is not 2.9.
+NEWER_FACTS = {}
+
+INVENTORY = []
+BEHAVIOURS = []
+
+
+def behaviour(component, pins, when, condition, ours, linuxcnc, why, witness, **more):
+    variant, streams, settings = witness
+    BEHAVIOURS.append(Behaviour(component, pins, when, condition, ours, linuxcnc, why, (Variant(*variant.split(" ", 1)), streams, settings), **more))
+
+
+def inventory(component, names, ours, linuxcnc, why, **more):
+    INVENTORY.append(InInventory(component, names, ours, linuxcnc, why, **more))
