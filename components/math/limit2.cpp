@@ -24,11 +24,12 @@ struct Limit2 : hal::Component {
     }
 
 private:
-    // Limits `value`, with max last. NaN if one of the three is NaN or the value is infinite.
+    // Limits `value`, to min first. NaN if one of the three is NaN or the value is infinite.
     double limited(double value) const noexcept {
         const double low = min, high = max;
         if (!std::isfinite(value) || std::isnan(low) || std::isnan(high)) return NAN;
-        return std::min(std::max(value, low), high);
+        if (value < low) return low;
+        return std::min(value, high);
     }
     double state_ = 0.0;
 };
@@ -37,8 +38,8 @@ private:
 
 HAL_COMPONENT(Limit2, "limit2", "Follows a value within limits of position and speed", R"(
 `out` starts at 0 and moves to `in`, limited to `min` and `max`, by at most `maxv` per second. `load` sets it to `in` immediately. While the
-input or a limit is NaN or infinite, `out` keeps its value; it also does while `maxv` is not above 0. If `min` is above `max`,
-`max` applies.
+input or a limit is NaN or infinite, `out` keeps its value; it also does while `maxv` is not above 0. If `min` is above `max`, a value
+below `min` gives `min` and any other one `max`.
 
     loadrt limit2 names=spindle-ramp
     addf spindle-ramp servo

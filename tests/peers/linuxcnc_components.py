@@ -143,7 +143,7 @@ class Comparison:
         ours, theirs, _ = self.inventories(variant)
         inputs = stimulus.Stimulus("witness", f"witness of {entry.component} {entry.pins}")
         inputs.streams = {name: (values + [values[-1]] * WITNESS_CYCLES)[:WITNESS_CYCLES] for name, values in streams.items()}
-        inputs.settings = [settings]
+        inputs.settings = settings if isinstance(settings, list) else [settings]
         lines, seen = self.run(variant, common(ours, theirs), inputs, WITNESS_CYCLES)
         if id(entry) not in seen:
             lines.append(f"{entry.component} | {entry.pins} | {entry.condition}: no difference; remove the entry")

@@ -7,6 +7,7 @@ LINKABLE = "as a read-only parameter it could not be linked; `getp` reads both"
 for component, names in {"axistest": "elapsed", "steptest": "elapsed", "carousel": "homing|motor-dir|state|timer", "edge": "last-in|time-left-ns", "mux16": "elapsed|selected",
                          "mux_generic": "elapsed|selected", "stepgen": "frequency|rawcounts"}.items():
     inventory(component, names, "output pin", "read-only parameter", LINKABLE)
+inventory("lowpass", "gain", "input pin", "writable parameter", "as a parameter it could not be linked; `setp` sets both")
 inventory("watchdog", "tripped-by", "the number of the input that timed out", "missing", "an addition")
 
 behaviour("wcomp", "out", lambda v: v.invalid("in", "min", "max"), "an input is NaN", "FALSE", "TRUE", "a value that is not a number is not inside a window",
@@ -37,3 +38,25 @@ behaviour("sim_axis_hardware", "A(maxsw|minsw|bothsw)-homesw-out", lambda v: Tru
           ("sim_axis_hardware", {"sim-axis-hardware.0.Acurrent-pos": [1.0]}, {}))
 behaviour("sphereprobe", "probe-out", lambda v: v.beyond(1e9), "coordinates beyond ±1e9 counts", "exact", "differences overflow", "",
           ("sphereprobe", {"sphereprobe.0.px": [2147483647], "sphereprobe.0.cx": [-2147483648], "sphereprobe.0.r": [5]}, {}))
+behaviour("ohmic", "ohmic-on|ohmic-volts|thcad-volts|arc-on", lambda v: v["thcad-max-volt-freq"] == v["thcad-0-volt-freq"] or v["thcad-divide"] == 0 or v["thcad-fullscale"] == 0 or v.beyond(1e12),
+          "the two frequencies are equal, as before they are set; a divisor is 0; a NaN", "voltages are 0", "infinite or NaN", "a voltage must not become NaN", lasts=True,
+          witness=("ohmic", {"ohmic.0.velocity-in": [100.0]}, {}))
+behaviour("ohmic", "ohmic-on", lambda v: v["is-probing"], "probing", "compares with `ohmic-threshold`", "compares with 1", "2.10's; its documentation is the same", lasts=True, versions=("2.9",),
+          witness=("ohmic", {"ohmic.0.is-probing": [True], "ohmic.0.velocity-in": [300.0], "ohmic.0.thcad-max-volt-freq": [900.0], "ohmic.0.thcad-divide": [1.0]}, {}))
+behaviour("multiclick", ".*-click|.*-click-only", lambda v: v["output-hold-ns"] == 0, "`output-hold-ns` is 0", "a pulse of one cycle", "the output remains TRUE", "a pulse has an end", lasts=True,
+          witness=("multiclick", {"multiclick.0.in": [False, True, True, False]}, {"multiclick.0.output-hold-ns": 0}))
+behaviour("limit2", "out", lambda v: not v["maxv"] >= 0 or v.beyond(1e18, "in", "max", "min", "maxv"), "`maxv` is negative; an input is NaN or infinite", "the output is held",
+          "moves away from the input; NaN", "a limit must hold", lasts=True, witness=("limit2", {"limit2.0.in": [1.0], "limit2.0.maxv": [-10.0]}, {}))
+behaviour("lincurve", "out|out-io", lambda v: v.invalid() or any(b < a for a, b in zip(v.all("x-val-00", "x-val-01", "x-val-02"), v.all("x-val-01", "x-val-02", "x-val-03"))),
+          "`in` is NaN; the points are not in ascending order", "the output is held; each pair of points is a segment", "NaN; depends on earlier inputs, and reads beyond the points", "", lasts=True,
+          witness=("lincurve personality=4", {"lincurve.0.in": [float("nan")]}, {"lincurve.0.x-val-03": 1.0, "lincurve.0.y-val-00": 2.0}))
+behaviour("modmath", "up|down|on-target", lambda v: v.beyond(1e9) or v["max-num"] < v["min-num"], "positions beyond ±1e9; `max-num` is below `min-num`", "computed in 64 bits", "overflows; divides by 0", "", lasts=True,
+          witness=("modmath mod_dir=1", {"mod-dir.0.actual": [1], "mod-dir.0.desired": [-1]}, {"mod-dir.0.max-num": 2147483647, "mod-dir.0.min-num": -100}))
+behaviour("histobins", "mean|variance", lambda v: True, "always", "include the first value", "divide by its number, and leave it out of the sum", "a wrong mean",
+          ("histobins", {"histobins.0.input": [2.0]}, {}))
+behaviour("histobins", ".*", lambda v: not v["binsize"] > 0 or v.invalid(), "`binsize` is not above 0; a value is NaN or infinite", "`input-error`, and the outputs are held", "writes outside of its memory", "",
+          lasts=True, witness=("histobins", {"histobins.0.binsize": [-1.0], "histobins.0.input": [2.0]}, {}))
+behaviour("lowpass", "out", lambda v: v.invalid(), "an input is NaN or infinite", "the cycle is skipped", "the output is NaN for ever", "", lasts=True,
+          witness=("lowpass", {"lowpass.0.in": [1.0, float("nan"), 1.0]}, {"lowpass.0.gain": 0.5}))
+behaviour("ilowpass", "out", lambda v: v.invalid() or v.beyond(1e100), "`gain` or `scale` is NaN or infinite", "the cycle is skipped", "0 for ever", "", lasts=True,
+          witness=("ilowpass", {"ilowpass.0.in": [5]}, [{}, {"ilowpass.0.gain": float("nan")}]))

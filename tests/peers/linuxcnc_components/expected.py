@@ -60,7 +60,11 @@ INVENTORY_ONLY = {
 }
 
 # Components of which 2.10's behaviour is ours: what is newer.
-NEWER = {}
+NEWER = {
+    "encoder": "a reset while latching", "eoffset_per_angle": "double precision", "filter_kalman": "double precision", "gantry": "double precision", "thc": "double precision",
+    "integ": "`reset`", "limit3": "the default of `maxa`", "ohmic": "`ohmic-on` compares with `ohmic-threshold`", "thcud": "`correction-vel` is a pin, `cur-offset` works",
+    "toggle2nist": "debounced, on and off have their edges",
+}
 # The version whose inventory inventory.json has for a component, if it is not 2.9.
 NEWER_FACTS = {}
 
