@@ -194,12 +194,13 @@ def compare_components(options, names):
 
 
 def compare_netlists(options):
-    linuxcnc, lines = halrun.HalrunRunner(), []
+    linuxcnc, lines, accepted = halrun.HalrunRunner(), [], set()
     for number in range(options.netlists):
-        found = netlists.compare(options.hal, linuxcnc, f"{options.seed}.{number}")
+        found = netlists.compare(options.hal, linuxcnc, f"{options.seed}.{number}", accepted)
         lines += found
         for line in found:
             print(line, flush=True)
+    print(f"{options.netlists} netlists; accepted: {'; '.join(sorted(accepted)) or 'none'}")
     return lines
 
 

@@ -62,7 +62,7 @@ INVENTORY_ONLY = {
 # Components of which 2.10's behaviour is ours: what is newer.
 NEWER = {
     "encoder": "a reset while latching", "eoffset_per_angle": "double precision", "filter_kalman": "double precision", "gantry": "double precision", "thc": "double precision",
-    "integ": "`reset`", "limit3": "the default of `maxa`", "ohmic": "`ohmic-on` compares with `ohmic-threshold`", "thcud": "`correction-vel` is a pin, `cur-offset` works",
+    "integ": "`reset`", "thcud": "`correction-vel` is a pin, `cur-offset` works",
     "toggle2nist": "debounced, on and off have their edges",
 }
 # The version whose inventory inventory.json has for a component, if it is not 2.9.
