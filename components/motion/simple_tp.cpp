@@ -29,7 +29,7 @@ struct SimpleTp : hal::Component {
         const double wanted = std::copysign(std::min(speed, at_least_0(max_velocity)), distance);
         const double slowest = velocity - change;
         const double fastest = velocity + change;
-        velocity = std::clamp(wanted, slowest, fastest);
+        velocity = std::clamp(wanted, slowest, fastest) + 0.0;  // never -0
         position = position + velocity * dt;
         active = going || velocity != 0.0;
     }

@@ -23,6 +23,7 @@ HOLD = {"plain": [1, 2, 5, 20, 100, 300], "edges": [1, 2, 3, 7, 40, 200], "wild"
 # Values with which a component does what it is for: (component, end of the name): values, in every class.
 USEFUL = {
     ("histobins", "binsize"): [0.1, 1.0, 5.0], ("histobins", "nbins"): [4, 20, 200], ("histobins", "pintype"): [0, 1, 2, 3],
+    ("lcd", "page_num"): [0],
     ("limit2", "maxv"): [1.0, 50.0, 0.1], ("limit3", "maxv"): [1.0, 50.0], ("limit3", "maxa"): [10.0, 500.0],
     ("ohmic", "thcad-0-volt-freq"): [121.0, 140000.0], ("ohmic", "thcad-max-volt-freq"): [925.0, 920000.0], ("ohmic", "thcad-fullscale"): [5.0, 10.0, 300.0],
     ("ohmic", "thcad-divide"): [1.0, 32.0], ("ohmic", "velocity-in"): [121.0, 500.0, 10000.0, 925.0, 100.0],
