@@ -60,3 +60,56 @@ behaviour("lowpass", "out", lambda v: v.invalid(), "an input is NaN or infinite"
           witness=("lowpass", {"lowpass.0.in": [1.0, float("nan"), 1.0]}, {"lowpass.0.gain": 0.5}))
 behaviour("ilowpass", "out", lambda v: v.invalid() or v.beyond(1e100), "`gain` or `scale` is NaN or infinite", "the cycle is skipped", "0 for ever", "", lasts=True,
           witness=("ilowpass", {"ilowpass.0.in": [5]}, [{}, {"ilowpass.0.gain": float("nan")}]))
+
+ROUNDED = "the constants of the formula have eight digits"
+SATURATED = "a conversion keeps the sign of the value and its order"
+HELD = "an output must not become NaN"
+
+for component, pins in {"clarkeinv": "a|b|c", "clarke2": "y", "clarke3": "y", "siggen": "sine|cosine", "spindle": "output"}.items():
+    behaviour(component, pins, lambda v: True, "always", "double precision", "differs from the eighth digit on", "", (component + (" num_chan=1" if component == "siggen" else ""), "wild"),
+              within=1e-4 if component == "siggen" else 2e-6 if component.startswith("clarke") else 1e-7, lasts=True)
+behaviour("comp", "equal|out", lambda v: v.invalid(), "an input is NaN", "FALSE", "`equal` is TRUE", "a NaN is not equal to a number", ("comp", "wild"), lasts=True)
+for component, pins in {"scaled_s32_sums": "out-s", "mux16": "out-s"}.items():
+    behaviour(component, pins, lambda v: v.beyond(1e6), "the value is beyond the range of s32, or NaN", "limited to the range; 0 for NaN", "-2147483648", SATURATED, (component, "wild"))
+behaviour("hypot", "out", lambda v: v.beyond(1e150), "an input is beyond 1e150", "exact", "infinite", "", ("hypot", "wild"))
+behaviour("minmax", "max|min", lambda v: v.invalid(), "`in` is NaN during `reset`", "the cycle is skipped", "NaN until the next reset", HELD, ("minmax", "wild"), lasts=True)
+behaviour("orient", "command|poserr|is-oriented", lambda v: v.invalid() or v.beyond(1e9), "an input is NaN or infinite", "`command` is held", "`command` is NaN or infinite", HELD, ("orient", "wild"), lasts=True)
+behaviour("ddt", "out", lambda v: v.invalid(), "`in` is NaN or infinite", "0", "NaN", HELD, ("ddt", "wild"), lasts=True)
+behaviour("lcd", "out", lambda v: True, "always", "the same text", "control characters in another order", "the display shows the same", ("lcd fmt_strings=%d", "plain"))
+behaviour("toggle2nist", "on|off", lambda v: True, "a request that `is-on` does not follow at once", "lasts `max-pulse-length` cycles", "ends at any time: its time runs while there is no request",
+          "a request of one cycle may be missed", ("toggle2nist", "plain"), lasts=True)
+inventory("toggle2nist", "debounce|max-pulse-length", "input pins of 2.10", "missing", "newer", versions=("2.9",))
+behaviour("thcud", "vel-status", lambda v: not v["enable"], "`enable` is FALSE", "FALSE", "keeps its value", "the pin reports a state of the control, which is off", ("thcud", "plain"), lasts=True)
+behaviour("thc", "vel-status", lambda v: not v["enable"], "`enable` is FALSE", "FALSE", "keeps its value", "the pin reports a state of the control, which is off", ("thc", "plain"), lasts=True)
+
+behaviour("biquad", ".*", lambda v: not v["f0"] > 0 or not v["Q"] > 0 or v.invalid() or v.beyond(1e12), "`f0` is 0 or below; a NaN", "`valid` is FALSE, `out` recovers", "the filter diverges",
+          HELD, ("biquad", "edges"), lasts=True)
+behaviour("siggen", "clock|square|sawtooth|triangle|sine|cosine", lambda v: v["frequency"] < 0 or v.invalid() or v.beyond(1e12), "a negative frequency; a NaN", "the waves run backwards; the phase is held",
+          "`sawtooth` and `triangle` leave their range; NaN for ever", "", ("siggen num_chan=1", "plain"), lasts=True)
+behaviour("spindle", ".*", lambda v: True, "always", "`brake` is set, `reverse` lasts until the spindle stops", "`brake` is always FALSE, `reverse` ends at once", "as documented", ("spindle", "plain"), lasts=True)
+behaviour("thc", "offset-value|z-pos-out|z-fb-out", lambda v: True, "`enable` or `torch-on` becomes FALSE; one cycle", "the correction is removed as documented", "removed in one cycle, or returned at once; `offset-value` is a cycle late",
+          "the torch must not jump", ("thc", "edges"), lasts=True)
+behaviour("thcud", "cur-offset|z-pos-out|z-fb-out|removing-offset", lambda v: True, "`enable` or `torch-on` becomes FALSE", "the correction is removed as documented", "removed in one cycle; `cur-offset` is 0 (2.9)",
+          "the torch must not jump", ("thcud", "plain"), lasts=True)
+behaviour("carousel", ".*", lambda v: True, "always", "states with other numbers; `enable` FALSE stops at once", "with `rev-pulse`, `decel-time` and `align-dc`, as at the pocket", "a stop is a stop",
+          ("carousel", "plain"), lasts=True)
+behaviour("anglejog", ".*", lambda v: True, "braking, angles in other quadrants", "acceleration fractions are positive; goes on braking", "with the sign of cosine and sine; the speed is held until the wheel turns",
+          "the motion controller takes a negative fraction as 1", ("anglejog", "plain"), lasts=True)
+behaviour("eoffset_per_angle", ".*", lambda v: True, "negative angles; the machine is switched off", "the same shape; `clear` becomes FALSE", "another shape; `clear` remains", "", ("eoffset_per_angle", "plain"), lasts=True)
+behaviour("gantry", "home|position-fb|joint.*", lambda v: True, "more than two joints; the first command", "`home` waits for all joints; the first command is not a motion", "not for the last ones; from 0", "",
+          ("gantry personality=3", "edges"), lasts=True)
+behaviour("sim_encoder", "phase-.", lambda v: True, "more than a quarter of a turn per cycle", "turns forward", "turns backwards", "", ("sim_encoder num_chan=1", "edges"), lasts=True)
+inventory("sim_encoder", "rawcounts", "output pin", "input pin", "the component writes it")
+behaviour("counter", "rawcounts|counts|position|velocity", lambda v: True, "`phase-A` is TRUE in the first cycle", "counting starts there", "an edge", "", ("counter num_chan=1", "plain"), lasts=True)
+behaviour("feedcomp", "out", lambda v: v["feed"] == 0 or v.invalid() or v.beyond(1e100), "`feed` is 0", "`in`", "infinite or NaN", HELD, ("feedcomp", "plain"))
+behaviour("integ", "out", lambda v: v.invalid() or v.beyond(1e18, "in", "gain"), "an input is NaN or infinite", "the cycle is skipped", "NaN for ever", HELD, ("integ", "wild"), lasts=True)
+behaviour("demux", "out-31", lambda v: v["bargraph"] or v.beyond(2147480000, "sel-u32"), "a bar of all outputs", "all TRUE", "the last output is FALSE", "a bar could not be full", ("demux", "edges"))
+behaviour("demux", "out-.*", lambda v: v.beyond(2147480000, "sel-u32"), "`sel-u32` beyond 2147483647", "the last output", "none, the sum is negative", "", ("demux", "wild"))
+behaviour("encoder_ratio", "error", lambda v: True, "`ppr` or teeth change, or are 0", "apply to all counts since the start; 0 disables that axis", "apply to later counts; the error is held", "",
+          ("encoder_ratio num_chan=1", "plain"), lasts=True)
+behaviour("filter_kalman", "xk-out", lambda v: v["Rk"] < 0 or v["Qk"] < 0 or v.invalid() or v.beyond(1e12), "`Rk` or `Qk` is negative; a NaN", "counts as 0; is ignored", "the estimate diverges", "", ("filter_kalman", "edges"),
+          lasts=True)
+behaviour("timedelay", "out|elapsed", lambda v: v.invalid(), "a delay is NaN", "counts as 0", "`out` never changes", "", ("timedelay", "wild"), lasts=True)
+behaviour("knob2float", "out", lambda v: v.beyond(1e9) or v.invalid(), "counts that wrap around; a NaN", "the difference in 32 bits", "overflows", "", ("knob2float", "wild"), lasts=True)
+inventory("carousel", "debounce", "writable", "read-only", "a time that is set by the user")
+behaviour("sim_encoder", "scale", lambda v: v["scale"] == 0, "`scale` is 0", "1", "-0 remains", "", ("sim_encoder num_chan=1", {}, {"sim-encoder.0.scale": -0.0}))

@@ -65,11 +65,14 @@ class SimRunner:
         flag = "" if self.plugins else f"--{self.source} "
         return f"loadrt {flag}{variant}"
 
-    def sim(self, folder, text, timeout=120):
+    def sim(self, folder, text, timeout=60):
         file = Path(folder, "run.hal")
         file.write_text(text)
-        return subprocess.run([self.hal, "sim", "--quiet", str(file)], env=self.environment(), cwd=folder, stdin=subprocess.DEVNULL,
-                              capture_output=True, text=True, errors="replace", timeout=timeout, check=False)
+        try:
+            return subprocess.run([self.hal, "sim", "--quiet", str(file)], env=self.environment(), cwd=folder, stdin=subprocess.DEVNULL,
+                                  capture_output=True, text=True, errors="replace", timeout=timeout, check=False)
+        except subprocess.TimeoutExpired as error:
+            raise RunError(f"a function hangs: {error}") from error
 
     def inventory(self, variant):
         with tempfile.TemporaryDirectory() as folder:

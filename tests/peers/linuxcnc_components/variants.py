@@ -20,6 +20,7 @@ class Variant:
 
 # Components that do nothing, or do not load in LinuxCNC, without arguments; and those whose arguments select a behaviour.
 ARGUMENTS = {
+    "bldc": ["cfg=h", "cfg=q", "cfg=ai", "cfg=n"],
     "bitslice": ["personality=8", "personality=16"],
     "debounce": ["cfg=1", "cfg=2,3"],
     "demux_generic": ["config=bb2", "config=ff3", "config=ss4,uu2"],
