@@ -125,7 +125,7 @@ class Comparison:
             ours, theirs, lines = self.inventories(variant)
         except RunError as error:
             return [f"{variant} | load | {error}"]
-        if variant.component in expected.INVENTORY_ONLY or variant.component in expected.BY_FEATURE:
+        if variant.component in expected.INVENTORY_ONLY or variant.component in expected.UNLIKE:
             return lines
         both = common(ours, theirs)
         for kind in options.classes:

@@ -24,7 +24,8 @@ def text():
                    sorted({(e.component, names(e.names), e.ours, e.linuxcnc + ("" if len(e.versions) == 2 else f" ({e.versions[0]} only)"), e.why) for e in expected.INVENTORY}))
     lines += ["", "Compared by their pins only:", ""]
     lines += table(("component", "why"), sorted(expected.INVENTORY_ONLY.items()))
-    lines += ["", "Compared [by feature](#our-components-compared-with-linuxcncs): " + ", ".join(expected.BY_FEATURE) + "."]
+    lines += ["", "Compared by their pins only, because they follow another law on purpose:", ""]
+    lines += table(("component", "what differs"), sorted(expected.UNLIKE.items()))
     lines += ["", "2.10 differs from 2.9, and ours is 2.10's:", ""]
     lines += table(("component", "what is newer"), sorted(expected.NEWER.items()))
     return "\n".join(lines)

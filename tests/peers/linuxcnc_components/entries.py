@@ -65,9 +65,9 @@ ROUNDED = "the constants of the formula have eight digits"
 SATURATED = "a conversion keeps the sign of the value and its order"
 HELD = "an output must not become NaN"
 
-for component, pins in {"clarkeinv": "a|b|c", "clarke2": "y", "clarke3": "y", "siggen": "sine|cosine", "spindle": "output"}.items():
+for component, pins in {"clarke2": "y", "clarke3": "y", "siggen": "sine|cosine", "spindle": "output|spindle-rpm|spindle-rpm-abs"}.items():
     behaviour(component, pins, lambda v: True, "always", "double precision", "differs from the eighth digit on", "", (component + (" num_chan=1" if component == "siggen" else ""), "wild"),
-              within=1e-4 if component == "siggen" else 2e-6 if component.startswith("clarke") else 1e-7, lasts=True)
+              within={"siggen": 1e-4}.get(component, 1e-5), lasts=True)
 behaviour("comp", "equal|out", lambda v: v.invalid(), "an input is NaN", "FALSE", "`equal` is TRUE", "a NaN is not equal to a number", ("comp", "wild"), lasts=True)
 for component, pins in {"scaled_s32_sums": "out-s", "mux16": "out-s"}.items():
     behaviour(component, pins, lambda v: v.beyond(1e6), "the value is beyond the range of s32, or NaN", "limited to the range; 0 for NaN", "-2147483648", SATURATED, (component, "wild"))
@@ -76,8 +76,6 @@ behaviour("minmax", "max|min", lambda v: v.invalid(), "`in` is NaN during `reset
 behaviour("orient", "command|poserr|is-oriented", lambda v: v.invalid() or v.beyond(1e9), "an input is NaN or infinite", "`command` is held", "`command` is NaN or infinite", HELD, ("orient", "wild"), lasts=True)
 behaviour("ddt", "out", lambda v: v.invalid(), "`in` is NaN or infinite", "0", "NaN", HELD, ("ddt", "wild"), lasts=True)
 behaviour("lcd", "out", lambda v: True, "always", "the same text", "control characters in another order", "the display shows the same", ("lcd fmt_strings=%d", "plain"))
-behaviour("toggle2nist", "on|off", lambda v: True, "a request that `is-on` does not follow at once", "lasts `max-pulse-length` cycles", "ends at any time: its time runs while there is no request",
-          "a request of one cycle may be missed", ("toggle2nist", "plain"), lasts=True)
 inventory("toggle2nist", "debounce|max-pulse-length", "input pins of 2.10", "missing", "newer", versions=("2.9",))
 behaviour("thcud", "vel-status", lambda v: not v["enable"], "`enable` is FALSE", "FALSE", "keeps its value", "the pin reports a state of the control, which is off", ("thcud", "plain"), lasts=True)
 behaviour("thc", "vel-status", lambda v: not v["enable"], "`enable` is FALSE", "FALSE", "keeps its value", "the pin reports a state of the control, which is off", ("thc", "plain"), lasts=True)
@@ -86,30 +84,58 @@ behaviour("biquad", ".*", lambda v: not v["f0"] > 0 or not v["Q"] > 0 or v.inval
           HELD, ("biquad", "edges"), lasts=True)
 behaviour("siggen", "clock|square|sawtooth|triangle|sine|cosine", lambda v: v["frequency"] < 0 or v.invalid() or v.beyond(1e12), "a negative frequency; a NaN", "the waves run backwards; the phase is held",
           "`sawtooth` and `triangle` leave their range; NaN for ever", "", ("siggen num_chan=1", "plain"), lasts=True)
-behaviour("spindle", ".*", lambda v: True, "always", "`brake` is set, `reverse` lasts until the spindle stops", "`brake` is always FALSE, `reverse` ends at once", "as documented", ("spindle", "plain"), lasts=True)
-behaviour("thc", "offset-value|z-pos-out|z-fb-out", lambda v: True, "`enable` or `torch-on` becomes FALSE; one cycle", "the correction is removed as documented", "removed in one cycle, or returned at once; `offset-value` is a cycle late",
-          "the torch must not jump", ("thc", "edges"), lasts=True)
-behaviour("thcud", "cur-offset|z-pos-out|z-fb-out|removing-offset", lambda v: True, "`enable` or `torch-on` becomes FALSE", "the correction is removed as documented", "removed in one cycle; `cur-offset` is 0 (2.9)",
-          "the torch must not jump", ("thcud", "plain"), lasts=True)
-behaviour("carousel", ".*", lambda v: True, "always", "states with other numbers; `enable` FALSE stops at once", "with `rev-pulse`, `decel-time` and `align-dc`, as at the pocket", "a stop is a stop",
-          ("carousel", "plain"), lasts=True)
-behaviour("anglejog", ".*", lambda v: True, "braking, angles in other quadrants", "acceleration fractions are positive; goes on braking", "with the sign of cosine and sine; the speed is held until the wheel turns",
-          "the motion controller takes a negative fraction as 1", ("anglejog", "plain"), lasts=True)
-behaviour("eoffset_per_angle", ".*", lambda v: True, "negative angles; the machine is switched off", "the same shape; `clear` becomes FALSE", "another shape; `clear` remains", "", ("eoffset_per_angle", "plain"), lasts=True)
-behaviour("gantry", "home|position-fb|joint.*", lambda v: True, "more than two joints; the first command", "`home` waits for all joints; the first command is not a motion", "not for the last ones; from 0", "",
-          ("gantry personality=3", "edges"), lasts=True)
-behaviour("sim_encoder", "phase-.", lambda v: True, "more than a quarter of a turn per cycle", "turns forward", "turns backwards", "", ("sim_encoder num_chan=1", "edges"), lasts=True)
 inventory("sim_encoder", "rawcounts", "output pin", "input pin", "the component writes it")
-behaviour("counter", "rawcounts|counts|position|velocity", lambda v: True, "`phase-A` is TRUE in the first cycle", "counting starts there", "an edge", "", ("counter num_chan=1", "plain"), lasts=True)
 behaviour("feedcomp", "out", lambda v: v["feed"] == 0 or v.invalid() or v.beyond(1e100), "`feed` is 0", "`in`", "infinite or NaN", HELD, ("feedcomp", "plain"))
 behaviour("integ", "out", lambda v: v.invalid() or v.beyond(1e18, "in", "gain"), "an input is NaN or infinite", "the cycle is skipped", "NaN for ever", HELD, ("integ", "wild"), lasts=True)
 behaviour("demux", "out-31", lambda v: v["bargraph"] or v.beyond(2147480000, "sel-u32"), "a bar of all outputs", "all TRUE", "the last output is FALSE", "a bar could not be full", ("demux", "edges"))
 behaviour("demux", "out-.*", lambda v: v.beyond(2147480000, "sel-u32"), "`sel-u32` beyond 2147483647", "the last output", "none, the sum is negative", "", ("demux", "wild"))
-behaviour("encoder_ratio", "error", lambda v: True, "`ppr` or teeth change, or are 0", "apply to all counts since the start; 0 disables that axis", "apply to later counts; the error is held", "",
-          ("encoder_ratio num_chan=1", "plain"), lasts=True)
 behaviour("filter_kalman", "xk-out", lambda v: v["Rk"] < 0 or v["Qk"] < 0 or v.invalid() or v.beyond(1e12), "`Rk` or `Qk` is negative; a NaN", "counts as 0; is ignored", "the estimate diverges", "", ("filter_kalman", "edges"),
           lasts=True)
 behaviour("timedelay", "out|elapsed", lambda v: v.invalid(), "a delay is NaN", "counts as 0", "`out` never changes", "", ("timedelay", "wild"), lasts=True)
 behaviour("knob2float", "out", lambda v: v.beyond(1e9) or v.invalid(), "counts that wrap around; a NaN", "the difference in 32 bits", "overflows", "", ("knob2float", "wild"), lasts=True)
 inventory("carousel", "debounce", "writable", "read-only", "a time that is set by the user")
 behaviour("sim_encoder", "scale", lambda v: v["scale"] == 0, "`scale` is 0", "1", "-0 remains", "", ("sim_encoder num_chan=1", {}, {"sim-encoder.0.scale": -0.0}))
+behaviour("clarkeinv", "a|b|c", lambda v: True, "always", "whole turns of `theta` are removed first, and the constants are exact", "2 pi has ten digits", "", ("clarkeinv", "plain"), within=1e-3)
+behaviour("clarkeinv", "a|b|c", lambda v: v.beyond(1e5), "inputs beyond 1e5; a NaN", "as above", "the angle has no digits left", "", ("clarkeinv", "wild"))
+for component in ("clarke2", "clarke3"):
+    behaviour(component, "x|y|h", lambda v: v.beyond(1e9), "inputs beyond 1e9; a NaN", "another order of the sum", "", "", (component, "wild"))
+behaviour("abs", "sign", lambda v: v.invalid(), "`in` is NaN", "FALSE", "TRUE", "", ("abs", "wild"))
+behaviour("abs_s32", "out", lambda v: v["in"] == -2147483648, "-2147483648", "2147483647", "-2147483648", "an absolute value is not negative", ("abs_s32", "wild"))
+behaviour("conv_float_s32", "out|out-of-range", lambda v: v.beyond(1e15), "beyond 2^63; a NaN", "wraps around; 0 for NaN", "-2147483648 or 0", SATURATED, ("conv_float_s32", "wild"), lasts=True)
+behaviour("conv_float_s32", "out", lambda v: v.beyond(2147483647), "beyond the range of s32", "wraps around, as documented", "-2147483648", "", ("conv_float_s32", "wild"), lasts=True)
+behaviour("conv_float_u32", "out|out-of-range", lambda v: v.beyond(2147483647) or v["in"] < 0, "beyond 2147483647; a NaN; negative", "wraps around, or with `clamp` is limited to the range", "0, or 2147483647 with `clamp`", SATURATED,
+          ("conv_float_u32", "wild"), lasts=True)
+behaviour("conv_s32_u32", "out-of-range", lambda v: v["in"] < 0, "a negative value", "TRUE", "FALSE", "a value that wraps around is out of range", ("conv_s32_u32", "edges"), lasts=True)
+behaviour("conv_u32_s32", "out-of-range", lambda v: v["in"] > 2147483647, "beyond 2147483647", "TRUE", "FALSE", "a value that wraps around is out of range", ("conv_u32_s32", "wild"), lasts=True)
+behaviour("joyhandle", "out", lambda v: v["inverse"] and v["in"] < 0 or v.invalid() or v.beyond(1e6), "`inverse`, and `in` is negative; a NaN; `power` beyond 1e3", "the curve has the same shape on both sides", "another shape: minus three times `offset`",
+          "", ("joyhandle", "wild"))
+behaviour("multiswitch", "bit-.*|position", lambda v: v["top-position"] > 2147483647, "`top-position` beyond 2147483647", "0 is the first position", "-1 is a position", "", ("multiswitch personality=3", "wild"), lasts=True)
+behaviour("mux_generic", "out-.*", lambda v: v.beyond(2147483647), "`sel-int` beyond the number of inputs; a value beyond the range", "the last input; limited", "reads beyond its inputs, or crashes", "", ("mux_generic config=su4", "wild"),
+          lasts=True)
+for names in ("in-type|out-type|offset-measured",):
+    inventory("bldc", names, "output pin", "read-only parameter", LINKABLE)
+inventory("thcud", "correction-vel", "input pin", "parameter", "2.10's", versions=("2.9",))
+behaviour("spindle", "brake", lambda v: True, "always", "as documented", "FALSE", "", ("spindle", "plain"))
+behaviour("spindle", "reverse", lambda v: not v["enable"] or v.changed("commanded-speed", "enable"), "a spindle that turns backwards decelerates", "TRUE until it stops", "becomes FALSE at once", "the spindle must not coast",
+          ("spindle", "plain"), lasts=True)
+behaviour("spindle", ".*", lambda v: v["select-gear"] > 0 or v.invalid() or v.beyond(1e9), "`select-gear` beyond the last gear; a NaN", "the last gear; counts as 0", "reads pins that do not exist; NaN for ever", "", ("spindle", "wild"), lasts=True)
+behaviour("thc", "offset-value|z-pos-out|z-fb-out", lambda v: not v["enable"] or not v["torch-on"] or v.invalid(), "`enable` or `torch-on` is FALSE", "the correction is removed as documented", "removed in one cycle, or returned at once",
+          "the torch must not jump", ("thc", "edges"), lasts=True)
+behaviour("thcud", "cur-offset|z-pos-out|z-fb-out|removing-offset", lambda v: not v["enable"] or not v["torch-on"] or v.invalid(), "`enable` or `torch-on` is FALSE", "the correction is removed as documented", "removed in one cycle",
+          "the torch must not jump", ("thcud", "plain"), lasts=True)
+behaviour("thcud", "cur-offset", lambda v: True, "always", "the correction", "0", "2.10's", ("thcud", "edges"), versions=("2.9",))
+behaviour("eoffset_per_angle", ".*", lambda v: v["angle"] < 0 or not v["is-on"] or v.invalid() or v.beyond(1e9), "a negative angle; the machine is switched off; a NaN", "the same shape; `clear` becomes FALSE", "another shape; `clear` remains", "",
+          ("eoffset_per_angle", "plain"), lasts=True)
+behaviour("gantry", "home|position-fb|joint.*", lambda v: v.has("joint.02.home"), "more than two joints", "`home` waits for all joints", "not for the last ones", "a gantry is at home when all its joints are", ("gantry personality=3", "edges"), lasts=True)
+behaviour("gantry", ".*", lambda v: v.invalid() or v.beyond(1e9), "a NaN or infinite input", "is ignored", "NaN for ever", "", ("gantry personality=2", "wild"), lasts=True)
+behaviour("sim_encoder", "phase-.", lambda v: v["scale"] == 0 or not abs(v["speed"] / v["scale"]) * v["ppr"] * 0.004 < 1 or v.invalid(), "a count per cycle or more", "turns forward", "turns backwards", "", ("sim_encoder num_chan=1", "edges"), lasts=True)
+behaviour("counter", "rawcounts|counts|position|velocity", lambda v: v.cycle == 0 and v["phase-A"] or v["reset"], "`phase-A` is TRUE in the first cycle; `reset`", "counting starts there; `rawcounts` is this cycle's", "an edge; that of the cycle before",
+          "", ("counter num_chan=1", "plain"), lasts=True)
+behaviour("encoder_ratio", "error", lambda v: v.changed("ppr", "teeth") or 0 in v.all("ppr", "teeth"), "`ppr` or teeth change, or are 0", "apply to all counts since the start; 0 disables that axis",
+          "apply to later counts; the error is held", "", ("encoder_ratio num_chan=1", "plain"), lasts=True)
+behaviour("toggle2nist", "on|off", lambda v: True, "a request that `is-on` does not follow at once", "lasts `max-pulse-length` cycles", "ends at any time: its time runs while there is no request", "a request of one cycle may be missed",
+          ("toggle2nist", "plain"), versions=("2.10",))
+behaviour("toggle2nist", "on|off", lambda v: True, "always", "those of 2.10", "both edges request the other state", "2.10's", ("toggle2nist", "plain"), lasts=True, versions=("2.9",))
+behaviour("gantry", ".*", lambda v: v.cycle == 0 and v["position-cmd"] != 0, "`position-cmd` is not 0 in the first cycle", "the first command is not a motion", "a motion from 0", "a machine must not jump", ("gantry personality=2", "plain"), lasts=True)
+behaviour("counter", "position-scale|position|velocity", lambda v: v.invalid() or v.beyond(1e12) or v["position-scale"] == 0, "`position-scale` is NaN, infinite or 0", "1", "is used", "", ("counter num_chan=1", "wild"), lasts=True)
+inventory("encoder", "quad-errors", "counts invalid transitions", "missing", "an addition")

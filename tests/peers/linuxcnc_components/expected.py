@@ -56,16 +56,23 @@ class InInventory:
         return component == self.component and re.search(rf"(?:^|\.)(?:{self.names})$", name) is not None
 
 
-# Components that follow another law on purpose, or whose inputs must be those of a machine: tests/peers/compare_components.py compares them feature by
-# feature; docs/linuxcnc-compatibility.md has the results.
-BY_FEATURE = ("encoder", "limit3", "pid", "pwmgen", "stepgen")
+# Components that follow another law on purpose, so that a comparison cycle by cycle says nothing. "by feature": tests/peers/compare_components.py compares
+# them feature by feature; docs/linuxcnc-compatibility.md has the results. The manual page of each lists what differs; netlists test it.
+FEATURES = "compared [by feature](#our-components-compared-with-linuxcncs)"
+UNLIKE = {
+    "encoder": FEATURES, "limit3": FEATURES, "pid": FEATURES, "pwmgen": FEATURES, "stepgen": FEATURES,
+    "anglejog": "acceleration fractions are positive in all directions; a motion that was interrupted goes on braking",
+    "bldc": "trapezoids follow `lead-angle`, the angle is extrapolated by fractions of a count, codes outside of the Hall pattern set the outputs to 0",
+    "carousel": "`enable` FALSE stops at once; the states have other numbers",
+    "moveoff": "brakes as late as whole periods allow and ends exactly at the offset",
+}
 
 # Components whose outputs depend on the time of day, or on records of other programs: only their inventory is compared.
 INVENTORY_ONLY = {
     "latencybins": "measures the computer's clock, which is simulated here",
     "timedelta": "measures the computer's clock, which is simulated here",
-    "sampler": "its records are compared by tests/peers/linuxcnc_components/streams.py",
-    "streamer": "its records are compared by tests/peers/linuxcnc_components/streams.py",
+    "sampler": "its records are tested by tests/netlists",
+    "streamer": "its records are tested by tests/netlists",
     "message": "prints",
 }
 

@@ -27,6 +27,8 @@ USEFUL = {
     ("limit2", "maxv"): [1.0, 50.0, 0.1], ("limit3", "maxv"): [1.0, 50.0], ("limit3", "maxa"): [10.0, 500.0],
     ("ohmic", "thcad-0-volt-freq"): [121.0, 140000.0], ("ohmic", "thcad-max-volt-freq"): [925.0, 920000.0], ("ohmic", "thcad-fullscale"): [5.0, 10.0, 300.0],
     ("ohmic", "thcad-divide"): [1.0, 32.0], ("ohmic", "velocity-in"): [121.0, 500.0, 10000.0, 925.0, 100.0],
+    ("spindle", "select-gear"): [0], ("spindle", "max.0"): [0.0, 3000.0], ("spindle", "accel.0"): [0.0, 500.0], ("spindle", "decel.0"): [0.0, 800.0],
+    ("spindle", "commanded-speed"): [0.0, 100.0, 1200.0, -500.0], ("spindle", "min.0"): [0.0, 60.0],
     ("simple_tp", "maxvel"): [0.5, 2.0, 30.0, 1e-3], ("simple_tp", "maxaccel"): [1.0, 20.0, 400.0],
     ("steptest", "maxvel"): [1.0, 20.0],
     ("watchdog", "timeout-0"): [0.002, 0.01, 0.0035], ("watchdog", "timeout-1"): [0.3, 0.05],

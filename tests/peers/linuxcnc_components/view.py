@@ -32,6 +32,16 @@ class View:
         """The values of all inputs and settings, or of those whose names end with one of `endings`."""
         return [self.of(name) for name in self.defaults if not endings or name.endswith(endings)]
 
+    def has(self, ending):
+        return any(name.endswith("." + ending) for name in self.defaults)
+
+    def changed(self, *endings):
+        """True if one of them differs from its value in the first cycle."""
+        now, cycle = self.all(*endings), self.cycle
+        before = self.at(0).all(*endings)
+        self.at(cycle)
+        return now != before
+
     def invalid(self, *endings):
         """True if one of them is NaN or infinite."""
         return any(isinstance(value, float) and not math.isfinite(value) for value in self.all(*endings))
