@@ -53,6 +53,8 @@ def differences(ours, theirs, absolute=ABSOLUTE):
         if cycles:
             found.append(Difference(name, cycles, column, other))
     for name, texts in ours.parameters.items():
+        if name not in theirs.parameters:
+            continue  # LinuxCNC's halrun
         a, b = [as_number(text) for text in texts], [as_number(text) for text in theirs.parameters[name]]
         ends = [ours.cycles * (i + 1) // len(texts) - 1 for i in range(len(texts))]
         # getp prints seven digits

@@ -70,7 +70,7 @@ for component, pins in {"clarke2": "y", "clarke3": "y", "siggen": "sine|cosine",
               within={"siggen": 1e-4}.get(component, 1e-5), lasts=True)
 behaviour("comp", "equal|out", lambda v: v.invalid(), "an input is NaN", "FALSE", "`equal` is TRUE", "a NaN is not equal to a number", ("comp", "wild"), lasts=True)
 for component, pins in {"scaled_s32_sums": "out-s", "mux16": "out-s"}.items():
-    behaviour(component, pins, lambda v: v.beyond(1e6), "the value is beyond the range of s32, or NaN", "limited to the range; 0 for NaN", "-2147483648", SATURATED, (component, "wild"))
+    behaviour(component, pins, lambda v: v.beyond(1e6), "the value is beyond the range of s32, or NaN", "limited to the range; 0 for NaN", "-2147483648", SATURATED, (component, "wild"), lasts=True)
 behaviour("hypot", "out", lambda v: v.beyond(1e150), "an input is beyond 1e150", "exact", "infinite", "", ("hypot", "wild"))
 behaviour("minmax", "max|min", lambda v: v.invalid(), "`in` is NaN during `reset`", "the cycle is skipped", "NaN until the next reset", HELD, ("minmax", "wild"), lasts=True)
 behaviour("orient", "command|poserr|is-oriented", lambda v: v.invalid() or v.beyond(1e9), "an input is NaN or infinite", "`command` is held", "`command` is NaN or infinite", HELD, ("orient", "wild"), lasts=True)
@@ -139,3 +139,4 @@ behaviour("toggle2nist", "on|off", lambda v: True, "always", "those of 2.10", "b
 behaviour("gantry", ".*", lambda v: v.cycle == 0 and v["position-cmd"] != 0, "`position-cmd` is not 0 in the first cycle", "the first command is not a motion", "a motion from 0", "a machine must not jump", ("gantry personality=2", "plain"), lasts=True)
 behaviour("counter", "position-scale|position|velocity", lambda v: v.invalid() or v.beyond(1e12) or v["position-scale"] == 0, "`position-scale` is NaN, infinite or 0", "1", "is used", "", ("counter num_chan=1", "wild"), lasts=True)
 inventory("encoder", "quad-errors", "counts invalid transitions", "missing", "an addition")
+inventory("pid", "feedbackD", "the derivative of the feedback, with `debug=1`", "missing", "an addition")
