@@ -30,6 +30,7 @@ MODULES = Path("/usr/lib/linuxcnc/modules")
 FOLDERS = ("logic", "math", "control", "motion", "io", "safety", "sim")
 ORDER = ("make-pulses", "update-counters", "capture-position", "update-freq")  # of functions in the thread; the others follow by name
 WITNESS_CYCLES = 400
+CRASHED = "LinuxCNC's module crashed or hung"
 
 
 def our_components():
@@ -101,7 +102,7 @@ class Comparison:
             except RunError as error:
                 if who != "ours" and any(word in str(error) for word in ("crashed", "hangs")):
                     print(f"{variant} | {inputs.seed} | LinuxCNC's own: {str(error)[:150]}", flush=True)
-                    return [], set()  # LinuxCNC's own fault
+                    return [], {CRASHED}
                 return [f"{variant} | {inputs.seed} | {who}: {error}"], set()
         ours, theirs = results
         lines, seen, view = [], set(), View(both, inputs, cycles)
@@ -160,7 +161,7 @@ class Comparison:
         for inputs, cycles in self.stimuli_of(entry, both):
             found, seen = self.run(variant, both, inputs, cycles)
             lines += found
-            if id(entry) in seen:
+            if id(entry) in seen or CRASHED in seen:
                 return lines
         return [*lines, f"{entry.component} | {entry.pins} | {entry.condition}: no difference; remove the entry"]
 

@@ -65,9 +65,9 @@ ROUNDED = "the constants of the formula have eight digits"
 SATURATED = "a conversion keeps the sign of the value and its order"
 HELD = "an output must not become NaN"
 
-for component, pins in {"clarke2": "y", "clarke3": "y", "siggen": "sine|cosine", "spindle": "output|spindle-rpm|spindle-rpm-abs"}.items():
+for component, pins in {"siggen": "sine|cosine", "spindle": "output|spindle-rpm|spindle-rpm-abs"}.items():
     behaviour(component, pins, lambda v: True, "always", "double precision", "differs from the eighth digit on", "", (component + (" num_chan=1" if component == "siggen" else ""), "wild"),
-              within={"siggen": 1e-4}.get(component, 1e-5), lasts=True)
+              within={"siggen": 1e-4, "spindle": 1e-2}.get(component, 1e-5), lasts=True)
 behaviour("comp", "equal|out", lambda v: v.invalid(), "an input is NaN", "FALSE", "`equal` is TRUE", "a NaN is not equal to a number", ("comp", "wild"), lasts=True)
 for component, pins in {"scaled_s32_sums": "out-s", "mux16": "out-s"}.items():
     behaviour(component, pins, lambda v: v.beyond(1e6), "the value is beyond the range of s32, or NaN", "limited to the range; 0 for NaN", "-2147483648", SATURATED, (component, "wild"), lasts=True)
@@ -97,12 +97,12 @@ inventory("carousel", "debounce", "writable", "read-only", "a time that is set b
 behaviour("sim_encoder", "scale", lambda v: v["scale"] == 0, "`scale` is 0", "1", "-0 remains", "", ("sim_encoder num_chan=1", {}, {"sim-encoder.0.scale": -0.0}))
 behaviour("clarkeinv", "a|b|c", lambda v: True, "always", "whole turns of `theta` are removed first, and the constants are exact", "2 pi has ten digits", "", ("clarkeinv", "plain"), within=1e-3)
 behaviour("clarkeinv", "a|b|c", lambda v: v.beyond(1e5), "inputs beyond 1e5; a NaN", "as above", "the angle has no digits left", "", ("clarkeinv", "wild"))
-for component in ("clarke2", "clarke3"):
-    behaviour(component, "x|y|h", lambda v: v.beyond(1e9), "inputs beyond 1e9; a NaN", "another order of the sum", "", "", (component, "wild"))
+for component, third in (("clarke2", {}), ("clarke3", {"clarke3.0.c": [-2147483648.0]})):
+    behaviour(component, "x|y|h", lambda v: v.beyond(1e6), "inputs beyond 1e6 that cancel each other; a NaN", "another rounding of the sum", "", "",
+              (component, {f"{component}.0.a": [4294967296.0 if component == "clarke2" else 0.00863335458], f"{component}.0.b": [-2147483648.0 if component == "clarke2" else 2147483648.0], **third}, {}))
 behaviour("abs", "sign", lambda v: v.invalid(), "`in` is NaN", "FALSE", "TRUE", "", ("abs", "wild"))
 behaviour("abs_s32", "out", lambda v: v["in"] == -2147483648, "-2147483648", "2147483647", "-2147483648", "an absolute value is not negative", ("abs_s32", "wild"))
-behaviour("conv_float_s32", "out|out-of-range", lambda v: v.beyond(1e15), "beyond 2^63; a NaN", "wraps around; 0 for NaN", "-2147483648 or 0", SATURATED, ("conv_float_s32", "wild"), lasts=True)
-behaviour("conv_float_s32", "out", lambda v: v.beyond(2147483647), "beyond the range of s32", "wraps around, as documented", "-2147483648", "", ("conv_float_s32", "wild"), lasts=True)
+behaviour("conv_float_s32", "out|out-of-range", lambda v: v.beyond(2147483647), "beyond the range of s32; a NaN", "wraps around, as documented; 0 for NaN", "-2147483648", SATURATED, ("conv_float_s32", "wild"), lasts=True)
 behaviour("conv_float_u32", "out|out-of-range", lambda v: v.beyond(2147483647) or v["in"] < 0, "beyond 2147483647; a NaN; negative", "wraps around, or with `clamp` is limited to the range", "0, or 2147483647 with `clamp`", SATURATED,
           ("conv_float_u32", "wild"), lasts=True)
 behaviour("conv_s32_u32", "out-of-range", lambda v: v["in"] < 0, "a negative value", "TRUE", "FALSE", "a value that wraps around is out of range", ("conv_s32_u32", "edges"), lasts=True)
@@ -110,8 +110,7 @@ behaviour("conv_u32_s32", "out-of-range", lambda v: v["in"] > 2147483647, "beyon
 behaviour("joyhandle", "out", lambda v: v["inverse"] and v["in"] < 0 or v.invalid() or v.beyond(1e6), "`inverse`, and `in` is negative; a NaN; `power` beyond 1e3", "the curve has the same shape on both sides", "another shape: minus three times `offset`",
           "", ("joyhandle", "wild"))
 behaviour("multiswitch", "bit-.*|position", lambda v: v["top-position"] > 2147483647, "`top-position` beyond 2147483647", "0 is the first position", "-1 is a position", "", ("multiswitch personality=3", "wild"), lasts=True)
-behaviour("mux_generic", "out-.*", lambda v: v.beyond(2147483647), "`sel-int` beyond the number of inputs; a value beyond the range", "the last input; limited", "reads beyond its inputs, or crashes", "", ("mux_generic config=su4", "wild"),
-          lasts=True)
+behaviour("mux_generic", "out-.*", lambda v: v.beyond(2147483647), "`sel-int` beyond the number of inputs; a value beyond the range", "the last input; limited", "reads beyond its inputs, or crashes", "", ("mux_generic config=su4", {"mux-gen.00.sel-int": [4294967295], "mux-gen.00.in-s32-03": [5]}, {}), lasts=True)
 for names in ("in-type|out-type|offset-measured",):
     inventory("bldc", names, "output pin", "read-only parameter", LINKABLE)
 inventory("thcud", "correction-vel", "input pin", "parameter", "2.10's", versions=("2.9",))
@@ -140,3 +139,6 @@ behaviour("gantry", ".*", lambda v: v.cycle == 0 and v["position-cmd"] != 0, "`p
 behaviour("counter", "position-scale|position|velocity", lambda v: v.invalid() or v.beyond(1e12) or v["position-scale"] == 0, "`position-scale` is NaN, infinite or 0", "1", "is used", "", ("counter num_chan=1", "wild"), lasts=True)
 inventory("encoder", "quad-errors", "counts invalid transitions", "missing", "an addition")
 inventory("pid", "feedbackD", "the derivative of the feedback, with `debug=1`", "missing", "an addition")
+behaviour("spindle", "zero-speed|at-speed|limited|forward|reverse|brake", lambda v: True, "a speed within the last digits of a tolerance", "double precision", "single precision: some cycles earlier or later", "", ("spindle", "edges"),
+          most_cycles=60)
+behaviour("counter", "velocity", lambda v: v["phase-A"], "after the first edge", "0: there is no interval yet", "a count per cycle", "", ("counter num_chan=1", "plain"), lasts=True)
