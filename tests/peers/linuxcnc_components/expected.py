@@ -60,7 +60,7 @@ class InInventory:
         return component == self.component and re.search(rf"(?:^|\.)(?:{self.names})$", name) is not None
 
 
-# Components that follow another law on purpose, so that a comparison cycle by cycle says nothing. "by feature": tests/peers/compare_components.py compares
+# Components that follow another law on purpose, so that a comparison cycle by cycle has no meaning. "by feature": tests/peers/compare_components.py compares
 # them feature by feature; docs/linuxcnc-compatibility.md has the results. The manual page of each lists what differs; netlists test it.
 FEATURES = "compared [by feature](#our-components-compared-with-linuxcncs)"
 UNLIKE = {
