@@ -140,6 +140,7 @@ def failed_lines(errors, netlist):
 # Commands of which one side reports an error: (pattern, the side, why). docs/linuxcnc-compatibility.md has each.
 ACCEPTED = [
     (r"setp .* -?1e400$|sets .* 1e400$|.* = 1e400$", "ours", "a number beyond the range of float is an error here, infinite there"),
+    (r"(setp|sets) \S+ \d{20,}$|.* = \d{20,}$", "ours", "a number of more than 64 bits is an error here, the largest one there"),
     (r"(setp|sets|.* =).* (yes|on|YES|ON|no|off)$", "LinuxCNC", "`yes` and `on` are bits here"),
 ]
 
