@@ -129,7 +129,7 @@ behaviour("gantry", ".*", lambda v: v.invalid() or v.beyond(1e9), "a NaN or infi
 behaviour("sim_encoder", "phase-.", lambda v: v["scale"] == 0 or not abs(v["speed"] / v["scale"]) * v["ppr"] * 0.004 < 1 or v.invalid(), "a count per cycle or more", "turns forward", "turns backwards", "a spindle does not reverse at its highest speed", ("sim_encoder num_chan=1", "edges"), lasts=True)
 behaviour("counter", "rawcounts|counts|position|velocity", lambda v: v.cycle == 0 and v["phase-A"] or v["reset"], "`phase-A` is TRUE in the first cycle; `reset`", "counting starts there; `rawcounts` is this cycle's", "an edge; that of the cycle before",
           "the first state is not an edge", ("counter num_chan=1", "plain"), lasts=True)
-behaviour("encoder_ratio", "error", lambda v: v.changed("ppr", "teeth") or 0 in v.all("ppr", "teeth"), "`ppr` or teeth change, or are 0", "apply to all counts since the start; 0 disables that axis",
+behaviour("encoder_ratio", "error", lambda v: v.changed("ppr", "teeth") or 0 in v.all("ppr", "teeth") or v.beyond(1e8, "ppr", "teeth"), "`ppr` or teeth change, are 0 or beyond 1e8", "apply to all counts since the start; 0 disables that axis",
           "apply to later counts; the error is held", "the gear ratio is that of the settings", ("encoder_ratio num_chan=1", "plain"), lasts=True)
 behaviour("toggle2nist", "on|off", lambda v: True, "a request that `is-on` does not follow at once", "lasts `max-pulse-length` cycles", "ends at any time: its time runs while there is no request", "a request of one cycle may be missed",
           ("toggle2nist", "plain"), versions=("2.10",))
