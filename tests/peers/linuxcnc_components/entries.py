@@ -141,4 +141,4 @@ inventory("pid", "feedbackD", "the derivative of the feedback, with `debug=1`", 
 behaviour("spindle", "zero-speed|at-speed|limited|forward|reverse|brake", lambda v: True, "a speed within the last digits of a tolerance", "double precision", "single precision: some cycles earlier or later", "speeds have all digits", ("spindle", "edges"),
           most_cycles=60)
 behaviour("counter", "velocity", lambda v: v["phase-A"], "after the first edge", "0: there is no interval yet", "a count per cycle", "a speed needs an interval", ("counter num_chan=1", "plain"), lasts=True)
-behaviour("gearchange", "speed-out|dir-out", lambda v: v.invalid(), "an input is NaN", "0", "NaN", HELD, ("gearchange", "wild"), lasts=True)
+behaviour("gearchange", "speed-out|dir-out", lambda v: v.invalid(), "an input is NaN", "0", "NaN", HELD, ("gearchange", {"gearchange.0.sel": [True], "gearchange.0.speed-in": [float("nan")]}, {"gearchange.0.max2": -1.0}), lasts=True)
