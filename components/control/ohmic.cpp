@@ -12,11 +12,11 @@ struct Ohmic : hal::Component {
     hal::In<double>  velocity_in{*this, "velocity-in", "divided frequency, as an encoder velocity", {.unit = "Hz"}};
     hal::In<double>  volt_divider{*this, "volt-divider", "ratio of sensed voltage to voltage at the card", {.initial = 4.9}};
     hal::In<double>  threshold{*this, "ohmic-threshold", "at or above this voltage the torch touches the material", {.initial = 18.0, .unit = "V"}};
-    hal::In<double>  low{*this, "ohmic-low", "at or below this voltage the torch does not touch the material", {.initial = 5.0, .unit = "V"}};
+    hal::In<double>  low{*this, "ohmic-low", "at or below this voltage ohmic-on becomes FALSE while the machine is not probing", {.initial = 5.0, .unit = "V"}};
     hal::Out<bool>   arc_on{*this, "arc-on", "TRUE while the card is at full scale: an arc is present"};
     hal::Out<double> thcad_volts{*this, "thcad-volts", "voltage at the card", {.unit = "V"}};
     hal::Out<double> ohmic_volts{*this, "ohmic-volts", "sensed voltage", {.unit = "V"}};
-    hal::Out<bool>   ohmic_on{*this, "ohmic-on", "TRUE while probing and the torch touches the material"};
+    hal::Out<bool>   ohmic_on{*this, "ohmic-on", "TRUE: the torch touches the material; set while probing"};
     hal::In<bool>    is_probing{*this, "is-probing", "TRUE while the machine is probing"};
     hal::Function    run{*this, "", &Ohmic::update, "computes the voltages and the contact state"};
 
@@ -26,7 +26,11 @@ struct Ohmic : hal::Component {
         thcad_volts = volts;
         ohmic_volts = volts * volt_divider;
         arc_on = span != 0.0 && volts >= full_scale;
-        ohmic_on = is_probing && (ohmic_volts >= threshold || (ohmic_on && ohmic_volts > low));
+        if (is_probing) {
+            ohmic_on = ohmic_volts >= threshold;
+        } else if (ohmic_volts <= low) {
+            ohmic_on = false;
+        }
     }
 };
 
@@ -36,8 +40,11 @@ HAL_COMPONENT(Ohmic, "ohmic", "Ohmic sensing of a plasma torch with a voltage-to
     thcad-volts = (velocity-in * thcad-divide - thcad-0-volt-freq) / (thcad-max-volt-freq - thcad-0-volt-freq) * thcad-fullscale
     ohmic-volts = thcad-volts * volt-divider
 
-`arc-on` is TRUE while the card is at full scale. `ohmic-on` becomes TRUE at `ohmic-threshold` and FALSE at `ohmic-low`, and is FALSE while
-`is-probing` is FALSE. While the two frequencies are equal, as before they are set, the voltages are 0.
+`arc-on` is TRUE while the card is at full scale. While `is-probing` is TRUE, `ohmic-on` is TRUE at and above `ohmic-threshold`; afterwards it
+keeps its state until the voltage is at or below `ohmic-low`.
+
+**Differences from LinuxCNC:** While the two frequencies are equal, as before they are set, the voltages are 0 (LinuxCNC: infinite or NaN). In 2.9,
+`ohmic-on` compares the voltage with 1 instead of `ohmic-threshold`; this is the component of 2.10.
 
     loadrt ohmic names=touch
     addf touch servo

@@ -11,7 +11,7 @@ constexpr std::int32_t most = 200;
 
 struct Histobins : hal::Component {
     using Component::Component;
-    hal::In<std::uint32_t> pintype{*this, "pintype", "input to use: 1 input-s32, 2 input-u32, 3 input-bit, otherwise input"};
+    hal::In<std::uint32_t> pintype{*this, "pintype", "input to use: 0 input, 1 input-s32, 2 input-u32, 3 input-bit"};
     hal::In<double>        input{*this, "input", "value to count, of type float"};
     hal::In<std::int32_t>  input_s32{*this, "input-s32", "value to count, of type s32"};
     hal::In<std::uint32_t> input_u32{*this, "input-u32", "value to count, of type u32"};
@@ -23,7 +23,7 @@ struct Histobins : hal::Component {
     hal::Out<std::int32_t> check{*this, "check", "the index that is shown"};
     hal::In<bool>          reset{*this, "reset", "TRUE clears the histogram"};
     hal::In<bool>          method{*this, "method", "no effect; LinuxCNC's two methods for the variance give the same result here"};
-    hal::Out<bool>         input_error{*this, "input-error", "TRUE: invalid setting or value; nothing is counted"};
+    hal::Out<bool>         input_error{*this, "input-error", "TRUE: invalid setting or value; nothing is counted and the outputs are held"};
     hal::Out<double>       binvalue{*this, "binvalue", "number of values in this bin; -1: invalid index"};
     hal::Out<double>       pextra{*this, "pextra", "number of values above the last bin"};
     hal::Out<double>       nextra{*this, "nextra", "number of values below the first bin"};
@@ -36,23 +36,23 @@ struct Histobins : hal::Component {
     hal::Function          run{*this, "", &Histobins::update, "counts the value"};
 
     void update(hal::Cycle) noexcept {
+        check = index.get();
+        available = most;
         const double value = chosen();
         const bool bins = nbins >= 1 && nbins <= most && binsize > 0.0 && std::isfinite(binsize) && std::isfinite(minvalue);
-        const bool valid = bins && std::fabs(value) <= 1e150;
-        if (reset || has_new_bins()) clear();
-        if (!reset && valid) count(value);
-        input_error = !valid;
-        const bool inside = index >= 0 && index < most && static_cast<std::uint32_t>(index) < nbins;
-        check = index.get();
-        binvalue = inside ? bins_[static_cast<std::size_t>(index)] : -1.0;
-        pextra = above_;
-        nextra = below_;
-        input_min = smallest_;
-        input_max = largest_;
-        nsamples = static_cast<std::uint32_t>(statistics_.count());
-        mean = statistics_.mean();
-        variance = statistics_.variance();
-        available = most;
+        input_error = !bins || !(std::fabs(value) <= 1e150);
+        if (input_error) return;
+
+        const bool changed = has_changed();
+        if (reset || changed) {
+            clear();
+        } else {
+            count(value);
+        }
+        smallest_ = std::min(smallest_, value);
+        largest_ = std::max(largest_, value);
+        statistics_.add(value);
+        show();
     }
 
 private:
@@ -64,45 +64,60 @@ private:
         default: return input;
         }
     }
-    bool has_new_bins() noexcept {
-        const bool changed = nbins != last_nbins_ || binsize != last_binsize_ || minvalue != last_minvalue_;
-        last_nbins_ = nbins;
-        last_binsize_ = binsize;
-        last_minvalue_ = minvalue;
-        return changed;
+    /// True in the first cycle and after a change of the bins.
+    bool has_changed() noexcept {
+        const bool same = nbins == counted_bins_ && binsize == counted_size_ && minvalue == counted_minimum_;
+        counted_bins_ = nbins;
+        counted_size_ = binsize;
+        counted_minimum_ = minvalue;
+        return !same;
     }
     void clear() noexcept {
         bins_.fill(0.0);
-        above_ = below_ = smallest_ = largest_ = 0.0;
+        above_ = 0.0;
+        below_ = 0.0;
+        smallest_ = 1e99;
+        largest_ = -1e99;
         statistics_ = {};
     }
     void count(double value) noexcept {
-        const bool first = statistics_.count() == 0;
-        smallest_ = first ? value : std::min(smallest_, value);
-        largest_ = first ? value : std::max(largest_, value);
-        statistics_.add(value);
-        const double bin = std::floor((value - minvalue) / binsize);
-        if (bin < 0.0) below_ += 1.0;
-        else if (bin >= static_cast<double>(nbins)) above_ += 1.0;
-        else bins_[static_cast<std::size_t>(bin)] += 1.0;
+        if (value < minvalue) {
+            below_ += 1.0;
+        } else if (value > minvalue + nbins * binsize) {
+            above_ += 1.0;
+        } else {
+            const auto bin = static_cast<std::size_t>((value - minvalue) / binsize);
+            if (bin < nbins) bins_[bin] += 1.0;
+        }
+    }
+    void show() noexcept {
+        const bool inside = index >= 0 && static_cast<std::uint32_t>(index) < nbins;
+        binvalue = inside ? bins_[static_cast<std::size_t>(index)] : -1.0;
+        pextra = above_;
+        nextra = below_;
+        input_min = smallest_;
+        input_max = largest_;
+        nsamples = static_cast<std::uint32_t>(statistics_.count());
+        mean = statistics_.mean();
+        variance = statistics_.variance();
     }
     measure::Statistics statistics_;
     std::array<double, most> bins_{};
     double above_ = 0.0, below_ = 0.0, smallest_ = 0.0, largest_ = 0.0;
-    std::uint32_t last_nbins_ = 0;
-    double last_binsize_ = 0.0, last_minvalue_ = 0.0;
+    std::uint32_t counted_bins_ = 0;  // settings of the bins at the last value; 0: none yet
+    double counted_size_ = 0.0, counted_minimum_ = 0.0;
 };
 
 }  // namespace
 
 HAL_COMPONENT(Histobins, "histobins", "Histogram of a value", R"(
 Counts the value of each cycle in one of `nbins` bins: bin i is from `minvalue` + i `binsize` up to, but not including, the next.
-Set `index` and, once `check` is equal to it, read `binvalue`. A change of `nbins`, `binsize` or `minvalue` clears the histogram, as `reset` does. The
-variance is the sample variance, with the divisor `nsamples` - 1.
+Set `index` and, once `check` is equal to it, read `binvalue`. `reset` and a change of the bins clear everything; the value of that cycle is the
+first of `nsamples`, but not counted in a bin, and neither is a value at the upper edge of the last bin. The variance is the sample variance, with the
+divisor `nsamples` - 1.
 
-**Differences from LinuxCNC:** the first value after a reset is counted like the others (LinuxCNC: in no bin, and as 0 in mean and variance), the
-value during `reset` is not (LinuxCNC: in `nsamples`). A value at the upper edge of the last bin is above it (LinuxCNC writes beyond its
-memory). Invalid values and a `binsize` of 0 or below set `input-error` (LinuxCNC: only an invalid `nbins`).
+**Differences from LinuxCNC:** `mean` and `variance` include the first value (LinuxCNC divides by its number and leaves it out). A `binsize` that is
+not above 0 and a value that is NaN or infinite set `input-error` (LinuxCNC: writes outside of its memory).
 
     loadrt histobins names=errors
     addf errors servo

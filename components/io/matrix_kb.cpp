@@ -21,7 +21,7 @@ struct Config {
         if (scan) ++end;
         if (*end != '\0' || rows < 1 || columns < 1 || rows > 32 || columns > 32)
             throw hal::ArgumentError("config", "config=" + text + " is not ROWSxCOLUMNS, each 1 to 32, with an s at the end to scan");
-        if (rows * static_cast<long>(std::bit_ceil(static_cast<unsigned long>(columns))) > 64)
+        if (rows * static_cast<long>(std::bit_ceil(static_cast<unsigned long>(std::max(columns, 2L)))) > 64)
             throw hal::ArgumentError("config", "config=" + text + " has more than 64 keys, the limit of the key code");
     }
     long rows, columns;
@@ -33,7 +33,7 @@ struct MatrixKb : hal::Component {
     hal::TextArgument text{*this, "config", "4x8", "ROWSxCOLUMNS, with an s to scan inputs and outputs", {.per_instance = true}};
     const Config config{text.get()};
 
-    const long stride_ = static_cast<long>(std::bit_ceil(static_cast<unsigned long>(config.columns)));  // of key numbers, per row
+    const long stride_ = static_cast<long>(std::bit_ceil(static_cast<unsigned long>(std::max(config.columns, 2L))));  // of key numbers, per row
     std::array<std::optional<hal::Out<bool>>, 64> keys;  // by key number
     hal::Ins<std::uint32_t> code_in{*this, "keycode", config.scan ? 0 : 1, "code of the keypad: 0xC0 + key: down, 0x80 + key: up"};
     hal::Outs<std::uint32_t> code_out{*this, "keycode", config.scan ? 1 : 0, "code of the newest change: 0xC0 + key: down, 0x80 + key: up; otherwise 0x40"};
@@ -53,31 +53,48 @@ struct MatrixKb : hal::Component {
 
     void update(hal::Cycle) noexcept {
         if (!config.scan) return obey(code_in[0]);
-        std::uint32_t code = 0x40;
-        for (long c = 0; c < config.columns; ++c) {
-            const auto key = static_cast<std::size_t>(driven_ * stride_ + c);
-            const bool pressed = column[static_cast<std::size_t>(c)] != negative[0];
-            const bool certain = pressed == seen_[key];  // equal in two scans: debounced
-            seen_[key] = pressed;
-            hal::Out<bool>& out = *keys[key];
-            if (!certain || pressed == out || (pressed && down_ >= rollover[0])) continue;
-            if (code != 0x40) continue;  // one change per cycle, so that each has its own code
-            out = pressed;
-            if (pressed) ++down_;
-            else --down_;
-            code = (pressed ? 0xC0u : 0x80u) + static_cast<std::uint32_t>(key);
-        }
-        code_out[0] = code;
+        scan();
+        const auto driven = static_cast<std::size_t>(driven_);
+        row[driven] = negative[0].get();
         driven_ = (driven_ + 1) % config.rows;
-        for (long r = 0; r < config.rows; ++r) row[static_cast<std::size_t>(r)] = (r == driven_) != negative[0];
+        row[static_cast<std::size_t>(driven_)] = !negative[0];
     }
 
 private:
+    /// Reads the columns of the driven row. A state counts when it is equal in two scans.
+    void scan() noexcept {
+        std::uint32_t pressed = 0;
+        for (std::size_t c = 0; c < column.size(); ++c)
+            if (column[c] != negative[0]) pressed |= std::uint32_t{1} << c;
+        Row& seen = seen_[static_cast<std::size_t>(driven_)];
+        const std::uint32_t changes = pressed == seen.newest ? pressed ^ seen.older : 0;
+        seen = {.newest = pressed, .older = seen.newest};
+
+        code_out[0] = 0x40;
+        for (std::size_t c = 0; c < column.size(); ++c) {
+            const std::uint32_t bit = std::uint32_t{1} << c;
+            if ((changes & bit) != 0) change(static_cast<std::size_t>(driven_ * stride_) + c, (pressed & bit) != 0);
+        }
+    }
+
+    void change(std::size_t key, bool pressed) noexcept {
+        code_out[0] = (pressed ? 0xC0u : 0x80u) + static_cast<std::uint32_t>(key);
+        if (pressed && down_ >= rollover[0]) return;
+        if (pressed) ++down_;
+        if (!pressed && down_ > 0) --down_;
+        *keys[key] = pressed;
+    }
+
     void obey(std::uint32_t code) noexcept {
         if ((code & ~0x7Fu) != 0x80u) return;  // neither up nor down
         if (auto& key = keys[code & 0x3Fu]) *key = (code & 0x40u) != 0;
     }
-    std::array<bool, 64> seen_{};
+    /// The columns of a row in the last two scans, a bit per column.
+    struct Row {
+        std::uint32_t newest = 0;
+        std::uint32_t older = 0;
+    };
+    std::array<Row, 32> seen_{};
     std::uint32_t down_ = 0;
     long driven_ = 0;
 };
@@ -88,10 +105,10 @@ HAL_COMPONENT(MatrixKb, "matrix_kb", "Keys of a keypad, from its key codes or by
 `config=` has an element per keypad: rows, an x, columns.
 
 Without s at the end the keypad has a controller: `keycode` 0xC0 + key sets the pin of the key, 0x80 + key clears it, other codes change
-nothing. The number of a key is row * w + column, where w is the number of columns rounded up to a power of two.
+nothing. The number of a key is row * w + column, where w is the number of columns rounded up to a power of two, at least 2.
 
 With s the keypad is scanned: one row is driven per cycle, and the columns are read in the next. A key change is accepted if it is equal in two
-scans. With `key_rollover` keys down, further keys are ignored, because most keypads then report ghost keys; increase it for keypads with
+scans. When several keys of a row change, `keycode` has the last one. With `key_rollover` keys down, further keys are ignored, because most keypads then report ghost keys; increase it for keypads with
 diodes. `negative-logic` is for inputs that are TRUE when open. Use a slow thread.
 
 The default name of an instance is `matrix_kb.N`.

@@ -17,9 +17,11 @@ struct Time : hal::Component {
     hal::Function run{*this, "", &Time::update, "advances the time"};
 
     void update(hal::Cycle cycle) noexcept {
-        if (begin && !began_) elapsed_ns_ = 0;
-        else if (begin && !pause) elapsed_ns_ += cycle.period_ns();
-        began_ = begin;
+        const bool running = begin || pause;
+        if (running && !was_running_) elapsed_ns_ = 0;
+        was_running_ = running;
+        if (!begin || pause) return;
+        elapsed_ns_ += cycle.period_ns();
         const std::int64_t whole = elapsed_ns_ / 1'000'000'000;
         seconds = static_cast<std::uint32_t>(whole % 60);
         minutes = static_cast<std::uint32_t>(whole / 60 % 60);
@@ -28,14 +30,14 @@ struct Time : hal::Component {
 
 private:
     std::int64_t elapsed_ns_ = 0;
-    bool began_ = false;
+    bool was_running_ = false;
 };
 
 }  // namespace
 
 HAL_COMPONENT(Time, "time", "Elapsed time in hours, minutes and seconds", R"(
-Counts the time for which `start` has been TRUE since its last rising edge, excluding the time `pause` was TRUE. When `start` becomes
-FALSE the result is held. The time is a sum of periods, not read from a clock: missed periods are not included.
+Counts the time for which `start` is TRUE and `pause` FALSE, from 0 when one of the two becomes TRUE after both were FALSE. Otherwise the
+result is held. The time is a sum of periods, not read from a clock: missed periods are not included.
 
     loadrt time
     addf time.0 servo-thread

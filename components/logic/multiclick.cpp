@@ -27,7 +27,7 @@ struct Multiclick : hal::Component {
         for (std::size_t i = 0; i < std::size(pulses_); ++i) {
             Pulse& pulse = pulses_[i];
             pulse.age_ns += pulse.age_ns < forever ? period : 0;
-            if (*pulse.out && pulse.age_ns >= std::int64_t{output_hold}) *pulse.out = false;
+            if (*pulse.out && pulse.age_ns >= pulse.hold_ns) *pulse.out = false;
         }
         in_state_ns_ += in_state_ns_ < forever ? period : 0;
         step(in != invert);
@@ -41,6 +41,7 @@ private:
     struct Pulse {
         hal::Out<bool>* out;
         std::int64_t age_ns = 0;
+        std::int64_t hold_ns = 0;
     };
 
     void step(bool pressed) {
@@ -50,10 +51,10 @@ private:
             if (!pressed) {
                 start(pulses_[state_ - 1]);
                 enter(state_ + 1);
-            } else if (in_state_ns_ > std::int64_t{max_hold}) enter(waiting);
+            } else if (in_state_ns_ > limit_ns_) enter(waiting);
         } else if (pressed) {
             enter(state_ == last_release ? waiting : state_ + 1);  // a fifth click is ignored
-        } else if (state_ != idle && in_state_ns_ > std::int64_t{max_space}) {
+        } else if (state_ != idle && in_state_ns_ > limit_ns_) {
             start(pulses_[state_ - 1]);
             enter(idle);
         }
@@ -61,15 +62,18 @@ private:
     void enter(std::int32_t next) {
         state_ = next;
         in_state_ns_ = 0;
+        limit_ns_ = next % 2 == 1 ? max_hold : max_space;
     }
     void start(Pulse& pulse) {
         *pulse.out = true;
         pulse.age_ns = 0;
+        pulse.hold_ns = output_hold;
     }
 
     // In the order of the states that start them.
     Pulse pulses_[8] = {{&single}, {&single_only}, {&twice}, {&twice_only}, {&triple}, {&triple_only}, {&quadruple}, {&quadruple_only}};
     std::int64_t in_state_ns_ = 0;
+    std::int64_t limit_ns_ = 0;  // of this state: max-hold-ns or max-space-ns when it began
     std::int32_t state_ = idle;
 };
 

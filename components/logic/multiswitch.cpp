@@ -24,11 +24,12 @@ struct Multiswitch : hal::Component {
 
     void update(hal::Cycle) noexcept {
         const bool up_now = up, down_now = down;
-        const std::int64_t last = std::min<std::int64_t>(top, std::int64_t{cfg} - 1);
+        const auto last = static_cast<std::int64_t>(static_cast<std::int32_t>(top.get()));
         std::int64_t at = position;
-        at += (up_now && !was_up_ ? 1 : 0) - (down_now && !was_down_ ? 1 : 0);
-        if (at > last) at = 0;
+        if (up_now && !was_up_) ++at;
+        if (down_now && !was_down_) --at;
         if (at < 0) at = last;
+        if (at < 0 || at > std::int64_t{top}) at = 0;
         was_up_ = up_now, was_down_ = down_now;
         position.move(static_cast<std::int32_t>(at));
         for (std::size_t i = 0; i < bit.size(); ++i) bit[i] = static_cast<std::int64_t>(i) == at;
@@ -42,7 +43,7 @@ private:
 
 HAL_COMPONENT(Multiswitch, "multiswitch", "A switch of several positions, moved by buttons", R"(
 Each press of `up` or `down` moves by one position and wraps around between `top-position` and 0.
-The bit of the current position is TRUE. `cfg=3,5` creates two switches, with three and five positions.
+The bit of the current position is TRUE; a position above the number of bits has none. `cfg=3,5` creates two switches, with three and five positions.
 
     loadrt multiswitch names=jog-step cfg=3
     addf jog-step servo

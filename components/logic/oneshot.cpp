@@ -5,10 +5,10 @@ namespace {
 
 struct Oneshot : hal::Component {
     using Component::Component;
-    hal::In<bool>    in{*this, "in", "an edge starts the pulse"};
-    hal::In<bool>    reset{*this, "reset", "TRUE ends the pulse and prevents new ones"};
+    hal::In<bool>    in{*this, "in", "an edge starts the pulse; TRUE in the first cycle is a rising edge"};
+    hal::In<bool>    reset{*this, "reset", "TRUE ends the pulse and prevents new ones; afterwards an input that is TRUE is a rising edge"};
     hal::Out<bool>   out{*this, "out", "TRUE during the pulse"};
-    hal::Out<bool>   out_not{*this, "out-not", "FALSE during the pulse", {.initial = true}};
+    hal::Out<bool>   out_not{*this, "out-not", "FALSE during the pulse"};
     hal::In<double>  width{*this, "width", "duration of the pulse", {.unit = "s"}};
     hal::Out<double> time_left{*this, "time-left", "remaining time of the pulse", {.unit = "s"}};
     hal::Param<bool> retriggerable{*this, "retriggerable", "TRUE: an edge during the pulse restarts it", {.initial = true}};
@@ -17,26 +17,28 @@ struct Oneshot : hal::Component {
     hal::Function    run{*this, "", hal::step<&Oneshot::update>, "turns edges into pulses"};
 
     void update(hal::Cycle cycle) noexcept {
+        if (reset) {
+            left_s_ = 0.0;
+            was_in_ = false;
+            out = false;
+            out_not = true;
+            return;
+        }
         const bool now = in;
-        const bool edge = started_ && now != was_in_ && (now ? rising : falling);
+        const bool edge = now != was_in_ && (now ? rising : falling);
         was_in_ = now;
-        started_ = true;
 
-        left_ns_ = std::max<std::int64_t>(left_ns_ - cycle.period_ns(), 0);
-        if (reset) left_ns_ = 0;
-        else if (edge && (left_ns_ == 0 || retriggerable)) left_ns_ = width_ns();
-        out = left_ns_ > 0;
-        out_not = left_ns_ == 0;
-        time_left = static_cast<double>(left_ns_) / 1e9;
+        const bool running = left_s_ > 0.0;
+        if (running) left_s_ = std::max(left_s_ - static_cast<double>(cycle.period_ns()) * 1e-9, 0.0);
+        if (edge && (!running || retriggerable)) left_s_ = width;
+        time_left = left_s_;
+        out = left_s_ > 0.0;  // FALSE for a width that is NaN
+        out_not = !out;
     }
 
 private:
-    std::int64_t width_ns() const {
-        const double ns = width * 1e9;
-        return ns >= 9e18 ? INT64_MAX : ns > 0.0 ? std::llround(ns) : 0;  // NaN: no pulse
-    }
-    std::int64_t left_ns_ = 0;
-    bool started_ = false, was_in_ = false;
+    double left_s_ = 0.0;
+    bool was_in_ = false;
 };
 
 }  // namespace

@@ -12,9 +12,11 @@ struct Ilowpass : hal::Component {
     hal::Function          run{*this, "", hal::step<&Ilowpass::update>, "filters the counts"};
 
     void update(hal::Cycle) noexcept {
-        const double next = state_ + (in * scale.get() - state_) * gain;
+        const double next = state_ + (in - state_) * gain;
         if (std::isfinite(next)) state_ = next;
-        out = conv::convert<std::int32_t>(std::floor(state_ + 0.5), false);
+        const double rounded = std::floor(state_ * scale + 0.5);
+        constexpr double past_s64 = 0x1p63;
+        out = std::fabs(rounded) < past_s64 ? conv::convert<std::int32_t>(rounded, false) : 0;
     }
 
 private:
@@ -26,7 +28,7 @@ private:
 HAL_COMPONENT(Ilowpass, "ilowpass", "Low-pass filter for counts", R"(
 Turns the steps of a handwheel into smooth motion: each cycle, `out` moves by the fraction `gain` of the remaining distance to `in * scale`, and it
 reaches it exactly. Divide the jog scale of the axis by `scale`. `out` wraps around at the limits of its type, as counters do; use its
-differences. A cycle whose result is NaN is skipped; above a gain of 2 the filter is unstable.
+differences. Beyond the range of s64 it is 0. A cycle whose result is NaN is skipped; above a gain of 2 the filter is unstable.
 
     loadrt ilowpass names=wheel-smooth
     addf wheel-smooth servo

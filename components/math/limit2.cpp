@@ -25,9 +25,13 @@ struct Limit2 : hal::Component {
     }
 
 private:
-    // Limits `value`, with max last. NaN if the value is NaN or infinite.
+    // Limits `value`, to min first. NaN if it is NaN or infinite.
     double limited(double value) const noexcept {
-        return std::isfinite(value) ? std::min(std::max(value, min.get()), max.get()) : NAN;
+        const double low = min;
+        const double high = max;
+        if (!std::isfinite(value)) return NAN;
+        if (value < low) return low;
+        return std::min(value, high);
     }
     double state_ = 0.0;
 };
@@ -37,7 +41,7 @@ private:
 HAL_COMPONENT(Limit2, "limit2", "Follows a value within limits of position and speed", R"(
 `out` starts at 0 and moves to `in`, limited to `min` and `max`, by at most `maxv` per second. `load` sets it to `in` immediately. While the
 input is NaN or infinite, `out` keeps its value; it also does while `maxv` is not above 0. While a limit is NaN, its last valid value applies, and a
-fault is raised. If `min` is above `max`, `max` applies.
+fault is raised. If `min` is above `max`, a value below `min` gives `min` and any other one `max`.
 
     loadrt limit2 names=spindle-ramp
     addf spindle-ramp servo

@@ -23,7 +23,8 @@ struct Lincurve : hal::Component {
 
 private:
     double at(double value) const noexcept {
-        if (value < x[0]) return y[0];
+        if (value >= x[x.size() - 1]) return y[y.size() - 1];
+        if (value <= x[0]) return y[0];
         for (std::size_t i = 1; i < x.size(); ++i) {
             if (!(value < x[i])) continue;
             const double width = x[i] - x[i - 1];

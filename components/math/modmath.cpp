@@ -12,20 +12,27 @@ struct Modmath : hal::Component {
     hal::Io<std::int32_t>  min{*this, "min-num", "lowest position", {.initial = 0}};
     hal::Io<std::int32_t>  max{*this, "max-num", "highest position", {.initial = 15}};
     hal::Io<bool>          wrap{*this, "wrap", "TRUE: the lowest position follows the highest one", {.initial = true}};
-    hal::Out<bool>         up{*this, "up", "TRUE: move up; the distance upwards is not longer"};
-    hal::Out<bool>         down{*this, "down", "TRUE: move down; the distance downwards is shorter"};
-    hal::Out<bool>         on_target{*this, "on-target", "TRUE: actual equals desired"};
+    hal::Out<bool>         up{*this, "up", "TRUE: move up"};
+    hal::Out<bool>         down{*this, "down", "TRUE: move down"};
+    hal::Out<bool>         on_target{*this, "on-target", "TRUE: actual equals desired", {.initial = true}};
     hal::Function          run{*this, "", hal::step<&Modmath::update>, "selects the direction"};
 
     void update(hal::Cycle) noexcept {
-        const std::int64_t positions = std::int64_t{max} - min + 1, apart = std::int64_t{desired} - actual;
-        if (wrap && positions > 0) {
-            const std::int64_t upward = (apart % positions + positions) % positions;
-            show(upward == 0, upward <= positions / 2);
-        } else show(apart == 0, apart > 0);
+        const std::int64_t positions = std::int64_t{max} - min + 1;
+        std::int64_t apart = in_range(desired, positions) - in_range(actual, positions);
+        const std::int64_t half = positions / 2;
+        if (wrap && apart > half) apart -= positions;
+        if (wrap && apart < -half) apart += positions;
+        show(apart == 0, apart > 0);
     }
 
 private:
+    /// A position outside of the range counts as one in it; the remainder of one below `min-num` is negative.
+    std::int64_t in_range(std::int64_t position, std::int64_t positions) const noexcept {
+        if (positions == 0 || (position >= min && position <= max)) return position;
+        return min + (position - min) % positions;
+    }
+
     void show(bool there, bool upward) noexcept {
         up = !there && upward;
         down = !there && !upward;
@@ -36,8 +43,8 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Modmath, "modmath", "Shortest direction to a position of a tool magazine", R"(
-The positions are `min-num` to `max-num`. With `wrap` they form a circle, and of two equal distances `up` is selected; without
-`wrap` they form a line. `mod_dir=2` creates two instances, `mod-dir.0` and `mod-dir.1`.
+The positions are `min-num` to `max-num`. With `wrap` they form a circle, and the shorter way is selected, of two equal ones the one that does not
+cross the end; without `wrap` they form a line. `mod_dir=2` creates two instances, `mod-dir.0` and `mod-dir.1`.
 
     loadrt modmath names=magazine
     addf magazine servo

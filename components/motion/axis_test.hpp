@@ -14,14 +14,14 @@ struct Mover : hal::Component {
     using Component::Component;
     hal::In<bool>          jog_minus{*this, "jog-minus", "TRUE jogs in the negative direction"};
     hal::In<bool>          jog_plus{*this, "jog-plus", "TRUE jogs in the positive direction"};
-    hal::In<bool>          run{*this, "run", "TRUE moves back and forth around the initial position"};
+    hal::In<bool>          run{*this, "run", "TRUE moves back and forth around the initial position; FALSE returns to it"};
     hal::In<double>        max_velocity{*this, "maxvel", "maximum speed"};
-    hal::In<double>        amplitude{*this, "amplitude", "distance of each end from the initial position"};
+    hal::In<double>        amplitude{*this, "amplitude", "distance of each end from the initial position; negative: the ends are exchanged"};
     hal::In<std::int32_t>  direction{*this, "dir", "0: both sides, 1: positive side, 2: negative side"};
     hal::Out<double>       position_cmd{*this, "position-cmd", "commanded position"};
     hal::In<double>        position_fb{*this, "position-fb", "position feedback of the axis"};
-    hal::Out<bool>         running{*this, "running", "TRUE while moving back and forth"};
-    hal::Out<double>       run_target{*this, "run-target", "end that the axis is moving to"};
+    hal::Out<bool>         running{*this, "running", "TRUE from run until the axis is back at the initial position"};
+    hal::Out<double>       run_target{*this, "run-target", "position that the axis is moving to while running is TRUE"};
     hal::Out<double>       run_start{*this, "run-start", "initial position: feedback when run became TRUE"};
     hal::Out<double>       run_low{*this, "run-low", "lower end"};
     hal::Out<double>       run_high{*this, "run-high", "upper end"};
@@ -30,39 +30,54 @@ struct Mover : hal::Component {
     hal::Out<double>       elapsed{*this, "elapsed", "time at this end", {.unit = "s"}};
 
 protected:
-    /// Runs one cycle; a jog commands a position `lead` ahead. [realtime]
-    void move(double lead, double dt) noexcept {
-        if (run && !was_running_) begin();
-        was_running_ = run;
-        running = run.get();
-        if (run) return to_and_fro(dt);
-        elapsed = 0.0;
-        const double way = jog_plus == jog_minus || !(lead > 0.0) ? 0.0 : jog_plus ? lead : -lead;
-        position_cmd = position_fb + way;
+    /// Runs one cycle. Returns true in the cycles in which the axis is neither running nor returning: the caller then commands a jog. [realtime]
+    bool free_to_jog(double dt) noexcept {
+        if (pausing_) paused_s_ += dt;
+        elapsed = paused_s_;
+        if (run) {
+            if (!running) begin();
+            to_and_fro();
+        } else if (running) {
+            go_back();
+        } else {
+            return true;
+        }
+        run_target = position_cmd.get();
+        return false;
     }
+
+    bool is_at(double position) const noexcept { return std::fabs(position_fb - position) < epsilon; }
 
 private:
     void begin() noexcept {
-        const double start = position_fb, half = std::fabs(amplitude);
-        run_start = start;
-        run_low = direction == 1 ? start : start - half;
-        run_high = direction == 2 ? start : start + half;
-        up_ = false;
-        elapsed = 0.0;
+        running = true;
+        run_start = position_fb;
+        run_high = direction == 2 ? run_start : run_start + amplitude;
+        run_low = direction == 1 ? run_start : run_start - amplitude;
+        position_cmd = run_low.get();
     }
-    void to_and_fro(double dt) noexcept {
-        if (std::fabs(position_fb - (up_ ? run_high : run_low)) <= epsilon) {
-            if (elapsed >= static_cast<double>(pause)) {
-                up_ = !up_;
-                elapsed = 0.0;
-            } else {
-                elapsed = elapsed + dt;
-            }
+
+    void to_and_fro() noexcept {
+        const bool commanded_an_end = position_cmd == run_low || position_cmd == run_high;
+        if (!commanded_an_end || !is_at(position_cmd)) return;
+        if (!pausing_) {
+            pausing_ = true;
+            paused_s_ = 0.0;
+        } else if (paused_s_ >= static_cast<double>(pause)) {
+            pausing_ = false;
+            position_cmd = position_cmd == run_low ? run_high : run_low;
         }
-        run_target = up_ ? run_high : run_low;
-        position_cmd = run_target;
     }
-    bool was_running_ = false, up_ = false;
+
+    void go_back() noexcept {
+        position_cmd = run_start.get();
+        if (!is_at(run_start)) return;
+        running = false;
+        pausing_ = false;
+    }
+
+    bool pausing_ = false;   // at an end
+    double paused_s_ = 0.0;  // since the axis reached the end
 };
 
 }  // namespace axis_test

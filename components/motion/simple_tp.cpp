@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
-#include "axis_planner.hpp"
+#include <algorithm>
+#include <cmath>
+
 #include "hal/component.hpp"
 #include "hal/limit.hpp"
 
@@ -17,16 +19,31 @@ struct SimpleTp : hal::Component {
     hal::Function    run{*this, "update", &SimpleTp::update, "computes the next position"};
 
     void update(hal::Cycle cycle) noexcept {
-        const double goal = target;
-        const bool going = enable && std::fabs(goal) <= plan::huge;
-        axis_.step(going ? &goal : nullptr, max_velocity, max_acceleration, cycle.seconds());
-        position = axis_.position();
-        velocity = axis_.velocity();
-        active = !axis_.resting() || (going && !axis_.at(goal));
+        const double dt = cycle.seconds();
+        const double acceleration = at_least_0(max_acceleration);
+        const double change = acceleration * dt;
+        const double negligible = change * dt * 0.001;
+        const double distance = std::fabs(target) <= huge ? target - position : 0.0;
+
+        const bool going = enable && std::fabs(distance) > negligible;
+        const double speed = going ? braking_speed(std::fabs(distance), acceleration, change) : 0.0;
+        const double wanted = std::copysign(std::min(speed, at_least_0(max_velocity)), distance);
+        const double slowest = velocity - change;
+        const double fastest = velocity + change;
+        velocity = std::clamp(wanted, slowest, fastest) + 0.0;  // never -0
+        position = position + velocity * dt;
+        active = going || velocity != 0.0;
     }
 
 private:
-    plan::Axis axis_;
+    static constexpr double huge = 1e20;  // beyond it sums would lose all digits, or overflow
+
+    static double at_least_0(double limit) noexcept { return limit > 0.0 ? std::min(limit, huge) : 0.0; }
+
+    /// The speed from which braking by `change` in each cycle ends at `distance`: v * v + 2 v change = 2 a distance.
+    static double braking_speed(double distance, double acceleration, double change) noexcept {
+        return std::sqrt(2.0 * acceleration * distance + change * change) - change;
+    }
 };
 
 }  // namespace
@@ -34,9 +51,11 @@ private:
 HAL_COMPONENT(SimpleTp, "simple_tp", "Trajectory planner for one axis: trapezoidal speed to a target", R"(
 Moves `current-pos` to `target-pos` with at most `maxvel` and `maxaccel`, and stops there without overshoot. The target and the limits
 may change at any time: the axis reverses or decelerates within `maxaccel`. While `enable` is FALSE, or the target is NaN or
-beyond 1e20, it brakes with `maxaccel` and stops. The initial position is 0. If `maxaccel` is not positive, the speed cannot change.
+beyond 1e20, it brakes with `maxaccel` and stops. The initial position is 0. It stops within a thousandth of the distance of the first cycle of
+an acceleration, `maxaccel` * T * T for a thread of period T.
 
-It brakes as late as whole periods allow, so it arrives a few periods earlier than LinuxCNC's.
+**Differences from LinuxCNC:** A `maxvel` or `maxaccel` that is negative or NaN counts as 0: no motion, no change of the speed (LinuxCNC:
+NaN in `current-pos`, or motion away from the target).
 
     loadrt simple_tp names=tp
     addf tp.update servo

@@ -28,24 +28,15 @@ struct Watchdog : hal::Component {
         if (!limits_known_.load(std::memory_order_acquire)) return;  // a rising edge of enable-in is not lost: it is detected later
         const bool restart = enable && !was_enabled_;
         was_enabled_ = enable;
-        const bool all_alive = count(restart, cycle.period_ns());
+        const bool all_alive = note_signs_of_life();
         starting_ = enable && (restart || starting_);
-        bool healthy = enable && ok;
-        if (starting_ && all_alive) {
-            starting_ = false;
-            healthy = true;
-            tripped = -1;
+        if (!enable) {
+            ok = false;
+        } else if (starting_) {
+            if (all_alive) begin();
+        } else if (ok) {
+            check(cycle.period_ns());
         }
-        const bool was_healthy = healthy;
-        for (std::size_t i = 0; i < input.size(); ++i) {
-            Watched& w = watched_[i];
-            const std::int64_t limit_ns = w.limit_ns.load(std::memory_order_relaxed);
-            if (w.silent_ns < limit_ns) continue;
-            if (healthy) tripped = static_cast<std::int32_t>(i);
-            healthy = false;
-            w.dead = w.dead || (was_healthy && limit_ns > 0);
-        }
-        ok = healthy;
     }
 
     void set_timeouts(hal::Cycle) noexcept {
@@ -57,28 +48,49 @@ struct Watchdog : hal::Component {
     }
 
 private:
+    /// Returns true if all inputs that tripped the watchdog have changed since. [realtime]
+    bool note_signs_of_life() noexcept {
+        bool all_alive = true;
+        for (std::size_t i = 0; i < input.size(); ++i) {
+            Watched& w = watched_[i];
+            w.dead = w.dead && input[i] == w.level;
+            all_alive = all_alive && !w.dead;
+        }
+        return all_alive;
+    }
+
+    void begin() noexcept {
+        starting_ = false;
+        tripped = -1;
+        ok = true;
+        for (std::size_t i = 0; i < input.size(); ++i) {
+            watched_[i].silent_ns = 0;
+            if (watched_[i].limit_ns.load(std::memory_order_relaxed) == 0) trip(i);
+        }
+    }
+
+    void check(std::int64_t period_ns) noexcept {
+        for (std::size_t i = 0; i < input.size(); ++i) {
+            Watched& w = watched_[i];
+            const std::int64_t limit_ns = w.limit_ns.load(std::memory_order_relaxed);
+            w.silent_ns = input[i] == w.level ? w.silent_ns + period_ns : 0;
+            w.level = input[i];
+            w.dead = limit_ns > 0 && w.silent_ns > limit_ns;
+            if (limit_ns == 0 || w.dead) trip(i);
+        }
+    }
+
+    void trip(std::size_t i) noexcept {
+        if (ok) tripped = static_cast<std::int32_t>(i);
+        ok = false;
+    }
+
     struct Watched {
         std::atomic<std::int64_t> limit_ns{0};  // set-timeouts writes, process reads
         std::int64_t silent_ns = 0;
         bool level = false;
         bool dead = false;                      // it tripped the watchdog and has not changed since
     };
-
-    /// Updates the time since the last change of each input. Returns true if all that tripped the watchdog have changed since. [realtime]
-    bool count(bool restart, std::int64_t period_ns) noexcept {
-        bool all_alive = true;
-        for (std::size_t i = 0; i < input.size(); ++i) {
-            Watched& w = watched_[i];
-            const bool changed = input[i] != w.level;
-            w.level = input[i];
-            if (changed) w.dead = false;
-            if (changed || (restart && !w.dead)) w.silent_ns = 0;
-            else w.silent_ns += period_ns;
-            all_alive = all_alive && !w.dead;
-        }
-        return all_alive;
-    }
-
     std::unique_ptr<Watched[]> watched_ = std::make_unique<Watched[]>(static_cast<std::size_t>(inputs));
     std::atomic<bool> limits_known_{false};         // set-timeouts writes, process reads
     bool was_enabled_ = false;

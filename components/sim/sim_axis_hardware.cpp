@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <optional>
@@ -17,8 +18,8 @@ struct SimAxisHardware : hal::Component {
         std::optional<hal::Out<bool>> home, max, min, both, max_home, min_home, both_home;
     };
     std::array<Axis, names.size()> axes;
-    hal::Out<bool>  home_all{*this, "homesw-all", "TRUE: the home switch of a homing axis is on"};
-    hal::Out<bool>  limit_all{*this, "limitsw-all", "TRUE: a limit switch of an axis that is not homing is on"};
+    hal::Out<bool>  home_all{*this, "homesw-all", "TRUE: an axis is homing and a home switch is on"};
+    hal::Out<bool>  limit_all{*this, "limitsw-all", "TRUE: no axis is homing and a limit switch is on"};
     hal::Out<bool>  all{*this, "limitsw-homesw-all", "TRUE: homesw-all or limitsw-all, as with all switches on one input"};
     hal::In<double> limit_offset{*this, "limit-offset", "distance by which limit switches trip after their positions", {.initial = 0.01}};
     hal::Function   run{*this, "update", &SimAxisHardware::update, "updates the switches"};
@@ -38,25 +39,26 @@ struct SimAxisHardware : hal::Component {
             real(a.min_upper, "minsw-upper", "upper end of the minimum switch", 0.0);
             real(a.min_lower, "minsw-lower", "lower end of the minimum switch", 0.0);
             real(a.home_width, "homesw-hyst", "width of the home switch, centred", 0.025);
-            bit(a.homing, "homing", "TRUE while the axis is homing; its limit switches are ignored");
+            bit(a.homing, "homing", "TRUE while the axis is homing");
             bit(a.home, "homesw-out", "home switch");
             bit(a.max, "maxsw-out", "maximum switch");
             bit(a.min, "minsw-out", "minimum switch");
-            bit(a.both, "bothsw-out", "either limit switch, FALSE while homing");
+            bit(a.both, "bothsw-out", "either limit switch, FALSE while any axis is homing");
             bit(a.max_home, "maxsw-homesw-out", "maximum or home switch");
             bit(a.min_home, "minsw-homesw-out", "minimum or home switch");
-            bit(a.both_home, "bothsw-homesw-out", "any switch; while homing the home switch only");
+            bit(a.both_home, "bothsw-homesw-out", "any switch; while any axis is homing the home switch only");
         }
     }
 
     void update(hal::Cycle) noexcept {
-        bool any_home = false, any_limit = false;
+        bool any_home = false;
+        bool any_limit = false;
+        const bool homing = std::any_of(axes.begin(), axes.end(), [](const Axis& a) { return a.homing->get(); });
         for (Axis& a : axes) {
             const double at = *a.position;
-            const bool homing = *a.homing;
-            const bool home = std::fabs(at - *a.home_position) <= 0.5 * *a.home_width;
-            const bool max = at > *a.max_lower + limit_offset && at < *a.max_upper;
-            const bool min = at > *a.min_lower && at < *a.min_upper - limit_offset;
+            const bool home = !(std::fabs(at - *a.home_position) > 0.5 * *a.home_width);  // a NaN trips a switch
+            const bool max = is_between(*a.max_lower + limit_offset, at, *a.max_upper);
+            const bool min = is_between(*a.min_lower, at, *a.min_upper - limit_offset);
             const bool limit = !homing && (max || min);
             *a.home = home;
             *a.max = max;
@@ -65,13 +67,16 @@ struct SimAxisHardware : hal::Component {
             *a.max_home = max || home;
             *a.min_home = min || home;
             *a.both_home = limit || home;
-            any_home = any_home || (homing && home);
+            any_home = any_home || home;
             any_limit = any_limit || limit;
         }
-        home_all = any_home;
+        home_all = any_home && homing;
         limit_all = any_limit;
-        all = any_home || any_limit;
+        all = home_all || any_limit;
     }
+
+private:
+    static bool is_between(double low, double value, double high) noexcept { return !(value >= high || value <= low); }
 };
 
 }  // namespace
@@ -79,7 +84,9 @@ struct SimAxisHardware : hal::Component {
 HAL_COMPONENT(SimAxisHardware, "sim_axis_hardware", "Simulated home and limit switches of X, Y, Z, A, U, V and tandem X2, Y2", R"(
 Each axis has a home switch centred at `homesw-pos`, `homesw-hyst` wide, and two limit switches with a lower and an upper end. The maximum
 switch trips `limit-offset` above its lower end, the minimum switch `limit-offset` below its upper end. Further pins combine switches, as
-on machines with shared inputs; there the limit switches of a homing axis are ignored, and in the `-all` pins only the home switch of a homing axis counts.
+on machines with shared inputs; while any axis is homing they ignore all limit switches, and `homesw-all` ignores the home switches while none is.
+
+**Differences from LinuxCNC:** `Amaxsw-homesw-out`, `Aminsw-homesw-out` and `Abothsw-homesw-out` work (LinuxCNC: always FALSE).
 
     loadrt sim_axis_hardware names=switches
     addf switches.update servo

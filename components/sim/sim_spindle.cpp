@@ -13,27 +13,21 @@ struct SimSpindle : hal::Component {
 
     void update(hal::Cycle cycle) noexcept {
         const double step = velocity_cmd * scale * cycle.seconds();
-        // Above 1e9 turns the resolution is too low for an index; the spindle stops there.
-        if (const double next = turns_ + step; std::fabs(next) <= 1e9) {
-            const double passed = step < 0.0 ? std::ceil(turns_) - 1.0 : std::floor(turns_) + 1.0;
-            if (index_enable && (step > 0.0 ? next >= passed : step < 0.0 && next <= passed)) {
-                zero_ = step > 0.0 ? std::floor(next) : std::ceil(next);
-                index_enable = false;
-            }
-            turns_ = next;
-        }
-        position_fb = turns_ - zero_;
+        const double next = position_fb + step;
+        if (!std::isfinite(next)) return;  // an infinite or invalid speed does not end in an invalid position
+        const bool indexed = index_enable && std::floor(position_fb) != std::floor(next);
+        if (indexed) index_enable = false;
+        const double turns = velocity_cmd < 0.0 ? std::ceil(next) : std::floor(next);
+        position_fb = indexed ? next - turns : next;
     }
-
-private:
-    double turns_ = 0.0, zero_ = 0.0;
 };
 
 }  // namespace
 
 HAL_COMPONENT(SimSpindle, "sim_spindle", "Simulated spindle with an index", R"(
-Turns at `velocity-cmd` * `scale` turns per second, without acceleration. While `index-enable` is TRUE the next full turn, in either direction, sets
-`position-fb` to 0 and clears `index-enable`.
+Turns at `velocity-cmd` * `scale` turns per second, without acceleration. While `index-enable` is TRUE the next full turn, in either direction,
+takes the full turns away from `position-fb` and clears `index-enable`. Backwards from exactly a full turn the first cycle does. The position is held
+while the speed is NaN or infinite.
 
     loadrt sim_spindle names=spindle-sim
     addf spindle-sim servo

@@ -18,8 +18,13 @@ struct Sphereprobe : hal::Component {
     hal::Function         run{*this, "", &Sphereprobe::update, "detects contact of the probe"};
 
     void update(hal::Cycle) noexcept {
-        const double x = away(px, cx), y = away(py, cy), z = away(pz, cz), radius = static_cast<double>(r);
-        probe_out = z < 0.0 || x * x + y * y + z * z <= radius * radius;
+        const double x = away(px, cx);
+        const double y = away(py, cy);
+        const double z = away(pz, cz);
+        const double radius = static_cast<double>(r);
+        const double across = x * x + y * y;
+        const bool over_table = across > radius * radius;
+        probe_out = over_table ? z < 0.0 : across + z * z <= radius * radius;
     }
 
 private:
@@ -31,8 +36,8 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Sphereprobe, "sphereprobe", "Simulated probe over a hemisphere", R"(
-`probe-out` is TRUE while the probe is in or on the hemisphere with centre (cx, cy, cz) and radius r, which is on a table at height
-cz, or below the table.
+A hemisphere with centre (cx, cy, cz) and radius r is on a table at height cz. Beside the hemisphere, `probe-out` is TRUE while the probe
+is below the table; above or below the hemisphere, while it is at most r away from the centre.
 
     loadrt sphereprobe names=ball
     addf ball servo

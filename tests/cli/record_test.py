@@ -9,8 +9,8 @@ from harness import Case, HAL, wait_until
 
 # A streamer feeds an adder, the sampler records input and output. Threads run no functions until `start`.
 NETLIST = """loadrt threads name1=servo period1=1000000
-loadrt streamer cfg=fb depth=1000
-loadrt sampler cfg=fbsukl depth=1000
+loadrt streamer cfg=fb depth=1001
+loadrt sampler cfg=fbsukl depth=1001
 loadrt sum2 names=twice
 addf streamer.0 servo
 addf twice servo

@@ -169,7 +169,7 @@ TEST_F(Protocol, a_component_is_there_as_long_as_its_client) {
 }
 
 TEST_F(Protocol, a_sampler_is_drained_and_a_streamer_fed) {
-    machine.must("loadrt sampler cfg=fb depth=4\nloadrt streamer cfg=fs depth=3\nnet level sampler.0.pin.0\naddf sampler.0 t\naddf streamer.0 t\n");
+    machine.must("loadrt sampler cfg=fb depth=5\nloadrt streamer cfg=fs depth=4\nnet level sampler.0.pin.0\naddf sampler.0 t\naddf streamer.0 t\n");
     EXPECT_EQ(ask({{"stream", "sampler.0"}})["types"], "fb");
     EXPECT_EQ(ask({{"stream", "sampler.0"}})["depth"], 4);
     EXPECT_EQ(ask({{"stream", "streamer.0"}, {"records", {{1.5, 1}, {2.5, -2}, {3, 3}, {4, 4}}}})["taken"], 3);
@@ -178,6 +178,7 @@ TEST_F(Protocol, a_sampler_is_drained_and_a_streamer_fed) {
     Json first = ask({{"stream", "sampler.0"}, {"take", 3}});
     EXPECT_EQ(first["records"], (Json{{0.0, false}, {0.0, false}, {7.0, false}}));
     EXPECT_EQ(first["numbers"], (Json{0, 1, 2}));
+    EXPECT_EQ(first["lost_before"], (Json{0, 0, 0}));
     EXPECT_EQ(first["waiting"], 1);
     EXPECT_EQ(first["lost"], 2);
     EXPECT_EQ(ask({{"stream", "sampler.0"}, {"take", 100}})["numbers"], (Json{3}));

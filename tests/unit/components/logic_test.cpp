@@ -242,7 +242,7 @@ TEST(Oneshot, Chooses_its_edges) {
     EXPECT_EQ(response(falling, "1100110"), "0010001");
 }
 
-TEST(Oneshot, Reset_ends_the_pulse_and_keeps_new_ones_away) {
+TEST(Oneshot, Reset_ends_the_pulse_and_an_input_that_is_true_afterwards_is_an_edge) {
     Instance oneshot("oneshot");
     oneshot.set("width", 1.0);
     EXPECT_EQ(response(oneshot, "011"), "011");
@@ -250,7 +250,18 @@ TEST(Oneshot, Reset_ends_the_pulse_and_keeps_new_ones_away) {
     oneshot.set("reset", true);
     EXPECT_EQ(response(oneshot, "101"), "000");
     oneshot.set("reset", false);
-    EXPECT_EQ(response(oneshot, "1101"), "0001");
+    EXPECT_EQ(response(oneshot, "0"), "0");
+    EXPECT_EQ(response(oneshot, "1101"), "1111");
+    oneshot.set("reset", true);
+    EXPECT_EQ(response(oneshot, "11"), "00");
+    oneshot.set("reset", false);
+    EXPECT_EQ(response(oneshot, "1"), "1");
+}
+
+TEST(Oneshot, An_input_that_is_true_in_the_first_cycle_is_an_edge) {
+    Instance oneshot("oneshot");
+    oneshot.set("width", 0.002);
+    EXPECT_EQ(response(oneshot, "1111"), "1100");
 }
 
 TEST(Oneshot, A_width_that_is_no_length_gives_no_pulse_and_a_huge_one_a_long_pulse) {

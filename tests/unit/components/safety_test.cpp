@@ -95,7 +95,7 @@ TEST(Watchdog, Trips_when_an_input_times_out_and_stays_tripped) {
     }
     dog.set("input-0", !level);
     dog.run("process");  // this change counts; from now on silence
-    dog.run("process", 1'000'000, 4);
+    dog.run("process", 1'000'000, 5);  // exactly the timeout
     EXPECT_TRUE(dog.get<bool>("ok-out"));
     dog.run("process");
     EXPECT_FALSE(dog.get<bool>("ok-out"));
@@ -117,7 +117,9 @@ TEST(Watchdog, Each_input_has_its_own_timeout) {
     dog.set("timeout-1", 0.003);
     dog.set("enable-in", true);
     dog.run("set-timeouts");
-    dog.run("process", 1'000'000, 4);
+    dog.run("process", 1'000'000, 4);  // the first one begins
+    EXPECT_TRUE(dog.get<bool>("ok-out"));
+    dog.run("process");
     EXPECT_FALSE(dog.get<bool>("ok-out"));
     EXPECT_EQ(dog.get<std::int32_t>("tripped-by"), 1);
 }
