@@ -42,7 +42,7 @@ public:
         no,       ///< nothing: handle() it
         done,     ///< the reply was appended
         stop,     ///< the same, and the instance is to end
-        halting,  ///< the functions of all threads have been told to stop: ask halted() until it replies
+        halting,  ///< the functions of all threads have been requested to stop: ask halted() until it replies
         lost      ///< a thread does not stop: handle() reports which
     };
     /// Executes a request that must not wait behind those of other clients: `stop` (the command and the verb) and `options`. Takes no lock.

@@ -15,7 +15,7 @@ struct Model;
 /// Which names: UnknownName::group of diagnostics about a model.
 enum class NameGroup : std::uint32_t { pins, signals, functions };
 
-/// Indexes the names of a model once, for as long as somebody holds the index and no name is added or removed. [setup]
+/// Indexes the names of a model once, for as long as the index is in use and no name is added or removed. [setup]
 class ModelNames {
 public:
     std::shared_ptr<const NameIndex> get(const Model& model, NameGroup group);

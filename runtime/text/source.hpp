@@ -36,7 +36,7 @@ public:
 
     /// Adds a text and returns its number.
     std::uint32_t add(std::string name, std::string text, std::uint32_t first_line = 1);
-    /// Keeps a text whatever sweep() is told, until as many calls of release(). Source 0 is ignored.
+    /// Keeps a text whatever sweep() is given, until as many calls of release(). Source 0 is ignored.
     void hold(std::uint32_t source);
     void release(std::uint32_t source);
     /// Frees a text into which no span points any more, unless it is held. Its number is used again.
@@ -64,7 +64,7 @@ private:
     std::deque<Source> sources_;
     std::vector<std::uint32_t> free_;           // numbers that are to be used again
     std::size_t bytes_ = 0;                     // of all texts
-    std::size_t swept_count_ = 0, swept_bytes_ = 0;  // what was left by the last sweep
+    std::size_t swept_count_ = 0, swept_bytes_ = 0;  // after the last sweep
 };
 
 }  // namespace hal

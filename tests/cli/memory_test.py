@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A machine with all its memory locked fits on a small board, and stays as small: edits that are undone and files that are read leave nothing."""
+"""A machine with all its memory locked fits on a small board, and stays as small: edits that are reverted and files that are read leave nothing."""
 import json
 import re
 import socket

@@ -11,7 +11,7 @@
 namespace hal::test {
 namespace {
 
-/// A machine whose threads run; whoever holds its lock stands for the work of another client.
+/// A machine whose threads run; its lock, held by a test, is the work of another client.
 struct StopTest : testing::Test {
     StopTest() {
         setenv("XDG_RUNTIME_DIR", folder.path.c_str(), 1);

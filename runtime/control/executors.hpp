@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: MIT
+// One client of the server, and the threads that execute its requests. Internal to the server.
+#pragma once
+
+#include <algorithm>
+#include <atomic>
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <string_view>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include <unistd.h>
+
+#include "control/connection.hpp"
+#include "hal/clock.hpp"
+
+namespace hal {
+
+constexpr std::size_t slow_reader = std::size_t{64} << 10; // bytes waiting for a client that skip its subscriptions
+
+/// What a client has an executor do: its next requests, then its subscriptions. Filled by the server's thread, carried out by an executor.
+struct Turn {
+    std::string lines;             ///< complete requests; afterwards those that remain
+    std::string waiting;           ///< a request that needs a thread of its own; it was not executed
+    std::string replies;
+    std::size_t capacity = 0;      ///< of replies: when they are longer the remaining requests are left for later
+    bool congested = false;        ///< subscriptions are skipped
+    bool stop = false;             ///< a request asked the instance to end
+    bool closes = false;           ///< the client is gone: the connection is closed, which may take long
+    std::uint64_t requests = 0, rubbish = 0;
+};
+
+/// One connected client. Used by the server's thread only, but for `result`, `finished` and `events` while a worker runs, and `turn` and
+/// `connection` while the client has a turn.
+struct ServedClient {
+    ServedClient(int f, Shell& shell, pid_t peer) : fd(f), connection(std::make_unique<Connection>(shell, peer)) {}
+    ~ServedClient() {
+        if (worker.joinable()) worker.join();
+        if (fd >= 0) close(fd);
+    }
+    ServedClient(const ServedClient&) = delete;
+
+    int fd;                        ///< -1 once it is gone
+    std::unique_ptr<Connection> connection;
+    std::string in, out;
+    std::size_t taken = 0;         ///< bytes of `in` that are done with
+    std::size_t searched = 0;      ///< up to here there is no end of line behind `taken`
+    std::size_t sent = 0;          ///< bytes of `out` that have gone
+    bool discarding = false;       ///< in the rest of a request that was too long
+    bool gone = false;             ///< to be removed as soon as no worker runs and its connection is closed
+    bool has_turn = false;         ///< the turn is queued or being carried out
+    bool placed = false;           ///< it counts among the places; others have urgent requests executed only
+    bool not_urgent = false;       ///< the next request has been looked at
+    std::int64_t stalled_since = 0; ///< since when a full queue has not moved; 0: it moves
+    std::int64_t halting_since = 0; ///< since when its next request, a `stop`, waits for the threads; 0: it does not
+    std::thread worker;            ///< runs a command that waits; until it has finished no other request is executed
+    std::string result;            ///< of the worker
+    std::atomic<bool> finished{false};
+    Turn turn;
+    std::atomic<bool> turn_over{false};
+    std::int64_t came_ns = monotonic_ns();
+    std::int64_t active_ns = came_ns;  ///< when it connected or made its last request
+    bool reserved = false;         ///< came when all places were taken
+    std::mutex events_mutex;
+    std::string events;            ///< that the worker has for the client meanwhile
+
+    /// The place of the next end of line, or npos. Every byte is looked at once, however slowly a long line comes.
+    std::size_t line_end() {
+        const auto end = in.find('\n', std::max(taken, searched));
+        searched = end == std::string::npos ? in.size() : end;
+        return end;
+    }
+    /// The next request, without its end of line, which is at `end`.
+    std::string_view line(std::size_t end) const {
+        const std::string_view text(in.data() + taken, end - taken);
+        return text.ends_with('\r') ? text.substr(0, text.size() - 1) : text;
+    }
+    void done_up_to(std::size_t place) {
+        taken = place;
+        not_urgent = false;
+        halting_since = 0;
+        if (taken < in.size()) return;
+        in.clear();
+        taken = searched = 0;
+        if (in.capacity() > slow_reader) in.shrink_to_fit();
+    }
+    bool busy() const { return worker.joinable(); }
+    std::size_t waiting() const { return out.size() - sent; }
+};
+
+/// Carries out the turns of clients, in the order in which they were given. A turn may wait for the session's lock for long: the server's thread
+/// never does.
+class Executors {
+public:
+    explicit Executors(std::function<void()> told) : told_(std::move(told)) {}
+    ~Executors() { end(); }
+    void start();
+    void give(ServedClient& client);
+    /// Ends the threads after their present turns.
+    void end();
+
+private:
+    void work();
+    static void carry_out(ServedClient& client);
+
+    std::function<void()> told_;
+    std::mutex mutex_;
+    std::condition_variable wake_;
+    std::deque<ServedClient*> queue_;   // guarded by mutex_
+    bool ending_ = false;         // guarded by mutex_
+    std::vector<std::thread> threads_;
+};
+
+}  // namespace hal
