@@ -58,7 +58,7 @@ class Memory(Case):
         print(f"{resident} kB resident")
         self.assertLess(resident, MOST_KB)
 
-    def test_edits_that_are_undone_leave_nothing(self):
+    def test_reverted_edits_leave_nothing(self):
         machine = self.start("run", "--no-picture", self.write("m.hal", SERVO.replace("net total adder.out\n", "newsig total float\n")))
         client = Client(self)
         number = 0

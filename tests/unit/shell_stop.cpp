@@ -59,7 +59,7 @@ TEST_F(StopTest, stop_is_carried_out_while_another_client_has_the_machine) {
     EXPECT_EQ(words["status"], 0);
     EXPECT_FALSE(machine->session.threads().running());
     EXPECT_EQ(calm->stop().status, 0);
-    EXPECT_TRUE(ended);
+    EXPECT_TRUE(eventually([this] { return ended.load(); }));
     lock.unlock();
     EXPECT_EQ(busy->wait(waiting)["status"], 0);
 }
@@ -115,7 +115,7 @@ TEST_F(StopTest, stop_gets_in_when_all_places_are_taken_by_clients_that_wait) {
     EXPECT_EQ(client()->run("stop").status, 0);
     EXPECT_FALSE(machine->session.threads().running());
     EXPECT_EQ(client()->stop().status, 0);
-    EXPECT_TRUE(ended);
+    EXPECT_TRUE(eventually([this] { return ended.load(); }));
 }
 
 TEST_F(StopTest, a_client_without_a_place_gets_one_when_another_leaves) {

@@ -9,7 +9,7 @@ namespace {
 
 bool has(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
-TEST(Texts, texts_of_edits_that_were_undone_are_freed) {
+TEST(Texts, texts_of_reverted_edits_are_freed) {
     ShellMachine machine;
     machine.must("loadrt and2 names=a\nnewthread t 1000000\n");
     const Sources& sources = machine.session.sources;
