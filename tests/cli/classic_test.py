@@ -89,6 +89,8 @@ class Halcmd(Case):
       = note: [J]MAX is '2.5 # end of travel' in {ini}:2
       = help: setp PIN-OR-PARAMETER VALUE
       = help: in an INI file a comment has a line of its own: behind a value it is part of the value
+
+1 error; nothing was changed
 """, done.stderr)
 
     def test_letters_may_be_joined(self):

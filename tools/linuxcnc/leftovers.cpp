@@ -133,7 +133,7 @@ void MachineLock::take_over(const std::string& noted) {
     if (launcher <= 0) return;
     std::vector<pid_t> left = left_by(launcher, server);
     took_over_ = true;
-    for (const int number : {SIGTERM, SIGKILL}) {
+    for (const int number : {SIGTERM, SIGKILL, SIGKILL, SIGKILL}) {  // what is found later was started meanwhile, by one that ignores SIGTERM
         for (const pid_t pid : left) {
             ::kill(pid, number);
             ::kill(pid, SIGCONT);  // one that is stopped would never see it
@@ -142,7 +142,7 @@ void MachineLock::take_over(const std::string& noted) {
             ::usleep(wait_us);
             std::erase_if(left, [](pid_t pid) { return state_of(pid) == 0 || state_of(pid) == 'Z'; });
         }
-        if (left.empty()) left = left_by(launcher, server);  // what they have started meanwhile
+        if (left.empty()) left = left_by(launcher, server);
     }
     if (left.empty()) return;
     problem_ = fmt::format("process {} of a machine whose launcher was killed does not end; end it first", left.front());

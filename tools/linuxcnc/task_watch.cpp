@@ -2,6 +2,7 @@
 #include "linuxcnc/task_watch.hpp"
 
 #include <algorithm>
+#include <cstring>
 #include <fstream>
 #include <iterator>
 #include <sstream>
@@ -17,22 +18,36 @@ namespace {
 
 constexpr std::int64_t longest_step_ns = 100'000'000;  // a longer one is a time without CPU, which task may not have had either
 
-// A buffer begins with its name in 32 bytes, then a header of three `long`: read since the last write, number of writes, size.
-constexpr std::size_t name_bytes = 32, writes_offset = name_bytes + sizeof(std::int64_t);
+// A buffer begins with its name in 32 bytes and a byte for each process, then a header of three `long`: read since the last write, number of
+// writes, size.
+constexpr std::size_t name_bytes = 32, most_processes = 1000;
 
-}  // namespace
+struct Buffer {
+    key_t key = -1;
+    std::size_t writes_offset = 0;
+};
 
-key_t nml_key(const std::string& nml, const std::string& buffer) {
+/// The buffer of that name in an NML configuration; key -1: there is none in shared memory.
+Buffer buffer_of(const std::string& nml, const std::string& name) {
     std::ifstream file(nml);
     for (std::string line; std::getline(file, line);) {  // B NAME SHMEM HOST SIZE 0 0 NUMBER PROCESSES KEY …
         std::istringstream in(line);
         const std::vector<std::string> words{std::istream_iterator<std::string>(in), {}};
-        if (words.size() < 10 || words[0] != "B" || words[1] != buffer || words[2] != "SHMEM") continue;
-        const auto key = parse_natural(words[9]);
-        return key ? static_cast<key_t>(*key) : -1;
+        if (words.size() < 10 || words[0] != "B" || words[1] != name || words[2] != "SHMEM") continue;
+        const auto processes = parse_natural(words[8]), key = parse_natural(words[9]);
+        if (!key || !processes || *processes > most_processes) return {};
+        return {static_cast<key_t>(*key), name_bytes + static_cast<std::size_t>(*processes) + sizeof(std::int64_t)};
     }
-    return -1;
+    return {};
 }
+
+std::int64_t number_at(const char* memory) {
+    std::int64_t number = 0;
+    std::memcpy(&number, memory, sizeof number);
+    return number;
+}
+
+}  // namespace
 
 TaskWatch::~TaskWatch() {
     if (memory_) ::shmdt(memory_);
@@ -42,15 +57,15 @@ void TaskWatch::attach() {
     using namespace std::chrono_literals;
     if (Clock::now() - attached_ < 500ms) return;
     attached_ = Clock::now();
-    const key_t key = nml_key(nml_, "emcStatus");
-    const int id = key == -1 ? -1 : ::shmget(key, 0, 0);
+    const Buffer buffer = buffer_of(nml_, "emcStatus");
+    const int id = buffer.key == -1 ? -1 : ::shmget(buffer.key, 0, 0);
     shmid_ds segment{};
-    if (id < 0 || ::shmctl(id, IPC_STAT, &segment) != 0 || segment.shm_segsz < writes_offset + sizeof(std::int64_t)) return;
+    if (id < 0 || ::shmctl(id, IPC_STAT, &segment) != 0 || segment.shm_segsz < buffer.writes_offset + sizeof(std::int64_t)) return;
     void* const memory = ::shmat(id, nullptr, SHM_RDONLY);
     if (memory == reinterpret_cast<void*>(-1)) return;
     memory_ = memory;
-    writes_ = reinterpret_cast<const volatile std::int64_t*>(static_cast<const char*>(memory) + writes_offset);
-    seen_ = *writes_;
+    writes_ = static_cast<const char*>(memory) + buffer.writes_offset;
+    seen_ = number_at(writes_);
     looked_ = Clock::now();
 }
 
@@ -61,7 +76,7 @@ std::int64_t TaskWatch::silent_ns() {
     const Clock::time_point now = Clock::now();
     silent_ns_ += std::min(std::chrono::nanoseconds(now - looked_).count(), longest_step_ns);
     looked_ = now;
-    if (const std::int64_t writes = *writes_; writes != seen_) {
+    if (const std::int64_t writes = number_at(writes_); writes != seen_) {
         seen_ = writes;
         silent_ns_ = 0;
         beats_ = true;

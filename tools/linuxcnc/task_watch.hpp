@@ -6,7 +6,6 @@
 #include <chrono>
 #include <cstdint>
 #include <string>
-#include <sys/types.h>
 
 namespace hal::tools {
 
@@ -27,14 +26,11 @@ private:
 
     std::string nml_;
     std::int64_t timeout_ns_;
-    const volatile std::int64_t* writes_ = nullptr;
+    const char* writes_ = nullptr;  ///< in the buffer, which task changes meanwhile
     const void* memory_ = nullptr;
     std::int64_t seen_ = 0, silent_ns_ = 0;
     bool beats_ = false;
     Clock::time_point looked_{}, attached_{};
 };
-
-/// The key of the shared memory of an NML buffer, as the line of that buffer has it; -1: there is none.
-key_t nml_key(const std::string& nml, const std::string& buffer);
 
 }  // namespace hal::tools
