@@ -47,7 +47,7 @@ void Transaction::apply(const EditForm& form, const Command& command, Diagnostic
         for (const auto& thread : s.model.threads)
             if (const Core* const core = s.core(thread.get())) thread->init_done = core->passed();
         Elaboration on{s.model, edit, s.plugins, session_->sources, diagnostics, s.auto_orders, form.usage, s.options.check_only, this,
-                       s.executor ? &s.executor->board().shared : nullptr};
+                       s.executor ? &s.executor->board().shared.faults : nullptr};
         for (const Command& plain : expand(command, diagnostics)) {
             ++s.commands;
             elaborate(on, form, plain);
