@@ -24,7 +24,7 @@ struct Joyhandle : hal::Component {
         if (deadband > 0.99) deadband.correct(0.99);
         if (deadband < 0.0) deadband.correct(0.0);
         const double x = std::fmin(std::fabs(in), 1.0), d = std::fmin(std::fmax(deadband, 0.0), 0.99);
-        if (!(std::fabs(in) >= d) || in == 0.0) {
+        if (!(std::fabs(in) > d)) {
             out = 0.0;
             return;
         }
