@@ -120,8 +120,7 @@ behaviour("spindle", ".*", lambda v: v["select-gear"] > 0 or v.invalid() or v.be
 behaviour("thc", "offset-value|z-pos-out|z-fb-out", lambda v: not v["enable"] or not v["torch-on"] or v.invalid(), "`enable` or `torch-on` is FALSE", "the correction is removed as documented", "removed in one cycle, or returned at once",
           "the torch must not jump", ("thc", "edges"), lasts=True)
 behaviour("thcud", "cur-offset|z-pos-out|z-fb-out|removing-offset", lambda v: not v["enable"] or not v["torch-on"] or v.invalid(), "`enable` or `torch-on` is FALSE", "the correction is removed as documented", "removed in one cycle",
-          "the torch must not jump", ("thcud", "plain"), lasts=True)
-behaviour("thcud", "cur-offset", lambda v: True, "always", "the correction", "0", "2.10's", ("thcud", "edges"), versions=("2.9",))
+          "the torch must not jump", ("thcud", "plain"), lasts=True, versions=("2.10",))
 behaviour("eoffset_per_angle", ".*", lambda v: v["angle"] < 0 or not v["is-on"] or v.invalid() or v.beyond(1e9), "a negative angle; the machine is switched off; a NaN", "the same shape; `clear` becomes FALSE", "another shape; `clear` remains", "a polygon repeats in both directions",
           ("eoffset_per_angle", "plain"), lasts=True)
 behaviour("gantry", "home|position-fb|joint.*", lambda v: v.has("joint.02.home"), "more than two joints", "`home` waits for all joints", "not for the last ones", "a gantry is at home when all its joints are", ("gantry personality=3", "edges"), lasts=True)
@@ -129,7 +128,7 @@ behaviour("gantry", ".*", lambda v: v.invalid() or v.beyond(1e9), "a NaN or infi
 behaviour("sim_encoder", "phase-.", lambda v: v["scale"] == 0 or not abs(v["speed"] / v["scale"]) * v["ppr"] * 0.004 < 1 or v.invalid(), "a count per cycle or more", "turns forward", "turns backwards", "a spindle does not reverse at its highest speed", ("sim_encoder num_chan=1", "edges"), lasts=True)
 behaviour("counter", "rawcounts|counts|position|velocity", lambda v: v.cycle == 0 and v["phase-A"] or v["reset"], "`phase-A` is TRUE in the first cycle; `reset`", "counting starts there; `rawcounts` is this cycle's", "an edge; that of the cycle before",
           "the first state is not an edge", ("counter num_chan=1", "plain"), lasts=True)
-behaviour("encoder_ratio", "error", lambda v: v.changed("ppr", "teeth") or 0 in v.all("ppr", "teeth") or v.beyond(1e8, "ppr", "teeth"), "`ppr` or teeth change, are 0 or beyond 1e8", "apply to all counts since the start; 0 disables that axis",
+behaviour("encoder_ratio", "error", lambda v: v.changed("ppr", "teeth") or 0 in v.all("ppr", "teeth") or v.beyond(20000, "ppr", "teeth"), "`ppr` or teeth change, are 0 or beyond 20000", "apply to all counts since the start; 0 disables that axis",
           "apply to later counts; the error is held", "the gear ratio is that of the settings", ("encoder_ratio num_chan=1", "plain"), lasts=True)
 behaviour("toggle2nist", "on|off", lambda v: True, "a request that `is-on` does not follow at once", "lasts `max-pulse-length` cycles", "ends at any time: its time runs while there is no request", "a request of one cycle may be missed",
           ("toggle2nist", "plain"), versions=("2.10",))
@@ -142,3 +141,10 @@ behaviour("spindle", "zero-speed|at-speed|limited|forward|reverse|brake", lambda
           most_cycles=60)
 behaviour("counter", "velocity", lambda v: v["phase-A"], "after the first edge", "0: there is no interval yet", "a count per cycle", "a speed needs an interval", ("counter num_chan=1", "plain"), lasts=True)
 behaviour("gearchange", "speed-out|dir-out", lambda v: v.invalid(), "an input is NaN", "0", "NaN", HELD, ("gearchange", {"gearchange.0.sel": [True], "gearchange.0.speed-in": [float("nan")]}, {"gearchange.0.max2": -1.0}), lasts=True)
+for component, pins, variant in (("filter_kalman", "xk-out", "filter_kalman"), ("eoffset_per_angle", "eoffset-dbg|kreciprocal", "eoffset_per_angle"), ("gantry", "joint.*", "gantry personality=2")):
+    behaviour(component, pins, lambda v: True, "always", "double precision, as in 2.10", "single precision", "2.10's", (variant, "edges"), lasts=True, within=1e-4, versions=("2.9",))
+THC_AT_WORK = ("thc", {"thc.enable": [True], "thc.torch-on": [True], "thc.arc-ok": [True], "thc.current-vel": [100.0], "thc.requested-vel": [100.0],
+                       "thc.encoder-vel": [0.0], "thc.volts-requested": [100.0], "thc.vel-tol": [1.0]},
+               {"thc.correction-vel": 0.1, "thc.vel-scale": 1.0, "thc.velocity-tol": 10.0})
+behaviour("thc", "offset-value", lambda v: True, "always", "the correction in use", "that of the cycle before", "2.10's", THC_AT_WORK, lasts=True, versions=("2.9",))
+behaviour("thc", "z-pos-out", lambda v: True, "always", "double precision, as in 2.10", "single precision", "2.10's", THC_AT_WORK, lasts=True, within=1e-4, versions=("2.9",))
