@@ -22,7 +22,8 @@ struct Ohmic : hal::Component {
 
     void update(hal::Cycle) noexcept {
         const double span = full_frequency - zero_frequency;
-        const double volts = span != 0.0 ? (velocity_in * divide - zero_frequency) / span * full_scale : 0.0;
+        const double hertz_per_volt = span / full_scale / divide;  // at velocity-in
+        const double volts = span != 0.0 ? (velocity_in - zero_frequency / divide) * (1.0 / hertz_per_volt) : 0.0;
         thcad_volts = volts;
         ohmic_volts = volts * volt_divider;
         arc_on = span != 0.0 && volts >= full_scale;
