@@ -108,7 +108,7 @@ behaviour("conv_s32_u32", "out-of-range", lambda v: v["in"] < 0, "a negative val
 behaviour("conv_u32_s32", "out-of-range", lambda v: v["in"] > 2147483647, "beyond 2147483647", "TRUE", "FALSE", "a value that wraps around is out of range", ("conv_u32_s32", "wild"), lasts=True)
 behaviour("joyhandle", "out", lambda v: v["inverse"] and v["in"] < 0 or v.invalid() or v.beyond(1e6), "`inverse`, and `in` is negative; a NaN; `power` beyond 1e3", "the curve has the same shape on both sides", "another shape: minus three times `offset`",
           "a handle is symmetrical", ("joyhandle", "wild"))
-behaviour("multiswitch", "bit-.*|position", lambda v: v["top-position"] > 2147483647, "`top-position` beyond 2147483647", "0 is the first position", "-1 is a position", "a position is not negative", ("multiswitch personality=3", "wild"), lasts=True)
+behaviour("multiswitch", "bit-.*|position", lambda v: v["top-position"] > 2147483647 or v["position"] == -2147483648, "`top-position` beyond 2147483647, `position` -2147483648", "0 is the first position", "-1 is a position", "a position is not negative", ("multiswitch personality=3", "wild"), lasts=True)
 behaviour("mux_generic", "out-.*", lambda v: v.beyond(2147483647), "`sel-int` beyond the number of inputs; a value beyond the range", "the last input; limited", "reads beyond its inputs, or crashes", "a selection must not read other memory", ("mux_generic config=su4", {"mux-gen.00.sel-int": [4294967295], "mux-gen.00.in-s32-03": [5]}, {}), lasts=True)
 for names in ("in-type|out-type|offset-measured",):
     inventory("bldc", names, "output pin", "read-only parameter", LINKABLE)
@@ -125,7 +125,7 @@ behaviour("eoffset_per_angle", ".*", lambda v: v["angle"] < 0 or not v["is-on"] 
           ("eoffset_per_angle", "plain"), lasts=True)
 behaviour("gantry", "home|position-fb|joint.*", lambda v: v.has("joint.02.home"), "more than two joints", "`home` waits for all joints", "not for the last ones", "a gantry is at home when all its joints are", ("gantry personality=3", "edges"), lasts=True)
 behaviour("gantry", ".*", lambda v: v.invalid() or v.beyond(1e9), "a NaN or infinite input", "is ignored", "NaN for ever", "a position must not become NaN", ("gantry personality=2", "wild"), lasts=True)
-behaviour("sim_encoder", "phase-.", lambda v: v["scale"] == 0 or not abs(v["speed"] / v["scale"]) * v["ppr"] * 0.004 < 1 or v.invalid(), "a count per cycle or more", "turns forward", "turns backwards", "a spindle does not reverse at its highest speed", ("sim_encoder num_chan=1", "edges"), lasts=True)
+behaviour("sim_encoder", "phase-.", lambda v: v["scale"] == 0 or not abs(v["speed"] / v["scale"]) * v["ppr"] * 0.004 < 1 or v.invalid() or v.changed("ppr"), "a count per cycle or more; `ppr` changes", "turns forward", "turns backwards", "a spindle does not reverse at its highest speed", ("sim_encoder num_chan=1", "edges"), lasts=True)
 behaviour("counter", "rawcounts|counts|position|velocity", lambda v: v.cycle == 0 and v["phase-A"] or v["reset"], "`phase-A` is TRUE in the first cycle; `reset`", "counting starts there; `rawcounts` is this cycle's", "an edge; that of the cycle before",
           "the first state is not an edge", ("counter num_chan=1", "plain"), lasts=True)
 behaviour("encoder_ratio", "error", lambda v: v.changed("ppr", "teeth") or 0 in v.all("ppr", "teeth") or v.beyond(20000, "ppr", "teeth"), "`ppr` or teeth change, are 0 or beyond 20000", "apply to all counts since the start; 0 disables that axis",
