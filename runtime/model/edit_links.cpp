@@ -364,6 +364,7 @@ void Edit::change_alias(Pin& pin, std::string alias) {
     if (!pin.alias.empty()) model_.pin.erase(pin.alias);
     pin.alias = std::move(alias);
     if (!pin.alias.empty()) model_.pin.emplace(pin.alias, &pin);
+    ++model_.next_id;  // similar names are looked up among those that existed
 }
 
 bool Edit::alias(Word name, Word second) {
