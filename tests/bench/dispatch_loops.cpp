@@ -6,6 +6,7 @@
 
 #include "dispatch_loops.hpp"
 #include "hal/component.hpp"
+#include "hal/limit.hpp"
 
 #undef HAL_COMPONENT
 #define HAL_COMPONENT(...)
