@@ -1,6 +1,6 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
-# PyPI python-can 4.6.1: a remote frame that CanutilsLogWriter has written comes back with length 0; candump's own spelling of its length is rejected.
+# PyPI python-can 4.6.1: a remote frame that CanutilsLogWriter has written is read with length 0; candump's own spelling of its length is rejected.
 #
 # A remote frame has a data length code without data. can-utils write it behind the R: 123#R4. python-can's writer writes 123#R whatever the
 # length, so its reader returns 0 for a frame that had 4. The reader takes 123#R4, and raises ValueError for the raw DLC that candump of

@@ -48,7 +48,7 @@
 #include "inspect/tdma_status.hpp"
 #include "inspect/top.hpp"
 #include "linuxcnc/linuxcnc.hpp"
-#include "other_program.hpp"
+#include "cli/other_program.hpp"
 #include "panel/panel.hpp"
 #include "part.hpp"
 #include "paths.hpp"

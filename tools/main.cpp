@@ -12,7 +12,7 @@
 #include "cli/standard_streams.hpp"
 #include "commands.hpp"
 #include "execute/process_setup.hpp"
-#include "other_program.hpp"
+#include "cli/other_program.hpp"
 
 namespace {
 

@@ -160,7 +160,7 @@ private:
                          "then set enable to FALSE and TRUE",
                          identification_.zero_offset());
         }
-        if (homed && fault_.lasts()) fault_.end(faults_, this);
+        if ((homed || !enable) && fault_.lasts()) fault_.end(faults_, this);  // without enable there is no torque
         zero_offset = identification_.zero_offset();
         identified_frequency = std::sqrt(rig_.weight_moment / rig_.pendulum_inertia);
     }

@@ -15,6 +15,15 @@ namespace {
 
 constexpr std::size_t most_labels = 5;  // of a diagnostic, those of values included
 
+/// Returns the value as a message has it: the beginning of a long one.
+std::string shortened(const std::string& value) {
+    constexpr std::size_t max_size = 80;
+    if (value.size() <= max_size) return value;
+    std::size_t end = max_size;
+    while (end > 0 && (static_cast<unsigned char>(value[end]) & 0xC0) == 0x80) --end;  // not within a character
+    return value.substr(0, end) + "…";
+}
+
 Diagnostics without_names(Diagnostic one) {
     one.unknown.reset();
     Diagnostics single;
@@ -120,7 +129,7 @@ Diagnostic Script::with_values(Diagnostic diagnostic) const {
         const Reference reference = reference_at(text, at);
         const Ini::Entry* const entry = reference.kind == Reference::key ? ini.find(reference.section, reference.name) : nullptr;
         if (!entry) continue;
-        std::string value = std::string(text.substr(at, reference.length)) + " is " + "'" + entry->value + "'";
+        std::string value = std::string(text.substr(at, reference.length)) + " is '" + shortened(entry->value) + "'";
         if (!entry->at.known() && !entry->place.empty()) value += " in " + entry->place;
         diagnostic.labels.push_back({entry->at, std::move(value)});
         has_comment = has_comment || entry->value.find(" #") != std::string::npos || entry->value.find(" ;") != std::string::npos;

@@ -310,7 +310,7 @@ bool runs_functions(const Model& model) {
 void check_that_something_ran(const Session& session, Diagnostics& diagnostics) {
     const Model& model = session.model();
     const Span at = session.threads().first_advance();
-    if (!has_functions(model) || session.threads().now_ns() == 0) return;
+    if (!has_functions(model) || session.threads().functions_ran() || session.threads().now_ns() == 0) return;
     if (model.threads.empty())
         diagnostics.warning("nothing-ran", at, "no thread exists, so no function ran", "",
                             "create one with `newthread servo-thread 1000000`, then `addf FUNCTION servo-thread`");

@@ -148,7 +148,10 @@ Connection::Handled Connection::handle(std::string_view line, std::string& repli
     const std::size_t before = replies.size();
     try {
         const Verb& verb = verb_of(body);
-        if (state.session.ending() && verb.handle != &State::end) return refuse("the machine ends");
+        // A program's values go on until the connection is closed, which is what it takes for the end of the machine.
+        constexpr decltype(verb.handle) until_closed[] = {&State::end, &State::exchange, &State::exit, &State::port, &State::stream};
+        const bool answered = std::find(std::begin(until_closed), std::end(until_closed), verb.handle) != std::end(until_closed);
+        if (state.session.ending() && !answered) return refuse("the machine ends");
         const bool script = verb.handle == &State::script;
         if (!may_wait && (verb.handle == &State::run || script)) {
             const Json& text = body[script ? "script" : "run"];

@@ -128,27 +128,14 @@ bool has_aliases(Elaboration& on, const Token& kind) {
     return false;
 }
 
-/// Returns true if the name is of that kind; reports it otherwise. An output may be a parameter in LinuxCNC, which has read-only ones.
-bool is_of_kind(Elaboration& on, const Token& kind, const Token& name) {
-    const Pin* const pin = on.edit.pin(word(name));
-    if (!pin) return false;
-    const bool as_pin = kind.text == "pin";
-    const bool is_parameter = pin->dir == HAL_DIR_PARAM;
-    const bool fits = as_pin ? !is_parameter : is_parameter || pin->dir == HAL_DIR_OUT;
-    if (fits) return true;
-    on.diagnostics.error("no-such-pin", name.span, quoted(name.text) + (as_pin ? " is a parameter, not a pin" : " is a pin, not a parameter"), "",
-                         as_pin ? "write param in the place of pin" : "write pin in the place of " + std::string(kind.text));
-    return false;
-}
-
 }  // namespace
 
 void edits::alias(Elaboration& on, Args args) {
-    if (has_aliases(on, args[0]) && is_of_kind(on, args[0], args[1])) on.edit.alias(word(args[1]), word(args[2]));
+    if (has_aliases(on, args[0])) on.edit.alias(word(args[1]), word(args[2]));
 }
 
 void edits::unalias(Elaboration& on, Args args) {
-    if (has_aliases(on, args[0]) && is_of_kind(on, args[0], args[1])) on.edit.unalias(word(args[1]));
+    if (has_aliases(on, args[0])) on.edit.unalias(word(args[1]));
 }
 
 }  // namespace hal

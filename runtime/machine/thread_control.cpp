@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "machine/thread_control.hpp"
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <deque>
@@ -93,10 +94,23 @@ ThreadControl::Halt ThreadControl::halted(std::uint64_t ticket) const {
 
 bool ThreadControl::running() const { return state_.executor->running(); }
 
-void ThreadControl::advance_ns(std::int64_t ns) { state_.executor->advance(ns); }
+/// Notes whether the time that advances now is time in which functions run.
+void ThreadControl::note_functions() {
+    const auto& threads = state_.model.threads;
+    const auto has_functions = [](const auto& thread) { return !thread->functions.empty(); };
+    const auto has_init = [](const auto& thread) { return !thread->init.empty(); };
+    if (running() && std::any_of(threads.begin(), threads.end(), has_functions)) functions_ran_ = true;
+    if (std::any_of(threads.begin(), threads.end(), has_init)) functions_ran_ = true;
+}
+
+void ThreadControl::advance_ns(std::int64_t ns) {
+    note_functions();
+    state_.executor->advance(ns);
+}
 
 void ThreadControl::advance_cycles(std::uint64_t cycles) {
     SessionState& s = state_;
+    note_functions();
     if (s.model.threads.empty()) return;
     const Thread& fastest = *s.model.threads.front();
     const Core* const core = s.core(&fastest);

@@ -34,6 +34,8 @@ public:
         first_advance_ = command;
         return true;
     }
+    /// Returns true when time has advanced while functions could run.
+    bool functions_ran() const { return functions_ran_; }
     /// Returns the first command that was noted, or an unknown span.
     Span first_advance() const { return first_advance_; }
     /// Stops the functions as stop() does, but waits for nothing and nobody: needs no lock of the session. Returns a ticket for
@@ -64,7 +66,10 @@ public:
 
 private:
     SessionState& state_;
+    void note_functions();
+
     bool was_started_ = false;
+    bool functions_ran_ = false;
     Span first_advance_;
     int watchdog_ = -1;  // the open device, until it is disarmed
 };

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """Two machines on a topic and their faults: a killed publisher, another type, a flood, a wrong clock, malformed samples."""
+import contextlib
 import os
 import re
 import signal
@@ -175,7 +176,10 @@ class Topics(DdsCase):
 
         def segments(process):
             """The segments that it created: it holds their lock files."""
-            held = [str(fd.readlink()) for fd in (Path("/proc") / str(process.pid) / "fd").iterdir()]
+            held = []
+            for fd in (Path("/proc") / str(process.pid) / "fd").iterdir():
+                with contextlib.suppress(FileNotFoundError):  # closed meanwhile
+                    held.append(str(fd.readlink()))
             return [lock[:-len("_el")] for lock in held if re.fullmatch(r"/dev/shm/fastrtps_[0-9a-f]+_el", lock)]
         left = segments(publisher)
         self.assertTrue(left)

@@ -275,7 +275,7 @@ TEST(Script, a_check_looks_at_the_whole_file_and_does_nothing) {
 
 TEST(Script, lines_that_make_nothing_leave_no_text_behind) {
     ShellMachine machine;
-    machine.must("loadrt and2 names=a\nnewthread t 1000000\nnet s a.out\n");
+    machine.must("loadrt and2 names=a\nnewthread t 1000000\nnet s a.out\nadvance 1 cycles\n");  // the first advance is kept, for a warning
     const auto next_number = [&] {
         const auto number = machine.session.sources.add("probe", "x");
         machine.session.sources.drop(number);

@@ -18,7 +18,7 @@
 #include "cli/prompt_loop.hpp"
 #include "control/client.hpp"
 #include "netlist/netlist.hpp"
-#include "other_program.hpp"
+#include "cli/other_program.hpp"
 #include "text/diagnostic.hpp"
 
 namespace hal::tools {

@@ -142,6 +142,7 @@ ACCEPTED = [
     (r"setp .* -?1e400$|sets .* 1e400$|.* = 1e400$", "ours", "a number beyond the range of float is an error here, infinite there"),
     (r"(setp|sets) \S+ \d{20,}$|.* = \d{20,}$", "ours", "a number of more than 64 bits is an error here, the largest one there"),
     (r"(setp|sets|.* =).* (yes|on|YES|ON|no|off)$", "LinuxCNC", "`yes` and `on` are bits here"),
+    (r"(un)?alias (pin|param) ", "LinuxCNC", "`alias` and `unalias` take `pin` and `param` for either"),
 ]
 
 

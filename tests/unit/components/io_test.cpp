@@ -193,7 +193,7 @@ TEST(Streamer, Disabled_takes_nothing_and_misses_nothing) {
 TEST(Time, Runs_while_started_holds_in_a_pause_and_begins_anew) {
     Instance t("time");
     t.set("start", true);
-    t.run("", 1'000'000'000, 1 + 3600 * 2 + 60 * 3 + 4);  // the first cycle is the start itself
+    t.run("", 1'000'000'000, 3600 * 2 + 60 * 3 + 4);  // the first cycle counts, as in LinuxCNC
     EXPECT_EQ(t.get<std::uint32_t>("hours"), 2u);
     EXPECT_EQ(t.get<std::uint32_t>("minutes"), 3u);
     EXPECT_EQ(t.get<std::uint32_t>("seconds"), 4u);
@@ -208,7 +208,7 @@ TEST(Time, Runs_while_started_holds_in_a_pause_and_begins_anew) {
     EXPECT_EQ(t.get<std::uint32_t>("seconds"), 5u);
     t.set("start", true);
     t.run("", 1'000'000'000, 2);
-    EXPECT_EQ(t.get<std::uint32_t>("seconds"), 1u);
+    EXPECT_EQ(t.get<std::uint32_t>("seconds"), 2u);
     EXPECT_EQ(t.get<std::uint32_t>("hours"), 0u);
 }
 

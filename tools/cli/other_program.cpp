@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "other_program.hpp"
+#include "cli/other_program.hpp"
 
 #include <cerrno>
 #include <csignal>
