@@ -75,12 +75,13 @@ private:
     /// Moves for one cycle to a point `distance` ahead, or brakes to a stop if that is 0. Returns true while it moves.
     bool move(double distance, double period_s) noexcept {
         const double acceleration = at_least_0(max_acceleration);
+        const double fastest = at_least_0(max_velocity);
         const double change = acceleration * period_s;
         const double negligible = change * period_s * 0.001;
         const bool going = std::fabs(distance) > negligible;
         // The speed v from which braking by `change` in each cycle ends at the distance d: v * v + 2 v change = 2 a d.
         const double braking = std::sqrt(2.0 * acceleration * std::fabs(distance) + change * change) - change;
-        const double speed = going ? std::min(braking, at_least_0(max_velocity)) : 0.0;
+        const double speed = going ? std::min(braking, fastest) : 0.0;
         velocity_ = std::clamp(std::copysign(speed, distance), velocity_ - change, velocity_ + change);
         magnitude_ += velocity_ * period_s;
         return going || velocity_ != 0.0;
