@@ -138,8 +138,9 @@ bool report_end(const char* call) noexcept {
     make_all_safe();
     print("hal: ");
     name_caller(in_function, module);
-    if (__rtsan_realtime_enter && in_function) {
-        print(" made the call that the real-time guard prints above, at cycle ");
+    if (__rtsan_realtime_enter && (in_function || module)) {
+        print(" made the call that the real-time guard prints above");
+        if (in_function) print(", at cycle ");
     } else {
         print(" called ");
         print(call);

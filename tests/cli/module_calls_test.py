@@ -25,7 +25,7 @@ setp sum.in1 100
 loadrt wires
 advance 2 cycles
 gets w
-getp wires.result
+getp wires.more
 getp wires.late
 getp wires.denied
 getp wires.add
@@ -52,9 +52,7 @@ addf 0 0 0 -22 -22, delf 0 -22, addf 0
 hal_param_set: 'wires.gain': the parameter has another type
 hal_param_set: 'nothing': unknown parameter
 set 0 3, type -22, foreign 0, missing -22
-hal_pin_alias: 'wires.out': 'wires.out' already has the alias 'wires.result'
-hal_pin_alias: 'wires.in': 'wires.in' has no alias
-alias 0 -22 -22 0
+alias 0 0 0 0
 sum.in1: type 2, 100, 0
 wires.out: type 2, 0, 1
 w: type 2, 0, 1
