@@ -39,6 +39,12 @@ printf '#!/bin/sh\\necho "started: $*"\\necho "builds with $HALCYON_BUILD"\\n' >
 chmod +x build/release/bin/hal
 """
 APT = """#!/bin/sh
+case "$*" in *--assume-no*)
+    [ -e "$TOOLS/offline" ] && exit 100
+    echo "Need to get 1,234 kB of archives."
+    echo "After this operation, 56.7 MB of additional disk space will be used."
+    exit 1 ;;
+esac
 echo "apt-get $*" >>"$TOOLS/log"
 [ -e "$TOOLS/offline" ] && exit 100
 case "$*" in *libsolving-dev*) touch "$TOOLS/solving.h" ;; esac
@@ -161,7 +167,7 @@ class Script(unittest.TestCase):
         calls = self.hal("run", "c.hal")
         self.assertEqual(["apt-get -o DPkg::Lock::Timeout=300 -o Acquire::Retries=1 install --no-install-recommends -y libsolving-dev",
                           self.BUILD + "hal component_sum2 component_pid component_lqr"], calls)
-        self.assertRegex(self.said, "^hal: installing Debian packages( through sudo)?: libsolving-dev\nhal: new since the last build: libsolving-dev\n")
+        self.assertRegex(self.said, "^hal: installing Debian packages( through sudo)?: libsolving-dev \\(1,234 kB to download, 56.7 MB on disk\\)\nhal: new since the last build: libsolving-dev\n")
 
     def test_a_package_that_cannot_be_installed_is_named(self):
         (self.tools / "offline").write_text("")

@@ -25,6 +25,7 @@ echo "== as it was" >&2; try
 """
 APT = f"""#!/bin/sh
 [ -e "$FOLDER/offline" ] && exit 100
+case "$*" in *--assume-no*) exit 1 ;; esac
 case "$*" in *libopencv-contrib-dev*) umount {HEADERS} ;; esac
 """
 
