@@ -115,6 +115,7 @@ public:
         slave_faults_.resize(bus_.setup.slaves.size());
         clock_faults_.resize(bus_.setup.slaves.size());
         unsent_ = unreceived_ = apart_ = 0;
+        idle_cycles_.store(0, std::memory_order_relaxed);
         interrupted_.store(false);
         filter_ = config::EventFilter(bus_.setup.slaves.size());
         discipline_.lose();
@@ -138,11 +139,19 @@ public:
     }
 
     void receive(hal::Cycle cycle) noexcept {
-        if (!master_ || !fits(cycle)) return;
+        if (!master_) return;
+        if (!fits(cycle)) {
+            show_offline(cycle);
+            return;
+        }
         unreceived_ = 0;
         receiver_.store(pthread_self(), std::memory_order_relaxed);
         if (unreceived_fault_.lasts()) unreceived_fault_.end(faults_, this);
         if (++unsent_ == tolerated_cycles) begin(unsent_fault_, no_transmit_words_);
+        if (idle_cycles_.fetch_add(1, std::memory_order_relaxed) >= tolerated_cycles) {
+            show_offline(cycle);
+            return;
+        }
         now_ns_ = cycle.start_ns();
         master_->receive(cycle.start_ns());
         if (interrupted_.exchange(false, std::memory_order_acquire)) resume();
@@ -164,6 +173,7 @@ public:
         if (apart_ == tolerated_cycles) begin(apart_fault_, apart_words_);
         else if (apart_ == 0 && apart_fault_.lasts()) apart_fault_.end(faults_, this);
         if (unreceived_ > 2 || apart_ > 2) return;  // outputs must not move without their inputs
+        idle_cycles_.store(0, std::memory_order_relaxed);
         // The thread was declared hung, but its cycle goes on.
         if (interrupted_.load(std::memory_order_acquire)) return;
         entries_.take(areas_);
@@ -223,10 +233,35 @@ private:
     bool fits(hal::Cycle cycle) noexcept {
         if (cycle.period_ns() == bus_.setup.cycle_ns) {
             if (period_fault_.lasts()) period_fault_.end(faults_, this);
+            period_reported_ = false;
             return true;
         }
         if (!std::exchange(period_reported_, true)) begin(period_fault_, period_words_, static_cast<double>(cycle.period_ns()) * 1e-3);
         return false;
+    }
+    /// Takes the slaves to SAFE-OP once, and shows them as offline while no process data is exchanged. They are
+    /// started again by the next exchange. [realtime]
+    void show_offline(hal::Cycle cycle) noexcept {
+        if (!interrupted_.load(std::memory_order_relaxed)) {
+            make_safe(cycle);
+            if (clock_ && was_fresh_) discipline_.lose();
+            was_fresh_ = false;
+        }
+        master::BusStatus network = master_->status();
+        network.state = State::none;
+        network.operational = false;
+        network.responding = 0;
+        network.wkc = 0;
+        network.wkc_state = master::WkcState::none;
+        network.dc_synchronised = false;
+        bus_pins_.show(network, master_->cycles_incomplete());
+        for (std::size_t n = 0; n < slaves_.size(); ++n) {
+            master::SlaveStatus slave = master_->slave_status(n);
+            slave.state = State::none;
+            slave.online = false;
+            slave.operational = false;
+            slaves_[n].show(slave, emergencies_->of(n));
+        }
     }
     /// Returns the time of the clocks of the slaves: ns since 2000-01-01. [setup]
     static std::int64_t since_2000_ns() noexcept {
@@ -358,6 +393,7 @@ private:
         apart_words_;
     config::EventFilter    filter_{0};
     unsigned               unsent_ = 0, unreceived_ = 0, apart_ = 0;
+    std::atomic<unsigned>  idle_cycles_{0};  ///< cycles of receive() since transmit() last exchanged process data
     std::atomic<pthread_t> receiver_{};
     std::atomic<bool>      interrupted_{false};  ///< set by make_safe() in any thread, taken by receive()
 
