@@ -136,6 +136,11 @@ bool ThreadControl::attach_watchdog(const std::string& path, std::string& proble
         problem = "cannot open '" + path + "': " + std::strerror(errno);
         return false;
     }
+    if (::write(device, "", 1) != 1) {  // a device that accepts no write would reset the host, or never protect it
+        problem = "cannot write to '" + path + "': " + std::strerror(errno);
+        ::close(device);
+        return false;
+    }
     watchdog_ = device;
     s.executor->supervisor().feed(device);
     return true;
@@ -146,7 +151,10 @@ void ThreadControl::disarm_watchdog() {
     state_.executor->supervisor().feed(-1);
     state_.executor->supervisor().fence();
     // The magic character: without it the driver resets the host after the close.
-    if (::write(watchdog_, "V", 1) != 1) return;
+    if (::write(watchdog_, "V", 1) != 1) {
+        watchdog_problem_ = std::strerror(errno);
+        return;
+    }
     ::close(watchdog_);
     watchdog_ = -1;
 }

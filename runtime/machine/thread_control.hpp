@@ -63,6 +63,8 @@ public:
     void disarm_watchdog();
     /// Returns true when there is no watchdog device or it accepted the disarming.
     bool watchdog_disarmed() const { return watchdog_ < 0; }
+    /// Returns why the watchdog device rejected the disarming. Empty: it was not asked to, because a thread does not end.
+    const std::string& watchdog_problem() const { return watchdog_problem_; }
 
 private:
     SessionState& state_;
@@ -72,6 +74,7 @@ private:
     bool functions_ran_ = false;
     Span first_advance_;
     int watchdog_ = -1;  // the open device, until it is disarmed
+    std::string watchdog_problem_;
 };
 
 }  // namespace hal

@@ -277,6 +277,20 @@ class Supervisor(HungCase):
         error = self.bad("run", self.write("a.hal", MACHINE.format(options="")), "--watchdog", "/nowhere/watchdog")
         self.assertIn("cannot open '/nowhere/watchdog': No such file or directory", error)
 
+    def test_watchdog_device_that_accepts_no_write_is_an_error(self):
+        error = self.bad("run", self.write("a.hal", MACHINE.format(options="")), "--watchdog", "/dev/full")
+        self.assertEqual("hal run: cannot write to '/dev/full': No space left on device\n", error)
+
+    def test_watchdog_device_that_rejects_the_disarming_is_named_with_the_reason(self):
+        device = self.folder / "watchdog"
+        os.mkfifo(device)
+        reader = os.open(device, os.O_RDONLY | os.O_NONBLOCK)
+        machine = self.machine("", "--watchdog", device)
+        os.close(reader)  # further writes fail
+        _, error = self.end(machine)
+        self.assertIn(f"{device} cannot be disarmed: Broken pipe; it resets this host after its timeout", error)
+        self.assertEqual(1, machine.returncode)
+
     def simulation(self, mode, *words):
         path = self.write("a.hal", f"newthread servo 1000000\nloadrt stall names=s file=events.txt\naddf s servo\nsetp s.mode {mode}\n")
         sim = subprocess.Popen(["hal", "sim", path, "--for", "1s", *words], executable=str(HAL), cwd=self.folder, env=self.environment,

@@ -82,8 +82,11 @@ int run_plain(HostedMachine& machine, const RunOptions& options, std::vector<Nod
     const std::string report = timing_report(machine.session);  // the threads take their figures with them
     machine.shut_down();
     print("\n" + end_reason(machine.stop.signal()) + report);
-    if (!options.watchdog.empty() && !machine.session.threads().watchdog_disarmed())
-        fail(options, options.watchdog + " was not disarmed, because a thread does not end; it resets this host after its timeout");
+    if (!options.watchdog.empty() && !machine.session.threads().watchdog_disarmed()) {
+        const std::string& problem = machine.session.threads().watchdog_problem();
+        const std::string reason = problem.empty() ? " was not disarmed, because a thread does not end" : " cannot be disarmed: " + problem;
+        status = fail(options, options.watchdog + reason + "; it resets this host after its timeout");
+    }
     return faulted ? 1 : status;
 }
 
