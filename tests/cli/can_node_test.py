@@ -338,6 +338,8 @@ class Watch(Node):
                 listener.communicate(timeout=2 * TIMEOUT)
                 self.assertEqual(lines, [line.split()[2] for line in (self.folder / "seen.log").read_text().splitlines()])
         self.assertEqual("hal can produce: unknown kind 'synk'; did you mean 'sync'?\n", self.bad("can", "produce", self.bus, "synk"))
+        for words in (("produce", self.bus, "sync"), ("generate", self.bus)):
+            self.assertIn("--every: invalid duration '0s'", self.bad("can", *words, "--every", "0s", "--count", 1))
         self.assertIn("invalid --id '800'", self.bad("can", "generate", self.bus, "--id", "800"))
 
     def begin(self, command, *words):

@@ -23,7 +23,7 @@ struct GenerateOptions : PeriodicOptions {
 
     void declare(OptionSet& set) override {
         set.words("ADDRESS", bus_address);
-        set.duration("--every", every_ns, "interval between two frames (default 100ms)");
+        set.duration("--every", every_ns, "interval between two frames (default 100ms)", 1);
         set.for_how_long(for_ns, "end after 2s, 500ms … (default: until Ctrl-C)");
         set.value("-n,--count", count, "N", "end after N frames");
         set.value("--id", id, "ID", "identifier or range in hex: 181, 100-1FF (default: all)");
@@ -39,7 +39,7 @@ struct ProduceOptions : PeriodicOptions {
 
     void declare(OptionSet& set) override {
         set.words("ADDRESS KIND", "the bus; heartbeat NODE, sync, or guarding NODE (the requests of a master)");
-        set.duration("--every", every_ns, "period (default 100ms; sync 10ms)");
+        set.duration("--every", every_ns, "period (default 100ms; sync 10ms)", 1);
         set.for_how_long(for_ns, "end after 2s, 500ms … (default: until Ctrl-C)");
         set.value("-n,--count", count, "N", "end after N frames");
         set.value("--counter", counter, "N", "sync: add a counter that overflows at N, 2..240");
