@@ -88,6 +88,8 @@ class Values(Ethercat):
     def test_objects(self):
         self.assertEqual("0x00020192 131474\n", self.on("upload", "-p", 1, "0x1000", 0))
         self.assertEqual(131474, json.loads(self.on("upload", "-p", 1, "0x1000", 0, "--json"))["value"])
+        self.assertIn("0x1000:0 has 4 bytes, type uint16 has 2; --type selects another one",
+                      self.refused("upload", "-p", 1, "0x1000", 0, "--type", "uint16"))
         self.on("download", "-p", 1, "0x6060", 0, 9)
         self.assertRegex(self.refused("download", "-p", 1, "0x1000", 0, 9), r"0x1000:0: SDO transfer aborted with code 0x06010002: ")
         self.assertIn("choose one with -p 0 … -p 3", self.refused("upload", "0x1000", 0))

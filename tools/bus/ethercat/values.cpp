@@ -172,6 +172,8 @@ int transfer(const EthercatValueOptions& options, bool download) {
     if (session.gateway_lost()) return fail(options, fmt::format("{} closed the connection; does the machine still run?", options.words.front()));
     if (!request.result) return fail_mailbox(options, *s, what, request.result);
     if (!download) bytes.resize(request.result.length);
+    if (!download && !options.type.empty() && type->bytes != 0 && bytes.size() != type->bytes)
+        return fail(options, fmt::format("{} has {} bytes, type {} has {}; --type selects another one", what, bytes.size(), type->name, type->bytes));
     std::string plain;
     const std::string text = value_words(bytes, *type, plain);
     if (options.json)
