@@ -50,6 +50,22 @@ class Interrupt(Case):
                             process.communicate()
                     self.assertGreaterEqual(process.returncode, 0)
 
+    def test_an_interrupted_replay_reports_how_much_was_replayed(self):
+        self.write("abs.hal", "loadrt threads name1=servo period1=1000000\nloadrt abs\naddf abs.0 servo\nnet a => abs.0.in\nnet b abs.0.out\n")
+        self.write("run.csv", "time_s,a,b\n0,0,0\n1e9,0,0\n")
+        process = subprocess.Popen([HAL, "replay", "run.csv", "abs.hal", "--tolerance", "1"], cwd=self.folder, env=self.environment,
+                                   stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, text=True)
+        try:
+            wait_until(lambda: process.poll() is not None or takes(process, signal.SIGTERM), "the replay runs")
+            process.send_signal(signal.SIGTERM)
+            out, _ = process.communicate(timeout=TIMEOUT)
+        finally:
+            if process.poll() is None:
+                process.kill()
+                process.communicate()
+        self.assertEqual(1, process.returncode)
+        self.assertRegex(out, r"(?m)^interrupted after \S+ s of 1e\+09 s of recording: 1 input driven, 1 value compared")
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -100,6 +100,7 @@ public:
         constexpr std::int64_t step_ns = 200'000'000;
         for (std::int64_t left_ns = wanted_ns + period_ns_; left_ns > 0 && !machine_.stop.requested(); left_ns -= step_ns) {
             machine_.advance(std::min(step_ns, left_ns), 0);
+            replayed_ns_ = std::min(wanted_ns, wanted_ns - left_ns + step_ns);
             if (!probe) continue;
             const auto lock = machine_.session.lock();
             for (const ProbeRows& rows : machine_.session.probes().take(*probe, std::size_t{1} << 28)) compare(rows, wanted_ns);
@@ -125,10 +126,13 @@ public:
                                     one.replayed, one.recorded, static_cast<double>(one.at_ns) * 1e-9);
         }
         const double seconds = static_cast<double>(recording_.end_ns() - recording_.begin_ns()) * 1e-9;
+        const double wanted = options_.for_ns < 0 ? seconds : std::min(seconds, static_cast<double>(options_.for_ns) * 1e-9);
+        const double replayed = static_cast<double>(replayed_ns_) * 1e-9;
         const bool nothing = options_.tolerance >= 0 && rows == 0;  // a test that tests nothing
         if (!options_.quiet || different != 0 || nothing)
-            text += fmt::format("{:.6g} s of recording: {} driven, {} compared{}\n",
-                                options_.for_ns < 0 ? seconds : std::min(seconds, static_cast<double>(options_.for_ns) * 1e-9),
+            text += fmt::format("{} s of recording: {} driven, {} compared{}\n",
+                                machine_.stop.requested() ? fmt::format("interrupted after {:.6g} s of {:.6g}", replayed, wanted)
+                                                          : fmt::format("{:.6g}", wanted),
                                 counted(driven_.size(), "input"), counted(compared_.size(), "value"),
                                 options_.tolerance < 0 ? ""
                                 : nothing              ? ": nothing was tested; record values that the netlist computes too"
@@ -250,7 +254,7 @@ private:
     std::set<std::string> driven_, seen_;
     std::vector<Compared> compared_;
     ProbeLayout layout_;
-    std::int64_t begin_ns_ = -1, period_ns_ = 0;
+    std::int64_t begin_ns_ = -1, period_ns_ = 0, replayed_ns_ = 0;
 };
 
 }  // namespace
