@@ -83,6 +83,7 @@ class ShellWatch(Case):
             self.assertRegex(out, r"(?m)^total +12\.5 ")
             self.assertRegex(out, r"(?m)^gate\.out +FALSE ")
         self.assertIn("missing name; type: watch NAME", self.bad("shell", "watch"))
+        self.assertIn("watch NAME…", self.good("shell", "help", "watch"))
 
     def test_a_pipe_has_it_among_other_commands(self):
         out = self.good("shell", given="setp adder.in0 4\nwatch total\ngets total\n")

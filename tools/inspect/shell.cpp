@@ -34,11 +34,14 @@ int show(const Client::Answer& answer) {
 
 constexpr std::string_view watch_help = "watch NAME…            show values live, with minimum, maximum and rate; q ends it\n";
 
-/// `watch NAME…` is a command of this program, which is `hal watch` with the same names. Returns nothing for another command.
+/// `watch NAME…` is a command of this program, which is `hal watch` with the same names; `help watch` describes it. Returns nothing
+/// for another command.
 std::optional<int> run_own(const RemoteShellOptions& options, const Client& client, std::string_view line) {
     std::istringstream words{std::string(line)};
     std::string first;
-    if (options.classic || !(words >> first) || first != "watch") return std::nullopt;
+    if (options.classic || !(words >> first)) return std::nullopt;
+    if (std::string topic, more; first == "help" && words >> topic && topic == "watch" && !(words >> more)) return print(watch_help) ? 0 : 1;
+    if (first != "watch") return std::nullopt;
     std::vector<std::string> arguments{"watch", "--name", client.instance()};
     const std::size_t own = arguments.size();
     for (std::string name; words >> name;) arguments.push_back(name);
