@@ -97,6 +97,27 @@ void check_alias(const Command& command, const Model& model, Diagnostics& diagno
                           command.name.text + " " + wanted + " " + command.args[1].text);
 }
 
+/// Options and arguments of ours, of commands that halcmd has.
+void check_arguments(const Command& command, const Model& model, Diagnostics& diagnostics) {
+    const std::string& verb = command.name.text;
+    if (command.args.empty()) return;
+    const Token& first = command.args[0];
+    const auto unsupported = [&](const Token& token, const std::string& help) {
+        diagnostics.error("linuxcnc-command", token.span, verb + " of LinuxCNC has no option " + hal::quoted(token.text), "", help);
+    };
+    if (verb == "addf" && first.text == "--auto") return unsupported(first, "write a line for each function: addf FUNCTION THREAD");
+    if (verb == "print" && command.args.size() > 1)
+        return diagnostics.error("linuxcnc-command", command.args[1].span, "print of LinuxCNC takes one argument", "", "write the text between quotes");
+    if (verb == "unloadrt" && !model.find_component(first.text) && model.find_instance(first.text))
+        return diagnostics.error("linuxcnc-command", first.span, "unloadrt of LinuxCNC unloads whole components: " + hal::quoted(first.text) + " is an instance");
+    if (verb != "loadusr" && verb != "waitusr") return;
+    for (const Token& token : command.args) {
+        if (!token.text.starts_with('-')) return;
+        if (token.text == "-t" || token.text.starts_with("--restart")) return unsupported(token, "");
+        if (token.text.ends_with('n')) return;  // the next one is a name
+    }
+}
+
 /// The model keeps them by period.
 std::vector<const Thread*> in_order_of_creation(const Model& model) {
     std::vector<const Thread*> all;
@@ -118,6 +139,7 @@ void LinuxcncCheck::command(const Command& command, const Model& model, Diagnost
     check_value(command, model, diagnostics);
     check_type(command, diagnostics);
     check_alias(command, model, diagnostics);
+    check_arguments(command, model, diagnostics);
     if (verb == "alias" && command.args.size() == 3) name(command.args[2].text, "alias", command.args[2].span, diagnostics);
 }
 

@@ -292,7 +292,7 @@ std::vector<FaultRecord> FaultLog::records(std::int64_t now_ns) const {
     for (const Row& row : rows_) {
         records.push_back(row.record);
         records.back().age_ns = now_ns - row.record.age_ns;
-        records.back().lasts = lasts(row);
+        records.back().lasts = lasts(row) && is_newest(row);
     }
     return records;
 }
