@@ -175,7 +175,7 @@ class Live(Case):
         process.send_signal(signal.SIGCONT)
 
     def hung(self, times):
-        wait_until(lambda: self.shell("--json", "show", "fault").stdout.count("hung-thread") >= times, "the hang is a fault")
+        wait_until(lambda: len(re.findall("hung-thread|starved-thread", self.shell("--json", "show", "fault").stdout)) >= times, "the hang is a fault")
 
     def after_every_stop(self, name, bus, drive, enable):
         operational, on = [f"{b}.operational" for b in bus], [f"{d}.enabled" for d in drive]
