@@ -49,8 +49,7 @@ struct Spindle : hal::Component {
         const double wanted = within_range(command, gear);
         limited = wanted != command;
 
-        const double measured = actual_speed * 60.0;
-        const double speed = simulated ? rpm.get() : std::isfinite(measured) ? measured : 0.0;
+        const double speed = simulated ? rpm.get() : measured_speed();
         const double magnitude = std::fabs(speed);
         show(magnitude, cycle.seconds());
         zero_speed = magnitude <= zero_tolerance[gear];
@@ -70,6 +69,12 @@ struct Spindle : hal::Component {
     }
 
 private:
+    /// Returns the speed that the encoder measures, in rpm; 0 while it is not a finite number. [realtime]
+    double measured_speed() const noexcept {
+        const double measured = actual_speed * 60.0;
+        return std::isfinite(measured) ? measured : 0.0;
+    }
+
     /// Returns a limit that must be above 0 to have an effect. [realtime]
     static double limit_or_none(double limit) noexcept { return limit > 0.0 ? limit : std::numeric_limits<double>::infinity(); }
 

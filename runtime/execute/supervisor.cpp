@@ -258,8 +258,10 @@ bool Supervisor::in_gap(const Watched& watched, std::int64_t now_ns, std::int64_
     return found.cause == Stall::Cause::starved;
 }
 
-void Supervisor::declare(Watched& watched, std::int64_t now_ns, std::int64_t gap_ns, std::int64_t suspended_ns) {
-    Core& core = *watched.core;
+namespace {
+
+/// Describes a thread that has not finished a cycle, before its cause is known.
+Stall stall_of(const Core& core, int cpu, std::int64_t now_ns) {
     Stall stall;
     stall.thread = core.id();
     stall.function = core.hung_function();
@@ -267,7 +269,15 @@ void Supervisor::declare(Watched& watched, std::int64_t now_ns, std::int64_t gap
     stall.limit_ns = core.supervise_ns;
     stall.silent_ns = now_ns - core.finished_ns();
     stall.time_ns = now_ns;
-    stall.cpu = watched.cpu;
+    stall.cpu = cpu;
+    return stall;
+}
+
+}  // namespace
+
+void Supervisor::declare(Watched& watched, std::int64_t now_ns, std::int64_t gap_ns, std::int64_t suspended_ns) {
+    Core& core = *watched.core;
+    Stall stall = stall_of(core, watched.cpu, now_ns);
     if (!core.declare_hung()) return;
     watched.starved = false;
     core.stand_in(now_ns, true);  // outputs first
@@ -301,14 +311,7 @@ void Supervisor::queue(const Stall& stall) noexcept {
 // A thread that seemed to be starved has got CPU time since, and its cycle does not end: its function is the cause after all.
 void Supervisor::declare_busy(Watched& watched, std::int64_t now_ns) {
     const Core& core = *watched.core;
-    Stall stall;
-    stall.thread = core.id();
-    stall.function = core.hung_function();
-    stall.cycle = core.cycles;
-    stall.limit_ns = core.supervise_ns;
-    stall.silent_ns = now_ns - core.finished_ns();
-    stall.time_ns = now_ns;
-    stall.cpu = watched.cpu;
+    Stall stall = stall_of(core, watched.cpu, now_ns);
     watched.starved = false;
     demote(watched, stall);
     queue(stall);
