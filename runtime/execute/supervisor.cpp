@@ -215,6 +215,7 @@ bool Supervisor::look(std::int64_t now_ns, std::int64_t gap_ns, std::int64_t sus
         core.sample();
         if (core.hung()) {  // what it goes on writing does not last
             core.stand_in(now_ns, false);
+            look_at_late(one);
             if (one.starved && uses_cpu(one)) declare_busy(one, now_ns);
             well = false;
             continue;
@@ -229,9 +230,10 @@ bool Supervisor::look(std::int64_t now_ns, std::int64_t gap_ns, std::int64_t sus
             declare(one, now_ns, gap_ns, suspended_ns);
             well = false;
         } else if (silent > limit / 4) {
-            if (one.mark.taken_ns == 0) one.mark = scheduler_usage(one.tid);
+            look_at_late(one);
         } else {
             one.mark = {};
+            one.blocked = false;
             if (now_ns - one.usage.taken_ns > usage_interval_ns) one.usage = scheduler_usage(one.tid);
         }
     }
@@ -323,6 +325,21 @@ bool Supervisor::uses_cpu(const Watched& watched) noexcept {
     return watched.mark.taken_ns != 0 && now.cpu_ns - watched.mark.cpu_ns > watched.core->supervise_ns;
 }
 
+namespace {
+
+bool is_blocked(const KernelView& view) noexcept { return view.state == 'S' || view.state == 'D' || view.state == 'I'; }
+
+}  // namespace
+
+// A thread that sleeps and wakes up in its function is ready to run at times, too.
+void Supervisor::look_at_late(Watched& watched) noexcept {
+    if (watched.mark.taken_ns == 0) {
+        watched.mark = scheduler_usage(watched.tid);
+        watched.blocked = false;
+    }
+    if (!watched.blocked) watched.blocked = is_blocked(kernel_view(watched.tid));
+}
+
 // Less than a tenth since it was first seen late. A function that loops for ever on a busy host has used more than its limit soon.
 bool Supervisor::got_no_cpu(const Watched& watched) noexcept {
     const SchedulerUsage now = scheduler_usage(watched.tid);
@@ -335,7 +352,7 @@ bool Supervisor::got_no_cpu(const Watched& watched) noexcept {
 bool Supervisor::starved(const Core& core) {
     const Hold hold(mutex_);
     const Watched* const of = find(core);
-    return of && kernel_view(of->tid).state == 'R' && got_no_cpu(*of);
+    return of && !of->blocked && kernel_view(of->tid).state == 'R' && got_no_cpu(*of);
 }
 
 void Supervisor::find_cause(const Watched& watched, Stall& stall) const {
@@ -343,7 +360,7 @@ void Supervisor::find_cause(const Watched& watched, Stall& stall) const {
     stall.tracer = seen.tracer;
     if (seen.state == 't' || seen.state == 'T') {
         stall.cause = Stall::Cause::stopped;
-    } else if (seen.state == 'S' || seen.state == 'D' || seen.state == 'I') {
+    } else if (is_blocked(seen) || (watched.blocked && got_no_cpu(watched))) {
         stall.cause = Stall::Cause::waiting;
     } else if (got_no_cpu(watched)) {
         stall.cause = Stall::Cause::starved;

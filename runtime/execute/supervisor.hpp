@@ -84,6 +84,7 @@ private:
         bool demoted = false;
         bool starved = false;                         // declared hung because it got no CPU time
         SchedulerUsage mark{};                        // when it was first seen late
+        bool blocked = false;                         // it was seen blocked in the kernel since then
         SchedulerUsage usage{};                       // when it was last seen in time, read once a second
     };
     void work();
@@ -95,6 +96,7 @@ private:
     void declare_busy(Watched& watched, std::int64_t now_ns);
     void demote(Watched& watched, Stall& stall) noexcept;
     void queue(const Stall& stall) noexcept;
+    static void look_at_late(Watched& watched) noexcept;
     static bool got_no_cpu(const Watched& watched) noexcept;
     static bool uses_cpu(const Watched& watched) noexcept;
     void find_cause(const Watched& watched, Stall& stall) const;
