@@ -107,8 +107,10 @@ void Server::State::remove_gone() {
 }
 
 void Server::State::end_all() {
-    for (const auto& client : clients)
-        if (client->connection && !client->turn.closes) client->connection->cancel();
+    for (const auto& client : clients) {
+        const bool is_being_closed = client->turn.closes;  // an executor has the connection
+        if (!is_being_closed && client->connection) client->connection->cancel();
+    }
     pool.end();
     for (const auto& client : clients) {
         if (client->has_turn) client->out += client->turn.replies;
