@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What nearly every source of these folders and of the programs includes, compiled once. A source includes what it uses all the same.
+// What nearly every source of these folders and of the programs includes, compiled once. A source
+// includes what it uses all the same.
 #pragma once
 
 #include <fmt/format.h>

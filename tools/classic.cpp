@@ -40,7 +40,9 @@ bool halcmd_letter(int letter, ExecutionOptions& options) {
     }
 }
 
-void take_words(Options& options, int argc, char** argv) { options.words.assign(argv + ::optind, argv + argc); }
+void take_words(Options& options, int argc, char** argv) {
+    options.words.assign(argv + ::optind, argv + argc);
+}
 
 constexpr const char* halcmd_usage =
     "usage: halcmd [OPTION…] [COMMAND…]\n"
@@ -60,15 +62,21 @@ int complete_word() {
     const char* point = std::getenv("COMP_POINT");
     if (!line) return 0;
     std::string typed(line);
-    if (point && *point) typed.resize(std::min(typed.size(), static_cast<std::size_t>(std::strtoul(point, nullptr, 10))));
+    if (point && *point) {
+        typed.resize(
+            std::min(typed.size(), static_cast<std::size_t>(std::strtoul(point, nullptr, 10))));
+    }
     const auto command = typed.find_first_of(" \t");
-    const auto begin = command == std::string::npos ? command : typed.find_first_not_of(" \t", command);
+    const auto begin =
+        command == std::string::npos ? command : typed.find_first_not_of(" \t", command);
     typed = begin == std::string::npos ? "" : typed.substr(begin);
     std::string problem;
     const auto client = Client::connect(instance_wanted(""), problem);
     if (!client) return 1;
     std::string text;
-    for (const Candidate& candidate : client->complete(typed, typed.size()).candidates) text += candidate.text + "\n";
+    for (const Candidate& candidate : client->complete(typed, typed.size()).candidates) {
+        text += candidate.text + "\n";
+    }
     return print(text) ? 0 : 1;
 }
 
@@ -92,7 +100,10 @@ int halcmd(int argc, char** argv) {
         fail(options, "-i needs -f");
         return bad_option;
     }
-    if (options.from_file && options.words.size() > 1) options.words.resize(1);  // a command as well is ignored
+    // a command as well is ignored
+    if (options.from_file && options.words.size() > 1) {
+        options.words.resize(1);
+    }
     return run_shell(options);
 }
 
@@ -107,9 +118,13 @@ constexpr const char* halrun_usage =
 int end_running(const Options& options) {
     std::string problem;
     const auto client = Client::connect(instance_wanted(""), problem);
-    if (!client) return 0;  // nothing runs: that is what was asked for
+    if (!client) {
+        return 0;  // nothing runs: that is what was asked for
+    }
     const Client::Answer answer = client->stop();
-    if (answer.status != 0) fail(options, answer.err);
+    if (answer.status != 0) {
+        fail(options, answer.err);
+    }
     return answer.status;
 }
 
@@ -134,15 +149,21 @@ int halrun(int argc, char** argv) {
     }
     if (!options.words.empty()) {
         const std::string& file = options.words.front();
-        if (!options.from_file && !file.ends_with(".hal") && !file.ends_with(".tcl") && !file.ends_with(".ini"))
-            return fail(options, fmt::format("'{}': the name of a netlist must end with .hal, .tcl or .ini; or type: halrun -f {}", file, file));
+        if (!options.from_file && !file.ends_with(".hal") && !file.ends_with(".tcl") &&
+            !file.ends_with(".ini")) {
+            return fail(options, fmt::format("'{}': the name of a netlist must end with .hal, .tcl "
+                                             "or .ini; or type: halrun -f {}",
+                                             file, file));
+        }
     }
     return run_run(options);
 }
 
 /// The configuration program of LinuxCNC's EtherCAT component.
 int lcec_conf(int argc, char** argv) {
-    std::string hal = "hal", group = "ethercat", command = "lcec-conf";
+    std::string hal = "hal";
+    std::string group = "ethercat";
+    std::string command = "lcec-conf";
     std::vector<char*> line{hal.data(), group.data(), command.data()};
     line.insert(line.end(), argv + std::min(argc, 1), argv + argc);
     const int words = static_cast<int>(line.size());
@@ -166,8 +187,9 @@ constexpr Classic table[] = {
 }  // namespace
 
 const Classic* find_classic(std::string_view program) {
-    for (const Classic& row : table)
+    for (const Classic& row : table) {
         if (program == row.name) return &row;
+    }
     return nullptr;
 }
 

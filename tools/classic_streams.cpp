@@ -13,10 +13,11 @@
 namespace hal::tools {
 namespace {
 
-/// Reads the options of halsampler or halstreamer: -c and -n are numbers; `take` handles the letters of one of them.
+/// Reads the options of halsampler or halstreamer: -c and -n are numbers; `take` handles the
+/// letters of one of them.
 template <class O>
-int sampler_or_streamer(int argc, char** argv, const char* program, const char* letters, bool (*take)(int letter, std::uint64_t number, O&),
-                        int (*run)(const O&)) {
+int sampler_or_streamer(int argc, char** argv, const char* program, const char* letters,
+                        bool (*take)(int letter, std::uint64_t number, O&), int (*run)(const O&)) {
     O options;
     options.program = program;
     options.classic = true;
@@ -24,8 +25,11 @@ int sampler_or_streamer(int argc, char** argv, const char* program, const char* 
     for (int letter; (letter = ::getopt(argc, argv, letters)) != -1;) {
         char* end = nullptr;
         const std::uint64_t number = ::optarg ? std::strtoull(::optarg, &end, 10) : 0;
-        if ((letter == 'c' || letter == 'n') && (*::optarg < '0' || *::optarg > '9' || *end != '\0'))
-            return fail(options, fmt::format("-{} {}: not a number", static_cast<char>(letter), ::optarg));
+        if ((letter == 'c' || letter == 'n') &&
+            (*::optarg < '0' || *::optarg > '9' || *end != '\0')) {
+            return fail(options,
+                        fmt::format("-{} {}: not a number", static_cast<char>(letter), ::optarg));
+        }
         switch (letter) {
         case 'c': options.channel = ::optarg; break;
         case 'N': options.name_as_component = ::optarg; break;
@@ -34,7 +38,9 @@ int sampler_or_streamer(int argc, char** argv, const char* program, const char* 
         }
     }
     options.words.assign(argv + ::optind, argv + argc);
-    if (options.words.size() > 1) return fail(options, fmt::format("unexpected second file '{}'", options.words[1]));
+    if (options.words.size() > 1) {
+        return fail(options, fmt::format("unexpected second file '{}'", options.words[1]));
+    }
     return run(options);
 }
 
@@ -50,7 +56,12 @@ bool take_streamer_letter(int, std::uint64_t, PlayOptions&) { return false; }
 
 }  // namespace
 
-int halsampler(int argc, char** argv) { return sampler_or_streamer(argc, argv, "halsampler", "c:n:tN:", take_sampler_letter, run_record); }
-int halstreamer(int argc, char** argv) { return sampler_or_streamer(argc, argv, "halstreamer", "c:N:", take_streamer_letter, run_play); }
+int halsampler(int argc, char** argv) {
+    return sampler_or_streamer(argc, argv, "halsampler", "c:n:tN:", take_sampler_letter,
+                               run_record);
+}
+int halstreamer(int argc, char** argv) {
+    return sampler_or_streamer(argc, argv, "halstreamer", "c:N:", take_streamer_letter, run_play);
+}
 
 }  // namespace hal::tools

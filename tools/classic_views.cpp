@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// halmeter, halscope and halshow: LinuxCNC's windows are views of ours, in the terminal or in a browser.
+// halmeter, halscope and halshow: LinuxCNC's windows are views of ours, in the terminal or in a
+// browser.
 #include "classic_views.hpp"
 
 #include <fmt/core.h>
@@ -16,7 +17,9 @@ namespace {
 int run_hal(std::vector<std::string> words) {
     words.insert(words.begin(), "hal");
     std::vector<char*> line;
-    for (std::string& word : words) line.push_back(word.data());
+    for (std::string& word : words) {
+        line.push_back(word.data());
+    }
     line.push_back(nullptr);
     return run_command_line(static_cast<int>(words.size()), line.data());
 }
@@ -35,16 +38,28 @@ int halmeter(int argc, char** argv) {
         const std::string word = argv[i];
         if (word == "-s") continue;
         if (word == "-g") {
-            while (i + 1 < argc && argv[i + 1][0] >= '0' && argv[i + 1][0] <= '9') ++i;
+            while (i + 1 < argc && argv[i + 1][0] >= '0' && argv[i + 1][0] <= '9') {
+                ++i;
+            }
             continue;
         }
-        if ((word == "pin" || word == "sig" || word == "signal" || word == "par" || word == "param" || word == "parameter") && i + 1 < argc)
+        if ((word == "pin" || word == "sig" || word == "signal" || word == "par" ||
+             word == "param" || word == "parameter") &&
+            i + 1 < argc) {
             continue;
-        if (word.starts_with('-') || !name.empty())
-            return complain("halmeter", fmt::format("unexpected argument '{}'; usage: halmeter [pin|sig|param] NAME", word));
+        }
+        if (word.starts_with('-') || !name.empty()) {
+            return complain(
+                "halmeter",
+                fmt::format("unexpected argument '{}'; usage: halmeter [pin|sig|param] NAME",
+                            word));
+        }
         name = word;
     }
-    if (name.empty()) return complain("halmeter", "which value? Type: halmeter pin NAME; hal shell show pin lists the pins");
+    if (name.empty()) {
+        return complain("halmeter",
+                        "which value? Type: halmeter pin NAME; hal shell show pin lists the pins");
+    }
     return run_hal({"meter", name});
 }
 
@@ -53,8 +68,12 @@ int halscope(int argc, char** argv) {
     std::vector<std::string> words{"scope"};
     for (int i = 1; i < argc; ++i) {
         const std::string word = argv[i];
-        if (word.starts_with('-'))
-            return complain("halscope", fmt::format("option '{}' is not supported; type: hal scope NAME…, or hal panel", word));
+        if (word.starts_with('-')) {
+            return complain(
+                "halscope",
+                fmt::format("option '{}' is not supported; type: hal scope NAME…, or hal panel",
+                            word));
+        }
         words.push_back(word);
     }
     return run_hal(words.size() > 1 ? words : std::vector<std::string>{"panel"});
@@ -62,7 +81,11 @@ int halscope(int argc, char** argv) {
 
 // halshow [FILE]: its watch lists are files of Tcl's; the panel has its own.
 int halshow(int argc, char** argv) {
-    if (argc > 1) return complain("halshow", fmt::format("unexpected argument '{}'; type: hal panel, or hal watch NAME…", argv[1]));
+    if (argc > 1) {
+        return complain(
+            "halshow",
+            fmt::format("unexpected argument '{}'; type: hal panel, or hal watch NAME…", argv[1]));
+    }
     return run_hal({"panel"});
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The table of subcommands: a row per command. The options are declared in the command's own header.
+// The table of subcommands: a row per command. The options are declared in the command's own
+// header.
 #include "commands.hpp"
 
 #include <algorithm>
@@ -23,15 +24,16 @@
 #include "bus/can/read_all.hpp"
 #include "bus/can/record.hpp"
 #include "bus/can/scan.hpp"
+#include "bus/can/scocan.hpp"
 #include "bus/can/sdo_command.hpp"
 #include "bus/can/send.hpp"
 #include "bus/can/sniff.hpp"
-#include "bus/can/scocan.hpp"
 #include "bus/can/tdma.hpp"
 #include "bus/ethercat/options.hpp"
 #include "bus/node/ethercat_line.hpp"
 #include "bus/node/kinds.hpp"
 #include "cli/option_set.hpp"
+#include "cli/other_program.hpp"
 #include "cli/output.hpp"
 #include "commands/table.hpp"
 #include "comp/compile.hpp"
@@ -48,14 +50,13 @@
 #include "inspect/tdma_status.hpp"
 #include "inspect/top.hpp"
 #include "linuxcnc/linuxcnc.hpp"
-#include "cli/other_program.hpp"
 #include "panel/panel.hpp"
 #include "part.hpp"
 #include "paths.hpp"
 #include "record/plot.hpp"
-#include "run/replay.hpp"
 #include "run/check.hpp"
 #include "run/fmt.hpp"
+#include "run/replay.hpp"
 #include "run/run.hpp"
 #include "run/sim.hpp"
 #include "run/sim_record.hpp"
@@ -76,120 +77,298 @@ struct Subcommand {
     std::unique_ptr<Options> (*make_options)();
     Part part;
     int (*run)(const Options&);  ///< nullptr: in another program
-    bool verbatim;               ///< from the first word on, everything counts as words, including `-1` and `--`
-    bool (*needs_tools)(const Options&) = nullptr;  ///< whether these options need hal-tools, although `hal` has the command
+    /// from the first word on, everything counts as words, including `-1` and `--`
+    bool verbatim;
+    /// whether these options need hal-tools, although `hal` has the command
+    bool (*needs_tools)(const Options&) = nullptr;
 };
 
 /// Makes a row. `Where` is an In, whose function takes the command's own options, O.
 template <class O, class Where>
-constexpr Subcommand command(const char* name, const char* usage, const char* summary, bool verbatim = false) {
+constexpr Subcommand command(const char* name, const char* usage, const char* summary,
+                             bool verbatim = false) {
     const auto make = []() -> std::unique_ptr<Options> { return std::make_unique<O>(); };
     Subcommand row{name, usage, summary, make, Where::part, nullptr, verbatim, nullptr};
-    if constexpr (!std::is_null_pointer_v<std::remove_const_t<decltype(Where::run)>>)
+    if constexpr (!std::is_null_pointer_v<std::remove_const_t<decltype(Where::run)>>) {
         row.run = [](const Options& options) { return Where::run(static_cast<const O&>(options)); };
+    }
     return row;
 }
 
 constexpr Subcommand sim_command() {
     Subcommand row = command<SimOptions, IN_CORE(run_sim)>(
-        "sim", "FILE… [--for TIME] [-- ARG…]", "run netlists on a virtual clock: deterministic, as fast as possible");
+        "sim", "FILE… [--for TIME] [-- ARG…]",
+        "run netlists on a virtual clock: deterministic, as fast as possible");
 #ifdef HALCYON_TOOLS_PROGRAM
-    row.run = [](const Options& options) { return run_recorded_sim(static_cast<const SimOptions&>(options)); };
+    row.run = [](const Options& options) {
+        return run_recorded_sim(static_cast<const SimOptions&>(options));
+    };
 #else
-    row.needs_tools = [](const Options& options) { return !static_cast<const SimOptions&>(options).record.empty(); };
+    row.needs_tools = [](const Options& options) {
+        return !static_cast<const SimOptions&>(options).record.empty();
+    };
 #endif
     return row;
 }
 
 constexpr Subcommand table[] = {
-    command<RunOptions, IN_CORE(run_run)>("run", "FILE… [-- ARG…]", "load netlists and run them in real-time threads"),
+    command<RunOptions, IN_CORE(run_run)>("run", "FILE… [-- ARG…]",
+                                          "load netlists and run them in real-time threads"),
     sim_command(),
-    command<LinuxcncOptions, IN_TOOLS(run_linuxcnc)>("linuxcnc", "FILE.ini [-- ARG…]", "run a LinuxCNC configuration: its netlists, task, I/O and display, until the display ends"),
-    command<RemoteShellOptions, IN_CORE(run_shell)>("shell", "[COMMAND…]", "command a running instance: one command, a file of commands, or interactively", true),
-    command<CheckOptions, IN_CORE(run_check)>("check", "FILE… [--assume NAME]", "check netlists without running them"),
+    command<LinuxcncOptions, IN_TOOLS(run_linuxcnc)>(
+        "linuxcnc", "FILE.ini [-- ARG…]",
+        "run a LinuxCNC configuration: its netlists, task, I/O and display, until the display "
+        "ends"),
+    command<RemoteShellOptions, IN_CORE(run_shell)>(
+        "shell", "[COMMAND…]",
+        "command a running instance: one command, a file of commands, or interactively", true),
+    command<CheckOptions, IN_CORE(run_check)>("check", "FILE… [--assume NAME]",
+                                              "check netlists without running them"),
     command<FmtOptions, IN_CORE(run_fmt)>("fmt", "FILE…", "format netlists"),
-    command<GraphOptions, IN_TOOLS(run_graph)>("graph", "FILE… [-o OUT] [--cluster KIND] [--around NAME [--depth N]]", "draw netlists"),
-    command<DocOptions, IN_TOOLS(run_doc)>("doc", "[COMPONENT…] [--all --output DIR]", "print the manual page of a component"),
-    command<NewOptions, IN_TOOLS(run_new)>("new", "component NAME [--folder DIR]", "create a component to start from: source, CMakeLists.txt, test"),
-    command<CompileOptions, IN_TOOLS(run_compile)>("compile", "FILE… [--output DIR] [--check-rt [-- ARGUMENT=VALUE…]]", "build a plugin from one source file and install it"),
-    command<ExplainOptions, IN_TOOLS(run_explain)>("explain", "[CODE]", "explain a diagnostic code and what to do about it"),
-    command<RecordOptions, IN_TOOLS(run_record)>("record", "FILE NAME… [--last TIME] | [CHANNEL] [FILE]", "record any values of a running instance to MCAP or CSV, or the samples of a sampler"),
-    command<PlotOptions, IN_TOOLS(run_plot)>("plot", "FILE [NAME…] [-o OUT.svg]", "draw values of a recording"),
-    command<ReplayOptions, IN_TOOLS(run_replay)>("replay", "FILE NETLIST… [--tolerance X]", "drive a netlist with a recording on a virtual clock, and compare"),
+    command<GraphOptions, IN_TOOLS(run_graph)>(
+        "graph", "FILE… [-o OUT] [--cluster KIND] [--around NAME [--depth N]]", "draw netlists"),
+    command<DocOptions, IN_TOOLS(run_doc)>("doc", "[COMPONENT…] [--all --output DIR]",
+                                           "print the manual page of a component"),
+    command<NewOptions, IN_TOOLS(run_new)>(
+        "new", "component NAME [--folder DIR]",
+        "create a component to start from: source, CMakeLists.txt, test"),
+    command<CompileOptions, IN_TOOLS(run_compile)>(
+        "compile", "FILE… [--output DIR] [--check-rt [-- ARGUMENT=VALUE…]]",
+        "build a plugin from one source file and install it"),
+    command<ExplainOptions, IN_TOOLS(run_explain)>(
+        "explain", "[CODE]", "explain a diagnostic code and what to do about it"),
+    command<RecordOptions, IN_TOOLS(run_record)>(
+        "record", "FILE NAME… [--last TIME] | [CHANNEL] [FILE]",
+        "record any values of a running instance to MCAP or CSV, or the samples of a sampler"),
+    command<PlotOptions, IN_TOOLS(run_plot)>("plot", "FILE [NAME…] [-o OUT.svg]",
+                                             "draw values of a recording"),
+    command<ReplayOptions, IN_TOOLS(run_replay)>(
+        "replay", "FILE NETLIST… [--tolerance X]",
+        "drive a netlist with a recording on a virtual clock, and compare"),
     command<PlayOptions, IN_TOOLS(run_play)>("play", "[CHANNEL] [FILE]", "feed a streamer"),
-    command<DumpOptions, ON_BUS(run_can_dump)>("can dump", "ADDRESS… [--filter ID[/MASK]] [--time relative|delta|absolute] [--for TIME] [--count N] [--json]", "print and decode the frames of a CAN bus"),
-    command<SendOptions, ON_BUS(run_can_send)>("can send", "ADDRESS FRAME… [--every TIME [--for TIME]]", "send frames: 123#1122AABB"),
-    command<CanRecordOptions, ON_BUS(run_can_record)>("can record", "ADDRESS FILE.log|FILE.pcapng [--for TIME]", "record the frames of a bus to a file"),
-    command<CanReplayOptions, ON_BUS(run_can_replay)>("can replay", "FILE ADDRESS [--speed FACTOR]", "replay a recording with its original timing"),
-    command<BusLoadOptions, ON_BUS(run_can_load)>("can load", "ADDRESS [--for TIME]", "measure the bus load per identifier"),
-    command<NodesOptions, ON_BUS(run_can_nodes)>("can nodes", "ADDRESS [--for TIME] [--json]", "list the live nodes by listening: state, heartbeat age, last emergencies"),
-    command<SniffOptions, ON_BUS(run_can_sniff)>("can sniff", "ADDRESS [--filter ID[/MASK]] [--for TIME]", "show one line per identifier, with changed bytes marked"),
-    command<GenerateOptions, ON_BUS(run_can_generate)>("can generate", "ADDRESS [--every TIME] [--id ID[-ID]] [--count N]", "send random or counting frames"),
-    command<ProduceOptions, ON_BUS(run_can_produce)>("can produce", "ADDRESS heartbeat NODE|sync|guarding NODE [--every TIME]", "send a heartbeat, SYNC or guarding requests periodically"),
-    command<FlashOptions, ON_BUS(run_can_flash)>("can flash", "ADDRESS NODE IMAGE [--program N]", "download a program to a node: stop, erase, download, start"),
-    command<NmtOptions, ON_BUS(run_can_nmt)>("can nmt", "ADDRESS start|stop|preop|reset|reset-comm NODE|all", "send an NMT command to CANopen nodes"),
-    command<ScanOptions, ON_BUS(run_can_scan)>("can scan", "ADDRESS [--for TIME] [--json]", "scan a bus for CANopen nodes: state, device type, identity"),
-    command<SdoReadOptions, ON_BUS(run_can_sdo_read)>("can sdo read", "ADDRESS NODE OBJECT… [--eds FILE] [--type TYPE] [-o FILE] [--json]", "read objects of a node"),
-    command<SdoWriteOptions, ON_BUS(run_can_sdo_write)>("can sdo write", "ADDRESS NODE OBJECT VALUE|--from FILE [--eds FILE] [--type TYPE]", "write an object of a node"),
-    command<ReadAllOptions, ON_BUS(run_can_read_all)>("can read-all", "ADDRESS NODE --eds FILE [-o FILE.csv] [--json]", "read all objects of a node that its EDS lists, including read-only objects"),
-    command<DcfReadOptions, ON_BUS(run_can_dcf_read)>("can dcf read", "ADDRESS NODE --eds FILE [-o FILE]", "read the settings of a node into a DCF"),
-    command<DcfWriteOptions, ON_BUS(run_can_dcf_write)>("can dcf write", "ADDRESS NODE FILE [--check]", "write the settings of a DCF to a node: only differences, verified"),
-    command<PdoShowOptions, ON_BUS(run_can_pdo_show)>("can pdo show", "ADDRESS NODE [--eds FILE] [--json]", "show the PDOs of a node and their mapping"),
-    command<PdoMapOptions, ON_BUS(run_can_pdo_map)>("can pdo map", "ADDRESS NODE PDO [OBJECT[/BITS]…] [--transmission N] [--id ID] [--inhibit TIME] [--event TIME]", "configure a PDO in the order of CiA 301"),
-    command<PdoSwitchOptions, ON_BUS(run_can_pdo_enable)>("can pdo enable", "ADDRESS NODE PDO", "enable a PDO"),
-    command<PdoSwitchOptions, ON_BUS(run_can_pdo_disable)>("can pdo disable", "ADDRESS NODE PDO", "disable a PDO"),
-    command<PdoWatchOptions, ON_BUS(run_can_pdo_watch)>("can pdo watch", "ADDRESS NODE [--eds FILE] [--for TIME] [--count N] [--json]", "print the values in the PDOs of a node as they are sent"),
-    command<LssOptions, ON_BUS(run_can_lss)>("can lss", "ADDRESS COMMAND [ARG…]", "LSS, node IDs and bit rates: scan, switch, select, inquire, node-id, bit-rate, activate, store, identify"),
-    command<GatewayOptions, ON_BUS(run_can_gateway)>("can gateway", "ADDRESS… [--socket PATH|--listen 127.0.0.1:PORT] [--state FILE] | --connect HOST:PORT|PATH [COMMAND…]", "run a CiA 309-3 gateway, controlled by lines of text, or its client"),
-    command<DriveOptions, ON_BUS(run_can_drive)>("can drive", "ADDRESS --node N [[AXIS] COMMAND [ARG…]]", "operate a drive: on, off, go, speed, stop, home, …, or an interactive shell", true),
-    command<EdsCheckOptions, ON_BUS(run_can_eds_check)>("can eds check", "FILE…", "check a device description and summarise it"),
-    command<CanopenCheckOptions, ON_BUS(run_canopen_check)>("canopen check", "FILE…", "check a network configuration and list its pins"),
-    command<CanopenPlanOptions, ON_BUS(run_canopen_plan)>("canopen plan", "FILE [--cycle TIME] [--json]", "compute worst-case response times of all messages of a bus"),
+    command<DumpOptions, ON_BUS(run_can_dump)>(
+        "can dump",
+        "ADDRESS… [--filter ID[/MASK]] [--time relative|delta|absolute] [--for TIME] [--count N] "
+        "[--json]",
+        "print and decode the frames of a CAN bus"),
+    command<SendOptions, ON_BUS(run_can_send)>(
+        "can send", "ADDRESS FRAME… [--every TIME [--for TIME]]", "send frames: 123#1122AABB"),
+    command<CanRecordOptions, ON_BUS(run_can_record)>("can record",
+                                                      "ADDRESS FILE.log|FILE.pcapng [--for TIME]",
+                                                      "record the frames of a bus to a file"),
+    command<CanReplayOptions, ON_BUS(run_can_replay)>(
+        "can replay", "FILE ADDRESS [--speed FACTOR]",
+        "replay a recording with its original timing"),
+    command<BusLoadOptions, ON_BUS(run_can_load)>("can load", "ADDRESS [--for TIME]",
+                                                  "measure the bus load per identifier"),
+    command<NodesOptions, ON_BUS(run_can_nodes)>(
+        "can nodes", "ADDRESS [--for TIME] [--json]",
+        "list the live nodes by listening: state, heartbeat age, last emergencies"),
+    command<SniffOptions, ON_BUS(run_can_sniff)>(
+        "can sniff", "ADDRESS [--filter ID[/MASK]] [--for TIME]",
+        "show one line per identifier, with changed bytes marked"),
+    command<GenerateOptions, ON_BUS(run_can_generate)>(
+        "can generate", "ADDRESS [--every TIME] [--id ID[-ID]] [--count N]",
+        "send random or counting frames"),
+    command<ProduceOptions, ON_BUS(run_can_produce)>(
+        "can produce", "ADDRESS heartbeat NODE|sync|guarding NODE [--every TIME]",
+        "send a heartbeat, SYNC or guarding requests periodically"),
+    command<FlashOptions, ON_BUS(run_can_flash)>(
+        "can flash", "ADDRESS NODE IMAGE [--program N]",
+        "download a program to a node: stop, erase, download, start"),
+    command<NmtOptions, ON_BUS(run_can_nmt)>("can nmt",
+                                             "ADDRESS start|stop|preop|reset|reset-comm NODE|all",
+                                             "send an NMT command to CANopen nodes"),
+    command<ScanOptions, ON_BUS(run_can_scan)>(
+        "can scan", "ADDRESS [--for TIME] [--json]",
+        "scan a bus for CANopen nodes: state, device type, identity"),
+    command<SdoReadOptions, ON_BUS(run_can_sdo_read)>(
+        "can sdo read", "ADDRESS NODE OBJECT… [--eds FILE] [--type TYPE] [-o FILE] [--json]",
+        "read objects of a node"),
+    command<SdoWriteOptions, ON_BUS(run_can_sdo_write)>(
+        "can sdo write", "ADDRESS NODE OBJECT VALUE|--from FILE [--eds FILE] [--type TYPE]",
+        "write an object of a node"),
+    command<ReadAllOptions, ON_BUS(run_can_read_all)>(
+        "can read-all", "ADDRESS NODE --eds FILE [-o FILE.csv] [--json]",
+        "read all objects of a node that its EDS lists, including read-only objects"),
+    command<DcfReadOptions, ON_BUS(run_can_dcf_read)>("can dcf read",
+                                                      "ADDRESS NODE --eds FILE [-o FILE]",
+                                                      "read the settings of a node into a DCF"),
+    command<DcfWriteOptions, ON_BUS(run_can_dcf_write)>(
+        "can dcf write", "ADDRESS NODE FILE [--check]",
+        "write the settings of a DCF to a node: only differences, verified"),
+    command<PdoShowOptions, ON_BUS(run_can_pdo_show)>("can pdo show",
+                                                      "ADDRESS NODE [--eds FILE] [--json]",
+                                                      "show the PDOs of a node and their mapping"),
+    command<PdoMapOptions, ON_BUS(run_can_pdo_map)>(
+        "can pdo map",
+        "ADDRESS NODE PDO [OBJECT[/BITS]…] [--transmission N] [--id ID] [--inhibit TIME] [--event "
+        "TIME]",
+        "configure a PDO in the order of CiA 301"),
+    command<PdoSwitchOptions, ON_BUS(run_can_pdo_enable)>("can pdo enable", "ADDRESS NODE PDO",
+                                                          "enable a PDO"),
+    command<PdoSwitchOptions, ON_BUS(run_can_pdo_disable)>("can pdo disable", "ADDRESS NODE PDO",
+                                                           "disable a PDO"),
+    command<PdoWatchOptions, ON_BUS(run_can_pdo_watch)>(
+        "can pdo watch", "ADDRESS NODE [--eds FILE] [--for TIME] [--count N] [--json]",
+        "print the values in the PDOs of a node as they are sent"),
+    command<LssOptions, ON_BUS(run_can_lss)>(
+        "can lss", "ADDRESS COMMAND [ARG…]",
+        "LSS, node IDs and bit rates: scan, switch, select, inquire, node-id, bit-rate, activate, "
+        "store, identify"),
+    command<GatewayOptions, ON_BUS(run_can_gateway)>(
+        "can gateway",
+        "ADDRESS… [--socket PATH|--listen 127.0.0.1:PORT] [--state FILE] | --connect "
+        "HOST:PORT|PATH [COMMAND…]",
+        "run a CiA 309-3 gateway, controlled by lines of text, or its client"),
+    command<DriveOptions, ON_BUS(run_can_drive)>(
+        "can drive", "ADDRESS --node N [[AXIS] COMMAND [ARG…]]",
+        "operate a drive: on, off, go, speed, stop, home, …, or an interactive shell", true),
+    command<EdsCheckOptions, ON_BUS(run_can_eds_check)>(
+        "can eds check", "FILE…", "check a device description and summarise it"),
+    command<CanopenCheckOptions, ON_BUS(run_canopen_check)>(
+        "canopen check", "FILE…", "check a network configuration and list its pins"),
+    command<CanopenPlanOptions, ON_BUS(run_canopen_plan)>(
+        "canopen plan", "FILE [--cycle TIME] [--json]",
+        "compute worst-case response times of all messages of a bus"),
 #ifdef HALCYON_ETHERCAT
-    command<EthercatOptions, ON_BUS(run_ethercat_scan)>("ethercat scan", "ADDRESS|--emulate LINE [--json]", "show the slaves of an EtherCAT bus as a tree: states, names, ports, delays"),
-    command<EthercatOptions, ON_BUS(run_ethercat_slaves)>("ethercat slaves", "ADDRESS|--emulate LINE [--json]", "list the slaves: position, alias, state, name"),
-    command<EthercatPositionOptions, ON_BUS(run_ethercat_states)>("ethercat states", "ADDRESS|--emulate LINE [-p N] [STATE] [--json]", "print the states of the slaves with the cause of an error, or request a state"),
-    command<EthercatOptions, ON_BUS(run_ethercat_crc)>("ethercat crc", "ADDRESS|--emulate LINE [--json]", "print the error counters of all ports and name the faulty cable"),
-    command<EthercatValueOptions, ON_BUS(run_ethercat_upload)>("ethercat upload", "ADDRESS|--emulate LINE [-p N] INDEX SUB [--type TYPE] [--json]", "read an object of a slave"),
-    command<EthercatValueOptions, ON_BUS(run_ethercat_download)>("ethercat download", "ADDRESS|--emulate LINE [-p N] INDEX SUB VALUE [--type TYPE] [--json]", "write an object of a slave"),
-    command<EthercatPositionOptions, ON_BUS(run_ethercat_reg_read)>("ethercat reg-read", "ADDRESS|--emulate LINE [-p N] REGISTER [BYTES] [--json]", "read registers of a slave"),
-    command<EthercatPositionOptions, ON_BUS(run_ethercat_reg_write)>("ethercat reg-write", "ADDRESS|--emulate LINE [-p N] REGISTER BYTE… [--json]", "write registers of a slave"),
-    command<EthercatPositionOptions, ON_BUS(run_ethercat_sii_read)>("ethercat sii-read", "ADDRESS|--emulate LINE [-p N] [--json] > FILE", "read the EEPROM of a slave (SII)"),
-    command<EthercatPositionOptions, ON_BUS(run_ethercat_sii_write)>("ethercat sii-write", "ADDRESS|--emulate LINE [-p N] FILE [--json]", "write the EEPROM of a slave (SII)"),
-    command<EthercatPositionOptions, ON_BUS(run_ethercat_alias)>("ethercat alias", "ADDRESS|--emulate LINE [-p N] ALIAS [--json]", "write the alias of a slave to its EEPROM"),
-    command<EthercatOptions, ON_BUS(run_ethercat_pdos)>("ethercat pdos", "ADDRESS|--emulate LINE [--json]", "list the process data of the slaves, as their EEPROMs have it"),
-    command<EthercatPositionOptions, ON_BUS(run_ethercat_sdos)>("ethercat sdos", "ADDRESS|--emulate LINE [-p N] [--json]", "list the object dictionary of a slave"),
-    command<EthercatFileOptions, ON_BUS(run_ethercat_foe_read)>("ethercat foe-read", "ADDRESS|--emulate LINE [-p N] NAME [--boot] [--password N] [--json] > FILE", "read a file of a slave in PRE-OP or BOOT"),
-    command<EthercatFileOptions, ON_BUS(run_ethercat_foe_write)>("ethercat foe-write", "ADDRESS|--emulate LINE [-p N] FILE [NAME] [--boot] [--password N] [--json]", "write a file to a slave in PRE-OP, or its firmware in BOOT"),
-    command<EthercatConfigOptions, ON_BUS(run_ethercat_config)>("ethercat config", "ADDRESS|--emulate LINE|--esi LIST NAME [--json]", "write NAME.ethercat and a netlist to start from for the slaves of a bus, or for descriptions"),
-    command<EthercatPositionOptions, ON_BUS(run_ethercat_xml)>("ethercat xml", "ADDRESS|--emulate LINE [-p N] [--json] > FILE", "print a device description (ESI) of a slave from its EEPROM"),
-    command<EthercatOptions, ON_BUS(run_ethercat_graph)>("ethercat graph", "ADDRESS|--emulate LINE [--json] > FILE", "draw the topology of a bus as SVG"),
-    command<EthercatOptions, ON_BUS(run_ethercat_dc)>("ethercat dc", "ADDRESS|--emulate LINE [--json]", "print the deviations of the clocks of the slaves"),
-    command<EthercatDumpOptions, ON_BUS(run_ethercat_dump)>("ethercat dump", "ADDRESS|FILE [--filter WORD] [--for TIME] [--count N] [--json]", "print the datagrams of a bus or of a capture in words"),
-    command<EthercatCheckOptions, ON_BUS(run_ethercat_check)>("ethercat check", "FILE… [--json]", "check the configuration of a bus and list its pins"),
-    command<EthercatPlanOptions, ON_BUS(run_ethercat_plan)>("ethercat plan", "FILE [--json]", "compute frames, wire time, cycle time and latency of a bus"),
-    command<EthercatLcecOptions, ON_BUS(run_ethercat_lcec_conf)>("ethercat lcec-conf", "FILE [--name NAME]", "check the configuration of the component lcec, for loadusr (lcec_conf)"),
+    command<EthercatOptions, ON_BUS(run_ethercat_scan)>(
+        "ethercat scan", "ADDRESS|--emulate LINE [--json]",
+        "show the slaves of an EtherCAT bus as a tree: states, names, ports, delays"),
+    command<EthercatOptions, ON_BUS(run_ethercat_slaves)>(
+        "ethercat slaves", "ADDRESS|--emulate LINE [--json]",
+        "list the slaves: position, alias, state, name"),
+    command<EthercatPositionOptions, ON_BUS(run_ethercat_states)>(
+        "ethercat states", "ADDRESS|--emulate LINE [-p N] [STATE] [--json]",
+        "print the states of the slaves with the cause of an error, or request a state"),
+    command<EthercatOptions, ON_BUS(run_ethercat_crc)>(
+        "ethercat crc", "ADDRESS|--emulate LINE [--json]",
+        "print the error counters of all ports and name the faulty cable"),
+    command<EthercatValueOptions, ON_BUS(run_ethercat_upload)>(
+        "ethercat upload", "ADDRESS|--emulate LINE [-p N] INDEX SUB [--type TYPE] [--json]",
+        "read an object of a slave"),
+    command<EthercatValueOptions, ON_BUS(run_ethercat_download)>(
+        "ethercat download", "ADDRESS|--emulate LINE [-p N] INDEX SUB VALUE [--type TYPE] [--json]",
+        "write an object of a slave"),
+    command<EthercatPositionOptions, ON_BUS(run_ethercat_reg_read)>(
+        "ethercat reg-read", "ADDRESS|--emulate LINE [-p N] REGISTER [BYTES] [--json]",
+        "read registers of a slave"),
+    command<EthercatPositionOptions, ON_BUS(run_ethercat_reg_write)>(
+        "ethercat reg-write", "ADDRESS|--emulate LINE [-p N] REGISTER BYTE… [--json]",
+        "write registers of a slave"),
+    command<EthercatPositionOptions, ON_BUS(run_ethercat_sii_read)>(
+        "ethercat sii-read", "ADDRESS|--emulate LINE [-p N] [--json] > FILE",
+        "read the EEPROM of a slave (SII)"),
+    command<EthercatPositionOptions, ON_BUS(run_ethercat_sii_write)>(
+        "ethercat sii-write", "ADDRESS|--emulate LINE [-p N] FILE [--json]",
+        "write the EEPROM of a slave (SII)"),
+    command<EthercatPositionOptions, ON_BUS(run_ethercat_alias)>(
+        "ethercat alias", "ADDRESS|--emulate LINE [-p N] ALIAS [--json]",
+        "write the alias of a slave to its EEPROM"),
+    command<EthercatOptions, ON_BUS(run_ethercat_pdos)>(
+        "ethercat pdos", "ADDRESS|--emulate LINE [--json]",
+        "list the process data of the slaves, as their EEPROMs have it"),
+    command<EthercatPositionOptions, ON_BUS(run_ethercat_sdos)>(
+        "ethercat sdos", "ADDRESS|--emulate LINE [-p N] [--json]",
+        "list the object dictionary of a slave"),
+    command<EthercatFileOptions, ON_BUS(run_ethercat_foe_read)>(
+        "ethercat foe-read",
+        "ADDRESS|--emulate LINE [-p N] NAME [--boot] [--password N] [--json] > FILE",
+        "read a file of a slave in PRE-OP or BOOT"),
+    command<EthercatFileOptions, ON_BUS(run_ethercat_foe_write)>(
+        "ethercat foe-write",
+        "ADDRESS|--emulate LINE [-p N] FILE [NAME] [--boot] [--password N] [--json]",
+        "write a file to a slave in PRE-OP, or its firmware in BOOT"),
+    command<EthercatConfigOptions, ON_BUS(run_ethercat_config)>(
+        "ethercat config", "ADDRESS|--emulate LINE|--esi LIST NAME [--json]",
+        "write NAME.ethercat and a netlist to start from for the slaves of a bus, or for "
+        "descriptions"),
+    command<EthercatPositionOptions, ON_BUS(run_ethercat_xml)>(
+        "ethercat xml", "ADDRESS|--emulate LINE [-p N] [--json] > FILE",
+        "print a device description (ESI) of a slave from its EEPROM"),
+    command<EthercatOptions, ON_BUS(run_ethercat_graph)>("ethercat graph",
+                                                         "ADDRESS|--emulate LINE [--json] > FILE",
+                                                         "draw the topology of a bus as SVG"),
+    command<EthercatOptions, ON_BUS(run_ethercat_dc)>(
+        "ethercat dc", "ADDRESS|--emulate LINE [--json]",
+        "print the deviations of the clocks of the slaves"),
+    command<EthercatDumpOptions, ON_BUS(run_ethercat_dump)>(
+        "ethercat dump", "ADDRESS|FILE [--filter WORD] [--for TIME] [--count N] [--json]",
+        "print the datagrams of a bus or of a capture in words"),
+    command<EthercatCheckOptions, ON_BUS(run_ethercat_check)>(
+        "ethercat check", "FILE… [--json]", "check the configuration of a bus and list its pins"),
+    command<EthercatPlanOptions, ON_BUS(run_ethercat_plan)>(
+        "ethercat plan", "FILE [--json]",
+        "compute frames, wire time, cycle time and latency of a bus"),
+    command<EthercatLcecOptions, ON_BUS(run_ethercat_lcec_conf)>(
+        "ethercat lcec-conf", "FILE [--name NAME]",
+        "check the configuration of the component lcec, for loadusr (lcec_conf)"),
 #endif
-    command<ScocanPlanOptions, ON_BUS(run_scocan_plan)>("scocan plan", "FILE [--mode MODE] [--json | --svg FILE]", "print the slots of a CAN bus as a timeline, its load and the worst-case latency of each message"),
-    command<TdmaPlanOptions, ON_BUS(run_tdma_plan)>("tdma plan", "FILE [--json | --svg FILE]", "print the slots of an Ethernet segment as a timeline, its load and its input-to-output latency"),
-    command<TdmaStatusOptions, IN_TOOLS(run_tdma_status)>("tdma status", "[--name NAME] [--json]", "print the stations of a segment as a running machine receives them"),
-    command<TdmaPingOptions, IN_TOOLS(run_tdma_ping)>("tdma ping", "STATION [-c COUNT] [--from COMPONENT] [--name NAME]", "measure the round-trip time to a station of a segment"),
-    command<DriveNodeOptions, ON_BUS(run_node_drive)>("node drive", "--link ADDRESS --id N [--axes N] [--motor NAME:VALUE] [--fault FAULT] | --eds", "simulate a CiA 402 drive with up to eight axes"),
-    command<IoNodeOptions, ON_BUS(run_node_io)>("node io", "--link ADDRESS --id N [--inputs N] [--outputs N] [--fault FAULT] | --eds", "simulate a CiA 401 I/O node"),
-    command<AxisIoNodeOptions, ON_BUS(run_node_axis_io)>("node axis-io", "--link ADDRESS --id N [--plant axis|furuta] [--tdma FILE] [--skew PPM] [--fault FAULT] | --eds", "simulate an axis whose control loop is closed over the bus"),
-    command<NodeOptions, ON_BUS(run_node_safe_io)>("node safe-io", "--link ADDRESS --id N [--fault FAULT] | --eds", "simulate an EN 50325-5 safety I/O node (for experiments only)"),
-    command<Jr3NodeOptions, ON_BUS(run_node_jr3)>("node jr3", "--link ADDRESS [--id N] [--stream FILE] [--fault FAULT] | --record FILE --for TIME | --eds", "simulate a force/torque node with a JR3 sensor"),
-    command<BootloaderNodeOptions, ON_BUS(run_node_bootloader)>("node bootloader", "--link ADDRESS --id N [--flash FILE] [--fault FAULT] | --make-image VERSION | --eds", "simulate a device with a boot loader"),
-    command<EthercatLineOptions, ON_BUS(run_node_ethercat)>("node ethercat", "FILE --link ADDRESS [--backup ADDRESS] [--for TIME]", "emulate a line of EtherCAT slaves on a network interface"),
-    command<Options, ON_BUS(run_node_faults)>("node faults", "", "list the faults that simulated devices can inject"),
-    command<TopOptions, IN_TOOLS(run_top)>("top", "", "show all instances on this machine and the network, their threads and faults"),
-    command<WatchOptions, IN_TOOLS(run_watch)>("watch", "NAME… [--for TIME] [--once]", "show values of a running instance live, with minimum, maximum and rate"),
-    command<MeterOptions, IN_TOOLS(run_meter)>("meter", "NAME [--for TIME]", "show one value of a running instance in large digits"),
-    command<ScopeOptions, IN_TOOLS(run_scope)>("scope", "NAME… [--trigger TRIGGER] [--pre TIME] [--post TIME] [--svg FILE] [--csv FILE] [--png FILE]", "show signals of a running instance over time, with trigger and measurements"),
-    command<TraceOptions, IN_TOOLS(run_trace)>("trace", "FILE [--for TIME] [--on-overrun|--on-fault [--keep TIME]] [--sched]", "record what the threads of a running instance run, as a Perfetto timeline"),
-    command<PanelOptions, ON_PANEL(run_panel)>("panel", "[FILE] [--write] [--listen ADDRESS]", "show a running machine in a web browser: values, graph, scope, user panels"),
-    command<DoctorOptions, IN_TOOLS(run_doctor)>("doctor", "", "check whether this machine is fit for real time"),
-    command<CompletionOptions, IN_CORE(run_completion)>("completion", "SHELL", "print a completion script: source <(hal completion bash)"),
+    command<ScocanPlanOptions, ON_BUS(run_scocan_plan)>(
+        "scocan plan", "FILE [--mode MODE] [--json | --svg FILE]",
+        "print the slots of a CAN bus as a timeline, its load and the worst-case latency of each "
+        "message"),
+    command<TdmaPlanOptions, ON_BUS(run_tdma_plan)>(
+        "tdma plan", "FILE [--json | --svg FILE]",
+        "print the slots of an Ethernet segment as a timeline, its load and its input-to-output "
+        "latency"),
+    command<TdmaStatusOptions, IN_TOOLS(run_tdma_status)>(
+        "tdma status", "[--name NAME] [--json]",
+        "print the stations of a segment as a running machine receives them"),
+    command<TdmaPingOptions, IN_TOOLS(run_tdma_ping)>(
+        "tdma ping", "STATION [-c COUNT] [--from COMPONENT] [--name NAME]",
+        "measure the round-trip time to a station of a segment"),
+    command<DriveNodeOptions, ON_BUS(run_node_drive)>(
+        "node drive",
+        "--link ADDRESS --id N [--axes N] [--motor NAME:VALUE] [--fault FAULT] | --eds",
+        "simulate a CiA 402 drive with up to eight axes"),
+    command<IoNodeOptions, ON_BUS(run_node_io)>(
+        "node io", "--link ADDRESS --id N [--inputs N] [--outputs N] [--fault FAULT] | --eds",
+        "simulate a CiA 401 I/O node"),
+    command<AxisIoNodeOptions, ON_BUS(run_node_axis_io)>(
+        "node axis-io",
+        "--link ADDRESS --id N [--plant axis|furuta] [--tdma FILE] [--skew PPM] [--fault FAULT] | "
+        "--eds",
+        "simulate an axis whose control loop is closed over the bus"),
+    command<NodeOptions, ON_BUS(run_node_safe_io)>(
+        "node safe-io", "--link ADDRESS --id N [--fault FAULT] | --eds",
+        "simulate an EN 50325-5 safety I/O node (for experiments only)"),
+    command<Jr3NodeOptions, ON_BUS(run_node_jr3)>(
+        "node jr3",
+        "--link ADDRESS [--id N] [--stream FILE] [--fault FAULT] | --record FILE --for TIME | "
+        "--eds",
+        "simulate a force/torque node with a JR3 sensor"),
+    command<BootloaderNodeOptions, ON_BUS(run_node_bootloader)>(
+        "node bootloader",
+        "--link ADDRESS --id N [--flash FILE] [--fault FAULT] | --make-image VERSION | --eds",
+        "simulate a device with a boot loader"),
+    command<EthercatLineOptions, ON_BUS(run_node_ethercat)>(
+        "node ethercat", "FILE --link ADDRESS [--backup ADDRESS] [--for TIME]",
+        "emulate a line of EtherCAT slaves on a network interface"),
+    command<Options, ON_BUS(run_node_faults)>("node faults", "",
+                                              "list the faults that simulated devices can inject"),
+    command<TopOptions, IN_TOOLS(run_top)>(
+        "top", "", "show all instances on this machine and the network, their threads and faults"),
+    command<WatchOptions, IN_TOOLS(run_watch)>(
+        "watch", "NAME… [--for TIME] [--once]",
+        "show values of a running instance live, with minimum, maximum and rate"),
+    command<MeterOptions, IN_TOOLS(run_meter)>(
+        "meter", "NAME [--for TIME]", "show one value of a running instance in large digits"),
+    command<ScopeOptions, IN_TOOLS(run_scope)>(
+        "scope",
+        "NAME… [--trigger TRIGGER] [--pre TIME] [--post TIME] [--svg FILE] [--csv FILE] [--png "
+        "FILE]",
+        "show signals of a running instance over time, with trigger and measurements"),
+    command<TraceOptions, IN_TOOLS(run_trace)>(
+        "trace", "FILE [--for TIME] [--on-overrun|--on-fault [--keep TIME]] [--sched]",
+        "record what the threads of a running instance run, as a Perfetto timeline"),
+    command<PanelOptions, ON_PANEL(run_panel)>(
+        "panel", "[FILE] [--write] [--listen ADDRESS]",
+        "show a running machine in a web browser: values, graph, scope, user panels"),
+    command<DoctorOptions, IN_TOOLS(run_doctor)>("doctor", "",
+                                                 "check whether this machine is fit for real time"),
+    command<CompletionOptions, IN_CORE(run_completion)>(
+        "completion", "SHELL", "print a completion script: source <(hal completion bash)"),
 };
 
 /// Commands of two and more words have a first word in common.
@@ -199,22 +378,32 @@ struct Group {
 };
 
 constexpr Group groups[] = {
-    {"can", "CAN bus tools: dump, send, record, replay, load, scan, nodes, sniff, generate, produce, nmt, flash, sdo, dcf, read-all, pdo, lss, drive, gateway; eds check"},
+    {"can",
+     "CAN bus tools: dump, send, record, replay, load, scan, nodes, sniff, generate, produce, nmt, "
+     "flash, sdo, dcf, read-all, pdo, lss, drive, gateway; eds check"},
     {"canopen", "check and plan a CANopen network"},
 #ifdef HALCYON_ETHERCAT
-    {"ethercat", "EtherCAT bus tools: scan, slaves, states, crc, upload, download, reg-read, reg-write, sii-read, sii-write, alias, pdos, sdos, foe-read, foe-write, config, xml, graph, dc, dump, check, plan"},
+    {"ethercat",
+     "EtherCAT bus tools: scan, slaves, states, crc, upload, download, reg-read, reg-write, "
+     "sii-read, sii-write, alias, pdos, sdos, foe-read, foe-write, config, xml, graph, dc, dump, "
+     "check, plan"},
 #endif
     {"scocan", "time slots of a CAN bus: plan"},
     {"tdma", "time slots of an Ethernet segment: plan, status, ping"},
-    {"node", "simulated CANopen devices as processes: drive, io, axis-io, safe-io, jr3, bootloader; injectable faults: faults; an EtherCAT line: ethercat"},
+    {"node",
+     "simulated CANopen devices as processes: drive, io, axis-io, safe-io, jr3, bootloader; "
+     "injectable faults: faults; an EtherCAT line: ethercat"},
 };
 
 const Group* find_group(std::string_view name) {
-    const auto* group = std::find_if(std::begin(groups), std::end(groups), [&](const Group& g) { return name == g.name; });
+    const auto* group = std::find_if(std::begin(groups), std::end(groups),
+                                     [&](const Group& g) { return name == g.name; });
     return group == std::end(groups) ? nullptr : group;
 }
 
-bool belongs(const Subcommand& row, const Group& group) { return std::string_view(row.name).starts_with(std::string(group.name) + " "); }
+bool belongs(const Subcommand& row, const Group& group) {
+    return std::string_view(row.name).starts_with(std::string(group.name) + " ");
+}
 
 struct Found {
     const Subcommand* row = nullptr;
@@ -227,79 +416,129 @@ Found find(const std::vector<std::string>& typed) {
     std::string name;
     for (std::size_t i = 0; i < typed.size() && i < 4; ++i) {
         name += (i == 0 ? "" : " ") + typed[i];
-        const auto* row = std::find_if(std::begin(table), std::end(table), [&](const Subcommand& s) { return name == s.name; });
-        if (row != std::end(table)) found = {row, i + 1};
+        const auto* row = std::find_if(std::begin(table), std::end(table),
+                                       [&](const Subcommand& s) { return name == s.name; });
+        if (row != std::end(table)) {
+            found = {row, i + 1};
+        }
     }
     return found;
 }
 
 std::string overview() {
-    std::string text = "Halcyon: control components, wired by netlists, run in real-time threads.\n\nusage: hal COMMAND …\n\n";
+    std::string text =
+        "Halcyon: control components, wired by netlists, run in real-time threads.\n\nusage: hal "
+        "COMMAND …\n\n";
     const Group* last = nullptr;
     for (const Subcommand& row : table) {
         const std::string_view name(row.name);
         const Group* group = find_group(name.substr(0, name.find(' ')));
-        if (group == nullptr) text += fmt::format("  {:11} {}\n", row.name, row.summary);
-        else if (group != last) text += fmt::format("  {:11} {}\n", group->name, group->summary);
+        if (group == nullptr) {
+            text += fmt::format("  {:11} {}\n", row.name, row.summary);
+        } else if (group != last) {
+            text += fmt::format("  {:11} {}\n", group->name, group->summary);
+        }
         last = group;
     }
-    return text + "\nFor details: hal help COMMAND. A first try: hal run halfiles/furuta/hang.hal --for 10s\n";
+    return text +
+           "\nFor details: hal help COMMAND. A first try: hal run halfiles/furuta/hang.hal --for "
+           "10s\n";
 }
 
 std::string help_of(const Group& group) {
-    std::string text = fmt::format("hal {}: {}\n\nusage: hal {} COMMAND …\n\n", group.name, group.summary, group.name);
-    for (const Subcommand& row : table)
-        if (belongs(row, group)) text += fmt::format("  {:16} {}\n", row.name, row.summary);
+    std::string text = fmt::format("hal {}: {}\n\nusage: hal {} COMMAND …\n\n", group.name,
+                                   group.summary, group.name);
+    for (const Subcommand& row : table) {
+        if (belongs(row, group)) {
+            text += fmt::format("  {:16} {}\n", row.name, row.summary);
+        }
+    }
     return text + fmt::format("\nFor details: hal help {} COMMAND.\n", group.name);
 }
 
 std::string help_of(const Subcommand& row) {
     const auto options = row.make_options();
     const OptionSet set(*options, row.name, row.summary);
-    return fmt::format("hal {}: {}\n\nusage: hal {} {}\n", row.name, row.summary, row.name, row.usage) + set.help();
+    return fmt::format("hal {}: {}\n\nusage: hal {} {}\n", row.name, row.summary, row.name,
+                       row.usage) +
+           set.help();
 }
 
 int no_such_command(const std::vector<std::string>& typed) {
     Options options;
     std::string word = typed.front();
-    if (!word.empty() && word[0] == '-') return fail(options, fmt::format("unknown option '{}'; type: hal help", word));
-    const auto ends = [&](std::string_view end) { return word.size() > end.size() && word.ends_with(end); };
-    if (ends(".hal") || ends(".ini")) return fail(options, fmt::format("'{0}' is not a command; to run it type: hal run {0}", word));
-    if (!find_group(word) && find_command(word))
-        return fail(options, fmt::format("'{0}' is a command of the shell; to run it in a running machine type: hal shell {1}", word, fmt::join(typed, " ")));
+    if (!word.empty() && word[0] == '-') {
+        return fail(options, fmt::format("unknown option '{}'; type: hal help", word));
+    }
+    const auto ends = [&](std::string_view end) {
+        return word.size() > end.size() && word.ends_with(end);
+    };
+    if (ends(".hal") || ends(".ini")) {
+        return fail(options,
+                    fmt::format("'{0}' is not a command; to run it type: hal run {0}", word));
+    }
+    if (!find_group(word) && find_command(word)) {
+        return fail(options, fmt::format("'{0}' is a command of the shell; to run it in a running "
+                                         "machine type: hal shell {1}",
+                                         word, fmt::join(typed, " ")));
+    }
     std::vector<std::string> names = {"help"};
     std::string where = "hal help";
     if (const Group* group = find_group(word)) {
-        if (typed.size() > 1) word += " " + typed[1];
+        if (typed.size() > 1) {
+            word += " " + typed[1];
+        }
         where += fmt::format(" {}", group->name);
         names.clear();
-        for (const Subcommand& row : table)
-            if (belongs(row, *group)) names.emplace_back(row.name);
+        for (const Subcommand& row : table) {
+            if (belongs(row, *group)) {
+                names.emplace_back(row.name);
+            }
+        }
     } else {
-        for (const Subcommand& row : table) names.emplace_back(row.name);
-        for (const Group& g : groups) names.emplace_back(g.name);
+        for (const Subcommand& row : table) {
+            names.emplace_back(row.name);
+        }
+        for (const Group& g : groups) {
+            names.emplace_back(g.name);
+        }
     }
     const std::string hint = did_you_mean(word, names);
-    return fail(options, fmt::format("unknown command '{}'; {}", word, hint.empty() ? "type: " + where : hint));
+    return fail(options, fmt::format("unknown command '{}'; {}", word,
+                                     hint.empty() ? "type: " + where : hint));
 }
 
 int help(const std::vector<std::string>& about) {
     if (about.empty()) return print(overview()) ? 0 : 1;
     if (const Found found = find(about); found.row) return print(help_of(*found.row)) ? 0 : 1;
-    if (const Group* group = find_group(about.front()); group && about.size() == 1) return print(help_of(*group)) ? 0 : 1;
+    if (const Group* group = find_group(about.front()); group && about.size() == 1) {
+        return print(help_of(*group)) ? 0 : 1;
+    }
     // The common beginning of some commands: can sdo, can eds.
     std::string start, text;
-    for (const std::string& word : about) start += word + " ";
-    for (const Subcommand& row : table)
-        if (std::string_view(row.name).starts_with(start)) text += fmt::format("  {:16} {}\n", row.name, row.summary);
-    if (!text.empty()) return print(fmt::format("usage: hal {}COMMAND …\n\n{}\nFor details: hal help {}COMMAND.\n", start, text, start)) ? 0 : 1;
+    for (const std::string& word : about) {
+        start += word + " ";
+    }
+    for (const Subcommand& row : table) {
+        if (std::string_view(row.name).starts_with(start)) {
+            text += fmt::format("  {:16} {}\n", row.name, row.summary);
+        }
+    }
+    if (!text.empty()) {
+        return print(fmt::format("usage: hal {}COMMAND …\n\n{}\nFor details: hal help {}COMMAND.\n",
+                                 start, text, start))
+                   ? 0
+                   : 1;
+    }
     return no_such_command(about);
 }
 
 /// Reads `arguments` into `options`. Returns an exit code when the program must exit.
-std::optional<int> read(const Subcommand& row, std::vector<std::string> arguments, Options& options) {
+std::optional<int> read(const Subcommand& row, std::vector<std::string> arguments,
+                        Options& options) {
     OptionSet set(options, row.name, row.summary);
-    if (const auto dashes = std::find(arguments.begin(), arguments.end(), "--"); !row.verbatim && dashes != arguments.end()) {
+    if (const auto dashes = std::find(arguments.begin(), arguments.end(), "--");
+        !row.verbatim && dashes != arguments.end()) {
         options.arguments.assign(dashes + 1, arguments.end());
         arguments.erase(dashes, arguments.end());
     }
@@ -307,22 +546,31 @@ std::optional<int> read(const Subcommand& row, std::vector<std::string> argument
     switch (reading.outcome) {
     case OptionSet::Outcome::good: break;
     case OptionSet::Outcome::help: return print(help_of(row)) ? 0 : 1;
-    case OptionSet::Outcome::missing: return fail(options, fmt::format("missing argument; type: hal {} {}", row.name, row.usage));
-    case OptionSet::Outcome::bad: return fail(options, fmt::format("{}; see: hal help {}", reading.problem, row.name));
+    case OptionSet::Outcome::missing:
+        return fail(options, fmt::format("missing argument; type: hal {} {}", row.name, row.usage));
+    case OptionSet::Outcome::bad:
+        return fail(options, fmt::format("{}; see: hal help {}", reading.problem, row.name));
     }
     const std::vector<std::string>& extra = reading.extra;
     if (row.verbatim) {
-        if (!extra.empty() && extra.front().size() > 1 && extra.front()[0] == '-' && !(extra.front() == "--")) {
+        if (!extra.empty() && extra.front().size() > 1 && extra.front()[0] == '-' &&
+            !(extra.front() == "--")) {
             const std::string hint = did_you_mean(extra.front(), set.names());
-            return fail(options, fmt::format("unknown option '{}'; {}", extra.front(),
-                                             hint.empty() ? fmt::format("see: hal help {}", row.name) : hint));
+            return fail(
+                options,
+                fmt::format("unknown option '{}'; {}", extra.front(),
+                            hint.empty() ? fmt::format("see: hal help {}", row.name) : hint));
         }
-        options.words.assign(extra.begin() + (!extra.empty() && extra.front() == "--"), extra.end());
+        options.words.assign(extra.begin() + (!extra.empty() && extra.front() == "--"),
+                             extra.end());
     } else if (!extra.empty()) {
         const std::string hint = did_you_mean(extra.front(), set.names());
         const bool option = extra.front().starts_with('-');
-        return fail(options, fmt::format("{} '{}'; {}", option ? "unknown option" : "unexpected argument", extra.front(),
-                                         option && !hint.empty() ? hint : fmt::format("see: hal help {}", row.name)));
+        return fail(
+            options,
+            fmt::format(
+                "{} '{}'; {}", option ? "unknown option" : "unexpected argument", extra.front(),
+                option && !hint.empty() ? hint : fmt::format("see: hal help {}", row.name)));
     }
     return std::nullopt;
 }
@@ -331,17 +579,31 @@ std::optional<int> read(const Subcommand& row, std::vector<std::string> argument
 
 int run_command_line(int argc, char** argv) {
     const std::vector<std::string> all(argv + std::min(argc, 1), argv + argc);
-    if (all.empty()) return help({});
-    if (all[0] == "help" || all[0] == "--help" || all[0] == "-h") return help({all.begin() + 1, all.end()});
-    if (all[0] == "--version" || all[0] == "version") return print(fmt::format("hal {} (commit {})\n", paths::version, paths::commit)) ? 0 : 1;
+    if (all.empty()) {
+        return help({});
+    }
+    if (all[0] == "help" || all[0] == "--help" || all[0] == "-h") {
+        return help({all.begin() + 1, all.end()});
+    }
+    if (all[0] == "--version" || all[0] == "version") {
+        return print(fmt::format("hal {} (commit {})\n", paths::version, paths::commit)) ? 0 : 1;
+    }
     const auto [row, name_words] = find(all);
-    if (!row && find_group(all[0]) && (all.size() == 1 || all[1] == "help" || all[1] == "--help" || all[1] == "-h")) return help({all[0]});
+    if (!row && find_group(all[0]) &&
+        (all.size() == 1 || all[1] == "help" || all[1] == "--help" || all[1] == "-h")) {
+        return help({all[0]});
+    }
     if (!row) return no_such_command(all);
     if (!row->run) return become_program(program_of(row->part), argv);
     const auto options = row->make_options();
     options->program = fmt::format("hal {}", row->name);
-    if (const auto end = read(*row, {all.begin() + static_cast<std::ptrdiff_t>(name_words), all.end()}, *options)) return *end;
-    if (row->needs_tools && row->needs_tools(*options)) return become_program(program_of(Part::tools), argv);
+    if (const auto end = read(
+            *row, {all.begin() + static_cast<std::ptrdiff_t>(name_words), all.end()}, *options)) {
+        return *end;
+    }
+    if (row->needs_tools && row->needs_tools(*options)) {
+        return become_program(program_of(Part::tools), argv);
+    }
     return row->run(*options);
 }
 
@@ -351,10 +613,19 @@ std::vector<Completion> completions() {
         const auto options = row.make_options();
         const std::string name = row.name;
         const auto space = name.find(' ');
-        if (all.empty() || all.back().name != name.substr(0, space)) all.push_back({name.substr(0, space), {}, {}});
-        if (space != name.npos) all.back().words.push_back(name.substr(space + 1, name.find(' ', space + 1) - space - 1));
-        for (std::string& option : OptionSet(*options, row.name, row.summary).names())
-            if (auto& known = all.back().options; std::find(known.begin(), known.end(), option) == known.end()) known.push_back(std::move(option));
+        if (all.empty() || all.back().name != name.substr(0, space)) {
+            all.push_back({name.substr(0, space), {}, {}});
+        }
+        if (space != name.npos) {
+            all.back().words.push_back(
+                name.substr(space + 1, name.find(' ', space + 1) - space - 1));
+        }
+        for (std::string& option : OptionSet(*options, row.name, row.summary).names()) {
+            if (auto& known = all.back().options;
+                std::find(known.begin(), known.end(), option) == known.end()) {
+                known.push_back(std::move(option));
+            }
+        }
     }
     return all;
 }

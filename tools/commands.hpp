@@ -10,7 +10,8 @@ namespace hal::tools {
 /// Finds the subcommand, reads its options, runs it. Returns the exit code.
 int run_command_line(int argc, char** argv);
 
-/// An entry of the completion script: a subcommand and its options, or a group, the words that may follow and all their options.
+/// An entry of the completion script: a subcommand and its options, or a group, the words that may
+/// follow and all their options.
 struct Completion {
     std::string name;
     std::vector<std::string> options;

@@ -11,7 +11,8 @@ namespace hal::tools {
 
 namespace {
 
-constexpr std::string_view script = R"BASH(# bash completion of hal; use it with: source <(hal completion bash)
+constexpr std::string_view script =
+    R"BASH(# bash completion of hal; use it with: source <(hal completion bash)
 _hal() {
     local word=${COMP_WORDS[COMP_CWORD]} options='' IFS=$' \t\n'
     local commands='@COMMANDS@'
@@ -38,23 +39,34 @@ complete -F _hal hal
 complete -C 'halcmd -C' halcmd
 )BASH";
 
-void replace(std::string& text, std::string_view what, std::string_view by) { text.replace(text.find(what), what.size(), by); }
+void replace(std::string& text, std::string_view what, std::string_view by) {
+    text.replace(text.find(what), what.size(), by);
+}
 
 }  // namespace
 
 int run_completion(const CompletionOptions& options) {
-    if (options.words != std::vector<std::string>{"bash"}) return fail(options, "unsupported shell; type: hal completion bash");
+    if (options.words != std::vector<std::string>{"bash"}) {
+        return fail(options, "unsupported shell; type: hal completion bash");
+    }
     std::string commands = "help", cases, groups;
     for (const Completion& completion : completions()) {
         commands += " " + completion.name;
         std::string all;
-        for (const std::string& option : completion.options) all += (all.empty() ? "" : " ") + option;
+        for (const std::string& option : completion.options) {
+            all += (all.empty() ? "" : " ") + option;
+        }
         cases += fmt::format("            {}) options='{}' ;;\n", completion.name, all);
         if (completion.words.empty()) continue;
         std::string words;
-        for (const std::string& word : completion.words) words += (words.empty() ? "" : " ") + word;
-        groups += fmt::format("        {}) if [ \"$COMP_CWORD\" -eq 2 ]; then COMPREPLY=($(compgen -W '{}' -- \"$word\")); "
-                              "else compopt -o default 2>/dev/null; fi ;;\n", completion.name, words);
+        for (const std::string& word : completion.words) {
+            words += (words.empty() ? "" : " ") + word;
+        }
+        groups += fmt::format(
+            "        {}) if [ \"$COMP_CWORD\" -eq 2 ]; then COMPREPLY=($(compgen -W '{}' -- "
+            "\"$word\")); "
+            "else compopt -o default 2>/dev/null; fi ;;\n",
+            completion.name, words);
     }
     std::string text(script);
     replace(text, "@COMMANDS@", commands);

@@ -6,12 +6,11 @@
 namespace hal::tools {
 
 struct CompletionOptions : Options {
-    void declare(OptionSet& set) override {
-        set.words("SHELL", "bash");
-    }
+    void declare(OptionSet& set) override { set.words("SHELL", "bash"); }
 };
 
-/// Runs `hal completion`: prints a script derived from the table of subcommands. Returns the exit code.
+/// Runs `hal completion`: prints a script derived from the table of subcommands. Returns the exit
+/// code.
 int run_completion(const CompletionOptions&);
 
 }  // namespace hal::tools

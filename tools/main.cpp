@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The program `hal`; under the names of classic.cpp (halcmd, halrun, …) it behaves like LinuxCNC's programs.
+// The program `hal`; under the names of classic.cpp (halcmd, halrun, …) it behaves like LinuxCNC's
+// programs.
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
@@ -9,26 +10,30 @@
 #include <unistd.h>
 
 #include "classic.hpp"
+#include "cli/other_program.hpp"
 #include "cli/standard_streams.hpp"
 #include "commands.hpp"
 #include "execute/process_setup.hpp"
-#include "cli/other_program.hpp"
 
 namespace {
 
-/// Ends this program with the machine when loadusr has started it. The spawner requests this from the kernel, which drops the request when it
-/// starts a program with file capabilities.
+/// Ends this program with the machine when loadusr has started it. The spawner requests this from
+/// the kernel, which drops the request when it starts a program with file capabilities.
 void end_with_machine() {
     const char* const machine = std::getenv("HALCYON_PARENT");
     const long pid = machine ? std::strtol(machine, nullptr, 10) : 0;
     if (pid <= 0 || ::getppid() != pid) return;
     ::prctl(PR_SET_PDEATHSIG, static_cast<unsigned long>(SIGTERM));
-    if (::getppid() != pid) std::raise(SIGTERM);  // it ended meanwhile
+    if (::getppid() != pid) {
+        std::raise(SIGTERM);  // it ended meanwhile
+    }
 }
 
 int run(const hal::tools::Classic* classic, int argc, char** argv) {
     if (!classic) return hal::tools::run_command_line(argc, argv);
-    if (!classic->run) return hal::tools::become_program(hal::tools::program_of(classic->part), argv);
+    if (!classic->run) {
+        return hal::tools::become_program(hal::tools::program_of(classic->part), argv);
+    }
     return classic->run(argc, argv);
 }
 
@@ -36,10 +41,14 @@ int run(const hal::tools::Classic* classic, int argc, char** argv) {
 
 int main(int argc, char** argv) {
     hal::tools::open_standard_streams();
-    std::signal(SIGPIPE, SIG_IGN);  // a reader that leaves is an error of that write, not the end of a machine
-    // With file capabilities the kernel leaves no core dump and gives /proc/PID to root. Every user who can start this program can load code into
-    // it, so it holds no secrets; still, only a process with the same capabilities can trace it.
-    if (::getauxval(AT_SECURE) != 0) ::prctl(PR_SET_DUMPABLE, 1UL);
+    // a reader that leaves is an error of that write, not the end of a machine
+    std::signal(SIGPIPE, SIG_IGN);
+    // With file capabilities the kernel leaves no core dump and gives /proc/PID to root. Every user
+    // who can start this program can load code into it, so it holds no secrets; still, only a
+    // process with the same capabilities can trace it.
+    if (::getauxval(AT_SECURE) != 0) {
+        ::prctl(PR_SET_DUMPABLE, 1UL);
+    }
     hal::limit_helper_stacks();
     end_with_machine();
     std::string_view program = argc > 0 ? argv[0] : "hal";

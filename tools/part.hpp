@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: MIT
-// Which program of the tool box has a command. The tables of commands are compiled once for each program.
+// Which program of the tool box has a command. The tables of commands are compiled once for each
+// program.
 #pragma once
 
 namespace hal::tools {
 
-/// The programs that share the tables. `hal` is what runs and commands machines, and is built first; it replaces itself with the others.
+/// The programs that share the tables. `hal` is what runs and commands machines, and is built
+/// first; it replaces itself with the others.
 enum class Part { core, tools, bus, panel };
 
-/// Where a command is: in which program, and its function, where this source is compiled for that program; nullptr elsewhere.
+/// Where a command is: in which program, and its function, where this source is compiled for that
+/// program; nullptr elsewhere.
 template <Part part_, auto run_>
 struct In {
     static constexpr Part part = part_;

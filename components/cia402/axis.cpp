@@ -8,12 +8,17 @@ namespace hal::canopen::cia402 {
 namespace {
 
 constexpr double farthest_count = 4e18;        // of a position that does not wrap
-constexpr unsigned mode_change_cycles = 3;     // for so many cycles the display in flight may be the old one
+// for so many cycles the display in flight may be the old one
+constexpr unsigned mode_change_cycles = 3;
 
 bool in_fault(State s) noexcept { return s == State::fault || s == State::fault_reaction_active; }
-bool by_position(Mode m) noexcept { return m == Mode::cyclic_position || m == Mode::interpolated_position; }
+bool by_position(Mode m) noexcept {
+    return m == Mode::cyclic_position || m == Mode::interpolated_position;
+}
 /// Returns true for modes with a halt bit (bit 8).
-bool can_halt(Mode m) noexcept { return m != Mode::cyclic_position && m != Mode::cyclic_velocity && m != Mode::cyclic_torque; }
+bool can_halt(Mode m) noexcept {
+    return m != Mode::cyclic_position && m != Mode::cyclic_velocity && m != Mode::cyclic_torque;
+}
 
 /// Falls smoothly from 1 to 0 while x goes from 0 to 1.
 double falling(double x) noexcept { return x >= 1.0 ? 0.0 : 1.0 - x * x * (3.0 - 2.0 * x); }
@@ -22,15 +27,20 @@ double falling(double x) noexcept { return x >= 1.0 ? 0.0 : 1.0 - x * x * (3.0 -
 
 void Axis::fail(Cause cause, Request request) noexcept {
     failure_ = {};
-    failure_.cause = cause, failure_.request = request, failure_.state = walk_.state();
-    failure_.statusword = in_.statusword, failure_.error_code = in_.error_code;
-    failure_.mode = orders_.mode, failure_.shown = in_.mode;
+    failure_.cause = cause;
+    failure_.request = request;
+    failure_.state = walk_.state();
+    failure_.statusword = in_.statusword;
+    failure_.error_code = in_.error_code;
+    failure_.mode = orders_.mode;
+    failure_.shown = in_.mode;
     wanted_ = false;
 }
 
 void Axis::fail(Cause cause, double value, double limit) noexcept {
     fail(cause, Request::run);
-    failure_.value = value, failure_.limit = limit;
+    failure_.value = value;
+    failure_.limit = limit;
 }
 
 const AxisOrders& Axis::act(const AxisCommand& command, const AxisRules& rules, Time now) noexcept {
@@ -40,8 +50,12 @@ const AxisOrders& Axis::act(const AxisCommand& command, const AxisRules& rules, 
     home(command, rules, now);
     active_ = enabled_ && mode_shown_ && home_ == Home::no;
     move(command, rules, now);
-    if (failure_) enabled_ = active_ = false;
-    was_enable_ = command.enable, was_reset_ = command.reset, was_home_ = command.home;
+    if (failure_) {
+        enabled_ = active_ = false;
+    }
+    was_enable_ = command.enable;
+    was_reset_ = command.reset;
+    was_home_ = command.home;
     was_operational_ = in_.operational;
     return orders_;
 }
@@ -56,20 +70,28 @@ void Axis::interrupt() noexcept {
 /// Updates position, velocity and torque in user units; without a node they keep their values.
 void Axis::observe(const AxisFeedback& in, const AxisRules& rules, Time now) noexcept {
     in_ = in;
-    const double dt = started_ ? static_cast<double>(now - last_) / static_cast<double>(one_second) : 0.0;
-    last_ = now, started_ = true;
+    const double dt =
+        started_ ? static_cast<double>(now - last_) / static_cast<double>(one_second) : 0.0;
+    last_ = now;
+    started_ = true;
     if (!in.operational || !rules.position.sound()) {
         velocity_ = torque_ = 0.0;
         return;
     }
     const bool first = !counter_.known();
     counter_.follow(in.position, rules.counter_bits);
-    last_position_ = first || jumped_ ? rules.position.to_user(static_cast<double>(counter_.count())) : position_;
+    last_position_ = first || jumped_
+                         ? rules.position.to_user(static_cast<double>(counter_.count()))
+                         : position_;
     jumped_ = false;
     position_ = rules.position.to_user(static_cast<double>(counter_.count()));
-    if (in.has_vl_velocity && in.mode == Mode::velocity && rules.vl.sound()) velocity_ = rules.vl.to_user(in.vl_velocity);
-    else if (in.has_velocity && rules.velocity.sound()) velocity_ = rules.velocity.to_user(in.velocity);
-    else velocity_ = dt > 0.0 ? (position_ - last_position_) / dt : 0.0;
+    if (in.has_vl_velocity && in.mode == Mode::velocity && rules.vl.sound()) {
+        velocity_ = rules.vl.to_user(in.vl_velocity);
+    } else if (in.has_velocity && rules.velocity.sound()) {
+        velocity_ = rules.velocity.to_user(in.velocity);
+    } else {
+        velocity_ = dt > 0.0 ? (position_ - last_position_) / dt : 0.0;
+    }
     torque_ = rules.torque.sound() ? rules.torque.to_user(in.torque) : 0.0;
 }
 
@@ -78,7 +100,9 @@ void Axis::decide(const AxisCommand& command, const AxisRules& rules) noexcept {
     const bool enable_edge = command.enable && !was_enable_;
     if ((command.reset && !was_reset_) || (enable_edge && rules.auto_reset)) {
         failure_ = {};
-        if (in_.operational && in_fault(state_of(in_.statusword))) walk_.reset_fault();
+        if (in_.operational && in_fault(state_of(in_.statusword))) {
+            walk_.reset_fault();
+        }
     }
     if (enable_edge && !failure_) {
         if (const Factor* const f = !rules.position.sound()       ? &rules.position
@@ -93,9 +117,13 @@ void Axis::decide(const AxisCommand& command, const AxisRules& rules) noexcept {
             wanted_ = true;
         }
     }
-    if (!command.enable || command.quick_stop) wanted_ = false;
+    if (!command.enable || command.quick_stop) {
+        wanted_ = false;
+    }
     if (!in_.operational) {
-        if (wanted_ && was_operational_) fail(Cause::lost, enabled_ ? Request::run : Request::enable);
+        if (wanted_ && was_operational_) {
+            fail(Cause::lost, enabled_ ? Request::run : Request::enable);
+        }
         homed_ = false;
     }
 }
@@ -105,38 +133,61 @@ void Axis::walk(const AxisCommand& command, const AxisRules& rules, Time now) no
         walk_.want(State::switch_on_disabled, Request::disable);
         enabled_ = false;
         orders_.controlword = command::disable_voltage;
-        disable_sent_ = true, disable_sent_at_ = now;
+        disable_sent_ = true;
+        disable_sent_at_ = now;
         return;
     }
-    const State before = walk_.state(), state = state_of(in_.statusword);
+    const State before = walk_.state();
+    const State state = state_of(in_.statusword);
     // The drive may still be executing the disable command from before this enabling.
     const bool late = disable_sent_ && now - disable_sent_at_ < rules.limits.step;
     if (enabled_ && wanted_ && state != State::operation_enabled && (in_fault(state) || !late)) {
         fail(in_fault(state) ? Cause::drive_fault : Cause::left, Request::run);
-        failure_.state = state, failure_.before = before;
+        failure_.state = state;
+        failure_.before = before;
     }
-    if (state != State::operation_enabled) disable_sent_ = false;
-    else if (!wanted_) disable_sent_ = true, disable_sent_at_ = now;
+    if (state != State::operation_enabled) {
+        disable_sent_ = false;
+    } else if (!wanted_) {
+        disable_sent_ = true;
+        disable_sent_at_ = now;
+    }
     const bool powered = state == State::operation_enabled || state == State::quick_stop_active;
-    if (wanted_) walk_.want(State::operation_enabled, Request::enable);
-    else if (powered && command.quick_stop) walk_.want(State::quick_stop_active, Request::quick_stop);
-    else if (state == State::operation_enabled && failure_ && failure_.cause != Cause::not_enabled)
+    if (wanted_) {
+        walk_.want(State::operation_enabled, Request::enable);
+    } else if (powered && command.quick_stop) {
         walk_.want(State::quick_stop_active, Request::quick_stop);
-    else walk_.want(State::switch_on_disabled, command.quick_stop ? Request::quick_stop : Request::disable);
+    } else if (state == State::operation_enabled && failure_ &&
+               failure_.cause != Cause::not_enabled) {
+        walk_.want(State::quick_stop_active, Request::quick_stop);
+    } else {
+        walk_.want(State::switch_on_disabled,
+                   command.quick_stop ? Request::quick_stop : Request::disable);
+    }
 
     orders_.controlword = walk_.step(in_.statusword, in_.error_code, now, rules.limits);
-    if (walk_.failure() && !failure_) failure_ = walk_.failure(), wanted_ = false;
-    if (state == State::fault && !failure_ && !walk_.resetting() && !wanted_) fail(Cause::drive_fault, Request::enable);
-    if (failure_.cause == Cause::drive_fault && failure_.error_code == 0 && in_fault(state))
+    if (walk_.failure() && !failure_) {
+        failure_ = walk_.failure();
+        wanted_ = false;
+    }
+    if (state == State::fault && !failure_ && !walk_.resetting() && !wanted_) {
+        fail(Cause::drive_fault, Request::enable);
+    }
+    if (failure_.cause == Cause::drive_fault && failure_.error_code == 0 && in_fault(state)) {
         failure_.error_code = in_.error_code;  // received later than the statusword
+    }
     enabled_ = wanted_ && walk_.reached();
 }
 
 /// Commands the mode and checks that the drive displays it.
 void Axis::select_mode(const AxisCommand& command, const AxisRules& rules, Time now) noexcept {
     const bool homing = home_ == Home::entering || home_ == Home::running;
-    const Mode wanted = homing ? Mode::homing : command.mode != Mode::none ? command.mode : in_.mode;
-    if (wanted != orders_.mode) mode_since_ = now;
+    const Mode wanted = homing                       ? Mode::homing
+                        : command.mode != Mode::none ? command.mode
+                                                     : in_.mode;
+    if (wanted != orders_.mode) {
+        mode_since_ = now;
+    }
     orders_.mode = wanted;
     mode_shown_ = !in_.has_mode || in_.mode == wanted;
     if (mode_shown_ || !enabled_) {
@@ -149,8 +200,13 @@ void Axis::select_mode(const AxisCommand& command, const AxisRules& rules, Time 
 
 void Axis::home(const AxisCommand& command, const AxisRules& rules, Time now) noexcept {
     if (command.home && !was_home_) {
-        if (enabled_) home_ = Home::entering, home_cycles_ = 0, homed_ = false;
-        else if (!failure_) fail(Cause::not_enabled, Request::home);
+        if (enabled_) {
+            home_ = Home::entering;
+            home_cycles_ = 0;
+            homed_ = false;
+        } else if (!failure_) {
+            fail(Cause::not_enabled, Request::home);
+        }
     }
     if (home_ == Home::no) return;
     if (!enabled_) {
@@ -159,15 +215,20 @@ void Axis::home(const AxisCommand& command, const AxisRules& rules, Time now) no
     }
     ++home_cycles_;
     if (home_ == Home::leaving) {
-        if (mode_shown_ && home_cycles_ > mode_change_cycles) home_ = Home::no;
+        if (mode_shown_ && home_cycles_ > mode_change_cycles) {
+            home_ = Home::no;
+        }
         return;
     }
     if (!command.home) {
-        home_ = Home::leaving, home_cycles_ = 0;
+        home_ = Home::leaving;
+        home_cycles_ = 0;
         return;
     }
     if (home_ == Home::entering) {
-        if (orders_.mode != Mode::homing || !mode_shown_ || home_cycles_ <= mode_change_cycles) return;
+        if (orders_.mode != Mode::homing || !mode_shown_ || home_cycles_ <= mode_change_cycles) {
+            return;
+        }
         home_ = Home::running;
         homing_run_.begin();
     }
@@ -177,25 +238,31 @@ void Axis::home(const AxisCommand& command, const AxisRules& rules, Time now) no
         homed_ = jumped_ = true;
         counter_.put(in_.position);
         position_ = rules.position.to_user(static_cast<double>(counter_.count()));
-        home_ = Home::leaving, home_cycles_ = 0;
+        home_ = Home::leaving;
+        home_cycles_ = 0;
         break;
     case HomingRun::Result::failed:
-        failure_ = homing_run_.failure(), wanted_ = false;
+        failure_ = homing_run_.failure();
+        wanted_ = false;
         home_ = Home::no;
         break;
     }
 }
 
-/// Follows the position command in csp and ip, after blending out its distance from the axis at enabling.
+/// Follows the position command in csp and ip, after blending out its distance from the axis at
+/// enabling.
 void Axis::follow_position(const AxisCommand& command, const AxisRules& rules, Time now) noexcept {
     const double asked = command.position;
     if (!rules.position.sound()) return fail(Cause::bad_factor, rules.position.ratio(), 0.0);
-    if (!(std::fabs(asked * rules.position.ratio()) < farthest_count)) return fail(Cause::bad_command, asked, 0.0);
+    if (!(std::fabs(asked * rules.position.ratio()) < farthest_count)) {
+        return fail(Cause::bad_command, asked, 0.0);
+    }
     if (!following_) {
         const double away = position_ - asked;
         if (rules.max_step > 0.0 && std::fabs(away) > rules.max_step) {
             fail(Cause::step_rejected, std::fabs(away), rules.max_step);
-            failure_.request = Request::enable, failure_.step = Step::enable_operation;
+            failure_.request = Request::enable;
+            failure_.step = Step::enable_operation;
             return;
         }
         following_ = true;
@@ -206,34 +273,55 @@ void Axis::follow_position(const AxisCommand& command, const AxisRules& rules, T
     }
     joined_ = asked;
     if (offset_ != 0.0) {
-        const double left = falling(static_cast<double>(now - joined_at_) / static_cast<double>(rules.blend));
-        if (left == 0.0) offset_ = 0.0;
+        const double left =
+            falling(static_cast<double>(now - joined_at_) / static_cast<double>(rules.blend));
+        if (left == 0.0) {
+            offset_ = 0.0;
+        }
         commanded_ = asked + offset_ * left;
     } else {
         commanded_ = asked;
     }
-    if (!(std::fabs(commanded_ * rules.position.ratio()) < farthest_count)) return fail(Cause::bad_command, commanded_, 0.0);
+    if (!(std::fabs(commanded_ * rules.position.ratio()) < farthest_count)) {
+        return fail(Cause::bad_command, commanded_, 0.0);
+    }
     const auto count = static_cast<std::int64_t>(std::llround(commanded_ * rules.position.ratio()));
-    orders_.target_position = Counter::low_bits(static_cast<std::uint32_t>(count), rules.counter_bits);
+    orders_.target_position =
+        Counter::low_bits(static_cast<std::uint32_t>(count), rules.counter_bits);
     const double error = std::fabs(commanded_ - position_);
-    if (rules.max_following_error > 0.0 && error > rules.max_following_error)
+    if (rules.max_following_error > 0.0 && error > rules.max_following_error) {
         fail(Cause::following_error, error, rules.max_following_error);
+    }
 }
 
 /// Sets the targets and the upper bits of the controlword that belong to the mode.
 void Axis::move(const AxisCommand& command, const AxisRules& rules, Time now) noexcept {
     const Mode mode = orders_.mode;
     const bool halted = command.halt || !active_;
-    const bool by_velocity = mode == Mode::profile_velocity || mode == Mode::velocity || mode == Mode::cyclic_velocity;
+    const bool by_velocity =
+        mode == Mode::profile_velocity || mode == Mode::velocity || mode == Mode::cyclic_velocity;
     const bool by_torque = mode == Mode::profile_torque || mode == Mode::cyclic_torque;
-    if (active_ && !(std::isfinite(command.velocity) && std::isfinite(command.torque)))
-        fail(Cause::bad_command, std::isfinite(command.velocity) ? command.torque : command.velocity, 0.0);
+    if (active_ && !(std::isfinite(command.velocity) && std::isfinite(command.torque))) {
+        fail(Cause::bad_command,
+             std::isfinite(command.velocity) ? command.torque : command.velocity, 0.0);
+    }
 
-    if (!active_ || halted || !by_position(mode)) following_ = false;
-    if (active_ && !halted && by_position(mode) && !failure_) follow_position(command, rules, now);
-    if (failure_) active_ = false, following_ = false;
-    if (!active_ && mode != Mode::profile_position) orders_.target_position = in_.position;
-    if (!active_ || !by_position(mode)) commanded_ = position_;
+    if (!active_ || halted || !by_position(mode)) {
+        following_ = false;
+    }
+    if (active_ && !halted && by_position(mode) && !failure_) {
+        follow_position(command, rules, now);
+    }
+    if (failure_) {
+        active_ = false;
+        following_ = false;
+    }
+    if (!active_ && mode != Mode::profile_position) {
+        orders_.target_position = in_.position;
+    }
+    if (!active_ || !by_position(mode)) {
+        commanded_ = position_;
+    }
     orders_.interpolation = orders_.target_position;
 
     if (mode != Mode::profile_position || !active_) {
@@ -242,41 +330,66 @@ void Axis::move(const AxisCommand& command, const AxisRules& rules, Time now) no
     }
     const bool later = enabled_ && !active_;  // during a mode change or homing
     const bool goes = command.go && !was_go_ && mode == Mode::profile_position && !later;
-    if (!later || !command.go) was_go_ = command.go;
+    if (!later || !command.go) {
+        was_go_ = command.go;
+    }
     if (goes) {
         const double count = command.position * rules.position.ratio();
         if (!active_) {
-            if (!failure_) fail(Cause::not_enabled, Request::go);
+            if (!failure_) {
+                fail(Cause::not_enabled, Request::go);
+            }
         } else if (!(std::fabs(count) < farthest_count)) {
-            fail(Cause::bad_command, command.position, 0.0), failure_.request = Request::go;
+            fail(Cause::bad_command, command.position, 0.0);
+            failure_.request = Request::go;
         } else {
             SetPoint p;
-            p.target = Counter::low_bits(static_cast<std::uint32_t>(std::llround(count)), command.relative ? 32 : rules.counter_bits);
-            p.relative = command.relative, p.immediate = command.immediate, p.blend = command.blend;
+            p.target = Counter::low_bits(static_cast<std::uint32_t>(std::llround(count)),
+                                         command.relative ? 32 : rules.counter_bits);
+            p.relative = command.relative;
+            p.immediate = command.immediate;
+            p.blend = command.blend;
             set_points_.push(p);
         }
     }
     if (active_ && mode == Mode::profile_position) {
-        orders_.controlword |= set_points_.step(in_.statusword, now, rules.limits.step, orders_.target_position);
+        orders_.controlword |=
+            set_points_.step(in_.statusword, now, rules.limits.step, orders_.target_position);
         target_reached_ = set_points_.done();
-        if (set_points_.failure()) failure_ = set_points_.failure(), wanted_ = active_ = false;
+        if (set_points_.failure()) {
+            failure_ = set_points_.failure();
+            wanted_ = active_ = false;
+        }
     }
 
     const bool still = !active_ || (command.halt && !can_halt(mode));
-    orders_.target_velocity = !still && by_velocity ? rules.velocity.to_drive<std::int32_t>(command.velocity) : 0;
-    orders_.vl_target_velocity = !still && mode == Mode::velocity ? rules.vl.to_drive<std::int16_t>(command.velocity) : std::int16_t{0};
-    orders_.target_torque = !still && by_torque ? rules.torque.to_drive<std::int16_t>(command.torque) : std::int16_t{0};
-    orders_.velocity_offset = following_ ? rules.velocity.to_drive<std::int32_t>(command.velocity) : 0;
+    orders_.target_velocity =
+        !still && by_velocity ? rules.velocity.to_drive<std::int32_t>(command.velocity) : 0;
+    orders_.vl_target_velocity = !still && mode == Mode::velocity
+                                     ? rules.vl.to_drive<std::int16_t>(command.velocity)
+                                     : std::int16_t{0};
+    orders_.target_torque =
+        !still && by_torque ? rules.torque.to_drive<std::int16_t>(command.torque) : std::int16_t{0};
+    orders_.velocity_offset =
+        following_ ? rules.velocity.to_drive<std::int32_t>(command.velocity) : 0;
     const bool ahead = following_ || (!still && mode == Mode::cyclic_velocity);
-    orders_.torque_offset = ahead ? rules.torque.to_drive<std::int16_t>(command.torque) : std::int16_t{0};
+    orders_.torque_offset =
+        ahead ? rules.torque.to_drive<std::int16_t>(command.torque) : std::int16_t{0};
     orders_.profile_velocity = rules.velocity.amount(command.profile_velocity);
     orders_.profile_acceleration = rules.acceleration.amount(command.profile_acceleration);
     orders_.profile_deceleration = rules.acceleration.amount(command.profile_deceleration);
 
-    constexpr std::uint16_t ramps = control::enable_ramp | control::unlock_ramp | control::reference_ramp;
-    if (active_ && mode == Mode::velocity && !command.halt) orders_.controlword |= ramps;
-    if (following_ && mode == Mode::interpolated_position) orders_.controlword |= control::enable_interpolation;
-    if (command.halt && enabled_ && can_halt(mode)) orders_.controlword |= control::halt;
+    constexpr std::uint16_t ramps =
+        control::enable_ramp | control::unlock_ramp | control::reference_ramp;
+    if (active_ && mode == Mode::velocity && !command.halt) {
+        orders_.controlword |= ramps;
+    }
+    if (following_ && mode == Mode::interpolated_position) {
+        orders_.controlword |= control::enable_interpolation;
+    }
+    if (command.halt && enabled_ && can_halt(mode)) {
+        orders_.controlword |= control::halt;
+    }
 }
 
 }  // namespace hal::canopen::cia402

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The master's side of one axis of CiA 402. It knows no bus: feedback of the drive goes in, orders to the drive come out, as raw values.
-// CANopen PDOs, SDOs or EtherCAT transport them.
+// The master's side of one axis of CiA 402. It knows no bus: feedback of the drive goes in, orders
+// to the drive come out, as raw values. CANopen PDOs, SDOs or EtherCAT transport them.
 //
 //     Axis axis;
 //     each cycle:
@@ -25,93 +25,114 @@ struct AxisFeedback {
     std::int32_t velocity = 0;     ///< 606Ch
     std::int16_t vl_velocity = 0;  ///< 6044h
     std::int16_t torque = 0;       ///< 6077h
-    bool has_mode = true, has_velocity = true, has_vl_velocity = false;  ///< the drive sends them
+    bool has_mode = true;
+    bool has_velocity = true;
+    bool has_vl_velocity = false;  ///< the drive sends them
 };
 
 /// Orders to the drive, in its units.
 struct AxisOrders {
-    std::uint16_t controlword = 0;          ///< 6040h
-    Mode mode = Mode::none;                 ///< 6060h; none: unchanged
-    std::int32_t target_position = 0;       ///< 607Ah
-    std::int32_t interpolation = 0;         ///< 60C1h:1
-    std::int32_t target_velocity = 0;       ///< 60FFh
-    std::int16_t vl_target_velocity = 0;    ///< 6042h
-    std::int16_t target_torque = 0;         ///< 6071h
-    std::int32_t velocity_offset = 0;       ///< 60B1h
-    std::int16_t torque_offset = 0;         ///< 60B2h
-    std::uint32_t profile_velocity = 0;     ///< 6081h
-    std::uint32_t profile_acceleration = 0, profile_deceleration = 0;  ///< 6083h, 6084h
+    std::uint16_t controlword = 0;  ///< 6040h
+    Mode mode = Mode::none;  ///< 6060h; none: unchanged
+    std::int32_t target_position = 0;  ///< 607Ah
+    std::int32_t interpolation = 0;  ///< 60C1h:1
+    std::int32_t target_velocity = 0;  ///< 60FFh
+    std::int16_t vl_target_velocity = 0;  ///< 6042h
+    std::int16_t target_torque = 0;  ///< 6071h
+    std::int32_t velocity_offset = 0;  ///< 60B1h
+    std::int16_t torque_offset = 0;  ///< 60B2h
+    std::uint32_t profile_velocity = 0;  ///< 6081h
+    std::uint32_t profile_acceleration = 0;
+    std::uint32_t profile_deceleration = 0;  ///< 6083h, 6084h
 };
 
 /// Commands to the axis, in user units.
 struct AxisCommand {
-    bool enable = false;      ///< a rising edge enables, false disables; after a failure another edge is needed
+    /// a rising edge enables, false disables; after a failure another edge is needed
+    bool enable = false;
     bool quick_stop = false;
-    bool halt = false;        ///< brake to standstill and stay enabled
-    bool reset = false;       ///< a rising edge clears a failure and the fault of the drive
-    bool home = false;        ///< a rising edge starts homing, false aborts it
-    bool go = false;          ///< pp: a rising edge makes position a new set-point, with the three flags
-    bool relative = false, immediate = false, blend = false;
-    Mode mode = Mode::none;   ///< none: that of the drive
-    double position = 0.0;    ///< csp, ip, pp
-    double velocity = 0.0;    ///< csv, pv, vl; csp: feed-forward
-    double torque = 0.0;      ///< cst, tq; csp, csv: feed-forward
-    double profile_velocity = 0.0, profile_acceleration = 0.0, profile_deceleration = 0.0;  ///< of moves planned by the drive
+    bool halt = false;  ///< brake to standstill and stay enabled
+    bool reset = false;  ///< a rising edge clears a failure and the fault of the drive
+    bool home = false;  ///< a rising edge starts homing, false aborts it
+    /// pp: a rising edge makes position a new set-point, with the three flags
+    bool go = false;
+    bool relative = false;
+    bool immediate = false;
+    bool blend = false;
+    Mode mode = Mode::none;  ///< none: that of the drive
+    double position = 0.0;  ///< csp, ip, pp
+    double velocity = 0.0;  ///< csv, pv, vl; csp: feed-forward
+    double torque = 0.0;  ///< cst, tq; csp, csv: feed-forward
+    /// of moves planned by the drive
+    double profile_velocity = 0.0;
+    double profile_acceleration = 0.0;
+    double profile_deceleration = 0.0;
 };
 
 /// Configuration of the axis; may change at any time.
 struct AxisRules {
-    Factor position;      ///< counts per unit
-    Factor velocity;      ///< drive's velocity units per unit/s
+    Factor position;  ///< counts per unit
+    Factor velocity;  ///< drive's velocity units per unit/s
     Factor acceleration;  ///< drive's acceleration units per unit/s²
-    Factor torque;        ///< 1/1000 of the rated torque per unit
-    Factor vl;            ///< units of mode vl (r/min) per unit/s
-    unsigned counter_bits = 32;        ///< valid bits of the drive's position counter
+    Factor torque;  ///< 1/1000 of the rated torque per unit
+    Factor vl;  ///< units of mode vl (r/min) per unit/s
+    unsigned counter_bits = 32;  ///< valid bits of the drive's position counter
     Walk::Limits limits{};
-    Time homing = 0;                   ///< timeout of homing, ns; 0: none
-    Time blend = one_second / 2;           ///< with max_step 0: time to blend out a command away from the axis at enabling, ns
-    double max_step = 0.0;             ///< largest step of position in one cycle, units; 0: not checked
+    Time homing = 0;  ///< timeout of homing, ns; 0: none
+    /// with max_step 0: time to blend out a command away from the axis at enabling, ns
+    Time blend = one_second / 2;
+    /// largest step of position in one cycle, units; 0: not checked
+    double max_step = 0.0;
     double max_following_error = 0.0;  ///< units; 0: not checked
-    bool auto_reset = false;           ///< enable also resets a failure
+    bool auto_reset = false;  ///< enable also resets a failure
 };
 
 /// The axis. All functions are called by one thread, in its cycle. [realtime]
 class Axis {
 public:
     /// Runs one cycle at `now` (ns). The result is valid until the next call. [realtime]
-    const AxisOrders& step(const AxisFeedback& feedback, const AxisCommand& command, const AxisRules& rules, Time now) noexcept {
+    const AxisOrders& step(const AxisFeedback& feedback, const AxisCommand& command,
+                           const AxisRules& rules, Time now) noexcept {
         observe(feedback, rules, now);
         return act(command, rules, now);
     }
-    /// The two halves of step(), for a caller that computes the command from the feedback in between. [realtime]
+    /// The two halves of step(), for a caller that computes the command from the feedback in
+    /// between. [realtime]
     void observe(const AxisFeedback&, const AxisRules&, Time now) noexcept;
     const AxisOrders& act(const AxisCommand&, const AxisRules&, Time now) noexcept;
 
-    /// Disables the axis after a time without cycles, in which the drive was stopped. This is not a failure;
-    /// enable needs another edge. [realtime]
+    /// Disables the axis after a time without cycles, in which the drive was stopped. This is not a
+    /// failure; enable needs another edge. [realtime]
     void interrupt() noexcept;
 
     State state() const noexcept { return walk_.state(); }
     bool enabled() const noexcept { return enabled_; }
-    /// Returns true while commands are followed: enabled, in the commanded mode, not homing. While false, let the position command track
-    /// the feedback.
+    /// Returns true while commands are followed: enabled, in the commanded mode, not homing. While
+    /// false, let the position command track the feedback.
     bool active() const noexcept { return active_; }
     /// Returns true while a commanded change of state is in progress.
     bool walking() const noexcept { return !walk_.reached(); }
     bool homed() const noexcept { return homed_; }
     bool homing() const noexcept { return home_ != Home::no; }
-    bool fault() const noexcept { return failure_ || walk_.state() == State::fault || walk_.state() == State::fault_reaction_active; }
+    bool fault() const noexcept {
+        return failure_ || walk_.state() == State::fault ||
+               walk_.state() == State::fault_reaction_active;
+    }
     /// Returns why the axis was disabled or rejected a command; kept until reset.
     const Failure& failure() const noexcept { return failure_; }
 
-    double position() const noexcept { return position_; }          ///< does not wrap with the drive's counter
+    /// does not wrap with the drive's counter
+    double position() const noexcept { return position_; }
     double velocity() const noexcept { return velocity_; }
     double torque() const noexcept { return torque_; }
-    double commanded() const noexcept { return commanded_; }        ///< position sent to the drive; while not active, the feedback
+    /// position sent to the drive; while not active, the feedback
+    double commanded() const noexcept { return commanded_; }
     double following_error() const noexcept { return commanded_ - position_; }
-    /// Returns true in pp when all set-points are done; in other modes the target reached bit (bit 10).
+    /// Returns true in pp when all set-points are done; in other modes the target reached bit (bit
+    /// 10).
     bool target_reached() const noexcept { return target_reached_; }
-    std::size_t set_points() const noexcept { return set_points_.waiting(); }  ///< queued until the drive takes them
+    /// queued until the drive takes them
+    std::size_t set_points() const noexcept { return set_points_.waiting(); }
 
 private:
     enum class Home : std::uint8_t { no, entering, running, leaving };
@@ -133,14 +154,36 @@ private:
     AxisFeedback in_;
     AxisOrders orders_;
 
-    double position_ = 0.0, velocity_ = 0.0, torque_ = 0.0, commanded_ = 0.0, last_position_ = 0.0;
-    double joined_ = 0.0, offset_ = 0.0;  // the command of the last cycle; its distance from the feedback at enabling
-    Time last_ = 0, mode_since_ = 0, joined_at_ = 0, disable_sent_at_ = 0;
+    double position_ = 0.0;
+    double velocity_ = 0.0;
+    double torque_ = 0.0;
+    double commanded_ = 0.0;
+    double last_position_ = 0.0;
+    // the command of the last cycle; its distance from the feedback at enabling
+    double joined_ = 0.0;
+    double offset_ = 0.0;
+    Time last_ = 0;
+    Time mode_since_ = 0;
+    Time joined_at_ = 0;
+    Time disable_sent_at_ = 0;
     Home home_ = Home::no;
     unsigned home_cycles_ = 0;
-    bool wanted_ = false, enabled_ = false, active_ = false, homed_ = false, following_ = false, mode_shown_ = false;
-    bool was_enable_ = false, was_reset_ = false, was_home_ = false, was_go_ = false, was_operational_ = false, started_ = false;
-    bool target_reached_ = false, jumped_ = false;
+    bool wanted_ = false;
+    bool enabled_ = false;
+    bool active_ = false;
+    bool homed_ = false;
+    bool following_ = false;
+
+    bool mode_shown_ = false;
+    bool was_enable_ = false;
+    bool was_reset_ = false;
+    bool was_home_ = false;
+    bool was_go_ = false;
+
+    bool was_operational_ = false;
+    bool started_ = false;
+    bool target_reached_ = false;
+    bool jumped_ = false;
     bool disable_sent_ = false;  // and the drive has not been seen disabled since
 };
 

@@ -30,12 +30,17 @@ constexpr Mode any_other{-128};  // in preformatted messages: a mode without a n
 std::string name(Mode mode) {
     if (mode == Mode::none) return "none";
     if (mode == any_other) return "another";
-    return *abbreviation(mode) != '-' ? std::string(abbreviation(mode)) : std::to_string(static_cast<int>(mode));
+    return *abbreviation(mode) != '-' ? std::string(abbreviation(mode))
+                                      : std::to_string(static_cast<int>(mode));
 }
 
-std::string state_words(State state) { return state == State::unknown ? "an undefined state" : quoted(to_string(state)); }
+std::string state_words(State state) {
+    return state == State::unknown ? "an undefined state" : quoted(to_string(state));
+}
 
-std::string after(Step step) { return step == Step::wait ? "" : " after " + quoted(to_string(step)); }
+std::string after(Step step) {
+    return step == Step::wait ? "" : " after " + quoted(to_string(step));
+}
 
 std::string error_words(std::uint16_t code) {
     if (code == 0) return "";
@@ -46,22 +51,32 @@ std::string error_words(std::uint16_t code) {
 std::string hint(const Failure& f) {
     if (f.statusword == 0) return "; check that the statusword is received";
     if (f.cause != Cause::stays || f.state == State::unknown) return "";
-    if ((f.statusword & status::remote) == 0) return "; remote is 0: the drive is under local control";
-    if ((f.statusword & status::voltage_enabled) == 0 && f.request == Request::enable)
+    if ((f.statusword & status::remote) == 0) {
+        return "; remote is 0: the drive is under local control";
+    }
+    if ((f.statusword & status::voltage_enabled) == 0 && f.request == Request::enable) {
         return "; voltage-enabled is 0: check the supply of the power stage";
+    }
     return "";
 }
 
 }  // namespace
 
 const char* to_string(Request request) noexcept {
-    constexpr const char* words[] = {"enable", "run", "disable", "quick stop", "reset", "mode", "home", "go"};
+    constexpr const char* words[] = {"enable", "run",  "disable", "quick stop",
+                                     "reset",  "mode", "home",    "go"};
     return words[static_cast<unsigned>(request)];
 }
 
 const char* to_string(Step step) noexcept {
-    constexpr const char* words[] = {"wait", "shutdown", "switch on", "enable operation", "disable operation", "disable voltage",
-                                     "quick stop", "fault reset"};
+    constexpr const char* words[] = {"wait",
+                                     "shutdown",
+                                     "switch on",
+                                     "enable operation",
+                                     "disable operation",
+                                     "disable voltage",
+                                     "quick stop",
+                                     "fault reset"};
     return words[static_cast<unsigned>(step)];
 }
 
@@ -70,24 +85,32 @@ std::string sentence(const Failure& f) {
     switch (f.cause) {
     case Cause::none: return "";
     case Cause::stays:
-        return asked + (f.state == State::unknown ? "drive shows " : "drive stays in ") + state_words(f.state) + after(f.step);
+        return asked + (f.state == State::unknown ? "drive shows " : "drive stays in ") +
+               state_words(f.state) + after(f.step);
     case Cause::drive_fault:
-        return asked + (f.step != Step::wait || f.request == Request::run ? "drive went into fault" + after(f.step) : "drive is in fault");
+        return asked + (f.step != Step::wait || f.request == Request::run
+                            ? "drive went into fault" + after(f.step)
+                            : "drive is in fault");
     case Cause::left:
-        return asked + "drive left " + quoted(to_string(f.before)) + " for " + state_words(f.state) + " without a command";
+        return asked + "drive left " + quoted(to_string(f.before)) + " for " +
+               state_words(f.state) + " without a command";
     case Cause::lost: return asked + "drive lost: node no longer operational";
-    case Cause::mode_rejected: return asked + "drive does not accept mode " + name(f.mode) + ", displays " + name(f.shown);
+    case Cause::mode_rejected:
+        return asked + "drive does not accept mode " + name(f.mode) + ", displays " + name(f.shown);
     case Cause::following_error: return asked + "following error above max-following-error";
     case Cause::step_rejected:
-        return asked + (f.step == Step::wait ? "position-cmd steps farther than max-step"
-                                             : "position-cmd is farther from position-fb than max-step");
+        return asked + (f.step == Step::wait
+                            ? "position-cmd steps farther than max-step"
+                            : "position-cmd is farther from position-fb than max-step");
     case Cause::bad_command: return asked + "the command is not a number, or too large";
     case Cause::bad_factor: return asked + "a scale is 0 or not a number";
-    case Cause::homing_error: return asked + "drive reports " + quoted(to_string(homing_of(f.statusword)));
+    case Cause::homing_error:
+        return asked + "drive reports " + quoted(to_string(homing_of(f.statusword)));
     case Cause::homing_timeout: return asked + "home position not attained";
     case Cause::set_point:
-        return asked + ((f.statusword & status::set_point_acknowledge) == 0 ? "drive does not acknowledge the set-point"
-                                                                            : "drive does not clear its acknowledge");
+        return asked + ((f.statusword & status::set_point_acknowledge) == 0
+                            ? "drive does not acknowledge the set-point"
+                            : "drive does not clear its acknowledge");
     case Cause::not_enabled: return asked + "the axis is not enabled";
     }
     return asked + "failed";
@@ -95,35 +118,60 @@ std::string sentence(const Failure& f) {
 
 std::string text(const Failure& f) {
     std::string all = sentence(f);
-    if (f.cause == Cause::stays || f.cause == Cause::mode_rejected || f.cause == Cause::set_point)
+    if (f.cause == Cause::stays || f.cause == Cause::mode_rejected || f.cause == Cause::set_point) {
         all += print(" for %.2f s", seconds(f.after));
-    if (f.cause == Cause::homing_timeout) all += print(" within %.2f s", seconds(f.after));
-    if (f.cause == Cause::following_error || f.cause == Cause::step_rejected) return all + print(" (%g, limit %g)", f.value, f.limit);
-    if (f.cause == Cause::bad_command || f.cause == Cause::bad_factor) return all + print(" (%g)", f.value);
-    if (f.cause == Cause::none || f.cause == Cause::lost || f.cause == Cause::not_enabled) return all;
-    return all + print(" (statusword 0x%04X", f.statusword) + error_words(f.error_code) + ")" + hint(f);
+    }
+    if (f.cause == Cause::homing_timeout) {
+        all += print(" within %.2f s", seconds(f.after));
+    }
+    if (f.cause == Cause::following_error || f.cause == Cause::step_rejected) {
+        return all + print(" (%g, limit %g)", f.value, f.limit);
+    }
+    if (f.cause == Cause::bad_command || f.cause == Cause::bad_factor) {
+        return all + print(" (%g)", f.value);
+    }
+    if (f.cause == Cause::none || f.cause == Cause::lost || f.cause == Cause::not_enabled) {
+        return all;
+    }
+    return all + print(" (statusword 0x%04X", f.statusword) + error_words(f.error_code) + ")" +
+           hint(f);
 }
 
 namespace {
 
 std::uint8_t known(Mode mode) noexcept {
-    return static_cast<std::uint8_t>(mode == Mode::none || *abbreviation(mode) != '-' ? mode : any_other);
+    return static_cast<std::uint8_t>(mode == Mode::none || *abbreviation(mode) != '-' ? mode
+                                                                                      : any_other);
 }
 
 /// Returns everything that selects the message as one number.
 std::uint32_t key_of(const Failure& f) noexcept {
-    unsigned a = 0, b = 0;
+    unsigned a = 0;
+    unsigned b = 0;
     switch (f.cause) {
-    case Cause::stays: a = static_cast<unsigned>(f.step), b = static_cast<unsigned>(f.state); break;
-    case Cause::drive_fault: a = static_cast<unsigned>(f.step), b = f.error_code != 0; break;
-    case Cause::left: a = static_cast<unsigned>(f.before), b = static_cast<unsigned>(f.state); break;
-    case Cause::mode_rejected: a = known(f.mode), b = known(f.shown); break;
+    case Cause::stays:
+        a = static_cast<unsigned>(f.step);
+        b = static_cast<unsigned>(f.state);
+        break;
+    case Cause::drive_fault:
+        a = static_cast<unsigned>(f.step);
+        b = f.error_code != 0;
+        break;
+    case Cause::left:
+        a = static_cast<unsigned>(f.before);
+        b = static_cast<unsigned>(f.state);
+        break;
+    case Cause::mode_rejected:
+        a = known(f.mode);
+        b = known(f.shown);
+        break;
     case Cause::homing_error: a = static_cast<unsigned>(homing_of(f.statusword)); break;
     case Cause::set_point: a = f.statusword >> 12 & 1; break;
     case Cause::step_rejected: a = f.step != Step::wait; break;
     default: break;
     }
-    return static_cast<std::uint32_t>(f.cause) << 24 | static_cast<std::uint32_t>(f.request) << 16 | a << 8 | b;
+    return static_cast<std::uint32_t>(f.cause) << 24 | static_cast<std::uint32_t>(f.request) << 16 |
+           a << 8 | b;
 }
 
 /// Returns the message with a placeholder for its number and with the reaction of the axis.
@@ -137,7 +185,9 @@ std::string reason(const Failure& f) {
     case Cause::set_point: number = " for {} s"; break;
     case Cause::homing_timeout: number = " within {} s"; break;
     case Cause::drive_fault:
-        if (f.error_code != 0) number = " (error code {x})";
+        if (f.error_code != 0) {
+            number = " (error code {x})";
+        }
         break;
     case Cause::following_error:
     case Cause::step_rejected:
@@ -154,51 +204,70 @@ Sentences::Sentences() {
     std::vector<Failure> all;
     const auto add = [&](Cause cause, Request request) -> Failure& {
         Failure f;
-        f.cause = cause, f.request = request;
+        f.cause = cause;
+        f.request = request;
         return all.emplace_back(f);
     };
-    constexpr unsigned states_and_none = static_cast<unsigned>(State::unknown) + 1, steps = static_cast<unsigned>(Step::fault_reset) + 1;
+    constexpr unsigned states_and_none = static_cast<unsigned>(State::unknown) + 1;
+
+    constexpr unsigned steps = static_cast<unsigned>(Step::fault_reset) + 1;
     for (unsigned r = 0; r <= static_cast<unsigned>(Request::go); ++r) {
         const auto request = static_cast<Request>(r);
-        for (const Cause cause : {Cause::lost, Cause::following_error, Cause::bad_command, Cause::bad_factor, Cause::homing_timeout,
-                                  Cause::not_enabled})
+        for (const Cause cause : {Cause::lost, Cause::following_error, Cause::bad_command,
+                                  Cause::bad_factor, Cause::homing_timeout, Cause::not_enabled}) {
             add(cause, request);
+        }
         for (unsigned step = 0; step < steps; ++step) {
             for (const std::uint16_t code : {std::uint16_t{0}, std::uint16_t{1}}) {
                 Failure& f = add(Cause::drive_fault, request);
-                f.step = static_cast<Step>(step), f.error_code = code;
+                f.step = static_cast<Step>(step);
+                f.error_code = code;
             }
             for (unsigned state = 0; state < states_and_none; ++state) {
                 Failure& f = add(Cause::stays, request);
-                f.step = static_cast<Step>(step), f.state = static_cast<State>(state);
+                f.step = static_cast<Step>(step);
+                f.state = static_cast<State>(state);
             }
         }
     }
-    for (const Step step : {Step::wait, Step::enable_operation})
+    for (const Step step : {Step::wait, Step::enable_operation}) {
         add(Cause::step_rejected, step == Step::wait ? Request::run : Request::enable).step = step;
+    }
     for (unsigned state = 0; state < states_and_none; ++state) {
         Failure& f = add(Cause::left, Request::run);
-        f.before = State::operation_enabled, f.state = static_cast<State>(state);
+        f.before = State::operation_enabled;
+        f.state = static_cast<State>(state);
     }
     std::vector<Mode> all_modes{any_other, Mode::none};
-    for (const ModeRow& row : modes) all_modes.push_back(row.mode);
-    for (const Mode asked : all_modes)
+    for (const ModeRow& row : modes) {
+        all_modes.push_back(row.mode);
+    }
+    for (const Mode asked : all_modes) {
         for (const Mode shown : all_modes) {
             Failure& f = add(Cause::mode_rejected, Request::mode);
-            f.mode = asked, f.shown = shown;
+            f.mode = asked;
+            f.shown = shown;
         }
-    for (unsigned bits = 0; bits < 2; ++bits) {
-        add(Cause::set_point, Request::go).statusword = bits != 0 ? status::set_point_acknowledge : std::uint16_t{0};
-        add(Cause::homing_error, Request::home).statusword =
-            static_cast<std::uint16_t>(status::homing_error | (bits != 0 ? status::target_reached : 0));
     }
-    std::sort(all.begin(), all.end(), [](const Failure& x, const Failure& y) { return key_of(x) < key_of(y); });
-    for (const Failure& f : all) keys_.push_back(key_of(f)), texts_.push_back(reason(f));
+    for (unsigned bits = 0; bits < 2; ++bits) {
+        add(Cause::set_point, Request::go).statusword =
+            bits != 0 ? status::set_point_acknowledge : std::uint16_t{0};
+        add(Cause::homing_error, Request::home).statusword = static_cast<std::uint16_t>(
+            status::homing_error | (bits != 0 ? status::target_reached : 0));
+    }
+    std::sort(all.begin(), all.end(),
+              [](const Failure& x, const Failure& y) { return key_of(x) < key_of(y); });
+    for (const Failure& f : all) {
+        keys_.push_back(key_of(f));
+        texts_.push_back(reason(f));
+    }
 }
 
 const char* Sentences::find(const Failure& f) const noexcept {
     const auto at = std::lower_bound(keys_.begin(), keys_.end(), key_of(f));
-    return at != keys_.end() && *at == key_of(f) ? texts_[static_cast<std::size_t>(at - keys_.begin())].c_str() : "the axis failed";
+    return at != keys_.end() && *at == key_of(f)
+               ? texts_[static_cast<std::size_t>(at - keys_.begin())].c_str()
+               : "the axis failed";
 }
 
 double Sentences::number(const Failure& f) noexcept {

@@ -18,7 +18,13 @@ const char* to_string(Request) noexcept;
 /// The transition that a controlword commands.
 enum class Step : std::uint8_t {
     wait,  ///< for an automatic transition of the drive
-    shutdown, switch_on, enable_operation, disable_operation, disable_voltage, quick_stop, fault_reset,
+    shutdown,
+    switch_on,
+    enable_operation,
+    disable_operation,
+    disable_voltage,
+    quick_stop,
+    fault_reset,
 };
 /// Returns the name of a step, as in "enable operation". [any]
 const char* to_string(Step) noexcept;
@@ -49,11 +55,13 @@ struct Failure {
     Step step = Step::wait;
     State state = State::unknown;           ///< of the drive at the time
     State before = State::unknown;          ///< left: the state it left
-    Mode mode = Mode::none, shown = Mode::none;  ///< commanded, and displayed
+    Mode mode = Mode::none;
+    Mode shown = Mode::none;  ///< commanded, and displayed
     std::uint16_t statusword = 0;
     std::uint16_t error_code = 0;           ///< 603Fh; 0: unknown
     Time after = 0;                         ///< time waited, ns
-    double value = 0.0, limit = 0.0;        ///< user units
+    double value = 0.0;
+    double limit = 0.0;        ///< user units
 
     explicit operator bool() const noexcept { return cause != Cause::none; }
 };
@@ -63,7 +71,8 @@ std::string sentence(const Failure&);
 /// Returns the message with all numbers, and a hint. [setup]
 std::string text(const Failure&);
 
-/// All messages, formatted in advance for a cycle that raises faults by hal.faults/1: "{}" or "{x}" stands for the number.
+/// All messages, formatted in advance for a cycle that raises faults by hal.faults/1: "{}" or "{x}"
+/// stands for the number.
 class Sentences {
 public:
     /// Formats all messages. [setup]

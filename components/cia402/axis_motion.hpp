@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The two modes with a handshake between master and drive: set-points of profile position, and homing.
+// The two modes with a handshake between master and drive: set-points of profile position, and
+// homing.
 #pragma once
 
 #include <array>
@@ -21,25 +22,37 @@ class SetPoints {
 public:
     static constexpr std::size_t room = 16;
 
-    /// Queues a set-point; an immediate one replaces all queued ones. Returns false when the queue is full. [realtime]
+    /// Queues a set-point; an immediate one replaces all queued ones. Returns false when the queue
+    /// is full. [realtime]
     bool push(const SetPoint&) noexcept;
-    void clear() noexcept { count_ = 0, phase_ = Phase::idle, failure_ = {}; }
-    /// Runs one cycle. Returns bits 4, 5, 6 and 9 of the controlword and sets the target that belongs to them. `limit`: timeout of an
-    /// acknowledge, ns. [realtime]
-    std::uint16_t step(std::uint16_t statusword, Time now, Time limit, std::int32_t& target) noexcept;
+    void clear() noexcept {
+        count_ = 0;
+        phase_ = Phase::idle;
+        failure_ = {};
+    }
+    /// Runs one cycle. Returns bits 4, 5, 6 and 9 of the controlword and sets the target that
+    /// belongs to them. `limit`: timeout of an acknowledge, ns. [realtime]
+    std::uint16_t step(std::uint16_t statusword, Time now, Time limit,
+                       std::int32_t& target) noexcept;
     std::size_t waiting() const noexcept { return count_; }
-    /// Returns true when all set-points are passed to the drive and it has reached the last. [realtime]
+    /// Returns true when all set-points are passed to the drive and it has reached the last.
+    /// [realtime]
     bool done() const noexcept { return done_; }
     /// Returns the failure of the handshake; cleared by clear().
     const Failure& failure() const noexcept { return failure_; }
 
 private:
     enum class Phase : std::uint8_t { idle, shown, raised, settling };
-    void enter(Phase phase, Time now) noexcept { phase_ = phase, since_ = now, cycles_ = 0; }
+    void enter(Phase phase, Time now) noexcept {
+        phase_ = phase;
+        since_ = now;
+        cycles_ = 0;
+    }
     void check(std::uint16_t statusword, Time now, Time limit) noexcept;
 
     std::array<SetPoint, room> queue_{};
-    std::size_t first_ = 0, count_ = 0;
+    std::size_t first_ = 0;
+    std::size_t count_ = 0;
     SetPoint now_;
     Phase phase_ = Phase::idle;
     Time since_ = 0;
@@ -52,9 +65,13 @@ private:
 class HomingRun {
 public:
     enum class Result : std::uint8_t { running, attained, failed };
-    void begin() noexcept { phase_ = Phase::fresh, failure_ = {}; }
-    /// Runs one cycle in mode hm; bit 4 of the controlword must be set meanwhile. `settle`: how long a stale result may persist; `limit`:
-    /// timeout of the whole run, 0 for none, both in ns. A halt stops the clock. [realtime]
+    void begin() noexcept {
+        phase_ = Phase::fresh;
+        failure_ = {};
+    }
+    /// Runs one cycle in mode hm; bit 4 of the controlword must be set meanwhile. `settle`: how
+    /// long a stale result may persist; `limit`: timeout of the whole run, 0 for none, both in ns.
+    /// A halt stops the clock. [realtime]
     Result step(std::uint16_t statusword, bool halted, Time now, Time settle, Time limit) noexcept;
     const Failure& failure() const noexcept { return failure_; }
 
@@ -63,7 +80,8 @@ private:
     Result fail(Cause, std::uint16_t statusword, Time waited) noexcept;
 
     Phase phase_ = Phase::fresh;
-    Time since_ = 0, last_ = 0;
+    Time since_ = 0;
+    Time last_ = 0;
     bool error_seen_ = false;
     Failure failure_;
 };

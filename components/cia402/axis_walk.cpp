@@ -8,11 +8,13 @@ namespace hal::canopen::cia402 {
 namespace {
 
 /// The commanded states, in the order of the columns below.
-constexpr State columns[] = {State::switch_on_disabled, State::ready_to_switch_on, State::switched_on, State::operation_enabled,
+constexpr State columns[] = {State::switch_on_disabled, State::ready_to_switch_on,
+                             State::switched_on, State::operation_enabled,
                              State::quick_stop_active};
 constexpr unsigned column_of(State wanted) noexcept {
-    for (unsigned i = 0; i < std::size(columns); ++i)
+    for (unsigned i = 0; i < std::size(columns); ++i) {
         if (columns[i] == wanted) return i;
+    }
     return 0;
 }
 
@@ -22,18 +24,47 @@ struct Transition {
 };
 constexpr Transition there(Step held) { return {held, true}; }
 
-/// The command in a state (row, in the order of State) that leads to the commanded one (column). Leaving operation enabled uses the ramps
-/// of the drive; no command leads through fault: only a reset leaves it.
+/// The command in a state (row, in the order of State) that leads to the commanded one (column).
+/// Leaving operation enabled uses the ramps of the drive; no command leads through fault: only a
+/// reset leaves it.
 constexpr Transition transitions[9][5] = {
     // off                          ready to switch on         switched on                operation enabled          quick stop
-    {there(Step::disable_voltage), {Step::wait}, {Step::wait}, {Step::wait}, there(Step::quick_stop)},
-    {there(Step::disable_voltage), {Step::shutdown}, {Step::shutdown}, {Step::shutdown}, there(Step::quick_stop)},
-    {{Step::disable_voltage}, there(Step::shutdown), {Step::switch_on}, {Step::switch_on}, there(Step::quick_stop)},
-    {{Step::shutdown}, {Step::shutdown}, there(Step::switch_on), {Step::enable_operation}, there(Step::quick_stop)},
-    {{Step::disable_operation}, {Step::disable_operation}, {Step::disable_operation}, there(Step::enable_operation), {Step::quick_stop}},
-    {{Step::quick_stop}, {Step::quick_stop}, {Step::quick_stop}, {Step::enable_operation}, there(Step::quick_stop)},
+    {there(Step::disable_voltage),
+     {Step::wait},
+     {Step::wait},
+     {Step::wait},
+     there(Step::quick_stop)},
+    {there(Step::disable_voltage),
+     {Step::shutdown},
+     {Step::shutdown},
+     {Step::shutdown},
+     there(Step::quick_stop)},
+    {{Step::disable_voltage},
+     there(Step::shutdown),
+     {Step::switch_on},
+     {Step::switch_on},
+     there(Step::quick_stop)},
+    {{Step::shutdown},
+     {Step::shutdown},
+     there(Step::switch_on),
+     {Step::enable_operation},
+     there(Step::quick_stop)},
+    {{Step::disable_operation},
+     {Step::disable_operation},
+     {Step::disable_operation},
+     there(Step::enable_operation),
+     {Step::quick_stop}},
+    {{Step::quick_stop},
+     {Step::quick_stop},
+     {Step::quick_stop},
+     {Step::enable_operation},
+     there(Step::quick_stop)},
     {{Step::wait}, {Step::wait}, {Step::wait}, {Step::wait}, {Step::wait}},
-    {there(Step::disable_voltage), {Step::wait}, {Step::wait}, {Step::wait}, there(Step::disable_voltage)},
+    {there(Step::disable_voltage),
+     {Step::wait},
+     {Step::wait},
+     {Step::wait},
+     there(Step::disable_voltage)},
     {{Step::wait}, {Step::wait}, {Step::wait}, {Step::wait}, {Step::wait}},
 };
 
@@ -55,10 +86,13 @@ constexpr std::uint16_t controlword(Step step) noexcept {
 
 void Walk::want(State wanted, Request request) noexcept {
     if (wanted == wanted_ && request == request_) return;
-    wanted_ = wanted, request_ = request;
+    wanted_ = wanted;
+    request_ = request;
     failure_ = {};
     step_ = led_ = Step::wait;
-    fresh_ = true, forced_ = false, reached_ = false;
+    fresh_ = true;
+    forced_ = false;
+    reached_ = false;
 }
 
 void Walk::reset_fault() noexcept {
@@ -67,42 +101,75 @@ void Walk::reset_fault() noexcept {
     fresh_ = true;
 }
 
-void Walk::fail(Cause cause, std::uint16_t statusword, std::uint16_t error_code, Time waited) noexcept {
+void Walk::fail(Cause cause, std::uint16_t statusword, std::uint16_t error_code,
+                Time waited) noexcept {
     failure_ = {};
-    failure_.cause = cause, failure_.request = resetting_ ? Request::reset : request_,
-    failure_.step = cause == Cause::drive_fault ? led_ : step_, failure_.state = state_;
-    failure_.statusword = statusword, failure_.error_code = error_code, failure_.after = waited;
+    failure_.cause = cause;
+    failure_.request = resetting_ ? Request::reset : request_;
+
+    failure_.step = cause == Cause::drive_fault ? led_ : step_;
+    failure_.state = state_;
+    failure_.statusword = statusword;
+    failure_.error_code = error_code;
+    failure_.after = waited;
 }
 
-std::uint16_t Walk::step(std::uint16_t statusword, std::uint16_t error_code, Time now, const Limits& limits) noexcept {
+std::uint16_t Walk::step(std::uint16_t statusword, std::uint16_t error_code, Time now,
+                         const Limits& limits) noexcept {
     const State before = state_;
     state_ = state_of(statusword);
-    if (resetting_ && state_ != State::fault && state_ != State::fault_reaction_active) resetting_ = false, fresh_ = true;
-    if (state_ != before) forced_ = false;
-    const bool off = wanted_ == State::switch_on_disabled, in_fault = state_ == State::fault;
+    if (resetting_ && state_ != State::fault && state_ != State::fault_reaction_active) {
+        resetting_ = false;
+        fresh_ = true;
+    }
+    if (state_ != before) {
+        forced_ = false;
+    }
+    const bool off = wanted_ == State::switch_on_disabled;
+    const bool in_fault = state_ == State::fault;
 
     Transition transition = transitions[static_cast<unsigned>(state_)][column_of(wanted_)];
-    if (resetting_ && in_fault) transition = {edge_low_ ? Step::wait : Step::fault_reset};
-    else if (in_fault && !transition.there && !failure_) fail(Cause::drive_fault, statusword, error_code, 0);
-    if (forced_ && !transition.there) transition.step = Step::disable_voltage;
+    if (resetting_ && in_fault) {
+        transition = {edge_low_ ? Step::wait : Step::fault_reset};
+    } else if (in_fault && !transition.there && !failure_) {
+        fail(Cause::drive_fault, statusword, error_code, 0);
+    }
+    if (forced_ && !transition.there) {
+        transition.step = Step::disable_voltage;
+    }
     edge_low_ = false;  // a cycle with bit 7 low makes the edge
     reached_ = transition.there && !resetting_;
-    if (failure_ && !off) return command::disable_voltage;  // gave up; the caller decides
+    if (failure_ && !off) {
+        return command::disable_voltage;  // gave up; the caller decides
+    }
 
     if (fresh_ || state_ != before || transition.step != step_) {
-        since_ = now, fresh_ = false;
+        since_ = now;
+        fresh_ = false;
         step_ = transition.step;
-        if (step_ != Step::wait) led_ = step_;
+        if (step_ != Step::wait) {
+            led_ = step_;
+        }
         return controlword(step_);
     }
     if (reached_) return controlword(step_);
-    const bool brakes = step_ == Step::disable_operation || state_ == State::quick_stop_active || state_ == State::fault_reaction_active;
+    const bool brakes = step_ == Step::disable_operation || state_ == State::quick_stop_active ||
+                        state_ == State::fault_reaction_active;
     const Time waited = now - since_;
     if (waited < (brakes ? limits.stop : limits.step)) return controlword(step_);
-    const bool optional = state_ == State::quick_stop_active;  // 605Ah may keep the drive there, and transition 16 is optional
-    if (!optional && !failure_) fail(Cause::stays, statusword, error_code, waited);
-    if (resetting_) resetting_ = false, fresh_ = true;
-    if (off || optional) forced_ = true, fresh_ = true;
+    // 605Ah may keep the drive there, and transition 16 is optional
+    const bool optional = state_ == State::quick_stop_active;
+    if (!optional && !failure_) {
+        fail(Cause::stays, statusword, error_code, waited);
+    }
+    if (resetting_) {
+        resetting_ = false;
+        fresh_ = true;
+    }
+    if (off || optional) {
+        forced_ = true;
+        fresh_ = true;
+    }
     return controlword(step_);
 }
 

@@ -157,11 +157,13 @@ constexpr Row rows[] = {
     {0xf003, "stroke operation"},
     {0xf004, "control"},
 };
-static_assert(std::is_sorted(std::begin(rows), std::end(rows), [](const Row& a, const Row& b) { return a.code < b.code; }));
+static_assert(std::is_sorted(std::begin(rows), std::end(rows),
+                             [](const Row& a, const Row& b) { return a.code < b.code; }));
 }  // namespace
 
 const char* error_word(std::uint16_t code) noexcept {
-    const auto* at = std::lower_bound(std::begin(rows), std::end(rows), code, [](const Row& r, std::uint16_t c) { return r.code < c; });
+    const auto* at = std::lower_bound(std::begin(rows), std::end(rows), code,
+                                      [](const Row& r, std::uint16_t c) { return r.code < c; });
     return at != std::end(rows) && at->code == code ? at->word : error_class_word(code);
 }
 
@@ -171,23 +173,45 @@ const char* error_class_word(std::uint16_t code) noexcept {
         const char* word;
     };
     static constexpr Row classes[] = {
-        {0x8110, 0xffff, "CAN overrun (objects lost)"}, {0x8120, 0xffff, "CAN in error passive mode"},
-        {0x8130, 0xffff, "life guard or heartbeat error"}, {0x8140, 0xffff, "recovered from bus off"},
-        {0x8150, 0xffff, "CAN-ID collision"}, {0x8210, 0xffff, "PDO not processed due to length error"},
-        {0x8220, 0xffff, "PDO length exceeded"}, {0x8230, 0xffff, "DAM-MPDO not processed, destination object not available"},
-        {0x8240, 0xffff, "unexpected SYNC data length"}, {0x8250, 0xffff, "RPDO time-out"},
-        {0x2100, 0xff00, "current, device input side"}, {0x2200, 0xff00, "current inside the device"},
-        {0x2300, 0xff00, "current, device output side"}, {0x3100, 0xff00, "mains voltage"}, {0x3200, 0xff00, "voltage inside the device"},
-        {0x3300, 0xff00, "output voltage"}, {0x4100, 0xff00, "ambient temperature"}, {0x4200, 0xff00, "device temperature"},
-        {0x6100, 0xff00, "internal software"}, {0x6200, 0xff00, "user software"}, {0x6300, 0xff00, "data set"},
-        {0x8100, 0xff00, "communication"}, {0x8200, 0xff00, "protocol error"}, {0x0000, 0xff00, "error reset or no error"},
-        {0x1000, 0xf000, "generic error"}, {0x2000, 0xf000, "current"}, {0x3000, 0xf000, "voltage"}, {0x4000, 0xf000, "temperature"},
-        {0x5000, 0xf000, "device hardware"}, {0x6000, 0xf000, "device software"}, {0x7000, 0xf000, "additional modules"},
-        {0x8000, 0xf000, "monitoring"}, {0x9000, 0xf000, "external error"}, {0xff00, 0xff00, "device specific"},
+        {0x8110, 0xffff, "CAN overrun (objects lost)"},
+        {0x8120, 0xffff, "CAN in error passive mode"},
+        {0x8130, 0xffff, "life guard or heartbeat error"},
+        {0x8140, 0xffff, "recovered from bus off"},
+        {0x8150, 0xffff, "CAN-ID collision"},
+        {0x8210, 0xffff, "PDO not processed due to length error"},
+        {0x8220, 0xffff, "PDO length exceeded"},
+        {0x8230, 0xffff, "DAM-MPDO not processed, destination object not available"},
+        {0x8240, 0xffff, "unexpected SYNC data length"},
+        {0x8250, 0xffff, "RPDO time-out"},
+        {0x2100, 0xff00, "current, device input side"},
+        {0x2200, 0xff00, "current inside the device"},
+        {0x2300, 0xff00, "current, device output side"},
+        {0x3100, 0xff00, "mains voltage"},
+        {0x3200, 0xff00, "voltage inside the device"},
+        {0x3300, 0xff00, "output voltage"},
+        {0x4100, 0xff00, "ambient temperature"},
+        {0x4200, 0xff00, "device temperature"},
+        {0x6100, 0xff00, "internal software"},
+        {0x6200, 0xff00, "user software"},
+        {0x6300, 0xff00, "data set"},
+        {0x8100, 0xff00, "communication"},
+        {0x8200, 0xff00, "protocol error"},
+        {0x0000, 0xff00, "error reset or no error"},
+        {0x1000, 0xf000, "generic error"},
+        {0x2000, 0xf000, "current"},
+        {0x3000, 0xf000, "voltage"},
+        {0x4000, 0xf000, "temperature"},
+        {0x5000, 0xf000, "device hardware"},
+        {0x6000, 0xf000, "device software"},
+        {0x7000, 0xf000, "additional modules"},
+        {0x8000, 0xf000, "monitoring"},
+        {0x9000, 0xf000, "external error"},
+        {0xff00, 0xff00, "device specific"},
         {0xf000, 0xf000, "additional functions"},
     };
-    for (const auto& row : classes)
+    for (const auto& row : classes) {
         if ((code & row.mask) == row.code) return row.word;
+    }
     return "unknown error";
 }
 

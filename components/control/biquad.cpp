@@ -12,32 +12,40 @@ public:
     void set(double value) noexcept { put(value); }
 };
 
-// H(z) = (n0 + n1 z^-1 + n2 z^-2) / (1 + d1 z^-1 + d2 z^-2), transposed direct form II. The coefficients are Robert
-// Bristow-Johnson's (Cookbook formulae for audio EQ biquad filter coefficients), with w = 2 pi f0 / rate:
+// H(z) = (n0 + n1 z^-1 + n2 z^-2) / (1 + d1 z^-1 + d2 z^-2), transposed direct form II. The
+// coefficients are Robert Bristow-Johnson's (Cookbook formulae for audio EQ biquad filter
+// coefficients), with w = 2 pi f0 / rate:
 //     low pass: n0 = n2 = (1 - cos w) / 2 / a,  n1 = (1 - cos w) / a
 //     notch:    n0 = n2 = 1 / a,                n1 = -2 cos w / a
 //     both:     d1 = -2 cos w / a,              d2 = (1 - s) / a       with s = sin w / (2 Q), a = 1 + s
 struct Biquad : hal::Component {
     using Component::Component;
-    hal::In<double>        in{*this, "in", "input"};
-    hal::Out<double>       out{*this, "out", "filtered input"};
-    hal::In<bool>          enable{*this, "enable", "a rising edge designs the filter; FALSE copies in to out"};
-    hal::Out<bool>         valid{*this, "valid", "TRUE: the parameters are valid; FALSE: in is copied to out"};
-    hal::In<std::uint32_t> type{*this, "type", "0: user-defined by n0 to d2; 1: low pass; 2: notch"};
-    hal::In<double>        f0{*this, "f0", "corner or notch frequency, at most half the rate of the thread",
-                              {.initial = 250.0, .unit = "Hz"}};
-    hal::In<double>        q{*this, "Q", "quality of the filter, 0.5 to 2", {.initial = 0.7071}};
-    hal::Out<double>       s1{*this, "s1", "state for the next cycle"};
-    hal::Out<double>       s2{*this, "s2", "state for the cycle after next"};
-    Coefficient            n0{*this, "n0", "coefficient of the input", {.initial = 1.0}};
-    Coefficient            n1{*this, "n1", "coefficient of the input one cycle ago"};
-    Coefficient            n2{*this, "n2", "coefficient of the input two cycles ago"};
-    Coefficient            d1{*this, "d1", "negated coefficient of the output one cycle ago"};
-    Coefficient            d2{*this, "d2", "negated coefficient of the output two cycles ago"};
-    hal::Function          run{*this, "", &Biquad::update, "filters"};
+    hal::In<double> in{*this, "in", "input"};
+    hal::Out<double> out{*this, "out", "filtered input"};
+    hal::In<bool> enable{*this, "enable",
+                         "a rising edge designs the filter; FALSE copies in to out"};
+    hal::Out<bool> valid{*this, "valid",
+                         "TRUE: the parameters are valid; FALSE: in is copied to out"};
+    hal::In<std::uint32_t> type{*this, "type",
+                                "0: user-defined by n0 to d2; 1: low pass; 2: notch"};
+    hal::In<double> f0{*this,
+                       "f0",
+                       "corner or notch frequency, at most half the rate of the thread",
+                       {.initial = 250.0, .unit = "Hz"}};
+    hal::In<double> q{*this, "Q", "quality of the filter, 0.5 to 2", {.initial = 0.7071}};
+    hal::Out<double> s1{*this, "s1", "state for the next cycle"};
+    hal::Out<double> s2{*this, "s2", "state for the cycle after next"};
+    Coefficient n0{*this, "n0", "coefficient of the input", {.initial = 1.0}};
+    Coefficient n1{*this, "n1", "coefficient of the input one cycle ago"};
+    Coefficient n2{*this, "n2", "coefficient of the input two cycles ago"};
+    Coefficient d1{*this, "d1", "negated coefficient of the output one cycle ago"};
+    Coefficient d2{*this, "d2", "negated coefficient of the output two cycles ago"};
+    hal::Function run{*this, "", &Biquad::update, "filters"};
 
     void update(hal::Cycle cycle) noexcept {
-        if (enable && !was_enabled_) valid = design(cycle.seconds());
+        if (enable && !was_enabled_) {
+            valid = design(cycle.seconds());
+        }
         was_enabled_ = enable;
         const double x = in;
         if (!enable || !valid) {
@@ -45,7 +53,8 @@ struct Biquad : hal::Component {
             return;
         }
         const double y = n0 * x + s1;
-        const double next1 = n1 * x - d1 * y + s2, next2 = n2 * x - d2 * y;
+        const double next1 = n1 * x - d1 * y + s2;
+        const double next2 = n2 * x - d2 * y;
         if (std::isfinite(y + next1 + next2)) {
             s1 = next1;
             s2 = next2;
@@ -57,13 +66,22 @@ struct Biquad : hal::Component {
     }
 
 private:
-    void clear() noexcept { s1 = 0.0, s2 = 0.0; }
+    void clear() noexcept {
+        s1 = 0.0;
+        s2 = 0.0;
+    }
 
     bool design(double dt) noexcept {
         if (type == 0) return std::isfinite(n0 + n1 + n2 + d1 + d2);
         if (type > 2 || !(f0 > 0.0 && f0 * dt <= 0.5) || !(q >= 0.5 && q <= 2.0)) return false;
-        const double w = 2.0 * std::numbers::pi * f0 * dt, cosine = std::cos(w), s = std::sin(w) / (2.0 * q), a = 1.0 + s;
-        const double outer = type == 1 ? (1.0 - cosine) / 2.0 : 1.0, middle = type == 1 ? 1.0 - cosine : -2.0 * cosine;
+        const double w = 2.0 * std::numbers::pi * f0 * dt;
+        const double cosine = std::cos(w);
+
+        const double s = std::sin(w) / (2.0 * q);
+        const double a = 1.0 + s;
+        const double outer = type == 1 ? (1.0 - cosine) / 2.0 : 1.0;
+
+        const double middle = type == 1 ? 1.0 - cosine : -2.0 * cosine;
         n0.set(outer / a);
         n1.set(middle / a);
         n2.set(outer / a);

@@ -27,12 +27,22 @@ struct Config {
             case 'H': hall_out = true; break;
             case 'F': gray_out = true; break;
             case 'T': trapezoid = true; break;
-            default: throw std::invalid_argument(std::string("cfg has the letter '") + letter + "'; it may have n h a q i f B 6 H F T");
+            default:
+                throw std::invalid_argument(std::string("cfg has the letter '") + letter +
+                                            "'; it may have n h a q i f B 6 H F T");
             }
         }
     }
-    bool hall = false, absolute = false, counting = false, index = false, gray = false;
-    bool bits = false, six = false, hall_out = false, gray_out = false, trapezoid = false;
+    bool hall = false;
+    bool absolute = false;
+    bool counting = false;
+    bool index = false;
+    bool gray = false;
+    bool bits = false;
+    bool six = false;
+    bool hall_out = false;
+    bool gray_out = false;
+    bool trapezoid = false;
     bool encoder() const { return absolute || counting; }
     bool aligns() const { return counting && !hall && !absolute; }
     bool free() const { return !hall && !encoder() && !index; }
@@ -41,19 +51,36 @@ struct Config {
 
 struct Bldc : hal::Component {
     using Component::Component;
-    hal::TextArgument cfg{*this, "cfg", "n", "letters for inputs and outputs, a group per instance", {.per_instance = true}};
+    hal::TextArgument cfg{*this,
+                          "cfg",
+                          "n",
+                          "letters for inputs and outputs, a group per instance",
+                          {.per_instance = true}};
     const Config has{cfg.get()};
 
     hal::Ins<bool> hall{*this, "hall#", has.hall ? 3 : 0, 1, "Hall sensor #"};
-    hal::Outs<bool> hall_error{*this, "hall-error", has.hall, "TRUE after a Hall code outside of the pattern, until the pattern is changed"};
+    hal::Outs<bool> hall_error{
+        *this, "hall-error", has.hall,
+        "TRUE after a Hall code outside of the pattern, until the pattern is changed"};
     std::array<std::optional<hal::In<bool>>, 4> gray;
     hal::In<double> value{*this, "value", "amplitude; a negative value reverses the direction"};
-    hal::Ins<double> lead_angle{*this, "lead-angle", has.encoder(), "angle by which the field leads the rotor", {.initial = 90.0, .unit = "deg"}};
+    hal::Ins<double> lead_angle{*this,
+                                "lead-angle",
+                                has.encoder(),
+                                "angle by which the field leads the rotor",
+                                {.initial = 90.0, .unit = "deg"}};
     hal::In<bool> rev{*this, "rev", "TRUE reverses the direction"};
-    hal::Ins<double> frequency{*this, "frequency", has.free(), "electrical turns of the field per second (open loop)", {.unit = "Hz"}};
-    hal::Ins<double> init_value{*this, "initvalue", has.counting, "amplitude while aligning", {.initial = 0.2}};
-    hal::Ins<std::int32_t> raw_counts{*this, "rawcounts", has.encoder(), "encoder counts that the index does not reset"};
-    hal::Ios<bool> index_enable{*this, "index-enable", has.index, "TRUE: waits for the encoder's index"};
+    hal::Ins<double> frequency{*this,
+                               "frequency",
+                               has.free(),
+                               "electrical turns of the field per second (open loop)",
+                               {.unit = "Hz"}};
+    hal::Ins<double> init_value{
+        *this, "initvalue", has.counting, "amplitude while aligning", {.initial = 0.2}};
+    hal::Ins<std::int32_t> raw_counts{*this, "rawcounts", has.encoder(),
+                                      "encoder counts that the index does not reset"};
+    hal::Ios<bool> index_enable{*this, "index-enable", has.index,
+                                "TRUE: waits for the encoder's index"};
     hal::Ins<bool> init{*this, "init", has.aligns(), "rising edge: aligns the motor"};
     hal::Outs<bool> init_done{*this, "init-done", has.aligns(), "TRUE: the motor is aligned"};
 
@@ -61,23 +88,43 @@ struct Bldc : hal::Component {
     std::array<std::optional<hal::Out<bool>>, 6> switches;
     hal::Outs<bool> hall_out{*this, "hall#-out", has.hall_out ? 3 : 0, 1, "emulated Hall sensor #"};
     std::array<std::optional<hal::Out<bool>>, 4> gray_out;
-    hal::Out<double> phase_angle{*this, "phase-angle", "angle of the field, 0 to 1 per electrical turn", {.unit = "turn", .finite = true}};
-    hal::Out<double> rotor_angle{*this, "rotor-angle", "angle of the rotor, 0 to 1 per electrical turn", {.unit = "turn", .finite = true}};
-    hal::Out<double> out{*this, "out", "amplitude in use, with its sign", {.safe = 0.0, .finite = true}};
+    hal::Out<double> phase_angle{*this,
+                                 "phase-angle",
+                                 "angle of the field, 0 to 1 per electrical turn",
+                                 {.unit = "turn", .finite = true}};
+    hal::Out<double> rotor_angle{*this,
+                                 "rotor-angle",
+                                 "angle of the rotor, 0 to 1 per electrical turn",
+                                 {.unit = "turn", .finite = true}};
+    hal::Out<double> out{
+        *this, "out", "amplitude in use, with its sign", {.safe = 0.0, .finite = true}};
     hal::Out<bool> out_dir{*this, "out-dir", "TRUE: out is negative"};
     hal::Out<double> out_abs{*this, "out-abs", "magnitude of out", {.safe = 0.0, .finite = true}};
 
     hal::Out<std::int32_t> in_type{
-        *this, "in-type", "source of the angle: 0 frequency, 1 Hall, 2 encoder, 3 Gray code, 4 alignment, 5 none yet", {.initial = -1}};
+        *this,
+        "in-type",
+        "source of the angle: 0 frequency, 1 Hall, 2 encoder, 3 Gray code, 4 alignment, 5 none yet",
+        {.initial = -1}};
     hal::Out<std::int32_t> out_type{*this, "out-type", "0 sine, 1 trapezoid", {.initial = -1}};
-    hal::Params<std::int32_t> scale{*this, "scale", has.encoder(), "counts per turn of the motor", {.initial = 512}};
-    hal::Params<std::int32_t> poles{*this, "poles", has.encoder(), "magnetic poles; two per electrical turn", {.initial = 4}};
-    hal::Params<std::int32_t> encoder_offset{*this, "encoder-offset", has.absolute || has.index,
-                                             "counts at the motor's zero, from the encoder's zero or index"};
-    hal::Outs<std::int32_t> offset_measured{*this, "offset-measured", has.counting, "counts at the motor's zero, as found"};
-    hal::Param<double> drive_offset{*this, "drive-offset", "offset that the drive adds to rotor-angle; used while aligning", {.unit = "deg"}};
-    hal::Params<std::uint32_t> output_pattern{*this, "output-pattern", has.hall_out, "Hall pattern to emulate, 0 to 47", {.initial = 25}};
-    hal::Pins<hal::CorrectedParam<std::uint32_t>, std::uint32_t> pattern{*this, "pattern", has.hall, "Hall pattern of the motor, 0 to 47", {.initial = 25}};
+    hal::Params<std::int32_t> scale{
+        *this, "scale", has.encoder(), "counts per turn of the motor", {.initial = 512}};
+    hal::Params<std::int32_t> poles{
+        *this, "poles", has.encoder(), "magnetic poles; two per electrical turn", {.initial = 4}};
+    hal::Params<std::int32_t> encoder_offset{
+        *this, "encoder-offset", has.absolute || has.index,
+        "counts at the motor's zero, from the encoder's zero or index"};
+    hal::Outs<std::int32_t> offset_measured{*this, "offset-measured", has.counting,
+                                            "counts at the motor's zero, as found"};
+    hal::Param<double> drive_offset{
+        *this,
+        "drive-offset",
+        "offset that the drive adds to rotor-angle; used while aligning",
+        {.unit = "deg"}};
+    hal::Params<std::uint32_t> output_pattern{
+        *this, "output-pattern", has.hall_out, "Hall pattern to emulate, 0 to 47", {.initial = 25}};
+    hal::Pins<hal::CorrectedParam<std::uint32_t>, std::uint32_t> pattern{
+        *this, "pattern", has.hall, "Hall pattern of the motor, 0 to 47", {.initial = 25}};
 
     hal::Function run{*this, "", &Bldc::update, "computes angles and phases"};
 
@@ -85,15 +132,25 @@ struct Bldc : hal::Component {
 
     void update(hal::Cycle cycle) noexcept {
         amplitude_ = std::fabs(value) <= 1e300 ? value.get() : 0.0;
-        if (rev) amplitude_ = -amplitude_;
+        if (rev) {
+            amplitude_ = -amplitude_;
+        }
         trapezoid_ = has.trapezoid || (has.bits && has.six);
         count();
         double rotor = 0.0;
-        if (has.encoder() && found()) rotor = from_encoder();
-        else if (has.hall) rotor = from_hall();
-        else if (has.counting) rotor = align(cycle.seconds());
-        else if (has.gray) source_ = 3, rotor = from_gray();
-        else source_ = 0, rotor = advance(cycle.seconds());
+        if (has.encoder() && found()) {
+            rotor = from_encoder();
+        } else if (has.hall) {
+            rotor = from_hall();
+        } else if (has.counting) {
+            rotor = align(cycle.seconds());
+        } else if (has.gray) {
+            source_ = 3;
+            rotor = from_gray();
+        } else {
+            source_ = 0;
+            rotor = advance(cycle.seconds());
+        }
         publish(bldc::fraction(rotor));
     }
 
@@ -109,7 +166,9 @@ private:
         if (!has.encoder()) return;
         const std::int32_t raw = raw_counts[0];
         // By differences, so that an overflow of the counter causes no jump.
-        moved_ = started_ ? static_cast<std::int32_t>(static_cast<std::uint32_t>(raw) - static_cast<std::uint32_t>(last_raw_)) : 0;
+        moved_ = started_ ? static_cast<std::int32_t>(static_cast<std::uint32_t>(raw) -
+                                                      static_cast<std::uint32_t>(last_raw_))
+                          : 0;
         counts_ = started_ ? counts_ + moved_ : raw;
         last_raw_ = raw;
         started_ = true;
@@ -118,14 +177,22 @@ private:
             if (init[0] && !was_init_) {
                 state_ = State::aligning;
                 elapsed_ = 0.0;
-                if (has.index) index_enable[0] = true;
+                if (has.index) {
+                    index_enable[0] = true;
+                }
             }
             was_init_ = init[0];
-            if (has.index && state_ == State::aligning && !index_enable[0]) set_zero(counts_ + encoder_offset[0]);
+            if (has.index && state_ == State::aligning && !index_enable[0]) {
+                set_zero(counts_ + encoder_offset[0]);
+            }
             init_done[0] = state_ == State::found;
         } else if (has.index && state_ != State::found) {
-            if (state_ == State::waiting) index_enable[0] = true, state_ = State::aligning;
-            else if (!index_enable[0]) set_zero(counts_ + encoder_offset[0]);
+            if (state_ == State::waiting) {
+                index_enable[0] = true;
+                state_ = State::aligning;
+            } else if (!index_enable[0]) {
+                set_zero(counts_ + encoder_offset[0]);
+            }
         }
     }
 
@@ -133,40 +200,59 @@ private:
         offset_ = counts;
         offset_measured[0] = static_cast<std::int32_t>(counts);
         state_ = State::found;
-        if (has.aligns()) init_done[0] = true;
+        if (has.aligns()) {
+            init_done[0] = true;
+        }
     }
 
     double from_encoder() noexcept {
         source_ = 2;
         // The outputs hold until the next cycle: use the rotor angle half a period ahead.
         const std::int64_t zero = has.absolute ? encoder_offset[0] : offset_;
-        return (static_cast<double>(counts_ - zero) + 0.5 * static_cast<double>(moved_)) / per_turn();
+        return (static_cast<double>(counts_ - zero) + 0.5 * static_cast<double>(moved_)) /
+               per_turn();
     }
 
     double from_hall() noexcept {
         source_ = 1;
         trapezoid_ = true;
-        if (pattern[0] >= bldc::pattern_count) pattern[0].correct(0);
-        if (pattern[0] != used_pattern_) used_pattern_ = pattern[0], hall_state_ = -1, error_ = false;
+        if (pattern[0] >= bldc::pattern_count) {
+            pattern[0].correct(0);
+        }
+        if (pattern[0] != used_pattern_) {
+            used_pattern_ = pattern[0];
+            hall_state_ = -1;
+            error_ = false;
+        }
         const unsigned code = (hall[0] ? 4u : 0u) | (hall[1] ? 2u : 0u) | (hall[2] ? 1u : 0u);
         const int state = bldc::state_of(code, used_pattern_);
         const int moved = state < 0 || hall_state_ < 0 ? 0 : (state - hall_state_ + 9) % 6 - 3;
         error_ = error_ || state < 0 || moved > 1 || moved < -1;
         hall_error[0] = error_;
         const double centre = static_cast<double>(state + 1) / 6.0;
-        if (has.counting && !has.index && !has.absolute && (moved == 1 || moved == -1)) {  // the edge between two states is an exact angle
+        // the edge between two states is an exact angle
+        if (has.counting && !has.index && !has.absolute && (moved == 1 || moved == -1)) {
             const double edge = centre - static_cast<double>(moved) / 12.0;
-            set_zero(counts_ - static_cast<std::int64_t>(std::clamp(std::round(edge * per_turn()), -1e9, 1e9)));
+            set_zero(counts_ - static_cast<std::int64_t>(
+                                   std::clamp(std::round(edge * per_turn()), -1e9, 1e9)));
         }
-        if (state >= 0) hall_state_ = state;
-        else amplitude_ = 0.0;
+        if (state >= 0) {
+            hall_state_ = state;
+        } else {
+            amplitude_ = 0.0;
+        }
         return centre;
     }
 
     double from_gray() const noexcept {
-        unsigned code = 0, binary = 0;
-        for (unsigned i = 0; i < 4; ++i) code |= *gray[i] ? 1u << i : 0u;
-        for (; code != 0; code >>= 1) binary ^= code;
+        unsigned code = 0;
+        unsigned binary = 0;
+        for (unsigned i = 0; i < 4; ++i) {
+            code |= *gray[i] ? 1u << i : 0u;
+        }
+        for (; code != 0; code >>= 1) {
+            binary ^= code;
+        }
         return (static_cast<double>(binary) + 0.5) / 16.0;
     }
 
@@ -178,8 +264,9 @@ private:
         return free_angle_;
     }
 
-    // With an index: turns slowly until the index. Without: ramps up the current at angle 0, then swings the field to both
-    // sides with decreasing amplitude, so that a rotor exactly opposite does not stay there.
+    // With an index: turns slowly until the index. Without: ramps up the current at angle 0, then
+    // swings the field to both sides with decreasing amplitude, so that a rotor exactly opposite
+    // does not stay there.
     double align(double dt) noexcept {
         const double current = std::fabs(init_value[0]) <= 1e300 ? init_value[0].get() : 0.0;
         source_ = state_ == State::aligning ? 4 : 5;
@@ -189,19 +276,33 @@ private:
             amplitude_ = rev ? -current : current;
             return bldc::fraction(rev ? -elapsed_ : elapsed_);
         }
-        constexpr double rise = 0.5, swing = 2.0, rest = 0.5;
+        constexpr double rise = 0.5;
+        constexpr double swing = 2.0;
+        constexpr double rest = 0.5;
         amplitude_ = current * std::min(elapsed_ / rise, 1.0);
-        if (elapsed_ >= rise + swing + rest) set_zero(counts_);
+        if (elapsed_ >= rise + swing + rest) {
+            set_zero(counts_);
+        }
         const double t = elapsed_ - rise;
-        return t > 0.0 && t < swing ? 0.2 * (1.0 - t / swing) * std::sin(2.0 * std::numbers::pi * t) : 0.0;
+        return t > 0.0 && t < swing ? 0.2 * (1.0 - t / swing) * std::sin(2.0 * std::numbers::pi * t)
+                                    : 0.0;
     }
 
     void publish(double rotor) noexcept {
-        double lead = has.free() && !has.gray ? 0.0 : has.index && !has.encoder() && !has.hall ? 0.0 : 0.25;
-        if (has.encoder() && std::isfinite(lead_angle[0])) lead = lead_angle[0] / 360.0;
-        if (source_ >= 4) lead = 0.0;
-        const double phase = bldc::fraction(rotor + (amplitude_ < 0.0 ? -lead : lead)), size = std::fabs(amplitude_);
-        const double back = source_ == 4 && std::isfinite(drive_offset) ? drive_offset / 360.0 : 0.0;
+        double lead = has.free() && !has.gray                    ? 0.0
+                      : has.index && !has.encoder() && !has.hall ? 0.0
+                                                                 : 0.25;
+        if (has.encoder() && std::isfinite(lead_angle[0])) {
+            lead = lead_angle[0] / 360.0;
+        }
+        if (source_ >= 4) {
+            lead = 0.0;
+        }
+        const double phase = bldc::fraction(rotor + (amplitude_ < 0.0 ? -lead : lead));
+
+        const double size = std::fabs(amplitude_);
+        const double back =
+            source_ == 4 && std::isfinite(drive_offset) ? drive_offset / 360.0 : 0.0;
         rotor_angle = bldc::fraction(rotor - back);
         phase_angle = phase;
         out = amplitude_;
@@ -209,14 +310,20 @@ private:
         out_dir = amplitude_ < 0.0;
         in_type = source_;
         out_type = trapezoid_ ? 1 : 0;
-        if (has.phases()) drive(phase, size);
+        if (has.phases()) {
+            drive(phase, size);
+        }
         if (has.hall_out) {
             const unsigned code = bldc::code_of(rotor, output_pattern[0]);
-            for (unsigned i = 0; i < 3; ++i) hall_out[i] = (code >> (2 - i) & 1u) != 0;
+            for (unsigned i = 0; i < 3; ++i) {
+                hall_out[i] = (code >> (2 - i) & 1u) != 0;
+            }
         }
         if (has.gray_out) {
             const auto at = static_cast<unsigned>(rotor * 16.0) & 15u;
-            for (unsigned i = 0; i < 4; ++i) *gray_out[i] = ((at ^ (at >> 1)) >> i & 1u) != 0;
+            for (unsigned i = 0; i < 4; ++i) {
+                *gray_out[i] = ((at ^ (at >> 1)) >> i & 1u) != 0;
+            }
         }
     }
 
@@ -240,19 +347,32 @@ private:
 
     enum class State : std::uint8_t { waiting, aligning, found };
     State state_ = State::waiting;
-    bool started_ = false, was_init_ = false, trapezoid_ = false, error_ = false;
-    int source_ = 0, hall_state_ = -1;
+    bool started_ = false;
+    bool was_init_ = false;
+    bool trapezoid_ = false;
+    bool error_ = false;
+    int source_ = 0;
+    int hall_state_ = -1;
     std::uint32_t used_pattern_ = 25;
-    std::int64_t counts_ = 0, offset_ = 0;
-    std::int32_t last_raw_ = 0, moved_ = 0;
-    double amplitude_ = 0.0, free_angle_ = 0.0, elapsed_ = 0.0;
+    std::int64_t counts_ = 0;
+    std::int64_t offset_ = 0;
+    std::int32_t last_raw_ = 0;
+    std::int32_t moved_ = 0;
+    double amplitude_ = 0.0;
+    double free_angle_ = 0.0;
+    double elapsed_ = 0.0;
 };
 
 Bldc::Bldc(const hal_host* host) : Component(host) {
     constexpr const char* bits[] = {"C1", "C2", "C4", "C8"};
     for (std::size_t i = 0; i < 4; ++i) {
-        if (has.gray) gray[i].emplace(*this, bits[i], "bit of the Gray code of a Fanuc motor");
-        if (has.gray_out) gray_out[i].emplace(*this, (std::string(bits[i]) + "-out").c_str(), "bit of the emulated Gray code");
+        if (has.gray) {
+            gray[i].emplace(*this, bits[i], "bit of the Gray code of a Fanuc motor");
+        }
+        if (has.gray_out) {
+            gray_out[i].emplace(*this, (std::string(bits[i]) + "-out").c_str(),
+                                "bit of the emulated Gray code");
+        }
     }
     if (!has.phases()) return;
     const hal::PinOptions<bool> off{.safe = false};
@@ -262,8 +382,13 @@ Bldc::Bldc(const hal_host* host) : Component(host) {
         for (const char* side : {"-high", "-low"}) {
             if (!has.six && side[1] == 'l') break;
             const std::string name = has.six ? phase + side : phase;
-            if (has.bits) switches[i].emplace(*this, (name + "-on").c_str(), "TRUE: this phase, or this side of it, conducts", off);
-            else levels[i].emplace(*this, (has.six ? name : name + "-value").c_str(), "amplitude of this phase, or this side of it", zero);
+            if (has.bits) {
+                switches[i].emplace(*this, (name + "-on").c_str(),
+                                    "TRUE: this phase, or this side of it, conducts", off);
+            } else {
+                levels[i].emplace(*this, (has.six ? name : name + "-value").c_str(),
+                                  "amplitude of this phase, or this side of it", zero);
+            }
             ++i;
         }
     }
@@ -271,7 +396,8 @@ Bldc::Bldc(const hal_host* host) : Component(host) {
 
 }  // namespace
 
-HAL_COMPONENT(Bldc, "bldc", "Commutation of a three-phase motor: from its feedback to the drive", R"(
+HAL_COMPONENT(Bldc, "bldc", "Commutation of a three-phase motor: from its feedback to the drive",
+              R"(
 `cfg=` has a group of letters per instance: lower case for the motor's feedback, upper case for the drive's inputs.
 
 | input | | output | |

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Electrical angles of a three-phase motor: Hall patterns and phase values. Angles are turns, 0 to 1.
+// Electrical angles of a three-phase motor: Hall patterns and phase values. Angles are turns, 0 to
+// 1.
 #pragma once
 
 #include <array>
@@ -10,8 +11,8 @@
 
 namespace bldc {
 
-/// The codes H1 H2 H3 (as 4 2 1) in the order of the excitations B-A C-A C-B A-B A-C B-C (source - sink), per pattern.
-/// Excitation number s fits a rotor around (s + 1) / 6 of a turn.
+/// The codes H1 H2 H3 (as 4 2 1) in the order of the excitations B-A C-A C-B A-B A-C B-C (source -
+/// sink), per pattern. Excitation number s fits a rotor around (s + 1) / 6 of a turn.
 inline constexpr std::uint32_t pattern_count = 48;
 inline constexpr const char* patterns[pattern_count] = {
     "013764", "102675", "023754", "132645", "231546", "320457", "201576", "310467",
@@ -28,12 +29,16 @@ inline double fraction(double angle) noexcept {
     return rest >= 0.0 && rest < 1.0 ? rest : 0.0;
 }
 
-inline const char* codes(std::uint32_t pattern) noexcept { return patterns[pattern < pattern_count ? pattern : 25]; }
+inline const char* codes(std::uint32_t pattern) noexcept {
+    return patterns[pattern < pattern_count ? pattern : 25];
+}
 
-/// Returns the number of the state with this code, 0..5, or -1 if the pattern does not contain it. [realtime]
+/// Returns the number of the state with this code, 0..5, or -1 if the pattern does not contain it.
+/// [realtime]
 inline int state_of(unsigned code, std::uint32_t pattern) noexcept {
-    for (int i = 0; i < 6; ++i)
+    for (int i = 0; i < 6; ++i) {
         if (static_cast<unsigned>(codes(pattern)[i] - '0') == code) return i;
+    }
     return -1;
 }
 
@@ -45,13 +50,15 @@ inline unsigned code_of(double rotor, std::uint32_t pattern) noexcept {
 
 /// Returns the phase values A B C of a field at `phase` (turns), amplitude 1. [realtime]
 inline std::array<double, 3> sine(double phase) noexcept {
-    const double angle = 2.0 * std::numbers::pi * phase, third = 2.0 * std::numbers::pi / 3.0;
+    const double angle = 2.0 * std::numbers::pi * phase;
+    const double third = 2.0 * std::numbers::pi / 3.0;
     return {std::cos(angle), std::cos(angle - third), std::cos(angle + third)};
 }
 
 /// Returns the pair of phases whose field is nearest to `phase` (turns). [realtime]
 inline std::array<double, 3> trapezoid(double phase) noexcept {
-    constexpr std::array<double, 3> pairs[6] = {{1, 0, -1}, {0, 1, -1}, {-1, 1, 0}, {-1, 0, 1}, {0, -1, 1}, {1, -1, 0}};
+    constexpr std::array<double, 3> pairs[6] = {{1, 0, -1}, {0, 1, -1}, {-1, 1, 0},
+                                                {-1, 0, 1}, {0, -1, 1}, {1, -1, 0}};
     return pairs[static_cast<std::size_t>(fraction(phase) * 6.0) % 6];
 }
 

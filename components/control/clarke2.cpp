@@ -7,11 +7,11 @@ namespace {
 
 struct Clarke2 : hal::Component {
     using Component::Component;
-    hal::In<double>  a{*this, "a", "first phase"};
-    hal::In<double>  b{*this, "b", "second phase; the third is -(a + b)"};
+    hal::In<double> a{*this, "a", "first phase"};
+    hal::In<double> b{*this, "b", "second phase; the third is -(a + b)"};
     hal::Out<double> x{*this, "x", "component in the direction of phase a"};
     hal::Out<double> y{*this, "y", "component a quarter turn ahead of x"};
-    hal::Function    run{*this, "", &Clarke2::update, "computes x and y"};
+    hal::Function run{*this, "", &Clarke2::update, "computes x and y"};
 
     void update(hal::Cycle) noexcept {
         x = a;
@@ -21,7 +21,8 @@ struct Clarke2 : hal::Component {
 
 }  // namespace
 
-HAL_COMPONENT(Clarke2, "clarke2", "Clarke transform of two phases whose sum with the third is zero", R"(
+HAL_COMPONENT(Clarke2, "clarke2", "Clarke transform of two phases whose sum with the third is zero",
+              R"(
     x = a
     y = (a + 2 b) / sqrt(3)
 

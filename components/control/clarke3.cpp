@@ -7,13 +7,13 @@ namespace {
 
 struct Clarke3 : hal::Component {
     using Component::Component;
-    hal::In<double>  a{*this, "a", "first phase"};
-    hal::In<double>  b{*this, "b", "second phase"};
-    hal::In<double>  c{*this, "c", "third phase"};
+    hal::In<double> a{*this, "a", "first phase"};
+    hal::In<double> b{*this, "b", "second phase"};
+    hal::In<double> c{*this, "c", "third phase"};
     hal::Out<double> x{*this, "x", "component in the direction of phase a"};
     hal::Out<double> y{*this, "y", "component a quarter turn ahead of x"};
     hal::Out<double> h{*this, "h", "homopolar component: the part common to all phases"};
-    hal::Function    run{*this, "", &Clarke3::update, "computes x, y and h"};
+    hal::Function run{*this, "", &Clarke3::update, "computes x, y and h"};
 
     void update(hal::Cycle) noexcept {
         x = (2.0 * a - b - c) / 3.0;

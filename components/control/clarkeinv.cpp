@@ -7,21 +7,28 @@ namespace {
 
 struct ClarkeInv : hal::Component {
     using Component::Component;
-    hal::In<double>  x{*this, "x", "component in the direction of phase a"};
-    hal::In<double>  y{*this, "y", "component a quarter turn ahead of x"};
-    hal::In<double>  h{*this, "h", "homopolar component, as computed by clarke3; usually 0"};
-    hal::In<double>  theta{*this, "theta", "angle by which the vector is rotated before the transform", {.unit = "turn"}};
+    hal::In<double> x{*this, "x", "component in the direction of phase a"};
+    hal::In<double> y{*this, "y", "component a quarter turn ahead of x"};
+    hal::In<double> h{*this, "h", "homopolar component, as computed by clarke3; usually 0"};
+    hal::In<double> theta{*this,
+                          "theta",
+                          "angle by which the vector is rotated before the transform",
+                          {.unit = "turn"}};
     hal::Out<double> a{*this, "a", "first phase"};
     hal::Out<double> b{*this, "b", "second phase"};
     hal::Out<double> c{*this, "c", "third phase"};
-    hal::Function    run{*this, "", &ClarkeInv::update, "computes a, b and c"};
+    hal::Function run{*this, "", &ClarkeInv::update, "computes a, b and c"};
 
     void update(hal::Cycle) noexcept {
         // Remove whole turns first: the sine of a large number of radians is inaccurate.
         const double angle = 2.0 * std::numbers::pi * (theta - std::floor(theta));
-        const double sine = std::sin(angle), cosine = std::cos(angle);
-        const double turned_x = x * cosine - y * sine, turned_y = x * sine + y * cosine;
-        const double common = h / std::numbers::sqrt2, across = turned_y * (std::numbers::sqrt3 / 2.0);
+        const double sine = std::sin(angle);
+        const double cosine = std::cos(angle);
+        const double turned_x = x * cosine - y * sine;
+        const double turned_y = x * sine + y * cosine;
+        const double common = h / std::numbers::sqrt2;
+
+        const double across = turned_y * (std::numbers::sqrt3 / 2.0);
         a = turned_x + common;
         b = -0.5 * turned_x + across + common;
         c = -0.5 * turned_x - across + common;

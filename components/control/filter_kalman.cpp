@@ -3,40 +3,52 @@
 
 namespace {
 
-// The Kalman filter of one value, measured with the variance Rk, whose true value changes with the variance Qk per cycle:
+// The Kalman filter of one value, measured with the variance Rk, whose true value changes with the
+// variance Qk per cycle:
 //     p = p + Qk,  k = p / (p + Rk),  x = x + k (z - x),  p = (1 - k) p
 struct FilterKalman : hal::Component {
     using Component::Component;
     static constexpr double tiny = 1.17549e-38;
-    hal::In<bool>      debug{*this, "debug", "no effect; record zk and xk-out instead"};
-    hal::In<bool>      passthrough{*this, "passthrough", "TRUE copies zk to xk-out"};
-    hal::In<bool>      reset{*this, "reset", "TRUE restarts the filter and sets xk-out to 0"};
-    hal::In<double>    zk{*this, "zk", "measured value"};
-    hal::Out<double>   xk_out{*this, "xk-out", "estimated value"};
+    hal::In<bool> debug{*this, "debug", "no effect; record zk and xk-out instead"};
+    hal::In<bool> passthrough{*this, "passthrough", "TRUE copies zk to xk-out"};
+    hal::In<bool> reset{*this, "reset", "TRUE restarts the filter and sets xk-out to 0"};
+    hal::In<double> zk{*this, "zk", "measured value"};
+    hal::Out<double> xk_out{*this, "xk-out", "estimated value"};
     hal::Param<double> rk{*this, "Rk", "variance of the measurement", {.initial = tiny}};
-    hal::Param<double> qk{*this, "Qk", "variance of the true value's change per cycle (process noise)", {.initial = tiny}};
-    hal::Function      run{*this, "", &FilterKalman::update, "estimates"};
+    hal::Param<double> qk{*this,
+                          "Qk",
+                          "variance of the true value's change per cycle (process noise)",
+                          {.initial = tiny}};
+    hal::Function run{*this, "", &FilterKalman::update, "estimates"};
 
     void update(hal::Cycle) noexcept {
-        if (reset) x_ = 0.0, p_ = 1.0;
-        else if (passthrough) {
+        if (reset) {
+            x_ = 0.0;
+            p_ = 1.0;
+        } else if (passthrough) {
             xk_out = zk.get();
             return;
-        } else estimate(zk);
+        } else {
+            estimate(zk);
+        }
         xk_out = x_;
     }
 
 private:
     void estimate(double z) noexcept {
-        const double before = p_ + std::fmax(qk, 0.0), noise = std::fmax(rk, 0.0);  // NaN counts as 0
+        // NaN counts as 0
+        const double before = p_ + std::fmax(qk, 0.0);
+        const double noise = std::fmax(rk, 0.0);
         const double gain = before + noise > 0.0 ? before / (before + noise) : 1.0;
-        const double x = x_ + gain * (z - x_), p = (1.0 - gain) * before;
+        const double x = x_ + gain * (z - x_);
+        const double p = (1.0 - gain) * before;
         if (!std::isfinite(x) || !std::isfinite(p)) return;
         x_ = x;
         p_ = p;
     }
 
-    double x_ = 0.0, p_ = 1.0;
+    double x_ = 0.0;
+    double p_ = 1.0;
 };
 
 }  // namespace

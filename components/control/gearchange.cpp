@@ -7,21 +7,28 @@ namespace {
 
 struct Gearchange : hal::Component {
     using Component::Component;
-    hal::In<bool>      sel{*this, "sel", "TRUE: gear 2, FALSE: gear 1"};
-    hal::In<double>    speed_in{*this, "speed-in", "commanded spindle speed"};
-    hal::Out<double>   speed_out{*this, "speed-out", "speed for the drive, scaled for gear 1"};
-    hal::In<bool>      dir_in{*this, "dir-in", "commanded direction"};
-    hal::Out<bool>     dir_out{*this, "dir-out", "direction for the drive"};
-    hal::LimitParam    min1{*this, "min1", "lowest speed in gear 1"};
-    hal::LimitParam    max1{*this, "max1", "highest speed in gear 1", {.initial = 100000.0}};
-    hal::LimitParam    min2{*this, "min2", "lowest speed in gear 2"};
-    hal::LimitParam    max2{*this, "max2", "highest speed in gear 2", {.initial = 100000.0}};
-    hal::CorrectedParam<double> scale2{*this, "scale2", "ratio of the spindle speeds in gear 2 and gear 1; at least 1", {.initial = 1.0}};
-    hal::Param<bool>   reverse{*this, "reverse", "TRUE: gear 2 reverses the direction of the spindle"};
-    hal::Function      run{*this, "", &Gearchange::update, "computes speed-out and dir-out"};
+    hal::In<bool> sel{*this, "sel", "TRUE: gear 2, FALSE: gear 1"};
+    hal::In<double> speed_in{*this, "speed-in", "commanded spindle speed"};
+    hal::Out<double> speed_out{*this, "speed-out", "speed for the drive, scaled for gear 1"};
+    hal::In<bool> dir_in{*this, "dir-in", "commanded direction"};
+    hal::Out<bool> dir_out{*this, "dir-out", "direction for the drive"};
+    hal::LimitParam min1{*this, "min1", "lowest speed in gear 1"};
+    hal::LimitParam max1{*this, "max1", "highest speed in gear 1", {.initial = 100000.0}};
+    hal::LimitParam min2{*this, "min2", "lowest speed in gear 2"};
+    hal::LimitParam max2{*this, "max2", "highest speed in gear 2", {.initial = 100000.0}};
+    hal::CorrectedParam<double> scale2{
+        *this,
+        "scale2",
+        "ratio of the spindle speeds in gear 2 and gear 1; at least 1",
+        {.initial = 1.0}};
+    hal::Param<bool> reverse{*this, "reverse",
+                             "TRUE: gear 2 reverses the direction of the spindle"};
+    hal::Function run{*this, "", &Gearchange::update, "computes speed-out and dir-out"};
 
     void update(hal::Cycle) noexcept {
-        if (!(scale2 >= 1.0)) scale2.correct(1.0);
+        if (!(scale2 >= 1.0)) {
+            scale2.correct(1.0);
+        }
         if (sel) {
             speed_out = within(speed_in, min2, max2, scale2);
             dir_out = dir_in != reverse;
@@ -43,7 +50,8 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(Gearchange, "gearchange", "Scales and limits a spindle speed for one of two gears", R"(
+HAL_COMPONENT(Gearchange, "gearchange", "Scales and limits a spindle speed for one of two gears",
+              R"(
 | sel   | speed-out | dir-out |
 | ----- | --- | --- |
 | FALSE | speed-in between min1 and max1 | dir-in |

@@ -8,21 +8,31 @@ enum Transition : std::uint32_t { jump = 0, fade = 1, decay = 2, slew = 3, keep_
 struct ModeSwitch : hal::Component {
     using Component::Component;
 
-    hal::Argument              inputs{*this, "inputs", 3, "how many sources", {.min = 1, .max = 256}};
-    hal::In<std::uint32_t>     select{*this, "select", "number of the source for out, from 0"};
-    hal::Ins<double>           in{*this, "in-##", inputs, "source ##"};
-    hal::In<std::uint32_t>     transition{*this, "transition", "0 jump; 1 fade; 2 decay; 3 slew; 4 keep the offset", {.initial = fade}};
-    hal::In<double>            time{*this, "time", "duration of a fade; time constant of a decay", {.initial = 0.1, .unit = "s"}};
-    hal::In<double>            rate{*this, "rate", "rate of change of the offset in a slew", {.initial = 1.0, .unit = "1/s"}};
-    hal::In<bool>              hold{*this, "hold", "TRUE holds out; FALSE returns to the source with a transition"};
-    hal::In<bool>              clear{*this, "clear", "TRUE sets the offset to 0 immediately"};
-    hal::Out<double>           out{*this, "out", "selected source plus the remaining offset", {.finite = true}};
-    hal::Out<double>           offset{*this, "offset", "out - source", {.finite = true}};
-    hal::Out<std::uint32_t>    selected{*this, "selected", "number of the source in use"};
-    hal::Out<bool>             switching{*this, "switching", "TRUE during a transition"};
-    hal::Out<bool>             bad_source{*this, "source-error", "TRUE: select is out of range, or the source is NaN or infinite"};
-    hal::Outs<bool>            active{*this, "active-##", inputs, "TRUE: source ## is in use"};
-    hal::Function              run{*this, "", &ModeSwitch::update, "passes the selected source"};
+    hal::Argument inputs{*this, "inputs", 3, "how many sources", {.min = 1, .max = 256}};
+    hal::In<std::uint32_t> select{*this, "select", "number of the source for out, from 0"};
+    hal::Ins<double> in{*this, "in-##", inputs, "source ##"};
+    hal::In<std::uint32_t> transition{*this,
+                                      "transition",
+                                      "0 jump; 1 fade; 2 decay; 3 slew; 4 keep the offset",
+                                      {.initial = fade}};
+    hal::In<double> time{*this,
+                         "time",
+                         "duration of a fade; time constant of a decay",
+                         {.initial = 0.1, .unit = "s"}};
+    hal::In<double> rate{
+        *this, "rate", "rate of change of the offset in a slew", {.initial = 1.0, .unit = "1/s"}};
+    hal::In<bool> hold{*this, "hold",
+                       "TRUE holds out; FALSE returns to the source with a transition"};
+    hal::In<bool> clear{*this, "clear", "TRUE sets the offset to 0 immediately"};
+    hal::Out<double> out{
+        *this, "out", "selected source plus the remaining offset", {.finite = true}};
+    hal::Out<double> offset{*this, "offset", "out - source", {.finite = true}};
+    hal::Out<std::uint32_t> selected{*this, "selected", "number of the source in use"};
+    hal::Out<bool> switching{*this, "switching", "TRUE during a transition"};
+    hal::Out<bool> bad_source{*this, "source-error",
+                              "TRUE: select is out of range, or the source is NaN or infinite"};
+    hal::Outs<bool> active{*this, "active-##", inputs, "TRUE: source ## is in use"};
+    hal::Function run{*this, "", &ModeSwitch::update, "passes the selected source"};
 
     void update(hal::Cycle cycle) noexcept {
         const bool known = select < in.size();
@@ -31,10 +41,16 @@ struct ModeSwitch : hal::Component {
         const bool usable = std::fabs(value) <= 1e300;
         const bool changes = wanted != source_ || was_held_;
         if (usable && !hold) {
-            if (!started_) offset_ = 0.0;
-            else if (changes) begin(out_ - value);
-            else approach(cycle.seconds());
-            if (clear) offset_ = 0.0;
+            if (!started_) {
+                offset_ = 0.0;
+            } else if (changes) {
+                begin(out_ - value);
+            } else {
+                approach(cycle.seconds());
+            }
+            if (clear) {
+                offset_ = 0.0;
+            }
             source_ = wanted;
             started_ = true;
             out_ = value + offset_;
@@ -45,40 +61,52 @@ struct ModeSwitch : hal::Component {
         offset = offset_;
         selected = static_cast<std::uint32_t>(source_);
         switching = offset_ != 0.0;
-        for (std::size_t i = 0; i < active.size(); ++i) active[i] = i == source_;
+        for (std::size_t i = 0; i < active.size(); ++i) {
+            active[i] = i == source_;
+        }
     }
 
 private:
     void begin(double gap) noexcept {
-        offset_ = first_ = std::isfinite(gap) && transition != jump && transition <= keep_offset ? gap : 0.0;
+        offset_ = first_ =
+            std::isfinite(gap) && transition != jump && transition <= keep_offset ? gap : 0.0;
         gone_ = 0.0;
     }
     void approach(double dt) noexcept {
         switch (transition) {
-            case fade:
-                gone_ += dt;
-                offset_ = time > 0.0 && gone_ < time * (1 - 1e-9) ? first_ * weight(gone_ / time) : 0.0;
-                break;
-            case decay:
-                offset_ *= time > 0.0 ? std::exp(-dt / time) : 0.0;
-                if (!(std::fabs(offset_) > 1e-9 * std::fabs(first_))) offset_ = 0.0;
-                break;
-            case slew: {
-                const double step = rate > 0.0 ? rate * dt : 0.0;
-                offset_ = std::fabs(offset_) <= step ? 0.0 : offset_ - std::copysign(step, offset_);
-                break;
+        case fade:
+            gone_ += dt;
+            offset_ = time > 0.0 && gone_ < time * (1 - 1e-9) ? first_ * weight(gone_ / time) : 0.0;
+            break;
+        case decay:
+            offset_ *= time > 0.0 ? std::exp(-dt / time) : 0.0;
+            if (!(std::fabs(offset_) > 1e-9 * std::fabs(first_))) {
+                offset_ = 0.0;
             }
-            case keep_offset: break;
-            default: offset_ = 0.0;
+            break;
+        case slew: {
+            const double step = rate > 0.0 ? rate * dt : 0.0;
+            offset_ = std::fabs(offset_) <= step ? 0.0 : offset_ - std::copysign(step, offset_);
+            break;
         }
-        if (!std::isfinite(offset_)) offset_ = 0.0;
+        case keep_offset: break;
+        default: offset_ = 0.0;
+        }
+        if (!std::isfinite(offset_)) {
+            offset_ = 0.0;
+        }
     }
-    /// From 1 to 0 with a slope of 0 at both ends: out leaves the old value and meets the new one smoothly.
+    /// From 1 to 0 with a slope of 0 at both ends: out leaves the old value and meets the new one
+    /// smoothly.
     static double weight(double share) noexcept { return 1 - share * share * (3 - 2 * share); }
 
-    double out_ = 0.0, offset_ = 0.0, first_ = 0.0, gone_ = 0.0;
+    double out_ = 0.0;
+    double offset_ = 0.0;
+    double first_ = 0.0;
+    double gone_ = 0.0;
     std::size_t source_ = 0;
-    bool started_ = false, was_held_ = false;
+    bool started_ = false;
+    bool was_held_ = false;
 };
 
 }  // namespace

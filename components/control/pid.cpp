@@ -9,7 +9,9 @@ namespace {
 /// Clamps `value` to ±|limit|; a limit of 0 disables the clamp.
 double limited(double value, double limit) {
     const double bound = std::fabs(limit);
-    if (bound > 0.0) return value < -bound ? -bound : value > bound ? bound : value;  // NaN passes
+    if (bound > 0.0) {
+        return value < -bound ? -bound : value > bound ? bound : value;  // NaN passes
+    }
     return value;
 }
 
@@ -18,7 +20,9 @@ class Gain : public hal::In<double> {
 public:
     using In::In;
     void tune(double value) noexcept {
-        if (!linked()) put(value);
+        if (!linked()) {
+            put(value);
+        }
     }
 };
 
@@ -26,85 +30,139 @@ struct alignas(64) Pid : hal::Component {
     using Component::Component;
     static constexpr hal::Traits traits{.default_count = 3};
 
-    hal::In<double>  command{*this, "command", "setpoint"};
-    hal::In<double>  feedback{*this, "feedback", "measured value"};
+    hal::In<double> command{*this, "command", "setpoint"};
+    hal::In<double> feedback{*this, "feedback", "measured value"};
     hal::Out<double> error{*this, "error", "command - feedback", {.finite = true}};
     hal::Out<double> output{*this, "output", "control effort", {.safe = 0.0}};
-    hal::In<bool>    enable{*this, "enable", "TRUE closes the loop; FALSE clears the integral and forces output to 0"};
-    hal::In<bool>    index_enable{*this, "index-enable", "command and feedback jump in the cycle of its falling edge: derivatives are held"};
-    hal::In<bool>    error_previous_target{*this, "error-previous-target", "error = command of the previous cycle - feedback", {.initial = true}};
-    hal::In<bool>    tune_mode{*this, "tune-mode", "TRUE opens the loop for auto-tuning: output is bias until tune-start"};
-    Gain             p_gain{*this, "Pgain", "proportional gain", {.initial = 1.0}};
-    Gain             i_gain{*this, "Igain", "integral gain"};
-    Gain             d_gain{*this, "Dgain", "derivative gain"};
-    hal::In<double>  ff0{*this, "FF0", "feed-forward of command"};
-    Gain             ff1{*this, "FF1", "feed-forward of the first derivative of command"};
-    hal::In<double>  ff2{*this, "FF2", "feed-forward of the second derivative of command"};
-    hal::In<double>  ff3{*this, "FF3", "feed-forward of the third derivative of command"};
-    hal::In<double>  bias{*this, "bias", "constant added to the output while enabled"};
-    hal::In<double>  deadband{*this, "deadband", "smaller errors count as 0; larger ones are reduced by it"};
+    hal::In<bool> enable{*this, "enable",
+                         "TRUE closes the loop; FALSE clears the integral and forces output to 0"};
+    hal::In<bool> index_enable{
+        *this, "index-enable",
+        "command and feedback jump in the cycle of its falling edge: derivatives are held"};
+    hal::In<bool> error_previous_target{*this,
+                                        "error-previous-target",
+                                        "error = command of the previous cycle - feedback",
+                                        {.initial = true}};
+    hal::In<bool> tune_mode{*this, "tune-mode",
+                            "TRUE opens the loop for auto-tuning: output is bias until tune-start"};
+    Gain p_gain{*this, "Pgain", "proportional gain", {.initial = 1.0}};
+    Gain i_gain{*this, "Igain", "integral gain"};
+    Gain d_gain{*this, "Dgain", "derivative gain"};
+    hal::In<double> ff0{*this, "FF0", "feed-forward of command"};
+    Gain ff1{*this, "FF1", "feed-forward of the first derivative of command"};
+    hal::In<double> ff2{*this, "FF2", "feed-forward of the second derivative of command"};
+    hal::In<double> ff3{*this, "FF3", "feed-forward of the third derivative of command"};
+    hal::In<double> bias{*this, "bias", "constant added to the output while enabled"};
+    hal::In<double> deadband{*this, "deadband",
+                             "smaller errors count as 0; larger ones are reduced by it"};
     hal::OptionalLimit max_error{*this, "maxerror", "limit on the error; 0: no limit"};
-    hal::OptionalLimit max_error_i{*this, "maxerrorI", "limit on the integral of the error; 0: no limit"};
-    hal::OptionalLimit max_error_d{*this, "maxerrorD", "limit on the derivative of the error; 0: no limit"};
-    hal::OptionalLimit max_command_d{*this, "maxcmdD", "limit on the first derivative of command; 0: no limit"};
-    hal::OptionalLimit max_command_dd{*this, "maxcmdDD", "limit on the second derivative of command; 0: no limit"};
-    hal::OptionalLimit max_command_ddd{*this, "maxcmdDDD", "limit on the third derivative of command; 0: no limit"};
+    hal::OptionalLimit max_error_i{*this, "maxerrorI",
+                                   "limit on the integral of the error; 0: no limit"};
+    hal::OptionalLimit max_error_d{*this, "maxerrorD",
+                                   "limit on the derivative of the error; 0: no limit"};
+    hal::OptionalLimit max_command_d{*this, "maxcmdD",
+                                     "limit on the first derivative of command; 0: no limit"};
+    hal::OptionalLimit max_command_dd{*this, "maxcmdDD",
+                                      "limit on the second derivative of command; 0: no limit"};
+    hal::OptionalLimit max_command_ddd{*this, "maxcmdDDD",
+                                       "limit on the third derivative of command; 0: no limit"};
     hal::OptionalLimit max_output{*this, "maxoutput", "limit on the output; 0: no limit"};
-    hal::In<double>  command_deriv{*this, "command-deriv", "derivative of command; estimated while unlinked"};
-    hal::In<double>  feedback_deriv{*this, "feedback-deriv", "derivative of feedback; estimated while unlinked"};
-    hal::Out<bool>   saturated{*this, "saturated", "TRUE while maxoutput limits the output"};
-    hal::Out<double> saturated_s{*this, "saturated-s", "time for which saturated has been TRUE", {.unit = "s"}};
-    hal::Out<std::int32_t> saturated_count{*this, "saturated-count", "number of cycles for which saturated has been TRUE"};
+    hal::In<double> command_deriv{*this, "command-deriv",
+                                  "derivative of command; estimated while unlinked"};
+    hal::In<double> feedback_deriv{*this, "feedback-deriv",
+                                   "derivative of feedback; estimated while unlinked"};
+    hal::Out<bool> saturated{*this, "saturated", "TRUE while maxoutput limits the output"};
+    hal::Out<double> saturated_s{
+        *this, "saturated-s", "time for which saturated has been TRUE", {.unit = "s"}};
+    hal::Out<std::int32_t> saturated_count{*this, "saturated-count",
+                                           "number of cycles for which saturated has been TRUE"};
 
-    hal::Argument debug{*this, "debug", 0, "1 adds the pins errorI to ultimate-period", {.min = 0, .max = 1}};
+    hal::Argument debug{
+        *this, "debug", 0, "1 adds the pins errorI to ultimate-period", {.min = 0, .max = 1}};
 
 private:
-    // The state of the loop is beside the pins that every cycle uses, so that a cycle touches few cache lines.
-    double integral_ = 0.0, pushing_ = 0.0;
-    double last_command_ = 0.0, last_feedback_ = 0.0, slope_ = 0.0;
-    double error_d_ = 0.0, feedback_d_ = 0.0, command_d_ = 0.0, command_dd_ = 0.0, command_ddd_ = 0.0;
-    bool has_previous_ = false, was_index_enable_ = false, tuning_ = false;
+    // The state of the loop is beside the pins that every cycle uses, so that a cycle touches few
+    // cache lines.
+    double integral_ = 0.0;
+
+private:
+    // The state of the loop is beside the pins that every cycle uses, so that a cycle touches few
+    // cache lines.
+    double pushing_ = 0.0;
+    double last_command_ = 0.0;
+    double last_feedback_ = 0.0;
+    double slope_ = 0.0;
+    double error_d_ = 0.0;
+    double feedback_d_ = 0.0;
+    double command_d_ = 0.0;
+    double command_dd_ = 0.0;
+
+    double command_ddd_ = 0.0;
+    bool has_previous_ = false;
+    bool was_index_enable_ = false;
+    bool tuning_ = false;
 
 public:
-    hal::Io<bool>            tune_start{*this, "tune-start", "TRUE starts auto-tuning; cleared when it ends"};
-    hal::Io<std::uint32_t>   tune_type{*this, "tune-type", "0 finds Pgain, Igain, Dgain; 1 finds Pgain, Igain, FF1"};
-    hal::Io<std::uint32_t>   tune_cycles{*this, "tune-cycles", "half cycles of the oscillation to average over", {.initial = 50}};
-    hal::Io<double>          tune_effort{*this, "tune-effort", "amplitude of the output's oscillation around bias", {.initial = 0.5}};
+    hal::Io<bool> tune_start{*this, "tune-start", "TRUE starts auto-tuning; cleared when it ends"};
+    hal::Io<std::uint32_t> tune_type{*this, "tune-type",
+                                     "0 finds Pgain, Igain, Dgain; 1 finds Pgain, Igain, FF1"};
+    hal::Io<std::uint32_t> tune_cycles{
+        *this, "tune-cycles", "half cycles of the oscillation to average over", {.initial = 50}};
+    hal::Io<double> tune_effort{*this,
+                                "tune-effort",
+                                "amplitude of the output's oscillation around bias",
+                                {.initial = 0.5}};
 
-    hal::Outs<double> error_i_out{*this, "errorI", debug, "integral of the error, limited by maxerrorI, before Igain; 0 while not enabled"};
+    hal::Outs<double> error_i_out{
+        *this, "errorI", debug,
+        "integral of the error, limited by maxerrorI, before Igain; 0 while not enabled"};
     hal::Outs<double> error_d_out{*this, "errorD", debug, "derivative of the error"};
     hal::Outs<double> command_d_out{*this, "commandD", debug, "first derivative of command"};
     hal::Outs<double> command_dd_out{*this, "commandDD", debug, "second derivative of command"};
     hal::Outs<double> command_ddd_out{*this, "commandDDD", debug, "third derivative of command"};
     hal::Outs<double> feedback_d_out{*this, "feedbackD", debug, "derivative of feedback"};
-    hal::Outs<double> ultimate_gain{*this, "ultimate-gain", debug, "gain at which the loop would oscillate, found by auto-tuning"};
-    hal::Outs<double> ultimate_period{*this, "ultimate-period", debug, "period of that oscillation", {.unit = "s"}};
+    hal::Outs<double> ultimate_gain{*this, "ultimate-gain", debug,
+                                    "gain at which the loop would oscillate, found by auto-tuning"};
+    hal::Outs<double> ultimate_period{
+        *this, "ultimate-period", debug, "period of that oscillation", {.unit = "s"}};
 
-    hal::Function run{*this, "do-pid-calcs", hal::step<&Pid::calculate>, "runs one step of the control loop"};
+    hal::Function run{*this, "do-pid-calcs", hal::step<&Pid::calculate>,
+                      "runs one step of the control loop"};
 
     void calculate(hal::Cycle cycle) noexcept {
         const double dt = cycle.seconds();
         const bool at_index = was_index_enable_ & !index_enable;
         was_index_enable_ = index_enable;
 
-        // The first cycle has no previous target, and at the index the previous one is in the old coordinates.
+        // The first cycle has no previous target, and at the index the previous one is in the old
+        // coordinates.
         const bool use_previous = error_previous_target & has_previous_ & !at_index;
         const double deviation = (use_previous ? last_command_ : command.get()) - feedback;
         error = deviation;
         const double e = beyond_deadband(limited(deviation, max_error));
         const bool valid = std::isfinite(command - feedback);
-        if (valid & has_previous_) differentiate(at_index, 1.0 / dt);
+        if (valid & has_previous_) {
+            differentiate(at_index, 1.0 / dt);
+        }
         last_command_ = command;
         last_feedback_ = feedback;
         has_previous_ = valid;
 
-        if (enable & tune_mode) tune(deviation, dt);
-        else {
-            if (tuning_) stop_tuning();
-            if (enable) control(e, dt);
-            else shut(0.0);
+        if (enable & tune_mode) {
+            tune(deviation, dt);
+        } else {
+            if (tuning_) {
+                stop_tuning();
+            }
+            if (enable) {
+                control(e, dt);
+            } else {
+                shut(0.0);
+            }
         }
-        if (debug != 0) publish_debug();
+        if (debug != 0) {
+            publish_debug();
+        }
     }
 
 private:
@@ -113,13 +171,20 @@ private:
         return e > band ? e - band : e < -band ? e + band : e * 0.0;  // 0, or NaN
     }
 
-    /// Estimates all derivatives, also while disabled, so that enabling causes no spike. The slope of the error is the slope of
-    /// command minus the slope of feedback, unaffected by maxerror and deadband: it damps inside the deadband, too.
+    /// Estimates all derivatives, also while disabled, so that enabling causes no spike. The slope
+    /// of the error is the slope of command minus the slope of feedback, unaffected by maxerror and
+    /// deadband: it damps inside the deadband, too.
     void differentiate(bool at_index, double rate) {
-        double slope = command_deriv.linked() ? command_deriv.get() : (command - last_command_) * rate;
-        if (at_index & !command_deriv.linked()) slope = slope_;
-        if (feedback_deriv.linked()) feedback_d_ = feedback_deriv;
-        else if (!at_index) feedback_d_ = (feedback - last_feedback_) * rate;
+        double slope =
+            command_deriv.linked() ? command_deriv.get() : (command - last_command_) * rate;
+        if (at_index & !command_deriv.linked()) {
+            slope = slope_;
+        }
+        if (feedback_deriv.linked()) {
+            feedback_d_ = feedback_deriv;
+        } else if (!at_index) {
+            feedback_d_ = (feedback - last_feedback_) * rate;
+        }
         error_d_ = limited(slope - feedback_d_, max_error_d);
         slope_ = slope;
 
@@ -132,8 +197,13 @@ private:
 
     void control(double e, double dt) {
         double integral = integral_;
-        if (e * pushing_ <= 0.0) integral = limited(integral + e * dt, max_error_i);  // while saturated, only away from the limit
-        const double wanted = bias + p_gain * e + i_gain * integral + d_gain * error_d_ + ff0 * command + ff1 * command_d_ + ff2 * command_dd_ + ff3 * command_ddd_;
+        // while saturated, only away from the limit
+        if (e * pushing_ <= 0.0) {
+            integral = limited(integral + e * dt, max_error_i);
+        }
+        const double wanted = bias + p_gain * e + i_gain * integral + d_gain * error_d_ +
+                              ff0 * command + ff1 * command_d_ + ff2 * command_dd_ +
+                              ff3 * command_ddd_;
         const double given = limited(wanted, max_output);
         if (!std::isfinite(wanted)) {
             finish(0.0, 0.0, dt);
@@ -159,10 +229,11 @@ private:
         finish(effort, 0.0, 0.0);
     }
 
-    // Auto-tuning, the relay method of Åström and Hägglund (Automatica 20, 1984, doi:10.1016/0005-1098(84)90014-1): the
-    // output switches between bias ± h with the sign of the error, so that the loop oscillates at its ultimate
-    // frequency. With the amplitude a and the period T of the error, the ultimate gain is K = 4 h / (pi a), and
-    // Ziegler and Nichols' table gives
+    // Auto-tuning, the relay method of Åström and Hägglund (Automatica 20, 1984,
+    // doi:10.1016/0005-1098(84)90014-1): the output switches between bias ± h with the sign of the
+    // error, so that the loop oscillates at its ultimate frequency. With the amplitude a and the
+    // period T of the error, the ultimate gain is K = 4 h / (pi a), and Ziegler and Nichols' table
+    // gives
     //     PID:      Pgain = 0.6 K,   Igain = Pgain / (T / 2),    Dgain = Pgain T / 8
     //     PI, FF1:  Pgain = 0.45 K,  Igain = Pgain / (T / 1.2),  FF1 = 1
     void tune(double deviation, double dt) {
@@ -172,7 +243,9 @@ private:
             half_cycles_ = -settling_half_cycles;
             peak_ = elapsed_ = amplitude_sum_ = time_sum_ = 0.0;
         }
-        if (tuning_ && (!tune_start || !std::isfinite(deviation))) stop_tuning();
+        if (tuning_ && (!tune_start || !std::isfinite(deviation))) {
+            stop_tuning();
+        }
         if (!tuning_) return shut(limited(bias, max_output));
 
         elapsed_ += dt;
@@ -185,8 +258,10 @@ private:
             direction_ = -direction_;
             peak_ = std::fabs(deviation);  // this sample is the first beyond zero
             elapsed_ = 0.0;
-            if (++half_cycles_ >= static_cast<std::int64_t>(std::max<std::uint32_t>(tune_cycles, 1))) {
-                adopt(amplitude_sum_ / static_cast<double>(half_cycles_), 2.0 * time_sum_ / static_cast<double>(half_cycles_));
+            if (++half_cycles_ >=
+                static_cast<std::int64_t>(std::max<std::uint32_t>(tune_cycles, 1))) {
+                adopt(amplitude_sum_ / static_cast<double>(half_cycles_),
+                      2.0 * time_sum_ / static_cast<double>(half_cycles_));
                 stop_tuning();
                 return shut(limited(bias, max_output));
             }
@@ -201,7 +276,9 @@ private:
         p_gain.tune((with_ff1 ? 0.45 : 0.6) * gain);
         i_gain.tune(with_ff1 ? 0.54 * gain / period : 1.2 * gain / period);
         d_gain.tune(with_ff1 ? 0.0 : 0.075 * gain * period);
-        if (with_ff1) ff1.tune(1.0);
+        if (with_ff1) {
+            ff1.tune(1.0);
+        }
         ultimate_gain_ = gain;
         ultimate_period_ = period;
     }
@@ -222,17 +299,26 @@ private:
         ultimate_period[0] = ultimate_period_;
     }
 
-    static constexpr std::int64_t settling_half_cycles = 2;  // until the oscillation has its final shape
+    // until the oscillation has its final shape
+    static constexpr std::int64_t settling_half_cycles = 2;
 
-    // While tuning: half cycles averaged (negative: still settling) and what was seen of the present one.
+    // While tuning: half cycles averaged (negative: still settling) and what was seen of the
+    // present one.
     std::int64_t half_cycles_ = 0;
-    double direction_ = 1.0, peak_ = 0.0, elapsed_ = 0.0, amplitude_sum_ = 0.0, time_sum_ = 0.0;
-    double ultimate_gain_ = 0.0, ultimate_period_ = 0.0;
+    double direction_ = 1.0;
+    double peak_ = 0.0;
+    double elapsed_ = 0.0;
+    double amplitude_sum_ = 0.0;
+    double time_sum_ = 0.0;
+    double ultimate_gain_ = 0.0;
+    double ultimate_period_ = 0.0;
 };
 
 }  // namespace
 
-HAL_COMPONENT(Pid, "pid", "Proportional/integral/derivative controller with feed-forward, limits and auto-tuning", R"(
+HAL_COMPONENT(
+    Pid, "pid",
+    "Proportional/integral/derivative controller with feed-forward, limits and auto-tuning", R"(
     error     = command - feedback, limited to ±maxerror, reduced by deadband
     errorI   += error * period, limited to ±maxerrorI; held while output is limited and error has the sign of what is cut off
     errorD    = slope of command - slope of feedback, limited to ±maxerrorD

@@ -11,22 +11,38 @@ namespace {
 struct SampledPid : hal::Component {
     using Component::Component;
 
-    hal::In<bool>   trigger{*this, "trigger", "TRUE: feedback is a new sample; the controller computes once"};
-    hal::In<bool>   enable{*this, "enable", "FALSE resets the controller and forces the output to 0", {.initial = true}};
+    hal::In<bool> trigger{*this, "trigger",
+                          "TRUE: feedback is a new sample; the controller computes once"};
+    hal::In<bool> enable{*this,
+                         "enable",
+                         "FALSE resets the controller and forces the output to 0",
+                         {.initial = true}};
     hal::In<double> command{*this, "command", "setpoint"};
     hal::In<double> feedback{*this, "feedback", "sample of the measured value"};
-    hal::In<double> delay{*this, "delay", "time between a sample and its output; 0: the same cycle", {.unit = "s"}};
+    hal::In<double> delay{
+        *this, "delay", "time between a sample and its output; 0: the same cycle", {.unit = "s"}};
 
     hal::Param<double> gain{*this, "gain", "proportional gain K", {.initial = 1.0}};
-    hal::Param<double> integral_time{*this, "integral-time", "integral time Ti; 0: no integral part", {.unit = "s"}};
-    hal::Param<double> derivative_time{*this, "derivative-time", "derivative time Td", {.unit = "s"}};
-    hal::Param<double> filter{*this, "filter", "N: the derivative is filtered with Td / N", {.initial = 10.0}};
-    hal::Param<double> weight{*this, "setpoint-weight", "b: share of the setpoint in the proportional part", {.initial = 1.0}};
-    hal::Param<double> period{*this, "sample-period", "h: designed time between two samples", {.initial = 0.01, .unit = "s"}};
+    hal::Param<double> integral_time{
+        *this, "integral-time", "integral time Ti; 0: no integral part", {.unit = "s"}};
+    hal::Param<double> derivative_time{
+        *this, "derivative-time", "derivative time Td", {.unit = "s"}};
+    hal::Param<double> filter{
+        *this, "filter", "N: the derivative is filtered with Td / N", {.initial = 10.0}};
+    hal::Param<double> weight{*this,
+                              "setpoint-weight",
+                              "b: share of the setpoint in the proportional part",
+                              {.initial = 1.0}};
+    hal::Param<double> period{*this,
+                              "sample-period",
+                              "h: designed time between two samples",
+                              {.initial = 0.01, .unit = "s"}};
     hal::OptionalLimitParam limit{*this, "max-output", "limit on the output; 0: no limit"};
 
-    hal::Out<double> output{*this, "output", "control effort of the newest sample", {.safe = 0.0, .finite = true}};
-    hal::Out<bool>   fresh{*this, "new", "TRUE for the cycle in which output is that of another sample"};
+    hal::Out<double> output{
+        *this, "output", "control effort of the newest sample", {.safe = 0.0, .finite = true}};
+    hal::Out<bool> fresh{*this, "new",
+                         "TRUE for the cycle in which output is that of another sample"};
 
     hal::Function run{*this, "update", &SampledPid::update, "computes when there is a new sample"};
 
@@ -52,38 +68,56 @@ struct SampledPid : hal::Component {
                 waiting_ = 0;
                 changed = true;
             } else {
-                queue_[(first_ + waiting_++) % queue_.size()] = {cycle.start_ns() + static_cast<std::int64_t>(std::llround(late * 1e9)),
-                                                                 next_};
+                queue_[(first_ + waiting_++) % queue_.size()] = {
+                    cycle.start_ns() + static_cast<std::int64_t>(std::llround(late * 1e9)), next_};
             }
         }
-        if (!enable) output = 0.0;
+        if (!enable) {
+            output = 0.0;
+        }
         fresh = changed;
     }
 
 private:
     /// u = K (b r - y) + I + D;  I += K h / Ti (r - y) after its use;  D = a D - K Td N / (Td + N h) (y - y_before), a = Td / (Td + N h).
     void compute() noexcept {
-        const double h = period > 0.0 ? period.get() : 1e-3, td = std::fmax(derivative_time, 0.0), n = std::fmax(filter, 1e-9);
-        if (!started_) before_ = feedback, started_ = true;
-        derivative_ = td / (td + n * h) * derivative_ - gain * td * n / (td + n * h) * (feedback - before_);
+        const double h = period > 0.0 ? period.get() : 1e-3;
+        const double td = std::fmax(derivative_time, 0.0);
+
+        const double n = std::fmax(filter, 1e-9);
+        if (!started_) {
+            before_ = feedback;
+            started_ = true;
+        }
+        derivative_ =
+            td / (td + n * h) * derivative_ - gain * td * n / (td + n * h) * (feedback - before_);
         before_ = feedback;
         const double wanted = gain * (weight * command - feedback) + integral_ + derivative_;
         const double most = std::fabs(limit);
         next_ = most > 0.0 ? std::clamp(wanted, -most, most) : wanted;
         const double error = command - feedback;
-        // While the output is limited the integral changes only towards the range (conditional integration).
-        if (integral_time > 0.0 && (next_ == wanted || error * (wanted - next_) < 0.0)) integral_ += gain * h / integral_time * error;
-        if (!std::isfinite(next_ + integral_ + derivative_)) next_ = integral_ = derivative_ = 0.0;
+        // While the output is limited the integral changes only towards the range (conditional
+        // integration).
+        if (integral_time > 0.0 && (next_ == wanted || error * (wanted - next_) < 0.0)) {
+            integral_ += gain * h / integral_time * error;
+        }
+        if (!std::isfinite(next_ + integral_ + derivative_)) {
+            next_ = integral_ = derivative_ = 0.0;
+        }
     }
 
     struct Pending {
         std::int64_t at_ns;
-        double       value;
+        double value;
     };
     std::array<Pending, 64> queue_{};
-    std::size_t             first_ = 0, waiting_ = 0;
-    double                  integral_ = 0.0, derivative_ = 0.0, before_ = 0.0, next_ = 0.0;
-    bool                    started_ = false;
+    std::size_t first_ = 0;
+    std::size_t waiting_ = 0;
+    double integral_ = 0.0;
+    double derivative_ = 0.0;
+    double before_ = 0.0;
+    double next_ = 0.0;
+    bool started_ = false;
 };
 
 }  // namespace

@@ -8,25 +8,36 @@ namespace {
 
 struct Siggen : hal::Component {
     using Component::Component;
-    hal::Out<double> square{*this, "square", "square wave: positive while triangle and cosine rise"};
+    hal::Out<double> square{*this, "square",
+                            "square wave: positive while triangle and cosine rise"};
     hal::Out<double> sine{*this, "sine", "sine wave: lags cosine by 90 degrees"};
     hal::Out<double> cosine{*this, "cosine", "cosine wave: leads sine by 90 degrees"};
-    hal::Out<double> triangle{*this, "triangle", "triangle wave: peaks coincide with those of cosine"};
-    hal::Out<double> sawtooth{*this, "sawtooth", "sawtooth wave: rises, and drops at the positive peak of cosine"};
-    hal::Out<bool>   clock{*this, "clock", "TRUE while square is at its upper level"};
-    hal::CorrectedIn<double> frequency{*this, "frequency", "periods of the wave per second, at most half the rate of the thread",
-                                       {.initial = 1.0, .unit = "Hz"}};
-    hal::In<double>  amplitude{*this, "amplitude", "peak deviation of the waves from offset", {.initial = 1.0}};
-    hal::In<double>  offset{*this, "offset", "added to all waves"};
-    hal::In<bool>    reset{*this, "reset", "TRUE holds the waves in the middle of the period"};
-    hal::Function    run{*this, "update", &Siggen::update, "computes the next sample"};
+    hal::Out<double> triangle{*this, "triangle",
+                              "triangle wave: peaks coincide with those of cosine"};
+    hal::Out<double> sawtooth{*this, "sawtooth",
+                              "sawtooth wave: rises, and drops at the positive peak of cosine"};
+    hal::Out<bool> clock{*this, "clock", "TRUE while square is at its upper level"};
+    hal::CorrectedIn<double> frequency{
+        *this,
+        "frequency",
+        "periods of the wave per second, at most half the rate of the thread",
+        {.initial = 1.0, .unit = "Hz"}};
+    hal::In<double> amplitude{
+        *this, "amplitude", "peak deviation of the waves from offset", {.initial = 1.0}};
+    hal::In<double> offset{*this, "offset", "added to all waves"};
+    hal::In<bool> reset{*this, "reset", "TRUE holds the waves in the middle of the period"};
+    hal::Function run{*this, "update", &Siggen::update, "computes the next sample"};
 
     void update(hal::Cycle cycle) noexcept {
-        if (reset) phase_ = 0.5;
-        else advance(cycle.seconds());
+        if (reset) {
+            phase_ = 0.5;
+        } else {
+            advance(cycle.seconds());
+        }
         const double angle = 2.0 * std::numbers::pi * phase_;
         const bool second_half = phase_ > 0.5;
-        const double scale = amplitude, middle = offset;
+        const double scale = amplitude;
+        const double middle = offset;
         square = middle + (second_half ? scale : -scale);
         sine = middle + scale * (phase_ == 0.5 ? 0.0 : std::sin(angle));
         cosine = middle + scale * std::cos(angle);
@@ -44,7 +55,9 @@ private:
         }
         const double next = phase_ + step;
         const double wrapped = next - std::floor(next);
-        if (std::isfinite(wrapped)) phase_ = wrapped < 1.0 ? wrapped : 0.0;
+        if (std::isfinite(wrapped)) {
+            phase_ = wrapped < 1.0 ? wrapped : 0.0;
+        }
     }
 
     static constexpr double max_step = 0.5;  // periods per cycle: the Nyquist frequency

@@ -10,34 +10,68 @@ struct Spindle : hal::Component {
     using Component::Component;
     hal::Argument gears{*this, "numgears", 1, "number of gears", {.min = 1, .max = 16}};
 
-    hal::In<std::uint32_t> select_gear{*this, "select-gear", "number of the gear; 0: as selected by select.0 and higher"};
-    hal::In<double>  commanded_speed{*this, "commanded-speed", "commanded speed; negative: reverse", {.unit = "rpm"}};
-    hal::In<double>  actual_speed{*this, "actual-speed", "speed measured by an encoder", {.unit = "turn/s"}};
-    hal::In<bool>    simulate_encoder{*this, "simulate-encoder", "TRUE simulates the speed of a spindle without encoder"};
-    hal::In<bool>    enable{*this, "enable", "FALSE decelerates the spindle to 0"};
-    hal::In<double>  lpf{*this, "spindle-lpf", "gain per second of the filter of spindle-rpm-abs while at speed; 0: no filter"};
+    hal::In<std::uint32_t> select_gear{*this, "select-gear",
+                                       "number of the gear; 0: as selected by select.0 and higher"};
+    hal::In<double> commanded_speed{
+        *this, "commanded-speed", "commanded speed; negative: reverse", {.unit = "rpm"}};
+    hal::In<double> actual_speed{
+        *this, "actual-speed", "speed measured by an encoder", {.unit = "turn/s"}};
+    hal::In<bool> simulate_encoder{*this, "simulate-encoder",
+                                   "TRUE simulates the speed of a spindle without encoder"};
+    hal::In<bool> enable{*this, "enable", "FALSE decelerates the spindle to 0"};
+    hal::In<double> lpf{
+        *this, "spindle-lpf",
+        "gain per second of the filter of spindle-rpm-abs while at speed; 0: no filter"};
     hal::Out<double> rpm{*this, "spindle-rpm", "speed, measured or simulated", {.unit = "rpm"}};
-    hal::Out<double> rpm_abs{*this, "spindle-rpm-abs", "magnitude of spindle-rpm, for a display", {.unit = "rpm"}};
+    hal::Out<double> rpm_abs{
+        *this, "spindle-rpm-abs", "magnitude of spindle-rpm, for a display", {.unit = "rpm"}};
     hal::Out<double> output{*this, "output", "command for the drive: (speed + offset) * scale"};
     hal::Out<std::uint32_t> current_gear{*this, "current-gear", "number of the gear in use"};
-    hal::Out<bool>   at_speed{*this, "at-speed", "TRUE while the speed is within speed-tolerance of commanded-speed"};
-    hal::Out<bool>   forward{*this, "forward", "TRUE: the drive turns forward", {.safe = false}};
-    hal::Out<bool>   reverse{*this, "reverse", "TRUE: the drive turns backward", {.safe = false}};
-    hal::Out<bool>   brake{*this, "brake", "TRUE while the spindle must decelerate"};
-    hal::Out<bool>   zero_speed{*this, "zero-speed", "TRUE while the speed is within zero-tolerance of 0"};
-    hal::Out<bool>   limited{*this, "limited", "TRUE while commanded-speed is above max, or not 0 and below min, and enabled"};
+    hal::Out<bool> at_speed{*this, "at-speed",
+                            "TRUE while the speed is within speed-tolerance of commanded-speed"};
+    hal::Out<bool> forward{*this, "forward", "TRUE: the drive turns forward", {.safe = false}};
+    hal::Out<bool> reverse{*this, "reverse", "TRUE: the drive turns backward", {.safe = false}};
+    hal::Out<bool> brake{*this, "brake", "TRUE while the spindle must decelerate"};
+    hal::Out<bool> zero_speed{*this, "zero-speed",
+                              "TRUE while the speed is within zero-tolerance of 0"};
+    hal::Out<bool> limited{
+        *this, "limited",
+        "TRUE while commanded-speed is above max, or not 0 and below min, and enabled"};
 
-    hal::Ins<double> scale{*this, "scale.#", gears, "scale of output in gear #; a negative scale inverts the output", {.initial = 1.0}};
-    hal::Limits      min{*this, "min.#", gears, "lowest speed in gear #", {.unit = "rpm"}};
-    hal::OptionalLimits max{*this, "max.#", gears, "highest speed in gear #; 0: no limit", {.unit = "rpm"}};
+    hal::Ins<double> scale{*this,
+                           "scale.#",
+                           gears,
+                           "scale of output in gear #; a negative scale inverts the output",
+                           {.initial = 1.0}};
+    hal::Limits min{*this, "min.#", gears, "lowest speed in gear #", {.unit = "rpm"}};
+    hal::OptionalLimits max{
+        *this, "max.#", gears, "highest speed in gear #; 0: no limit", {.unit = "rpm"}};
     hal::OptionalLimits accel{*this, "accel.#", gears,
-        "acceleration: rpm per second without encoder; with an encoder, lead of the output over the speed in rpm; 0: no limit"};
+                              "acceleration: rpm per second without encoder; with an encoder, lead "
+                              "of the output over the speed in rpm; 0: no limit"};
     hal::OptionalLimits decel{*this, "decel.#", gears, "deceleration, like accel"};
-    hal::Ins<double> speed_tolerance{*this, "speed-tolerance.#", gears, "tolerance of at-speed", {.initial = 20.0, .unit = "rpm"}};
-    hal::Ins<double> zero_tolerance{*this, "zero-tolerance.#", gears, "tolerance of zero-speed", {.initial = 20.0, .unit = "rpm"}};
-    hal::Ins<double> offset{*this, "offset.#", gears, "offset added to the speed for output in gear #", {.unit = "rpm"}};
-    hal::In<bool>    select_first{*this, "select.0", "TRUE: gear 0, the default when no other is selected", {.initial = gears == 1}};
-    hal::Pins<hal::In<bool>, bool> select{*this, "select.#", gears - 1, 1, "TRUE: gear #; the highest selected gear takes precedence"};
+    hal::Ins<double> speed_tolerance{*this,
+                                     "speed-tolerance.#",
+                                     gears,
+                                     "tolerance of at-speed",
+                                     {.initial = 20.0, .unit = "rpm"}};
+    hal::Ins<double> zero_tolerance{*this,
+                                    "zero-tolerance.#",
+                                    gears,
+                                    "tolerance of zero-speed",
+                                    {.initial = 20.0, .unit = "rpm"}};
+    hal::Ins<double> offset{*this,
+                            "offset.#",
+                            gears,
+                            "offset added to the speed for output in gear #",
+                            {.unit = "rpm"}};
+    hal::In<bool> select_first{*this,
+                               "select.0",
+                               "TRUE: gear 0, the default when no other is selected",
+                               {.initial = gears == 1}};
+    hal::Pins<hal::In<bool>, bool> select{
+        *this, "select.#", gears - 1, 1,
+        "TRUE: gear #; the highest selected gear takes precedence"};
 
     hal::Function run{*this, "", &Spindle::update, "computes the drive's speed and direction"};
 
@@ -45,7 +79,8 @@ struct Spindle : hal::Component {
         const std::size_t gear = chosen_gear();
         current_gear = static_cast<std::uint32_t>(gear);
         const bool simulated = simulate_encoder;
-        const double command = enable && std::isfinite(commanded_speed) ? commanded_speed.get() : 0.0;
+        const double command =
+            enable && std::isfinite(commanded_speed) ? commanded_speed.get() : 0.0;
         const double wanted = within_range(command, gear);
         limited = wanted != command;
 
@@ -53,7 +88,8 @@ struct Spindle : hal::Component {
         const double magnitude = std::fabs(speed);
         show(magnitude, cycle.seconds());
         zero_speed = magnitude <= zero_tolerance[gear];
-        at_speed = speed_tolerance[gear] > 0.0 && std::fabs(command - speed) <= speed_tolerance[gear] && command * speed >= 0.0;
+        at_speed = speed_tolerance[gear] > 0.0 &&
+                   std::fabs(command - speed) <= speed_tolerance[gear] && command * speed >= 0.0;
 
         const double period_s = simulated ? cycle.seconds() : 1.0;
         const double up = limit_or_none(accel[gear]) * period_s;
@@ -61,22 +97,27 @@ struct Spindle : hal::Component {
         const double drive = at_speed ? wanted : next(speed, wanted, up, down);
         const double turning = simulated ? drive : speed;
         rpm = turning + 0.0;  // never -0
-        const bool too_fast = wanted * turning <= 0.0 || std::fabs(turning) > std::fabs(wanted) + speed_tolerance[gear];
+        const bool too_fast = wanted * turning <= 0.0 ||
+                              std::fabs(turning) > std::fabs(wanted) + speed_tolerance[gear];
         brake = too_fast && !(std::fabs(turning) <= zero_tolerance[gear]);
-        forward = drive > 0.0 && (wanted != 0.0 || forward);  // a spindle turned by hand does not switch the drive on
+        // a spindle turned by hand does not switch the drive on
+        forward = drive > 0.0 && (wanted != 0.0 || forward);
         reverse = drive < 0.0 && (wanted != 0.0 || reverse);
         output = (std::fabs(drive) + offset[gear]) * scale[gear];
     }
 
 private:
-    /// Returns the speed that the encoder measures, in rpm; 0 while it is not a finite number. [realtime]
+    /// Returns the speed that the encoder measures, in rpm; 0 while it is not a finite number.
+    /// [realtime]
     double measured_speed() const noexcept {
         const double measured = actual_speed * 60.0;
         return std::isfinite(measured) ? measured : 0.0;
     }
 
     /// Returns a limit that must be above 0 to have an effect. [realtime]
-    static double limit_or_none(double limit) noexcept { return limit > 0.0 ? limit : std::numeric_limits<double>::infinity(); }
+    static double limit_or_none(double limit) noexcept {
+        return limit > 0.0 ? limit : std::numeric_limits<double>::infinity();
+    }
 
     std::size_t chosen_gear() const noexcept {
         const std::size_t last = scale.size() - 1;
@@ -91,7 +132,8 @@ private:
     double within_range(double command, std::size_t gear) const noexcept {
         if (command == 0.0) return 0.0;
         const double low = min[gear] > 0.0 ? min[gear].get() : 0.0;
-        return std::copysign(std::min(std::max(std::fabs(command), low), limit_or_none(max[gear])), command);
+        return std::copysign(std::min(std::max(std::fabs(command), low), limit_or_none(max[gear])),
+                             command);
     }
 
     /// One step from `speed` towards `wanted`; a change of direction stops at 0 for a cycle.
@@ -103,13 +145,15 @@ private:
 
     void show(double magnitude, double period_s) noexcept {
         const bool smooth = lpf > 0.0 && at_speed;
-        rpm_abs = smooth ? rpm_abs + (magnitude - rpm_abs) * std::min(lpf * period_s, 1.0) : magnitude;
+        rpm_abs =
+            smooth ? rpm_abs + (magnitude - rpm_abs) * std::min(lpf * period_s, 1.0) : magnitude;
     }
 };
 
 }  // namespace
 
-HAL_COMPONENT(Spindle, "spindle", "Spindle with acceleration and deceleration, brake and up to 16 gears", R"(
+HAL_COMPONENT(Spindle, "spindle",
+              "Spindle with acceleration and deceleration, brake and up to 16 gears", R"(
 For a drive with inputs for speed and direction. The target is `commanded-speed` with its magnitude limited to `min` and `max` of the
 gear (`min` does not apply at 0), or 0 while `enable` is FALSE. `output` is the magnitude of the speed commanded to the drive, plus
 `offset`, times `scale`; `forward` and `reverse` are its direction, both FALSE at 0. To change direction the spindle first decelerates to 0.

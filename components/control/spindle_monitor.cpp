@@ -12,32 +12,44 @@ public:
 
 struct SpindleMonitor : hal::Component {
     using Component::Component;
-    hal::In<bool>      is_on{*this, "spindle-is-on", "TRUE while the spindle is commanded to run"};
-    hal::In<double>    command{*this, "spindle-command", "commanded speed"};
-    hal::In<double>    feedback{*this, "spindle-feedback", "measured speed"};
-    hal::Out<bool>     at_speed{*this, "spindle-at-speed", "TRUE after the commanded speed was reached, until the spindle is switched off"};
-    hal::Out<bool>     underspeed{*this, "spindle-underspeed", "TRUE after the speed has dropped again, until the spindle is switched off"};
-    StateParam         level{*this, "level", "state: 0 off, 1 accelerating, 2 reached its speed"};
+    hal::In<bool> is_on{*this, "spindle-is-on", "TRUE while the spindle is commanded to run"};
+    hal::In<double> command{*this, "spindle-command", "commanded speed"};
+    hal::In<double> feedback{*this, "spindle-feedback", "measured speed"};
+    hal::Out<bool> at_speed{
+        *this, "spindle-at-speed",
+        "TRUE after the commanded speed was reached, until the spindle is switched off"};
+    hal::Out<bool> underspeed{
+        *this, "spindle-underspeed",
+        "TRUE after the speed has dropped again, until the spindle is switched off"};
+    StateParam level{*this, "level", "state: 0 off, 1 accelerating, 2 reached its speed"};
     hal::Param<double> threshold{*this, "threshold", "permitted deviation from the command"};
-    hal::Function      run{*this, "", &SpindleMonitor::update, "monitors the speed"};
+    hal::Function run{*this, "", &SpindleMonitor::update, "monitors the speed"};
 
     void update(hal::Cycle) noexcept {
         switch (level) {
         case off:
             at_speed = false;
             underspeed = false;
-            if (is_on) level.enter(accelerating);
+            if (is_on) {
+                level.enter(accelerating);
+            }
             break;
         case accelerating:
             if (is_on && std::fabs(command - feedback) < threshold) {
                 level.enter(reached);
                 at_speed = true;
             }
-            if (!is_on) level.enter(off);
+            if (!is_on) {
+                level.enter(off);
+            }
             break;
         case reached:
-            if (is_on && has_dropped()) underspeed = true;
-            if (!is_on) level.enter(off);
+            if (is_on && has_dropped()) {
+                underspeed = true;
+            }
+            if (!is_on) {
+                level.enter(off);
+            }
             break;
         default: level.enter(off); break;
         }
@@ -57,7 +69,8 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(SpindleMonitor, "spindle_monitor", "Detects when a spindle reaches its speed and when it drops below it", R"(
+HAL_COMPONENT(SpindleMonitor, "spindle_monitor",
+              "Detects when a spindle reaches its speed and when it drops below it", R"(
 With the spindle on, `spindle-at-speed` becomes TRUE when the speed is within `threshold` of the command. If the speed then
 drops more than `threshold` below the command, or is NaN, `spindle-underspeed` becomes TRUE. Both remain TRUE until the spindle is off.
 Each change of `level` takes a cycle, and both are cleared one cycle after it becomes 0.

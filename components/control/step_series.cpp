@@ -9,12 +9,19 @@ namespace {
 /// Mean, standard deviation and maximum of a series (B. P. Welford, Technometrics 4, 1962).
 struct Series {
     Series(hal::Component& c, const char* name, const char* doc, const char* unit)
-        : mean(c, (std::string(name) + "-mean").c_str(), (std::string(doc) + ", mean of the steps").c_str(), {.unit = unit}),
-          deviation(c, (std::string(name) + "-sd").c_str(), (std::string(doc) + ", standard deviation").c_str(), {.unit = unit}),
-          most(c, (std::string(name) + "-max").c_str(), (std::string(doc) + ", worst step").c_str(), {.unit = unit}) {}
+        : mean(c, (std::string(name) + "-mean").c_str(),
+               (std::string(doc) + ", mean of the steps").c_str(), {.unit = unit}),
+          deviation(c, (std::string(name) + "-sd").c_str(),
+                    (std::string(doc) + ", standard deviation").c_str(), {.unit = unit}),
+          most(c, (std::string(name) + "-max").c_str(), (std::string(doc) + ", worst step").c_str(),
+               {.unit = unit}) {}
 
     void add(double value, std::uint32_t count) noexcept {
-        if (count == 1) mean = 0.0, square_ = 0.0, most = value;
+        if (count == 1) {
+            mean = 0.0;
+            square_ = 0.0;
+            most = value;
+        }
         const double off = value - mean;
         mean = mean + off / count;
         square_ += off * (value - mean);
@@ -30,30 +37,39 @@ private:
 struct StepSeries : hal::Component {
     using Component::Component;
 
-    hal::In<bool>             trigger{*this, "trigger", "TRUE: a sample is taken in this cycle"};
-    hal::In<double>           value{*this, "value", "measured value"};
-    hal::Param<std::uint32_t> samples{*this, "samples", "samples from one step to the next", {.initial = 120}};
-    hal::Param<double>        size{*this, "size", "size of the steps", {.initial = 1.0}};
-    hal::Param<double>        band{*this, "band", "tolerance for settling, as a fraction of the step", {.initial = 0.02}};
+    hal::In<bool> trigger{*this, "trigger", "TRUE: a sample is taken in this cycle"};
+    hal::In<double> value{*this, "value", "measured value"};
+    hal::Param<std::uint32_t> samples{
+        *this, "samples", "samples from one step to the next", {.initial = 120}};
+    hal::Param<double> size{*this, "size", "size of the steps", {.initial = 1.0}};
+    hal::Param<double> band{
+        *this, "band", "tolerance for settling, as a fraction of the step", {.initial = 0.02}};
 
-    hal::Out<double>        command{*this, "command", "setpoint: 0 and size in turn"};
-    hal::Out<double>        response{*this, "response", "value as a fraction of the step, from 0 to 1"};
-    hal::Out<double>        time{*this, "time", "time since the step", {.unit = "s"}};
+    hal::Out<double> command{*this, "command", "setpoint: 0 and size in turn"};
+    hal::Out<double> response{*this, "response", "value as a fraction of the step, from 0 to 1"};
+    hal::Out<double> time{*this, "time", "time since the step", {.unit = "s"}};
     hal::Out<std::uint32_t> steps{*this, "steps", "complete steps, without the first"};
-    Series                  overshoot{*this, "overshoot", "overshoot beyond the step, as a fraction of it", ""};
-    Series                  settling{*this, "settling", "time from the step to the last value outside of the band", "s"};
-    Series                  itae{*this, "itae", "integral of time times the absolute error, as a fraction of the step", "s^2"};
+    Series overshoot{*this, "overshoot", "overshoot beyond the step, as a fraction of it", ""};
+    Series settling{*this, "settling", "time from the step to the last value outside of the band",
+                    "s"};
+    Series itae{*this, "itae",
+                "integral of time times the absolute error, as a fraction of the step", "s^2"};
 
-    hal::Function run{*this, "update", &StepSeries::update, "steps the setpoint and measures the response"};
+    hal::Function run{*this, "update", &StepSeries::update,
+                      "steps the setpoint and measures the response"};
 
     void update(hal::Cycle cycle) noexcept {
-        if (trigger && count_++ % std::max<std::uint32_t>(samples, 1) == 0) begin();
+        if (trigger && count_++ % std::max<std::uint32_t>(samples, 1) == 0) {
+            begin();
+        }
         if (!started_) return;
         time = since_;
         response = (value - from_) / (command - from_);
         const double off = std::isfinite(response) ? response - 1.0 : 0.0;
         peak_ = std::fmax(peak_, off);
-        if (std::fabs(off) > band) settled_ = since_;
+        if (std::fabs(off) > band) {
+            settled_ = since_;
+        }
         sum_ += since_ * std::fabs(off) * cycle.seconds();
         since_ += cycle.seconds();
     }
@@ -73,9 +89,14 @@ private:
         since_ = peak_ = settled_ = sum_ = 0.0;
     }
 
-    double        from_ = 0.0, since_ = 0.0, peak_ = 0.0, settled_ = 0.0, sum_ = 0.0;
-    std::uint32_t count_ = 0, number_ = 0;
-    bool          started_ = false;
+    double from_ = 0.0;
+    double since_ = 0.0;
+    double peak_ = 0.0;
+    double settled_ = 0.0;
+    double sum_ = 0.0;
+    std::uint32_t count_ = 0;
+    std::uint32_t number_ = 0;
+    bool started_ = false;
 };
 
 }  // namespace

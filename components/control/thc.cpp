@@ -6,16 +6,21 @@ namespace {
 struct Thc : TorchHeight {
     using TorchHeight::TorchHeight;
 
-    hal::In<double>    encoder_vel{*this, "encoder-vel", "frequency of the voltage-to-frequency converter, as an encoder velocity"};
-    hal::In<double>    volts_requested{*this, "volts-requested", "requested arc voltage", {.unit = "V"}};
-    hal::In<double>    vel_tol{*this, "vel-tol", "no effect; set velocity-tol instead"};
-    hal::Out<double>   volts{*this, "volts", "arc voltage, not below 0", {.unit = "V"}};
-    hal::Out<double>   offset_value{*this, "offset-value", "current correction"};
+    hal::In<double> encoder_vel{
+        *this, "encoder-vel",
+        "frequency of the voltage-to-frequency converter, as an encoder velocity"};
+    hal::In<double> volts_requested{
+        *this, "volts-requested", "requested arc voltage", {.unit = "V"}};
+    hal::In<double> vel_tol{*this, "vel-tol", "no effect; set velocity-tol instead"};
+    hal::Out<double> volts{*this, "volts", "arc voltage, not below 0", {.unit = "V"}};
+    hal::Out<double> offset_value{*this, "offset-value", "current correction"};
     hal::Param<double> vel_scale{*this, "vel-scale", "volts per unit of encoder-vel"};
     hal::Param<double> scale_offset{*this, "scale-offset", "encoder-vel at 0 V"};
-    hal::Param<double> voltage_tol{*this, "voltage-tol", "deadband around volts-requested", {.unit = "V"}};
-    hal::Param<double> correction_vel{*this, "correction-vel", "change of the correction per cycle"};
-    hal::Function      run{*this, "", &Thc::update, "computes the arc voltage and corrects Z"};
+    hal::Param<double> voltage_tol{
+        *this, "voltage-tol", "deadband around volts-requested", {.unit = "V"}};
+    hal::Param<double> correction_vel{*this, "correction-vel",
+                                      "change of the correction per cycle"};
+    hal::Function run{*this, "", &Thc::update, "computes the arc voltage and corrects Z"};
 
     void update(hal::Cycle) noexcept {
         const double measured = (encoder_vel - scale_offset) * vel_scale;

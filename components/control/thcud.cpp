@@ -6,15 +6,18 @@ namespace {
 struct Thcud : TorchHeight {
     using TorchHeight::TorchHeight;
 
-    hal::In<bool>    torch_up{*this, "torch-up", "request to raise the torch"};
-    hal::In<bool>    torch_down{*this, "torch-down", "request to lower the torch"};
+    hal::In<bool> torch_up{*this, "torch-up", "request to raise the torch"};
+    hal::In<bool> torch_down{*this, "torch-down", "request to lower the torch"};
     hal::Out<double> cur_offset{*this, "cur-offset", "current correction"};
-    hal::Out<bool>   removing_offset{*this, "removing-offset", "TRUE while the torch is off and the correction is being removed"};
-    hal::In<double>  correction_vel{*this, "correction-vel", "change of the correction per cycle"};
-    hal::Function    run{*this, "", &Thcud::update, "corrects Z"};
+    hal::Out<bool> removing_offset{
+        *this, "removing-offset",
+        "TRUE while the torch is off and the correction is being removed"};
+    hal::In<double> correction_vel{*this, "correction-vel", "change of the correction per cycle"};
+    hal::Function run{*this, "", &Thcud::update, "corrects Z"};
 
     void update(hal::Cycle) noexcept {
-        removing_offset = control([&] { return int{torch_up.get()} - int{torch_down.get()}; }, correction_vel);
+        removing_offset =
+            control([&] { return int{torch_up.get()} - int{torch_down.get()}; }, correction_vel);
         cur_offset = offset();
     }
 };

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The status that each instance publishes: one topic for all instances, one text of lines "KEY VALUE" each, twice a second, for `hal top`
-// and for the nodes of a netlist. The first lines are the host's (hal/status.h), the others a component's.
+// The status that each instance publishes: one topic for all instances, one text of lines "KEY
+// VALUE" each, twice a second, for `hal top` and for the nodes of a netlist. The first lines are
+// the host's (hal/status.h), the others a component's.
 #pragma once
 
 #include <cstddef>
@@ -33,15 +34,17 @@ public:
     virtual void add(const void* owner, const std::string& lines) = 0;
 };
 /// Returns the beacon of a participant. Without `host` it publishes only the added lines. [setup]
-HAL_EXPORT std::shared_ptr<Beacon> beacon(const std::shared_ptr<Participant>&, const hal_status* host);
+HAL_EXPORT std::shared_ptr<Beacon> beacon(const std::shared_ptr<Participant>&,
+                                          const hal_status* host);
 
 }  // namespace hal::dds
 
-/// For `hal top`, which loads this library when it is installed: calls `heard` with each received status, in a thread of the engine,
-/// until halcyon_status_close. `settings` are words KEY=VALUE as for `hal run --dds`. Returns nullptr and sets `problem` (256 bytes) to the
-/// reason.
+/// For `hal top`, which loads this library when it is installed: calls `heard` with each received
+/// status, in a thread of the engine, until halcyon_status_close. `settings` are words KEY=VALUE as
+/// for `hal run --dds`. Returns nullptr and sets `problem` (256 bytes) to the reason.
 extern "C" {
-HAL_EXPORT void* halcyon_status_open(const char* settings, void (*heard)(void* user, const char* text, size_t length), void* user,
-                                     char* problem);
-HAL_EXPORT void  halcyon_status_close(void*);
+HAL_EXPORT void* halcyon_status_open(const char* settings,
+                                     void (*heard)(void* user, const char* text, size_t length),
+                                     void* user, char* problem);
+HAL_EXPORT void halcyon_status_close(void*);
 }

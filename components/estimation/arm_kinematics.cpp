@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "estimation/arm_kinematics.hpp"
 
-HAL_COMPONENT(hal::estimation::ArmKinematics, "arm_kinematics", "Forward and inverse kinematics of a serial arm with up to 8 joints", R"(
+HAL_COMPONENT(hal::estimation::ArmKinematics, "arm_kinematics",
+              "Forward and inverse kinematics of a serial arm with up to 8 joints", R"(
 `dh` is the arm's Denavit-Hartenberg table, a row per joint: a, alpha, d, theta (m, rad), and a fifth column with 1 for a prismatic joint. `pose` is
 x y z roll pitch yaw; roll, pitch and yaw rotate about the fixed axes x, y and z, in this order.
 

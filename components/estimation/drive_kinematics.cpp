@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "estimation/drive_kinematics.hpp"
 
-HAL_COMPONENT(hal::estimation::DriveKinematics, "drive_kinematics", "Wheel speeds and odometry of a robot with two driven wheels", R"(
+HAL_COMPONENT(hal::estimation::DriveKinematics, "drive_kinematics",
+              "Wheel speeds and odometry of a robot with two driven wheels", R"(
 The two wheels are `track` apart. Joints are the measured wheel speeds, left then right; `pose` is the odometry. `target-0` is the forward speed, `target-1`
 the turning speed, and the commands are the wheel speeds for them. `diff_drive` does the same from wheel angles, with a named pin
 for each value and with limits of speed and acceleration.

@@ -5,39 +5,61 @@
 
 namespace hal::estimation {
 
-/// v = (right + left) / 2, w = (right - left) / track. The path of a cycle is an arc; its chord is added to the position.
+/// v = (right + left) / 2, w = (right - left) / track. The path of a cycle is an arc; its chord is
+/// added to the position.
 class DriveKinematics : public Kinematics {
 public:
     explicit DriveKinematics(const hal_host* host)
         : Kinematics(host, 2,
                      {"measured speed of wheel # (0: left, 1: right), m/s",
-                      "target-0: forward speed (m/s); target-1: turning speed (rad/s); the others have no effect",
-                      "odometry: x y (m), heading (rad), forward speed (m/s), turning speed (rad/s), distance driven (m)",
-                      "speed of wheel # that reaches the target: m/s", "while TRUE, the odometry is reset to 0"}) {}
+                      "target-0: forward speed (m/s); target-1: turning speed (rad/s); the others "
+                      "have no effect",
+                      "odometry: x y (m), heading (rad), forward speed (m/s), turning speed "
+                      "(rad/s), distance driven (m)",
+                      "speed of wheel # that reaches the target: m/s",
+                      "while TRUE, the odometry is reset to 0"}) {}
 
     void update(Cycle cycle) noexcept {
         if (!read_inputs()) return;
-        const double dt = cycle.seconds(), width = track > 0.0 ? track.get() : 1.0, v = 0.5 * (measured_(0) + measured_(1)),
+        const double dt = cycle.seconds(), width = track > 0.0 ? track.get() : 1.0,
+                     v = 0.5 * (measured_(0) + measured_(1)),
                      w = (measured_(1) - measured_(0)) / width;
-        if (follow) x_ = y_ = heading_ = distance_ = 0.0;
-        const double turn = 0.5 * w * dt, chord = std::fabs(turn) > 1e-6 ? std::sin(turn) / turn : 1.0 - turn * turn / 6.0;
+        if (follow) {
+            x_ = y_ = heading_ = distance_ = 0.0;
+        }
+        const double turn = 0.5 * w * dt, chord = std::fabs(turn) > 1e-6 ? std::sin(turn) / turn
+                                                                         : 1.0 - turn * turn / 6.0;
         x_ += v * dt * chord * std::cos(heading_ + turn);
         y_ += v * dt * chord * std::sin(heading_ + turn);
         heading_ = std::remainder(heading_ + w * dt, 2.0 * pi);
         distance_ += std::fabs(v) * dt;
         const double shown[] = {x_, y_, heading_, v, w, distance_};
-        for (std::size_t i = 0; i < 6; ++i) pose[i] = shown[i];
+        for (std::size_t i = 0; i < 6; ++i) {
+            pose[i] = shown[i];
+        }
         command[0] = target[0] - 0.5 * width * target[1];
         command[1] = target[0] + 0.5 * width * target[1];
         solved = track > 0.0;
     }
 
 private:
-    double x_ = 0.0, y_ = 0.0, heading_ = 0.0, distance_ = 0.0;
+    double x_ = 0.0;
+
+private:
+    double y_ = 0.0;
+
+private:
+    double heading_ = 0.0;
+
+private:
+    double distance_ = 0.0;
 
 public:
-    Param<double> track{*this, "track", "distance between the wheels", {.initial = 0.3, .unit = "m"}};
-    Function      run{*this, "update", &DriveKinematics::update, "computes the odometry from the wheel speeds, and the wheel commands from the target"};
+    Param<double> track{
+        *this, "track", "distance between the wheels", {.initial = 0.3, .unit = "m"}};
+    Function run{
+        *this, "update", &DriveKinematics::update,
+        "computes the odometry from the wheel speeds, and the wheel commands from the target"};
 };
 
 }  // namespace hal::estimation

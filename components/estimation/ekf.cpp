@@ -20,19 +20,29 @@ speed' = -gl * sin(angle) - 0.1 * speed
 measure encoder = angle sigma 0.002 wrap
 )";
 
-/// The model as the filter needs it: a step by Runge and Kutta on duals gives the state and its derivative by the state before.
+/// The model as the filter needs it: a step by Runge and Kutta on duals gives the state and its
+/// derivative by the state before.
 class Nonlinear {
 public:
     explicit Nonlinear(Model model) : model_(std::move(model)), values_(model_.variables()) {
-        for (std::size_t i = 0; i < model_.constants.size(); ++i) values_[most_slopes + Model::most_inputs + i].value = model_.constants[i];
+        for (std::size_t i = 0; i < model_.constants.size(); ++i) {
+            values_[most_slopes + Model::most_inputs + i].value = model_.constants[i];
+        }
     }
     const Model& model() const noexcept { return model_; }
-    void         set_period(double period) noexcept { period_ = period; }
+    void set_period(double period) noexcept { period_ = period; }
 
     void predict(Moment& to, const Moment& from) noexcept {
         const std::size_t n = model_.states.size();
-        for (std::size_t i = 0; i < model_.inputs.size(); ++i) values_[most_slopes + i] = Dual{to.u(static_cast<Eigen::Index>(i))};
-        States x{}, k1{}, k2{}, k3{}, k4{}, next{};
+        for (std::size_t i = 0; i < model_.inputs.size(); ++i) {
+            values_[most_slopes + i] = Dual{to.u(static_cast<Eigen::Index>(i))};
+        }
+        States x{};
+        States k1{};
+        States k2{};
+        States k3{};
+        States k4{};
+        States next{};
         for (std::size_t i = 0; i < n; ++i) {
             x[i].value = from.x(static_cast<Eigen::Index>(i));
             x[i].slope[i] = 1.0;
@@ -42,10 +52,14 @@ public:
         rates(along(x, k2, 0.5 * period_), k3);
         rates(along(x, k3, period_), k4);
         for (std::size_t i = 0; i < n; ++i) {
-            const auto step = [&](double a, double b, double c, double d) { return period_ / 6.0 * (a + 2.0 * b + 2.0 * c + d); };
+            const auto step = [&](double a, double b, double c, double d) {
+                return period_ / 6.0 * (a + 2.0 * b + 2.0 * c + d);
+            };
             next[i].value = x[i].value + step(k1[i].value, k2[i].value, k3[i].value, k4[i].value);
-            for (std::size_t j = 0; j < n; ++j)
-                next[i].slope[j] = x[i].slope[j] + step(k1[i].slope[j], k2[i].slope[j], k3[i].slope[j], k4[i].slope[j]);
+            for (std::size_t j = 0; j < n; ++j) {
+                next[i].slope[j] = x[i].slope[j] + step(k1[i].slope[j], k2[i].slope[j],
+                                                        k3[i].slope[j], k4[i].slope[j]);
+            }
         }
         const auto size = static_cast<Eigen::Index>(n);
         f_.resize(size, size);
@@ -55,24 +69,33 @@ public:
             const auto at = static_cast<std::size_t>(i);
             to.x(i) = next[at].value;
             q_(i, i) = model_.states[at].noise * model_.states[at].noise * period_;
-            for (Eigen::Index j = 0; j < size; ++j) f_(i, j) = next[at].slope[static_cast<std::size_t>(j)];
+            for (Eigen::Index j = 0; j < size; ++j) {
+                f_(i, j) = next[at].slope[static_cast<std::size_t>(j)];
+            }
         }
         spread(to.p, f_, from.p, q_);
     }
     Fate measure(Moment& moment, Eigen::Index channel, double gate) noexcept {
         const Model::Measure& m = model_.measures[static_cast<std::size_t>(channel)];
-        const std::size_t     n = model_.states.size();
+        const std::size_t n = model_.states.size();
         for (std::size_t i = 0; i < n; ++i) {
             values_[i] = Dual{moment.x(static_cast<Eigen::Index>(i))};
             values_[i].slope[i] = 1.0;
         }
-        for (std::size_t i = 0; i < model_.inputs.size(); ++i) values_[most_slopes + i] = Dual{moment.u(static_cast<Eigen::Index>(i))};
+        for (std::size_t i = 0; i < model_.inputs.size(); ++i) {
+            values_[most_slopes + i] = Dual{moment.u(static_cast<Eigen::Index>(i))};
+        }
         const Dual expected = m.value(values_.data(), n);
-        double     off = moment.z(channel) - expected.value;
-        if (m.wrap > 0.0) off = std::remainder(off, m.wrap);
+        double off = moment.z(channel) - expected.value;
+        if (m.wrap > 0.0) {
+            off = std::remainder(off, m.wrap);
+        }
         Vector row(static_cast<Eigen::Index>(n));
-        for (std::size_t i = 0; i < n; ++i) row(static_cast<Eigen::Index>(i)) = expected.slope[i];
-        if (!std::isfinite(off) || !finite(row)) return Fate::outlier;  // a formula that has no value here
+        for (std::size_t i = 0; i < n; ++i) {
+            row(static_cast<Eigen::Index>(i)) = expected.slope[i];
+        }
+        // a formula that has no value here
+        if (!std::isfinite(off) || !finite(row)) return Fate::outlier;
         return correct(moment.x, moment.p, row, off, m.sigma * m.sigma, gate);
     }
 
@@ -81,22 +104,28 @@ private:
 
     void rates(const States& x, States& to) noexcept {
         const std::size_t n = model_.states.size();
-        for (std::size_t i = 0; i < n; ++i) values_[i] = x[i];
-        for (std::size_t i = 0; i < n; ++i) to[i] = model_.states[i].rate(values_.data(), n);
+        for (std::size_t i = 0; i < n; ++i) {
+            values_[i] = x[i];
+        }
+        for (std::size_t i = 0; i < n; ++i) {
+            to[i] = model_.states[i].rate(values_.data(), n);
+        }
     }
     States along(const States& x, const States& k, double by) const noexcept {
         States to = x;
         for (std::size_t i = 0; i < model_.states.size(); ++i) {
             to[i].value += by * k[i].value;
-            for (std::size_t j = 0; j < model_.states.size(); ++j) to[i].slope[j] += by * k[i].slope[j];
+            for (std::size_t j = 0; j < model_.states.size(); ++j) {
+                to[i].slope[j] += by * k[i].slope[j];
+            }
         }
         return to;
     }
 
-    Model             model_;
+    Model model_;
     std::vector<Dual> values_;
-    Matrix            f_, q_;
-    double            period_ = 0.001;
+    Matrix f_, q_;
+    double period_ = 0.001;
 };
 
 class Ekf : public hal::Component {
@@ -104,19 +133,26 @@ public:
     explicit Ekf(const hal_host* host)
         : Component(host),
           texts_(*this),
-          file_(*this, "model", "", "model file, relative to the netlist; default: a pendulum of 0.3 m"),
-          history_(*this, "history", 32, "length of the history in cycles; measurements may be up to history - 2 cycles old",
-                   {.min = 3, .max = 4096}),
+          file_(*this, "model", "",
+                "model file, relative to the netlist; default: a pendulum of 0.3 m"),
+          history_(
+              *this, "history", 32,
+              "length of the history in cycles; measurements may be up to history - 2 cycles old",
+              {.min = 3, .max = 4096}),
           plant_(read()),
-          past_(plant_, static_cast<std::size_t>(history_), start(), covariance(), count(plant_.model().inputs),
-                count(plant_.model().measures)),
+          past_(plant_, static_cast<std::size_t>(history_), start(), covariance(),
+                count(plant_.model().inputs), count(plant_.model().measures)),
           channels_(*this, count(plant_.model().measures), names()) {
-        for (const auto& name : plant_.model().inputs)
-            inputs_.emplace_back(*this, dashed(name).c_str(), "input of the model since the previous cycle");
+        for (const auto& name : plant_.model().inputs) {
+            inputs_.emplace_back(*this, dashed(name).c_str(),
+                                 "input of the model since the previous cycle");
+        }
         for (const Model::State& s : plant_.model().states) {
-            x_.emplace_back(*this, ("x-" + dashed(s.name)).c_str(), ("state " + s.name + ", estimated").c_str(),
+            x_.emplace_back(*this, ("x-" + dashed(s.name)).c_str(),
+                            ("state " + s.name + ", estimated").c_str(),
                             hal::PinOptions<double>{.finite = true});
-            sigma_.emplace_back(*this, ("sigma-" + dashed(s.name)).c_str(), ("standard deviation of state " + s.name).c_str(),
+            sigma_.emplace_back(*this, ("sigma-" + dashed(s.name)).c_str(),
+                                ("standard deviation of state " + s.name).c_str(),
                                 hal::PinOptions<double>{.finite = true});
         }
         input_ = Vector::Zero(count(plant_.model().inputs));
@@ -124,9 +160,14 @@ public:
 
     void update(hal::Cycle cycle) noexcept {
         plant_.set_period(cycle.seconds());
-        if (reset) past_.restart();
-        for (std::size_t i = 0; i < inputs_.size(); ++i)
-            if (const double value = inputs_[i]; std::isfinite(value)) input_(static_cast<Eigen::Index>(i)) = value;
+        if (reset) {
+            past_.restart();
+        }
+        for (std::size_t i = 0; i < inputs_.size(); ++i) {
+            if (const double value = inputs_[i]; std::isfinite(value)) {
+                input_(static_cast<Eigen::Index>(i)) = value;
+            }
+        }
         past_.advance(input_);
         channels_.feed(past_, cycle);
         past_.settle(std::fmax(channels_.gate, 0.0));
@@ -145,23 +186,31 @@ private:
         return static_cast<Eigen::Index>(list.size());
     }
     static std::string dashed(std::string name) {
-        for (char& c : name) c = c == '_' ? '-' : static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+        for (char& c : name) {
+            c = c == '_' ? '-' : static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+        }
         return name;
     }
     std::vector<std::string> names() const {
         std::vector<std::string> names;
-        for (const auto& m : plant_.model().measures) names.push_back(dashed(m.name));
+        for (const auto& m : plant_.model().measures) {
+            names.push_back(dashed(m.name));
+        }
         return names;
     }
     Vector start() const {
         Vector x(count(plant_.model().states));
-        for (Eigen::Index i = 0; i < x.size(); ++i) x(i) = plant_.model().states[static_cast<std::size_t>(i)].start;
+        for (Eigen::Index i = 0; i < x.size(); ++i) {
+            x(i) = plant_.model().states[static_cast<std::size_t>(i)].start;
+        }
         return x;
     }
     Matrix covariance() const {
         const Eigen::Index n = count(plant_.model().states);
-        Matrix             p = Matrix::Zero(n, n);
-        for (Eigen::Index i = 0; i < n; ++i) p(i, i) = std::pow(plant_.model().states[static_cast<std::size_t>(i)].sigma, 2);
+        Matrix p = Matrix::Zero(n, n);
+        for (Eigen::Index i = 0; i < n; ++i) {
+            p(i, i) = std::pow(plant_.model().states[static_cast<std::size_t>(i)].sigma, 2);
+        }
         return p;
     }
     Nonlinear read() const {
@@ -172,19 +221,22 @@ private:
         return Nonlinear(std::move(model));
     }
 
-    hal::Texts                   texts_;
-    hal::TextArgument            file_;
-    hal::Argument                history_;
-    Nonlinear                    plant_;
-    Past<Nonlinear>              past_;
-    Channels                     channels_;
-    Vector                       input_;
-    std::deque<hal::In<double>>  inputs_;
+    hal::Texts texts_;
+    hal::TextArgument file_;
+    hal::Argument history_;
+    Nonlinear plant_;
+    Past<Nonlinear> past_;
+    Channels channels_;
+    Vector input_;
+    std::deque<hal::In<double>> inputs_;
     std::deque<hal::Out<double>> x_, sigma_;
 
 public:
-    hal::In<bool> reset{*this, "reset", "TRUE resets the estimate to its initial value, corrected by the current measurements"};
-    hal::Function run{*this, "update", &Ekf::update, "predicts one period and applies the measurements"};
+    hal::In<bool> reset{
+        *this, "reset",
+        "TRUE resets the estimate to its initial value, corrected by the current measurements"};
+    hal::Function run{*this, "update", &Ekf::update,
+                      "predicts one period and applies the measurements"};
 };
 
 }  // namespace

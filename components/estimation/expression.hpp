@@ -23,7 +23,7 @@ inline constexpr int most_slopes = 8;  ///< states of a nonlinear model at most
 
 /// A number and its derivatives by the states: forward differentiation is exact, not a difference.
 struct Dual {
-    double                          value = 0.0;
+    double value = 0.0;
     std::array<double, most_slopes> slope{};
 };
 
@@ -36,24 +36,30 @@ public:
     /// Returns the number of a variable, or nothing.
     using Lookup = std::function<std::optional<std::uint16_t>(std::string_view)>;
 
-    /// Precedence from weak to strong: + -, * /, sign, ^ (to the right). `at` is the offset of `text` in its file. [setup]
-    static std::optional<Problem> compile(std::string_view text, std::uint32_t at, const Lookup& lookup, Expression& to) {
+    /// Precedence from weak to strong: + -, * /, sign, ^ (to the right). `at` is the offset of
+    /// `text` in its file. [setup]
+    static std::optional<Problem> compile(std::string_view text, std::uint32_t at,
+                                          const Lookup& lookup, Expression& to) {
         Parser parser{text, at, lookup, to, 0, {}, 0};
         to.steps_.clear();
         parser.sum();
         parser.skip();
-        if (!parser.problem && parser.place < text.size())
-            parser.fail(parser.place, parser.place + 1, "'" + std::string(1, text[parser.place]) + "' is not an operator",
+        if (!parser.problem && parser.place < text.size()) {
+            parser.fail(parser.place, parser.place + 1,
+                        "'" + std::string(1, text[parser.place]) + "' is not an operator",
                         "write one of + - * / ^ between two values");
-        if (!parser.problem && parser.deep > deepest)
-            parser.fail(0, text.size(), "the formula is nested too deeply", "split it with constants, or use fewer brackets");
+        }
+        if (!parser.problem && parser.deep > deepest) {
+            parser.fail(0, text.size(), "the formula is nested too deeply",
+                        "split it with constants, or use fewer brackets");
+        }
         return parser.problem;
     }
 
     /// `n` of the slopes are computed. [realtime]
     Dual operator()(const Dual* variables, std::size_t n) const noexcept {
         std::array<Dual, deepest> stack;
-        std::size_t               top = 0;
+        std::size_t top = 0;
         for (const Step& s : steps_) {
             switch (s.kind) {
             case Kind::number: stack[top++] = Dual{s.number}; break;
@@ -71,21 +77,27 @@ public:
 private:
     enum class Kind : std::uint8_t { number, variable, one, two };
     struct Step {
-        Kind          kind;
+        Kind kind;
         std::uint16_t index;
-        double        number;
+        double number;
     };
-    static constexpr const char* ones[] = {"-", "sin", "cos", "tan", "sqrt", "exp", "log", "abs", "tanh", "asin", "acos", "atan"};
+    static constexpr const char* ones[] = {"-",   "sin", "cos",  "tan",  "sqrt", "exp",
+                                           "log", "abs", "tanh", "asin", "acos", "atan"};
     static constexpr const char* twos[] = {"+", "-", "*", "/", "^", "atan2", "min", "max"};
 
     static Dual chain(const Dual& x, double value, double factor, std::size_t n) noexcept {
         Dual result{value};
-        for (std::size_t i = 0; i < n; ++i) result.slope[i] = factor * x.slope[i];
+        for (std::size_t i = 0; i < n; ++i) {
+            result.slope[i] = factor * x.slope[i];
+        }
         return result;
     }
-    static Dual chain(const Dual& x, const Dual& y, double value, double by_x, double by_y, std::size_t n) noexcept {
+    static Dual chain(const Dual& x, const Dual& y, double value, double by_x, double by_y,
+                      std::size_t n) noexcept {
         Dual result{value};
-        for (std::size_t i = 0; i < n; ++i) result.slope[i] = by_x * x.slope[i] + by_y * y.slope[i];
+        for (std::size_t i = 0; i < n; ++i) {
+            result.slope[i] = by_x * x.slope[i] + by_y * y.slope[i];
+        }
         return result;
     }
     static Dual one(std::uint16_t which, const Dual& x, std::size_t n) noexcept {
@@ -106,7 +118,8 @@ private:
         }
     }
     static Dual two(std::uint16_t which, const Dual& x, const Dual& y, std::size_t n) noexcept {
-        const double a = x.value, b = y.value;
+        const double a = x.value;
+        const double b = y.value;
         switch (which) {
         case 0: return chain(x, y, a + b, 1.0, 1.0, n);
         case 1: return chain(x, y, a - b, 1.0, -1.0, n);
@@ -114,7 +127,8 @@ private:
         case 3: return chain(x, y, a / b, 1.0 / b, -a / (b * b), n);
         case 4: {
             const double power = std::pow(a, b);
-            return chain(x, y, power, b == 0.0 ? 0.0 : b * std::pow(a, b - 1.0), a > 0.0 ? power * std::log(a) : 0.0, n);
+            return chain(x, y, power, b == 0.0 ? 0.0 : b * std::pow(a, b - 1.0),
+                         a > 0.0 ? power * std::log(a) : 0.0, n);
         }
         case 5: return chain(x, y, std::atan2(a, b), b / (a * a + b * b), -a / (a * a + b * b), n);
         case 6: return a <= b ? x : y;
@@ -123,23 +137,29 @@ private:
     }
 
     struct Parser {
-        static constexpr const char* a_value = "a value is a number, a name, a function such as sin(x), or a formula in brackets";
+        static constexpr const char* a_value =
+            "a value is a number, a name, a function such as sin(x), or a formula in brackets";
 
-        std::string_view       text;
-        std::uint32_t          at;
-        const Lookup&          lookup;
-        Expression&            to;
-        std::size_t            place;
+        std::string_view text;
+        std::uint32_t at;
+        const Lookup& lookup;
+        Expression& to;
+        std::size_t place;
         std::optional<Problem> problem;
-        std::size_t            deep, now = 0, nested = 0;
+        std::size_t deep, now = 0, nested = 0;
 
         void fail(std::size_t begin, std::size_t end, std::string sentence, std::string help) {
-            if (!problem)
-                problem = Problem{at + static_cast<std::uint32_t>(begin), at + static_cast<std::uint32_t>(end), std::move(sentence),
+            if (!problem) {
+                problem = Problem{at + static_cast<std::uint32_t>(begin),
+                                  at + static_cast<std::uint32_t>(end), std::move(sentence),
                                   std::move(help)};
+            }
         }
         void skip() {
-            while (place < text.size() && (text[place] == ' ' || text[place] == '\t' || text[place] == '\r')) ++place;
+            while (place < text.size() &&
+                   (text[place] == ' ' || text[place] == '\t' || text[place] == '\r')) {
+                ++place;
+            }
         }
         bool take(char c) {
             skip();
@@ -149,90 +169,138 @@ private:
         }
         void push(Step s) {
             to.steps_.push_back(s);
-            if (s.kind == Kind::number || s.kind == Kind::variable) deep = std::max(deep, ++now);
-            if (s.kind == Kind::two) --now;
+            if (s.kind == Kind::number || s.kind == Kind::variable) {
+                deep = std::max(deep, ++now);
+            }
+            if (s.kind == Kind::two) {
+                --now;
+            }
         }
         void sum() {
             product();
             while (!problem) {
-                if (take('+')) product(), push({Kind::two, 0, 0.0});
-                else if (take('-')) product(), push({Kind::two, 1, 0.0});
-                else return;
+                if (take('+')) {
+                    product();
+                    push({Kind::two, 0, 0.0});
+                } else if (take('-')) {
+                    product();
+                    push({Kind::two, 1, 0.0});
+                } else {
+                    return;
+                }
             }
         }
         void product() {
             sign();
             while (!problem) {
-                if (take('*')) sign(), push({Kind::two, 2, 0.0});
-                else if (take('/')) sign(), push({Kind::two, 3, 0.0});
-                else return;
+                if (take('*')) {
+                    sign();
+                    push({Kind::two, 2, 0.0});
+                } else if (take('/')) {
+                    sign();
+                    push({Kind::two, 3, 0.0});
+                } else {
+                    return;
+                }
             }
         }
         void sign() {
-            if (++nested > 200) return fail(place, place + 1, "the formula is nested too deeply", "use fewer brackets");
-            if (take('-')) sign(), push({Kind::one, 0, 0.0});
-            else if (take('+')) sign();
-            else power();
+            if (++nested > 200) {
+                return fail(place, place + 1, "the formula is nested too deeply",
+                            "use fewer brackets");
+            }
+            if (take('-')) {
+                sign();
+                push({Kind::one, 0, 0.0});
+            } else if (take('+')) {
+                sign();
+            } else {
+                power();
+            }
             --nested;
         }
         void power() {
             value();
-            if (take('^')) sign(), push({Kind::two, 4, 0.0});
+            if (take('^')) {
+                sign();
+                push({Kind::two, 4, 0.0});
+            }
         }
         void value() {
             skip();
             if (problem) return;
-            if (place >= text.size())
-                return fail(text.empty() ? 0 : text.size() - 1, text.size(), "missing value at the end of the formula", a_value);
+            if (place >= text.size()) {
+                return fail(text.empty() ? 0 : text.size() - 1, text.size(),
+                            "missing value at the end of the formula", a_value);
+            }
             const std::size_t begin = place;
             if (take('(')) {
                 sum();
-                if (!problem && !take(')')) fail(begin, begin + 1, "unclosed bracket", "write the closing )");
+                if (!problem && !take(')')) {
+                    fail(begin, begin + 1, "unclosed bracket", "write the closing )");
+                }
                 return;
             }
             const unsigned char c = static_cast<unsigned char>(text[place]);
             if (std::isdigit(c) || c == '.') return number();
             if (std::isalpha(c) || c == '_') return word();
-            fail(begin, begin + 1, "'" + std::string(1, text[begin]) + "' is not a value",
-                 a_value);
+            fail(begin, begin + 1, "'" + std::string(1, text[begin]) + "' is not a value", a_value);
         }
         void number() {
             const std::string rest(text.substr(place));
-            char*             end = nullptr;
-            const double      v = std::strtod(rest.c_str(), &end);
-            if (end == rest.c_str()) return fail(place, place + 1, "'.' is not a number", "write numbers as in 9.81 or 2e-3");
+            char* end = nullptr;
+            const double v = std::strtod(rest.c_str(), &end);
+            if (end == rest.c_str()) {
+                return fail(place, place + 1, "'.' is not a number",
+                            "write numbers as in 9.81 or 2e-3");
+            }
             place += static_cast<std::size_t>(end - rest.c_str());
             push({Kind::number, 0, v});
         }
         void word() {
             const std::size_t begin = place;
-            while (place < text.size() && (std::isalnum(static_cast<unsigned char>(text[place])) || text[place] == '_')) ++place;
+            while (place < text.size() &&
+                   (std::isalnum(static_cast<unsigned char>(text[place])) || text[place] == '_')) {
+                ++place;
+            }
             const std::string name(text.substr(begin, place - begin));
             if (take('(')) {
                 const auto find = [&](const auto& table, std::size_t from) -> int {
-                    for (std::size_t i = from; i < std::size(table); ++i)
+                    for (std::size_t i = from; i < std::size(table); ++i) {
                         if (name == table[i]) return static_cast<int>(i);
+                    }
                     return -1;
                 };
                 if (const int i = find(ones, 1); i >= 0) {
                     sum();
-                    if (!problem && !take(')'))
-                        fail(begin, begin + name.size(), name + " takes one value in brackets", "write " + name + "(x)");
+                    if (!problem && !take(')')) {
+                        fail(begin, begin + name.size(), name + " takes one value in brackets",
+                             "write " + name + "(x)");
+                    }
                     return push({Kind::one, static_cast<std::uint16_t>(i), 0.0});
                 }
                 if (const int i = find(twos, 5); i >= 0) {
                     sum();
                     const bool comma = take(',');
-                    if (comma) sum();
-                    if (!problem && !(comma && take(')')))
-                        fail(begin, begin + name.size(), name + " takes two values", "write " + name + "(y, x)");
+                    if (comma) {
+                        sum();
+                    }
+                    if (!problem && !(comma && take(')'))) {
+                        fail(begin, begin + name.size(), name + " takes two values",
+                             "write " + name + "(y, x)");
+                    }
                     return push({Kind::two, static_cast<std::uint16_t>(i), 0.0});
                 }
                 return fail(begin, begin + name.size(), "unknown function '" + name + "'",
-                            "the functions are sin cos tan asin acos atan atan2 sqrt exp log abs tanh min max");
+                            "the functions are sin cos tan asin acos atan atan2 sqrt exp log abs "
+                            "tanh min max");
             }
-            if (name == "pi") return push({Kind::number, 0, std::numbers::pi});
-            if (const auto i = lookup(name)) return push({Kind::variable, *i, 0.0});
+            if (name == "pi") {
+                return push({Kind::number, 0, std::numbers::pi});
+            }
+            if (const auto i = lookup(name)) {
+                return push({Kind::variable, *i, 0.0});
+            }
             fail(begin, begin + name.size(), "unknown name '" + name + "'",
                  "define states, inputs and constants above this line");
         }

@@ -15,91 +15,168 @@ enum class Phase : std::uint32_t { off, swing_up, balance };
 struct FurutaControl : hal::Component {
     using Component::Component;
 
-    hal::In<bool>   enable{*this, "enable", "FALSE sets the torque to 0"};
-    hal::In<bool>   gains_valid{*this, "gains-valid", "TRUE: the gains are valid; FALSE prevents balancing", {.initial = true}};
+    hal::In<bool> enable{*this, "enable", "FALSE sets the torque to 0"};
+    hal::In<bool> gains_valid{*this,
+                              "gains-valid",
+                              "TRUE: the gains are valid; FALSE prevents balancing",
+                              {.initial = true}};
     hal::In<double> arm_angle{*this, "arm-angle", "arm angle", {.unit = "rad"}};
     hal::In<double> arm_velocity{*this, "arm-velocity", "arm velocity", {.unit = "rad/s"}};
-    hal::In<double> pendulum_angle{*this, "pendulum-angle", "pendulum angle; 0 hanging down", {.unit = "rad"}};
-    hal::In<double> pendulum_velocity{*this, "pendulum-velocity", "pendulum velocity", {.unit = "rad/s"}};
-    hal::In<double> pendulum_age{*this, "pendulum-age", "age of the pendulum's measurements; they are predicted by this time", {.unit = "s"}};
-    hal::In<bool>   identify{*this,
+    hal::In<double> pendulum_angle{
+        *this, "pendulum-angle", "pendulum angle; 0 hanging down", {.unit = "rad"}};
+    hal::In<double> pendulum_velocity{
+        *this, "pendulum-velocity", "pendulum velocity", {.unit = "rad/s"}};
+    hal::In<double> pendulum_age{
+        *this,
+        "pendulum-age",
+        "age of the pendulum's measurements; they are predicted by this time",
+        {.unit = "s"}};
+    hal::In<bool> identify{*this,
                            "identify",
-                           "TRUE: the rig's parameters are identified during motion; FALSE: the parameters below are used",
-                             {.initial = true}};
+                           "TRUE: the rig's parameters are identified during motion; FALSE: the "
+                           "parameters below are used",
+                           {.initial = true}};
     hal::In<double> arm_command{*this, "arm-command", "commanded arm angle", {.unit = "rad"}};
 
-    hal::In<double> gain_arm{*this, "gain-arm", "balance: torque per angle of the arm", {.unit = "N*m/rad"}};
-    hal::In<double> gain_pendulum{*this, "gain-pendulum", "balance: torque per angle of the pendulum from upright", {.unit = "N*m/rad"}};
-    hal::In<double> gain_arm_velocity{*this, "gain-arm-velocity", "balance: torque per speed of the arm", {.unit = "N*m*s/rad"}};
-    hal::In<double> gain_pendulum_velocity{
-        *this, "gain-pendulum-velocity", "balance: torque per speed of the pendulum", {.unit = "N*m*s/rad"}};
+    hal::In<double> gain_arm{
+        *this, "gain-arm", "balance: torque per angle of the arm", {.unit = "N*m/rad"}};
+    hal::In<double> gain_pendulum{*this,
+                                  "gain-pendulum",
+                                  "balance: torque per angle of the pendulum from upright",
+                                  {.unit = "N*m/rad"}};
+    hal::In<double> gain_arm_velocity{
+        *this, "gain-arm-velocity", "balance: torque per speed of the arm", {.unit = "N*m*s/rad"}};
+    hal::In<double> gain_pendulum_velocity{*this,
+                                           "gain-pendulum-velocity",
+                                           "balance: torque per speed of the pendulum",
+                                           {.unit = "N*m*s/rad"}};
 
-    hal::Out<double> voltage{*this, "voltage", "motor voltage", {.unit = "V", .safe = 0.0, .finite = true}};
-    hal::Out<double> torque{*this, "torque", "commanded torque", {.unit = "N*m", .safe = 0.0, .finite = true}};
-    hal::Out<double> from_upright{
-        *this, "from-upright", "predicted angle of the pendulum from upright, -pi..pi", {.unit = "rad", .finite = true}};
-    hal::Out<double>        energy{*this, "energy", "energy of the pendulum relative to that upright at standstill", {.finite = true}};
+    hal::Out<double> voltage{
+        *this, "voltage", "motor voltage", {.unit = "V", .safe = 0.0, .finite = true}};
+    hal::Out<double> torque{
+        *this, "torque", "commanded torque", {.unit = "N*m", .safe = 0.0, .finite = true}};
+    hal::Out<double> from_upright{*this,
+                                  "from-upright",
+                                  "predicted angle of the pendulum from upright, -pi..pi",
+                                  {.unit = "rad", .finite = true}};
+    hal::Out<double> energy{*this,
+                            "energy",
+                            "energy of the pendulum relative to that upright at standstill",
+                            {.finite = true}};
     hal::Out<std::uint32_t> phase{*this, "phase", "0 off, 1 swinging up, 2 balancing"};
-    hal::Out<bool>          balanced{*this, "balanced", "TRUE: upright within upright-angle for upright-time"};
-    hal::Out<std::uint32_t> catches{*this, "catches", "number of transitions from swing-up to balancing"};
-    hal::Out<bool>          homed{
-        *this,
-        "homed",
-        "FALSE: the pendulum oscillates around an angle other than 0, because it was moving at the start; the torque is 0",
-                 {.initial = true}};
-    hal::Out<double> zero_offset{
-        *this, "zero-offset", "identified angle around which the pendulum oscillates", {.unit = "rad", .finite = true}};
+    hal::Out<bool> balanced{*this, "balanced",
+                            "TRUE: upright within upright-angle for upright-time"};
+    hal::Out<std::uint32_t> catches{*this, "catches",
+                                    "number of transitions from swing-up to balancing"};
+    hal::Out<bool> homed{*this,
+                         "homed",
+                         "FALSE: the pendulum oscillates around an angle other than 0, because it "
+                         "was moving at the start; the torque is 0",
+                         {.initial = true}};
+    hal::Out<double> zero_offset{*this,
+                                 "zero-offset",
+                                 "identified angle around which the pendulum oscillates",
+                                 {.unit = "rad", .finite = true}};
     hal::Out<double> identified_frequency{
-        *this, "identified-frequency", "identified frequency of small oscillations with the arm fixed", {.unit = "rad/s", .finite = true}};
-    hal::Out<std::uint32_t> bad_inputs{*this, "bad-inputs", "cycles with a NaN or infinite angle or speed; the torque is 0"};
+        *this,
+        "identified-frequency",
+        "identified frequency of small oscillations with the arm fixed",
+        {.unit = "rad/s", .finite = true}};
+    hal::Out<std::uint32_t> bad_inputs{
+        *this, "bad-inputs", "cycles with a NaN or infinite angle or speed; the torque is 0"};
 
-    hal::LimitParam    max_acceleration{*this, "max-acceleration", "swing-up: maximum acceleration of the arm", {.initial = 30.0, .unit = "rad/s^2"}};
+    hal::LimitParam max_acceleration{*this,
+                                     "max-acceleration",
+                                     "swing-up: maximum acceleration of the arm",
+                                     {.initial = 30.0, .unit = "rad/s^2"}};
     hal::Param<double> energy_gain{
-        *this, "energy-gain", "swing-up: requested acceleration, in multiples of max-acceleration, at zero energy", {.initial = 20.0}};
-    hal::Param<double> energy_target{
-        *this, "energy-target", "swing-up: target for energy; above 1 to compensate friction", {.initial = 1.15}};
-    hal::Param<double> centre_gain{
-        *this, "centre-gain", "swing-up: acceleration per angle of the arm from arm-command", {.initial = 15.0, .unit = "1/s^2"}};
-    hal::Param<double> centre_damping{
-        *this, "centre-damping", "swing-up: acceleration per speed of the arm", {.initial = 0.0, .unit = "1/s"}};
-    hal::LimitParam    max_velocity{*this,
-                                    "max-arm-velocity",
-                                    "swing-up: maximum speed of the arm; balancing ends at 1.25 times this speed",
-                                    {.initial = 6.5, .unit = "rad/s"}};
+        *this,
+        "energy-gain",
+        "swing-up: requested acceleration, in multiples of max-acceleration, at zero energy",
+        {.initial = 20.0}};
+    hal::Param<double> energy_target{*this,
+                                     "energy-target",
+                                     "swing-up: target for energy; above 1 to compensate friction",
+                                     {.initial = 1.15}};
+    hal::Param<double> centre_gain{*this,
+                                   "centre-gain",
+                                   "swing-up: acceleration per angle of the arm from arm-command",
+                                   {.initial = 15.0, .unit = "1/s^2"}};
+    hal::Param<double> centre_damping{*this,
+                                      "centre-damping",
+                                      "swing-up: acceleration per speed of the arm",
+                                      {.initial = 0.0, .unit = "1/s"}};
+    hal::LimitParam max_velocity{
+        *this,
+        "max-arm-velocity",
+        "swing-up: maximum speed of the arm; balancing ends at 1.25 times this speed",
+        {.initial = 6.5, .unit = "rad/s"}};
     hal::Param<double> catch_angle{
-        *this, "catch-angle", "maximum angle from upright at which balancing starts, if the prediction succeeds", {.initial = 0.4, .unit = "rad"}};
-    hal::LimitParam    lose_angle{
-        *this, "lose-angle", "angle from upright at which balancing ends", {.initial = 0.6, .unit = "rad"}};
-    hal::LimitParam    arm_reach{
-        *this, "arm-reach", "balance: limit of the arm's deviation from arm-command", {.initial = 1.0, .unit = "rad"}};
-    hal::Param<double> upright_angle{*this, "upright-angle", "maximum angle from upright for balanced", {.initial = 0.1, .unit = "rad"}};
-    hal::Param<double> upright_time{*this, "upright-time", "time within upright-angle for balanced", {.initial = 0.5, .unit = "s"}};
+        *this,
+        "catch-angle",
+        "maximum angle from upright at which balancing starts, if the prediction succeeds",
+        {.initial = 0.4, .unit = "rad"}};
+    hal::LimitParam lose_angle{*this,
+                               "lose-angle",
+                               "angle from upright at which balancing ends",
+                               {.initial = 0.6, .unit = "rad"}};
+    hal::LimitParam arm_reach{*this,
+                              "arm-reach",
+                              "balance: limit of the arm's deviation from arm-command",
+                              {.initial = 1.0, .unit = "rad"}};
+    hal::Param<double> upright_angle{*this,
+                                     "upright-angle",
+                                     "maximum angle from upright for balanced",
+                                     {.initial = 0.1, .unit = "rad"}};
+    hal::Param<double> upright_time{*this,
+                                    "upright-time",
+                                    "time within upright-angle for balanced",
+                                    {.initial = 0.5, .unit = "s"}};
 
-    hal::LimitParam    max_torque{
-        *this, "max-torque", "maximum torque of motor and amplifier: torque constant times current limit", {.initial = 0.2708, .unit = "N*m"}};
-    hal::Param<double> torque_constant{
-        *this, "torque-constant", "motor: torque per current, and voltage per speed", {.initial = 0.0677, .unit = "N*m/A"}};
-    hal::Param<double> resistance{*this, "resistance", "motor: winding resistance", {.initial = 0.68, .unit = "Ohm"}};
-    hal::Param<double> friction{
-        *this, "friction", "Coulomb friction of the arm, compensated during swing-up", {.initial = 0.008, .unit = "N*m"}};
-    hal::Param<double> arm_inertia{*this,
-                                   "arm-inertia",
-                                   "inertia of arm, rotor and the pendulum's mass at the arm's end about the motor axis",
-                                   {.initial = 6.7417e-3, .unit = "kg*m^2"}};
-    hal::Param<double> swing_inertia{*this, "pendulum-inertia", "inertia of the pendulum about its pivot", {.initial = 3e-3, .unit = "kg*m^2"}};
+    hal::LimitParam max_torque{
+        *this,
+        "max-torque",
+        "maximum torque of motor and amplifier: torque constant times current limit",
+        {.initial = 0.2708, .unit = "N*m"}};
+    hal::Param<double> torque_constant{*this,
+                                       "torque-constant",
+                                       "motor: torque per current, and voltage per speed",
+                                       {.initial = 0.0677, .unit = "N*m/A"}};
+    hal::Param<double> resistance{
+        *this, "resistance", "motor: winding resistance", {.initial = 0.68, .unit = "Ohm"}};
+    hal::Param<double> friction{*this,
+                                "friction",
+                                "Coulomb friction of the arm, compensated during swing-up",
+                                {.initial = 0.008, .unit = "N*m"}};
+    hal::Param<double> arm_inertia{
+        *this,
+        "arm-inertia",
+        "inertia of arm, rotor and the pendulum's mass at the arm's end about the motor axis",
+        {.initial = 6.7417e-3, .unit = "kg*m^2"}};
+    hal::Param<double> swing_inertia{*this,
+                                     "pendulum-inertia",
+                                     "inertia of the pendulum about its pivot",
+                                     {.initial = 3e-3, .unit = "kg*m^2"}};
     hal::Param<double> coupling{
-        *this, "coupling", "pendulum mass times arm length times distance from pivot to centre of mass", {.initial = 3e-3, .unit = "kg*m^2"}};
-    hal::Param<double> weight_moment{
-        *this, "weight-moment", "pendulum weight times distance from pivot to centre of mass", {.initial = 0.147099750, .unit = "N*m"}};
+        *this,
+        "coupling",
+        "pendulum mass times arm length times distance from pivot to centre of mass",
+        {.initial = 3e-3, .unit = "kg*m^2"}};
+    hal::Param<double> weight_moment{*this,
+                                     "weight-moment",
+                                     "pendulum weight times distance from pivot to centre of mass",
+                                     {.initial = 0.147099750, .unit = "N*m"}};
 
-    hal::Function run{*this, "update", &FurutaControl::update, "runs one step of swing-up or balancing"};
+    hal::Function run{*this, "update", &FurutaControl::update,
+                      "runs one step of swing-up or balancing"};
 
     void start() { faults_ = hal::extension<hal_faults>("hal.faults/1"); }
 
     void update(hal::Cycle cycle) noexcept {
         const double dt = cycle.seconds();
-        State        s{arm_angle - arm_command, pendulum_angle, arm_velocity, pendulum_velocity};
-        const bool   sane = std::isfinite(s.arm + s.pendulum + s.arm_speed + s.pendulum_speed) && std::fabs(s.pendulum) < 1e6;
+        State s{arm_angle - arm_command, pendulum_angle, arm_velocity, pendulum_velocity};
+        const bool sane = std::isfinite(s.arm + s.pendulum + s.arm_speed + s.pendulum_speed) &&
+                          std::fabs(s.pendulum) < 1e6;
         if (!sane) {
             bad_inputs = bad_inputs + 1;
             balanced = false;
@@ -111,10 +188,13 @@ struct FurutaControl : hal::Component {
         lead(s);
         const double tilt = std::remainder(s.pendulum - std::numbers::pi, 2.0 * std::numbers::pi);
         // in the frame of the turning arm: the energy upright at a constant arm speed
-        const double spread = s.arm_speed * std::sin(tilt),
-                     kinetic = 0.5 * rig_.pendulum_inertia * (s.pendulum_speed * s.pendulum_speed - spread * spread);
+        const double spread = s.arm_speed * std::sin(tilt);
+
+        const double kinetic =
+            0.5 * rig_.pendulum_inertia * (s.pendulum_speed * s.pendulum_speed - spread * spread);
         const double weight = rig_.weight_moment;
-        const double part = weight > 0.0 ? (kinetic + weight * (1.0 + std::cos(tilt))) / (2.0 * weight) : 0.0;
+        const double part =
+            weight > 0.0 ? (kinetic + weight * (1.0 + std::cos(tilt))) / (2.0 * weight) : 0.0;
         const double known = std::isfinite(part) ? part : 0.0;
         from_upright = tilt;
         energy = known;
@@ -134,11 +214,14 @@ private:
         double arm, pendulum, arm_speed, pendulum_speed;
     };
 
-    /// Returns the rig as given, or as identified from its motion. A pendulum that does not hang at 0 is not driven, because every
-    /// torque would be computed for a wrong angle. A rising edge of `enable` restarts the identification.
+    /// Returns the rig as given, or as identified from its motion. A pendulum that does not hang at
+    /// 0 is not driven, because every torque would be computed for a wrong angle. A rising edge of
+    /// `enable` restarts the identification.
     void learn(const State& s, double dt) noexcept {
-        const hal::estimation::FurutaParameters given{arm_inertia, swing_inertia, coupling, weight_moment, friction};
-        const bool usable = given.arm_inertia > 0.0 && given.pendulum_inertia > 0.0 && given.coupling > 0.0 && given.weight_moment > 0.0;
+        const hal::estimation::FurutaParameters given{arm_inertia, swing_inertia, coupling,
+                                                      weight_moment, friction};
+        const bool usable = given.arm_inertia > 0.0 && given.pendulum_inertia > 0.0 &&
+                            given.coupling > 0.0 && given.weight_moment > 0.0;
         if (!identify || !usable) {
             rig_ = given;
             homed = true;
@@ -151,86 +234,131 @@ private:
             identification_.restart(given, dt);
             homed = true;
         }
-        identification_.add({arm_angle, s.pendulum, s.arm_speed, s.pendulum_speed, torque}, pendulum_age, now_ == Phase::swing_up);
+        identification_.add({arm_angle, s.pendulum, s.arm_speed, s.pendulum_speed, torque},
+                            pendulum_age, now_ == Phase::swing_up);
         rig_ = identification_.estimate();
         if (homed && enable && identification_.zero_is_wrong()) {
             homed = false;
             fault_.begin(faults_, this,
-                         "not homed: the pendulum oscillates around {} rad, expected 0; the torque is 0; let it hang at rest, zero its encoder, "
+                         "not homed: the pendulum oscillates around {} rad, expected 0; the torque "
+                         "is 0; let it hang at rest, zero its encoder, "
                          "then set enable to FALSE and TRUE",
                          identification_.zero_offset());
         }
-        if ((homed || !enable) && fault_.lasts()) fault_.end(faults_, this);  // without enable there is no torque
+        // without enable there is no torque
+        if ((homed || !enable) && fault_.lasts()) {
+            fault_.end(faults_, this);
+        }
         zero_offset = identification_.zero_offset();
         identified_frequency = std::sqrt(rig_.weight_moment / rig_.pendulum_inertia);
     }
 
     void choose(double tilt, const State& s) noexcept {
-        if (!enable || !homed) now_ = Phase::off;
-        else if (now_ != Phase::balance || std::fabs(tilt) >= lose_angle || std::fabs(s.arm_speed) >= 1.25 * max_velocity || !gains_valid) {
+        if (!enable || !homed) {
+            now_ = Phase::off;
+        } else if (now_ != Phase::balance || std::fabs(tilt) >= lose_angle ||
+                   std::fabs(s.arm_speed) >= 1.25 * max_velocity || !gains_valid) {
             const bool can = gains_valid && std::fabs(tilt) < catch_angle && succeeds(tilt, s);
             now_ = can ? Phase::balance : Phase::swing_up;
-            if (can) catches = catches + 1;
+            if (can) {
+                catches = catches + 1;
+            }
         }
         phase = static_cast<std::uint32_t>(now_);
     }
 
     double held(double tilt, const State& s) const noexcept {
         const double reach = std::fabs(arm_reach);
-        return -(gain_arm * std::clamp(s.arm, -reach, reach) + gain_pendulum * tilt + gain_arm_velocity * s.arm_speed +
-                 gain_pendulum_velocity * s.pendulum_speed);
+        return -(gain_arm * std::clamp(s.arm, -reach, reach) + gain_pendulum * tilt +
+                 gain_arm_velocity * s.arm_speed + gain_pendulum_velocity * s.pendulum_speed);
     }
 
-    /// Predicts whether balancing succeeds: with less than the available torque, as the amplifier may limit it further,
-    /// and with the arm below the speed that ends balancing.
+    /// Predicts whether balancing succeeds: with less than the available torque, as the amplifier
+    /// may limit it further, and with the arm below the speed that ends balancing.
     bool succeeds(double tilt, State s) const noexcept {
-        constexpr double dt = 0.005, part_of_torque = 0.8, part_of_speed = 0.95;
-        constexpr int    steps = 120;  // 0.6 s
-        const double     limit = part_of_torque * std::fabs(max_torque), fastest = std::fabs(max_velocity);
+        constexpr double dt = 0.005;
+        constexpr double part_of_torque = 0.8;
+        constexpr double part_of_speed = 0.95;
+        constexpr int steps = 120;  // 0.6 s
+        const double limit = part_of_torque * std::fabs(max_torque);
+
+        const double fastest = std::fabs(max_velocity);
         for (int i = 0; i < steps; ++i) {
             const Rates rates = under(std::clamp(held(tilt, s), -limit, limit), s);
-            s.arm += dt * (s.arm_speed + 0.5 * dt * rates.arm), tilt += dt * (s.pendulum_speed + 0.5 * dt * rates.pendulum);
-            s.arm_speed += dt * rates.arm, s.pendulum_speed += dt * rates.pendulum;
+            s.arm += dt * (s.arm_speed + 0.5 * dt * rates.arm);
+
+            tilt += dt * (s.pendulum_speed + 0.5 * dt * rates.pendulum);
+            s.arm_speed += dt * rates.arm;
+            s.pendulum_speed += dt * rates.pendulum;
             s.pendulum = tilt + std::numbers::pi;
-            if (!(std::fabs(tilt) < lose_angle && std::fabs(s.arm_speed) < part_of_speed * 1.25 * fastest)) return false;
-            if (std::fabs(tilt) < upright_angle && std::fabs(s.pendulum_speed) < 1.0 && std::fabs(s.arm_speed) < fastest) return true;
+            if (!(std::fabs(tilt) < lose_angle &&
+                  std::fabs(s.arm_speed) < part_of_speed * 1.25 * fastest)) {
+                return false;
+            }
+            if (std::fabs(tilt) < upright_angle && std::fabs(s.pendulum_speed) < 1.0 &&
+                std::fabs(s.arm_speed) < fastest) {
+                return true;
+            }
         }
         return false;
     }
 
-    /// Energy flows into the pendulum as -(c cos a a' + K sin²a q') q" (K. Åström, K. Furuta, *Swinging up a pendulum by energy control*,
-    /// Automatica 36, 2000, and the centrifugal part), so the arm is accelerated against the sign of that; from rest in either direction.
+    /// Energy flows into the pendulum as -(c cos a a' + K sin²a q') q" (K. Åström, K. Furuta,
+    /// *Swinging up a pendulum by energy control*, Automatica 36, 2000, and the centrifugal part),
+    /// so the arm is accelerated against the sign of that; from rest in either direction.
     double pumped(double part, const State& s) const noexcept {
-        const double limit = std::fabs(max_acceleration), sin = std::sin(s.pendulum), cos = std::cos(s.pendulum);
+        const double limit = std::fabs(max_acceleration);
+        const double sin = std::sin(s.pendulum);
+
+        const double cos = std::cos(s.pendulum);
         const double wanted = std::clamp(energy_gain * (energy_target - part), -1.0, 1.0) * limit;
-        const double flow = rig_.coupling * cos * s.pendulum_speed + rig_.pendulum_inertia * sin * sin * s.arm_speed;
-        const double sign = part < 0.01 && flow == 0.0 ? 1.0 : std::clamp(flow / (0.1 * rig_.coupling), -1.0, 1.0);
+        const double flow = rig_.coupling * cos * s.pendulum_speed +
+                            rig_.pendulum_inertia * sin * sin * s.arm_speed;
+        const double sign =
+            part < 0.01 && flow == 0.0 ? 1.0 : std::clamp(flow / (0.1 * rig_.coupling), -1.0, 1.0);
         const double centring = -centre_gain * s.arm - centre_damping * s.arm_speed;
-        const bool   fast = std::fabs(s.arm_speed) > max_velocity;
-        const double acceleration = fast ? std::copysign(limit, -s.arm_speed) : std::clamp(-wanted * sign + centring, -limit, limit);
-        // the torque for this acceleration, from the rig's two equations with a" put in from the second
-        const double K = rig_.pendulum_inertia, c = rig_.coupling * cos;
+        const bool fast = std::fabs(s.arm_speed) > max_velocity;
+        const double acceleration = fast ? std::copysign(limit, -s.arm_speed)
+                                         : std::clamp(-wanted * sign + centring, -limit, limit);
+        // the torque for this acceleration, from the rig's two equations with a" put in from the
+        // second
+        const double K = rig_.pendulum_inertia;
+        const double c = rig_.coupling * cos;
         if (!(K > 0.0)) return 0.0;
-        const double on_pendulum = K * sin * cos * s.arm_speed * s.arm_speed - rig_.weight_moment * sin;
-        const double drive = (rig_.arm_inertia + K * sin * sin - c * c / K) * acceleration + c / K * on_pendulum +
+        const double on_pendulum =
+            K * sin * cos * s.arm_speed * s.arm_speed - rig_.weight_moment * sin;
+        const double drive = (rig_.arm_inertia + K * sin * sin - c * c / K) * acceleration +
+                             c / K * on_pendulum +
                              2.0 * K * sin * cos * s.arm_speed * s.pendulum_speed -
-                             rig_.coupling * sin * s.pendulum_speed * s.pendulum_speed + rig_.friction * std::tanh(s.arm_speed / 0.05);
-        // do not brake the arm when the pendulum itself moves it in the commanded direction: that would remove energy from both
+                             rig_.coupling * sin * s.pendulum_speed * s.pendulum_speed +
+                             rig_.friction * std::tanh(s.arm_speed / 0.05);
+        // do not brake the arm when the pendulum itself moves it in the commanded direction: that
+        // would remove energy from both
         return !fast && wanted > 0.0 && drive * acceleration < 0.0 ? 0.0 : drive;
     }
 
     struct Rates {
         double arm, pendulum;
     };
-    /// Accelerations under a torque, without friction: the rig's two equations, solved. Zeros when the parameters make no physical sense.
+    /// Accelerations under a torque, without friction: the rig's two equations, solved. Zeros when
+    /// the parameters make no physical sense.
     Rates under(double drive, const State& s) const noexcept {
-        const double K = rig_.pendulum_inertia, sin = std::sin(s.pendulum), cos = std::cos(s.pendulum), c = rig_.coupling * cos;
-        const double J = rig_.arm_inertia + K * sin * sin, determinant = J * K - c * c;
-        if (!(determinant > 0.0)) return {0.0, 0.0};
-        const double on_arm =
-            drive - 2.0 * K * sin * cos * s.arm_speed * s.pendulum_speed + rig_.coupling * sin * s.pendulum_speed * s.pendulum_speed;
-        const double on_pendulum = K * sin * cos * s.arm_speed * s.arm_speed - rig_.weight_moment * sin;
-        return {(K * on_arm - c * on_pendulum) / determinant, (J * on_pendulum - c * on_arm) / determinant};
+        const double K = rig_.pendulum_inertia;
+        const double sin = std::sin(s.pendulum);
+
+        const double cos = std::cos(s.pendulum);
+        const double c = rig_.coupling * cos;
+        const double J = rig_.arm_inertia + K * sin * sin;
+        const double determinant = J * K - c * c;
+        if (!(determinant > 0.0)) {
+            return {0.0, 0.0};
+        }
+        const double on_arm = drive - 2.0 * K * sin * cos * s.arm_speed * s.pendulum_speed +
+                              rig_.coupling * sin * s.pendulum_speed * s.pendulum_speed;
+        const double on_pendulum =
+            K * sin * cos * s.arm_speed * s.arm_speed - rig_.weight_moment * sin;
+        return {(K * on_arm - c * on_pendulum) / determinant,
+                (J * on_pendulum - c * on_arm) / determinant};
     }
 
     /// Leads the pendulum on by its age, with the arm's acceleration of the last torque.
@@ -243,21 +371,25 @@ private:
     }
 
     void give(double wanted, double arm_speed) noexcept {
-        const double limit = std::fabs(max_torque), given = std::isfinite(wanted) ? std::clamp(wanted, -limit, limit) : 0.0;
+        const double limit = std::fabs(max_torque);
+
+        const double given = std::isfinite(wanted) ? std::clamp(wanted, -limit, limit) : 0.0;
         torque = given;
         const double volts =
-            torque_constant > 0.0 && now_ != Phase::off ? resistance / torque_constant * given + torque_constant * arm_speed : 0.0;
+            torque_constant > 0.0 && now_ != Phase::off
+                ? resistance / torque_constant * given + torque_constant * arm_speed
+                : 0.0;
         voltage = std::isfinite(volts) ? volts : 0.0;
     }
 
-    Phase  now_ = Phase::off;
+    Phase now_ = Phase::off;
     double upright_s_ = 0.0;
-    bool   enabled_ = false;
+    bool enabled_ = false;
 
     const hal_faults* faults_ = nullptr;
     hal::LastingFault fault_;
 
-    hal::estimation::FurutaParameters     rig_;
+    hal::estimation::FurutaParameters rig_;
     hal::estimation::FurutaIdentification identification_;
 };
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What arm_kinematics, mill_kinematics and drive_kinematics have in common: pins and the check of their inputs.
+// What arm_kinematics, mill_kinematics and drive_kinematics have in common: pins and the check of
+// their inputs.
 #pragma once
 
 #include <cmath>
@@ -16,7 +17,8 @@ struct KinematicsDocs {
     const char *joint, *target, *pose, *command, *follow;
 };
 
-/// Base of the kinematics components. A derived class declares the function `update` and calls `read_inputs` first.
+/// Base of the kinematics components. A derived class declares the function `update` and calls
+/// `read_inputs` first.
 class Kinematics : public Component {
 protected:
     static constexpr double pi = std::numbers::pi;
@@ -31,28 +33,38 @@ protected:
         measured_ = Vector::Zero(static_cast<Eigen::Index>(joints));
     }
 
-    /// Copies the joints to `measured_`. False, with `solved` FALSE, when an input is not finite or exceeds 1e9. [realtime]
+    /// Copies the joints to `measured_`. False, with `solved` FALSE, when an input is not finite or
+    /// exceeds 1e9. [realtime]
     bool read_inputs() noexcept {
         bool valid = true;
-        for (const auto& pin : joint) valid = valid && std::fabs(pin.get()) < 1e9;  // false for NaN, too
-        for (const auto& pin : target) valid = valid && std::fabs(pin.get()) < 1e9;
+        // false for NaN, too
+        for (const auto& pin : joint) {
+            valid = valid && std::fabs(pin.get()) < 1e9;
+        }
+        for (const auto& pin : target) {
+            valid = valid && std::fabs(pin.get()) < 1e9;
+        }
         if (!valid) {
             bad_inputs = bad_inputs + 1;
             solved = false;
             return false;
         }
-        for (std::size_t i = 0; i < joint.size(); ++i) measured_(static_cast<Eigen::Index>(i)) = joint[i];
+        for (std::size_t i = 0; i < joint.size(); ++i) {
+            measured_(static_cast<Eigen::Index>(i)) = joint[i];
+        }
         return true;
     }
 
     Vector measured_;
 
 public:
-    Ins<double>        joint, target;
-    Outs<double>       pose, command;
-    In<bool>           follow;
-    Out<bool>          solved{*this, "solved", "TRUE while the commands reach the target"};
-    Out<std::uint32_t> bad_inputs{*this, "bad-inputs", "cycles with an input that is NaN, infinite or above 1e9; the outputs keep their values"};
+    Ins<double> joint, target;
+    Outs<double> pose, command;
+    In<bool> follow;
+    Out<bool> solved{*this, "solved", "TRUE while the commands reach the target"};
+    Out<std::uint32_t> bad_inputs{
+        *this, "bad-inputs",
+        "cycles with an input that is NaN, infinite or above 1e9; the outputs keep their values"};
 };
 
 }  // namespace hal::estimation

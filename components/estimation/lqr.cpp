@@ -20,8 +20,8 @@ using namespace hal::estimation;
 enum class Plant { continuous, discrete, sampled };
 
 struct Problem {
-    Plant  plant = Plant::continuous;
-    Dense  a, b, q, r;
+    Plant plant = Plant::continuous;
+    Dense a, b, q, r;
     double period = 0.001;
 
     std::optional<Riccati> solve() const {
@@ -34,34 +34,39 @@ struct Problem {
 
 /// The current weights, from the cycle to the helper thread, and the resulting gain.
 struct Order {
-    Vector        q, r;
-    std::int64_t  period_ns = 0;
+    Vector q, r;
+    std::int64_t period_ns = 0;
     std::uint32_t number = 0;
 };
 struct Delivery {
-    Matrix        gain;
-    bool          good = false;
+    Matrix gain;
+    bool good = false;
     std::uint32_t number = 0;
 };
 
-/// Solves the Riccati equation outside of the cycle. The cycle is the only writer of orders and the only reader of deliveries.
+/// Solves the Riccati equation outside of the cycle. The cycle is the only writer of orders and the
+/// only reader of deliveries.
 class Designer {
 public:
     explicit Designer(Problem problem) : problem_(std::move(problem)) {}
     void start() { background_.start(); }  ///< [setup]
     void stop() noexcept { background_.stop(); }  ///< [setup]
 
-    hal::Mailbox<Order>    orders;
+    hal::Mailbox<Order> orders;
     hal::Mailbox<Delivery> deliveries;
 
 private:
-    static constexpr auto look_every = std::chrono::milliseconds(2);  // a cycle must not wake a thread, so this thread polls
+    // a cycle must not wake a thread, so this thread polls
+    static constexpr auto look_every = std::chrono::milliseconds(2);
 
     void turn(bool may_wait) noexcept {
-        bool         fresh = false;
+        bool fresh = false;
         const Order& order = orders.get(&fresh);
-        if (fresh) deliveries.put(designed(order));
-        else if (may_wait) std::this_thread::sleep_for(look_every);
+        if (fresh) {
+            deliveries.put(designed(order));
+        } else if (may_wait) {
+            std::this_thread::sleep_for(look_every);
+        }
     }
     Delivery designed(const Order& order) const noexcept {
         Delivery delivery;
@@ -73,11 +78,16 @@ private:
             problem.r.diagonal() = order.r;
             problem.period = static_cast<double>(order.period_ns) * 1e-9;
             if (!positive(problem.q, true) || !positive(problem.r)) return delivery;
-            if (const auto solved = problem.solve()) delivery.gain = solved->gain, delivery.good = finite(delivery.gain);
-        } catch (const std::bad_alloc&) { delivery.good = false; }
+            if (const auto solved = problem.solve()) {
+                delivery.gain = solved->gain;
+                delivery.good = finite(delivery.gain);
+            }
+        } catch (const std::bad_alloc&) {
+            delivery.good = false;
+        }
         return delivery;
     }
-    const Problem   problem_;
+    const Problem problem_;
     hal::Background background_{[this](std::int64_t, bool may_wait) { turn(may_wait); }};
 };
 
@@ -86,37 +96,51 @@ public:
     explicit Lqr(const hal_host* host)
         : Component(host),
           plant_(*this, "plant", "continuous",
-                 "continuous: x' = Ax + Bu, gain of a continuous controller; sampled: the same plant, gain for a u held for a "
+                 "continuous: x' = Ax + Bu, gain of a continuous controller; sampled: the same "
+                 "plant, gain for a u held for a "
                  "period; discrete: x(k+1) = Ax + Bu"),
-          period_(*this, "period", 0.001, "sampled: the thread's period in s, so that the gain is available in the first cycle"),
+          period_(*this, "period", 0.001,
+                  "sampled: the thread's period in s, so that the gain is available in the first "
+                  "cycle"),
           problem_(read()),
           x(*this, "x-#", problem_.a.rows(), "state #"),
           target(*this, "target-#", problem_.a.rows(), "target of state #"),
           u(*this, "u-#", problem_.b.cols(), "command for input #", {.safe = 0.0, .finite = true}),
           designer_(problem_) {
-        for (Eigen::Index i = 0; i < problem_.a.rows(); ++i)
-            q_.emplace_back(*this, name("q", i).c_str(),
-                            ("weight of state " + std::to_string(i) + " squared; a change starts a new design").c_str(),
-                            hal::PinOptions<double>{.initial = problem_.q(i, i)});
-        for (Eigen::Index i = 0; i < problem_.b.cols(); ++i)
-            r_.emplace_back(*this, name("r", i).c_str(),
-                            ("weight of input " + std::to_string(i) + " squared; a change starts a new design").c_str(),
-                            hal::PinOptions<double>{.initial = problem_.r(i, i)});
+        for (Eigen::Index i = 0; i < problem_.a.rows(); ++i) {
+            q_.emplace_back(
+                *this, name("q", i).c_str(),
+                ("weight of state " + std::to_string(i) + " squared; a change starts a new design")
+                    .c_str(),
+                hal::PinOptions<double>{.initial = problem_.q(i, i)});
+        }
+        for (Eigen::Index i = 0; i < problem_.b.cols(); ++i) {
+            r_.emplace_back(
+                *this, name("r", i).c_str(),
+                ("weight of input " + std::to_string(i) + " squared; a change starts a new design")
+                    .c_str(),
+                hal::PinOptions<double>{.initial = problem_.r(i, i)});
+        }
         const auto solved = problem_.solve();
-        if (!solved)
+        if (!solved) {
             throw std::runtime_error(
-                "no gain was found for these matrices; the plant is controllable, but the numbers are out of range");
+                "no gain was found for these matrices; the plant is controllable, but the numbers "
+                "are out of range");
+        }
         gain_ = solved->gain;
         order_.q = problem_.q.diagonal();
         order_.r = problem_.r.diagonal();
         order_.period_ns = std::llround(problem_.period * 1e9);
         state_ = Vector::Zero(problem_.a.rows());
-        for (Eigen::Index i = 0; i < gain_.rows(); ++i)
-            for (Eigen::Index j = 0; j < gain_.cols(); ++j)
-                gains_.emplace_back(
-                    *this, (name("gain", i) + "-" + std::to_string(j)).c_str(),
-                    ("effect of state " + std::to_string(j) + " on input " + std::to_string(i) + ": u = -gain (x - target)").c_str(),
-                    hal::PinOptions<double>{.initial = gain_(i, j)});
+        for (Eigen::Index i = 0; i < gain_.rows(); ++i) {
+            for (Eigen::Index j = 0; j < gain_.cols(); ++j) {
+                gains_.emplace_back(*this, (name("gain", i) + "-" + std::to_string(j)).c_str(),
+                                    ("effect of state " + std::to_string(j) + " on input " +
+                                     std::to_string(i) + ": u = -gain (x - target)")
+                                        .c_str(),
+                                    hal::PinOptions<double>{.initial = gain_(i, j)});
+            }
+        }
         show();
     }
 
@@ -138,8 +162,12 @@ public:
         bool numbers = true;
         for (std::size_t i = 0; i < x.size(); ++i) {
             const double off = x[i] - target[i];
-            if (std::isfinite(off)) state_(static_cast<Eigen::Index>(i)) = off;
-            else bad_inputs = bad_inputs + 1, numbers = false;
+            if (std::isfinite(off)) {
+                state_(static_cast<Eigen::Index>(i)) = off;
+            } else {
+                bad_inputs = bad_inputs + 1;
+                numbers = false;
+            }
         }
         blind_ = numbers ? 0 : std::min(blind_, UINT32_MAX - 1) + 1;
         valid = blind_ <= hold_cycles;
@@ -147,7 +175,8 @@ public:
         multiply(out, gain_, state_);
         bool full = false;
         for (std::size_t i = 0; i < u.size(); ++i) {
-            const double wanted = -out(static_cast<Eigen::Index>(i)), limit = std::fabs(max_output);
+            const double wanted = -out(static_cast<Eigen::Index>(i));
+            const double limit = std::fabs(max_output);
             const double given = limit > 0.0 ? std::clamp(wanted, -limit, limit) : wanted;
             full = full || given != wanted;
             u[i] = enable && valid && std::isfinite(given) ? given : 0.0;
@@ -156,50 +185,76 @@ public:
     }
 
 private:
-    static std::string name(const char* what, Eigen::Index i) { return std::string(what) + "-" + std::to_string(i); }
+    static std::string name(const char* what, Eigen::Index i) {
+        return std::string(what) + "-" + std::to_string(i);
+    }
 
     Problem read() {
         Problem p;
-        if (plant_.get() == "discrete") p.plant = Plant::discrete;
-        else if (plant_.get() == "sampled") p.plant = Plant::sampled;
-        else if (plant_.get() != "continuous")
-            throw hal::ArgumentError("plant", "plant=" + plant_.get() + " is not continuous, sampled or discrete");
+        if (plant_.get() == "discrete") {
+            p.plant = Plant::discrete;
+        } else if (plant_.get() == "sampled") {
+            p.plant = Plant::sampled;
+        } else if (plant_.get() != "continuous") {
+            throw hal::ArgumentError(
+                "plant", "plant=" + plant_.get() + " is not continuous, sampled or discrete");
+        }
         p.period = period_;
-        if (!(p.period > 0.0 && p.period <= 3600.0))
-            throw hal::ArgumentError("period", "period= is not between 0 and 3600 s; write the thread's period in s, 0.001 for one of 1 ms");
-        const Matrices given(*this, {{"A", "0,1;0,0", "n x n: system matrix"},
-                                     {"B", "0;1", "n x m: input matrix"},
-                                     {"Q", "1,0;0,1", "n x n: cost of the states; symmetric, positive semidefinite"},
-                                     {"R", "1", "m x m: cost of the inputs; symmetric, positive definite"}});
+        if (!(p.period > 0.0 && p.period <= 3600.0)) {
+            throw hal::ArgumentError("period",
+                                     "period= is not between 0 and 3600 s; write the thread's "
+                                     "period in s, 0.001 for one of 1 ms");
+        }
+        const Matrices given(
+            *this, {{"A", "0,1;0,0", "n x n: system matrix"},
+                    {"B", "0;1", "n x m: input matrix"},
+                    {"Q", "1,0;0,1", "n x n: cost of the states; symmetric, positive semidefinite"},
+                    {"R", "1", "m x m: cost of the inputs; symmetric, positive definite"}});
         p.a = given.square("A");
         const Eigen::Index n = p.a.rows();
         p.b = given.at("B", n, given.at("B").value.cols(), "it has a row per state, as A has");
         p.q = given.at("Q", n, n, "it has a row and a column per state");
-        p.r = given.at("R", p.b.cols(), p.b.cols(), "it has a row and a column per input, as B has columns");
-        for (const char* symmetric : {"Q", "R"})
-            if (const Dense& m = given.at(symmetric).value; (m - m.transpose()).norm() > 1e-12 * m.norm())
+        p.r = given.at("R", p.b.cols(), p.b.cols(),
+                       "it has a row and a column per input, as B has columns");
+        for (const char* symmetric : {"Q", "R"}) {
+            if (const Dense& m = given.at(symmetric).value;
+                (m - m.transpose()).norm() > 1e-12 * m.norm()) {
                 given.refuse(symmetric, std::string(symmetric) + " is not symmetric",
                              "a cost matrix is symmetric");
-        if (!positive(p.q, true))
-            given.refuse("Q", "Q has a negative eigenvalue", "start with diag and a number per state, 0 or above");
-        if (!positive(p.r)) given.refuse("R", "R is not positive", "start with diag and 1 per input");
+            }
+        }
+        if (!positive(p.q, true)) {
+            given.refuse("Q", "Q has a negative eigenvalue",
+                         "start with diag and a number per state, 0 or above");
+        }
+        if (!positive(p.r)) {
+            given.refuse("R", "R is not positive", "start with diag and 1 per input");
+        }
         const Time time = p.plant == Plant::discrete ? Time::discrete : Time::continuous;
-        if (const auto mode = unreachable(p.a, p.b, time))
+        if (const auto mode = unreachable(p.a, p.b, time)) {
             given.refuse("B",
-                         "the plant is uncontrollable: no input reaches its mode at " + text(mode->value) + ", strongest in state " +
+                         "the plant is uncontrollable: no input reaches its mode at " +
+                             text(mode->value) + ", strongest in state " +
                              std::to_string(mode->state),
-                         "that mode is unstable; look at row " + std::to_string(mode->state + 1) + " of A and B");
-        if (const auto mode = unseen(p.a, p.q, time))
-            given.refuse(
-                "Q",
-                "the cost does not observe the plant's mode at " + text(mode->value) + ", strongest in state " + std::to_string(mode->state),
-                "give that state a weight in Q");
+                         "that mode is unstable; look at row " + std::to_string(mode->state + 1) +
+                             " of A and B");
+        }
+        if (const auto mode = unseen(p.a, p.q, time)) {
+            given.refuse("Q",
+                         "the cost does not observe the plant's mode at " + text(mode->value) +
+                             ", strongest in state " + std::to_string(mode->state),
+                         "give that state a weight in Q");
+        }
         return p;
     }
     void order(hal::Cycle cycle) noexcept {
         bool changed = problem_.plant == Plant::sampled && cycle.period_ns() != order_.period_ns;
-        for (std::size_t i = 0; i < q_.size(); ++i) changed = take(order_.q(static_cast<Eigen::Index>(i)), q_[i]) || changed;
-        for (std::size_t i = 0; i < r_.size(); ++i) changed = take(order_.r(static_cast<Eigen::Index>(i)), r_[i]) || changed;
+        for (std::size_t i = 0; i < q_.size(); ++i) {
+            changed = take(order_.q(static_cast<Eigen::Index>(i)), q_[i]) || changed;
+        }
+        for (std::size_t i = 0; i < r_.size(); ++i) {
+            changed = take(order_.r(static_cast<Eigen::Index>(i)), r_[i]) || changed;
+        }
         if (!changed) return;
         order_.period_ns = cycle.period_ns();
         ++order_.number;
@@ -213,37 +268,51 @@ private:
         return other;
     }
     void show() noexcept {
-        for (Eigen::Index i = 0, k = 0; i < gain_.rows(); ++i)
-            for (Eigen::Index j = 0; j < gain_.cols(); ++j, ++k) gains_[static_cast<std::size_t>(k)] = gain_(i, j);
+        for (Eigen::Index i = 0, k = 0; i < gain_.rows(); ++i) {
+            for (Eigen::Index j = 0; j < gain_.cols(); ++j, ++k) {
+                gains_[static_cast<std::size_t>(k)] = gain_(i, j);
+            }
+        }
     }
 
     hal::TextArgument plant_;
     hal::RealArgument period_;
-    Problem           problem_;
+    Problem problem_;
 
 public:
-    hal::Ins<double>  x, target;
+    hal::Ins<double> x, target;
     hal::Outs<double> u;
-    hal::In<bool>     enable{*this, "enable", "FALSE sets all u to 0", {.initial = true}};
+    hal::In<bool> enable{*this, "enable", "FALSE sets all u to 0", {.initial = true}};
     hal::OptionalLimit max_output{*this, "max-output", "limit of each u; 0: no limit"};
-    hal::Out<bool>    saturated{*this, "saturated", "TRUE: a u is at its limit"};
-    hal::Out<bool>    designing{*this, "designing", "TRUE: a new gain is being computed; the old one is in use"};
-    hal::Out<bool>    rejected{*this, "rejected", "TRUE: the weights are invalid (negative or NaN); the last valid gain is in use"};
+    hal::Out<bool> saturated{*this, "saturated", "TRUE: a u is at its limit"};
+    hal::Out<bool> designing{*this, "designing",
+                             "TRUE: a new gain is being computed; the old one is in use"};
+    hal::Out<bool> rejected{
+        *this, "rejected",
+        "TRUE: the weights are invalid (negative or NaN); the last valid gain is in use"};
     hal::Out<std::uint32_t> designs{*this, "designs", "number of gains applied since the start"};
-    hal::Out<bool> valid{*this, "valid", "FALSE: a state was NaN or infinite for longer than hold-cycles; all u are 0", {.safe = false}};
-    hal::Out<std::uint32_t>   bad_inputs{*this, "bad-inputs", "number of states that were NaN or infinite"};
-    hal::Param<std::uint32_t> hold_cycles{
-        *this, "hold-cycles", "number of consecutive cycles for which the last valid value replaces a NaN or infinite state", {.initial = 10}};
+    hal::Out<bool> valid{
+        *this,
+        "valid",
+        "FALSE: a state was NaN or infinite for longer than hold-cycles; all u are 0",
+        {.safe = false}};
+    hal::Out<std::uint32_t> bad_inputs{*this, "bad-inputs",
+                                       "number of states that were NaN or infinite"};
+    hal::Param<std::uint32_t> hold_cycles{*this,
+                                          "hold-cycles",
+                                          "number of consecutive cycles for which the last valid "
+                                          "value replaces a NaN or infinite state",
+                                          {.initial = 10}};
     hal::Function run{*this, "update", &Lqr::update, "applies the gain, after taking a new one"};
 
 private:
-    std::deque<hal::In<double>>  q_, r_;
+    std::deque<hal::In<double>> q_, r_;
     std::deque<hal::Out<double>> gains_;
-    Matrix                       gain_;
-    Vector                       state_;
-    Order                        order_;
-    std::uint32_t                blind_ = 0;  // consecutive cycles with a NaN or infinite state
-    Designer                     designer_;
+    Matrix gain_;
+    Vector state_;
+    Order order_;
+    std::uint32_t blind_ = 0;  // consecutive cycles with a NaN or infinite state
+    Designer designer_;
 };
 
 }  // namespace

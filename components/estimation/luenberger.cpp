@@ -18,33 +18,44 @@ public:
           u(*this, "u-#", model_.b.cols(), "input # of the plant since the previous cycle"),
           z(*this, "z-#", model_.c.rows(), "measurement #"),
           x(*this, "x-#", model_.a.rows(), "state #, estimated", {.finite = true}),
-          innovation(*this, "innovation-#", model_.c.rows(), "measurement # minus its expected value") {
+          innovation(*this, "innovation-#", model_.c.rows(),
+                     "measurement # minus its expected value") {
         state_ = start_;
     }
 
     void update(hal::Cycle) noexcept {
-        Vector next, pushed, expected, corrected, input(static_cast<Eigen::Index>(u.size())), off(static_cast<Eigen::Index>(z.size()));
-        for (std::size_t i = 0; i < u.size(); ++i) input(static_cast<Eigen::Index>(i)) = std::isfinite(u[i]) ? u[i].get() : 0.0;
+        Vector next, pushed, expected, corrected, input(static_cast<Eigen::Index>(u.size())),
+            off(static_cast<Eigen::Index>(z.size()));
+        for (std::size_t i = 0; i < u.size(); ++i) {
+            input(static_cast<Eigen::Index>(i)) = std::isfinite(u[i]) ? u[i].get() : 0.0;
+        }
         multiply(next, model_.a, state_);
         multiply(pushed, model_.b, input);
         next += pushed;
         multiply(expected, model_.c, next);
         for (std::size_t i = 0; i < z.size(); ++i) {
-            const auto   at = static_cast<Eigen::Index>(i);
+            const auto at = static_cast<Eigen::Index>(i);
             const double value = z[i];
-            if (!std::isfinite(value)) skipped = skipped + 1;
+            if (!std::isfinite(value)) {
+                skipped = skipped + 1;
+            }
             off(at) = std::isfinite(value) ? value - expected(at) : 0.0;
             innovation[i] = off(at);
         }
         multiply(corrected, model_.l, off);
         next += corrected;
-        if (reset) next = start_;
-        if (finite(next)) state_ = next;
-        else {
+        if (reset) {
+            next = start_;
+        }
+        if (finite(next)) {
+            state_ = next;
+        } else {
             state_ = start_;
             restarts = restarts + 1;
         }
-        for (std::size_t i = 0; i < x.size(); ++i) x[i] = state_(static_cast<Eigen::Index>(i));
+        for (std::size_t i = 0; i < x.size(); ++i) {
+            x[i] = state_(static_cast<Eigen::Index>(i));
+        }
     }
 
 private:
@@ -52,50 +63,62 @@ private:
         Matrix a, b, c, l;
     };
     Model read() {
-        const Matrices given(
-            *this,
-            {{"A", "1,0.001;0,1", "n x n: x(k+1) = Ax + Bu"},
-             {"B", "0;0.001", "n x m; default: no inputs"},
-             {"C", "1,0", "p x n: z = Cx"},
-             {"L", "", "n x p: gain; alternatively poles"},
-             {"poles", "0.95,0.9",
-              "n: poles of the error; real, inside of the unit circle; distinct if there is one measurement"},
-             {"x0", "", "n: initial states; default: 0"}});
-        const Dense&       a = given.square("A");
+        const Matrices given(*this, {{"A", "1,0.001;0,1", "n x n: x(k+1) = Ax + Bu"},
+                                     {"B", "0;0.001", "n x m; default: no inputs"},
+                                     {"C", "1,0", "p x n: z = Cx"},
+                                     {"L", "", "n x p: gain; alternatively poles"},
+                                     {"poles", "0.95,0.9",
+                                      "n: poles of the error; real, inside of the unit circle; "
+                                      "distinct if there is one measurement"},
+                                     {"x0", "", "n: initial states; default: 0"}});
+        const Dense& a = given.square("A");
         const Eigen::Index n = a.rows();
-        const Dense        b =
-            given.has("B") ? given.at("B", n, given.at("B").value.cols(), "it has a row per state, as A has") : Dense(Dense::Zero(n, 0));
-        const Dense c = given.at("C", given.at("C").value.rows(), n, "it has a column per state, as A has");
-        start_ = given.has("x0") ? Vector(given.vector("x0", n, "it has a number per state")) : Vector(Vector::Zero(n));
+        const Dense b = given.has("B") ? given.at("B", n, given.at("B").value.cols(),
+                                                  "it has a row per state, as A has")
+                                       : Dense(Dense::Zero(n, 0));
+        const Dense c =
+            given.at("C", given.at("C").value.rows(), n, "it has a column per state, as A has");
+        start_ = given.has("x0") ? Vector(given.vector("x0", n, "it has a number per state"))
+                                 : Vector(Vector::Zero(n));
         if (given.has("L")) {
             // the estimate is corrected after the prediction: its error is multiplied by (I - LC) A
-            const Dense l = given.at("L", n, c.rows(), "it has a row per state and a column per measurement");
-            if (const double radius = spectral_radius(a - l * c * a); radius >= 1.0)
-                given.refuse("L", "with this gain the observer is unstable: its largest pole is " + std::to_string(radius),
+            const Dense l =
+                given.at("L", n, c.rows(), "it has a row per state and a column per measurement");
+            if (const double radius = spectral_radius(a - l * c * a); radius >= 1.0) {
+                given.refuse("L",
+                             "with this gain the observer is unstable: its largest pole is " +
+                                 std::to_string(radius),
                              "use poles= instead of L=");
+            }
             return {a, b, c, l};
         }
         const Eigen::VectorXd poles = given.vector("poles", n, "one for each state");
-        if (poles.cwiseAbs().maxCoeff() >= 1.0)
+        if (poles.cwiseAbs().maxCoeff() >= 1.0) {
             given.refuse("poles", "a pole is outside of the unit circle",
                          "use poles between 0 and 1: 0 settles in one cycle, 0.99 in some hundred");
+        }
         const auto l = place_observer(a, c * a, poles.cast<std::complex<double>>());
-        if (!l)
-            given.refuse("C", "the plant is not observable, or a pole of the observer is one of its own",
+        if (!l) {
+            given.refuse("C",
+                         "the plant is not observable, or a pole of the observer is one of its own",
                          "look at C, or change the poles slightly");
+        }
         return {a, b, c, *l};
     }
 
     Vector start_, state_;
-    Model  model_;
+    Model model_;
 
 public:
-    hal::Ins<double>        u, z;
-    hal::Outs<double>       x, innovation;
-    hal::In<bool>           reset{*this, "reset", "TRUE sets the states to x0"};
-    hal::Out<std::uint32_t> skipped{*this, "skipped", "number of NaN or infinite measurements; they are ignored"};
-    hal::Out<std::uint32_t> restarts{*this, "restarts", "number of times the states overflowed and were reset to x0"};
-    hal::Function           run{*this, "update", &Luenberger::update, "predicts one period and applies the measurements"};
+    hal::Ins<double> u, z;
+    hal::Outs<double> x, innovation;
+    hal::In<bool> reset{*this, "reset", "TRUE sets the states to x0"};
+    hal::Out<std::uint32_t> skipped{*this, "skipped",
+                                    "number of NaN or infinite measurements; they are ignored"};
+    hal::Out<std::uint32_t> restarts{*this, "restarts",
+                                     "number of times the states overflowed and were reset to x0"};
+    hal::Function run{*this, "update", &Luenberger::update,
+                      "predicts one period and applies the measurements"};
 };
 
 }  // namespace

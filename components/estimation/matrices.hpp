@@ -22,25 +22,28 @@ namespace hal::estimation {
 
 /// A matrix and its span.
 struct Given {
-    std::string     name;
+    std::string name;
     Eigen::MatrixXd value;
-    bool            in_file = false;
-    std::uint32_t   begin = 0, end = 0;  ///< its name in the file
-    std::string     argument;            ///< NAME=TEXT, shortened, if a load argument gave it
+    bool in_file = false;
+    std::uint32_t begin = 0;
+    std::uint32_t end = 0;  ///< its name in the file
+    std::string argument;  ///< NAME=TEXT, shortened, if a load argument gave it
 };
 
-/// NAME = rows, a line or a `;` between rows, spaces or commas between numbers, `diag` before the numbers of a diagonal, `#` before a
-/// comment. Names are not case sensitive. [setup]
+/// NAME = rows, a line or a `;` between rows, spaces or commas between numbers, `diag` before the
+/// numbers of a diagonal, `#` before a comment. Names are not case sensitive. [setup]
 class MatrixText {
 public:
-    std::vector<Given>         found;
+    std::vector<Given> found;
     std::vector<text::Problem> problems;
 
     /// Reads a whole file. [setup]
     void read_file(std::string_view text) {
         text_ = text;
         text::Lines lines(text, "#");  // a `;` separates rows
-        while (const auto line = lines.next()) read_line(line->at.offset, line->at.offset + line->at.length);
+        while (const auto line = lines.next()) {
+            read_line(line->at.offset, line->at.offset + line->at.length);
+        }
         finish();
         in_files();
     }
@@ -56,21 +59,38 @@ private:
     static bool space(char c) { return c == ' ' || c == '\t' || c == ',' || c == '\r'; }
 
     void in_files() {
-        for (Given& given : found) given.in_file = true;
+        for (Given& given : found) {
+            given.in_file = true;
+        }
     }
     void read_line(std::size_t at, std::size_t end) {
-        if (const std::size_t equals = text_.substr(at, end - at).find('='); equals != std::string_view::npos) {
-            std::size_t begin = at, stop = at + equals;
-            while (begin < stop && space(text_[begin])) ++begin;
-            while (stop > begin && space(text_[stop - 1])) --stop;
+        if (const std::size_t equals = text_.substr(at, end - at).find('=');
+            equals != std::string_view::npos) {
+            std::size_t begin = at;
+            std::size_t stop = at + equals;
+            while (begin < stop && space(text_[begin])) {
+                ++begin;
+            }
+            while (stop > begin && space(text_[stop - 1])) {
+                --stop;
+            }
             finish();
             const std::string name(text_.substr(begin, stop - begin));
-            bool              word = !name.empty() && std::isalpha(static_cast<unsigned char>(name[0]));
-            for (const char c : name) word = word && (std::isalnum(static_cast<unsigned char>(c)) || c == '_' || c == '-');
-            if (!word)
-                report_at(begin, std::max(stop, begin + 1), "'" + name + "' is not a name of a matrix", "write NAME = numbers, as in: A = 0 1");
+            bool word = !name.empty() && std::isalpha(static_cast<unsigned char>(name[0]));
+            for (const char c : name) {
+                word =
+                    word && (std::isalnum(static_cast<unsigned char>(c)) || c == '_' || c == '-');
+            }
+            if (!word) {
+                report_at(begin, std::max(stop, begin + 1),
+                          "'" + name + "' is not a name of a matrix",
+                          "write NAME = numbers, as in: A = 0 1");
+            }
             const std::string key = lower(name);
-            if (++defined_[key] == 2) report_at(begin, stop, "duplicate matrix '" + name + "'", "delete all but one of them");
+            if (++defined_[key] == 2) {
+                report_at(begin, stop, "duplicate matrix '" + name + "'",
+                          "delete all but one of them");
+            }
             open(name, begin, stop);
             at += equals + 1;
         }
@@ -88,7 +108,9 @@ private:
                 continue;
             }
             std::size_t stop = at;
-            while (stop < end && !space(text_[stop]) && text_[stop] != ';') ++stop;
+            while (stop < end && !space(text_[stop]) && text_[stop] != ';') {
+                ++stop;
+            }
             word(at, stop);
             at = stop;
         }
@@ -97,7 +119,10 @@ private:
     void word(std::size_t at, std::size_t stop) {
         const std::string token(text_.substr(at, stop - at));
         if (!open_) {
-            if (!lost_) report_at(at, stop, "'" + token + "' outside a matrix", "write NAME = before the numbers, as in: A = 0 1");
+            if (!lost_) {
+                report_at(at, stop, "'" + token + "' outside a matrix",
+                          "write NAME = before the numbers, as in: A = 0 1");
+            }
             lost_ = true;
             return;
         }
@@ -105,25 +130,37 @@ private:
             diagonal_ = true;
             return;
         }
-        const auto   real = parse_real(token);
+        const auto real = parse_real(token);
         const double number = real.value_or(0.0);
-        if (!real || !(std::fabs(number) < 1e300)) report_at(at, stop, "'" + token + "' is not a number", "write numbers as in -1.5 or 2e-3");
-        if (numbers_.empty()) row_begin_ = at;
+        if (!real || !(std::fabs(number) < 1e300)) {
+            report_at(at, stop, "'" + token + "' is not a number",
+                      "write numbers as in -1.5 or 2e-3");
+        }
+        if (numbers_.empty()) {
+            row_begin_ = at;
+        }
         row_end_ = stop;
         numbers_.push_back(number);
     }
     void row() {
         if (numbers_.empty()) return;
-        if (!rows_.empty() && rows_[0].size() != numbers_.size())
+        if (!rows_.empty() && rows_[0].size() != numbers_.size()) {
             report_at(row_begin_, row_end_,
-                "row " + std::to_string(rows_.size() + 1) + " of " + current_.name + " has " + counted(numbers_.size(), "number") +
-                    ", its first has " + std::to_string(rows_[0].size()),
-                "all rows of a matrix must have the same length");
+                      "row " + std::to_string(rows_.size() + 1) + " of " + current_.name + " has " +
+                          counted(numbers_.size(), "number") + ", its first has " +
+                          std::to_string(rows_[0].size()),
+                      "all rows of a matrix must have the same length");
+        }
         rows_.push_back(std::move(numbers_));
         numbers_.clear();
     }
     void open(std::string name, std::size_t begin, std::size_t end) {
-        current_ = {std::move(name), {}, false, static_cast<std::uint32_t>(begin), static_cast<std::uint32_t>(end), {}};
+        current_ = {std::move(name),
+                    {},
+                    false,
+                    static_cast<std::uint32_t>(begin),
+                    static_cast<std::uint32_t>(end),
+                    {}};
         open_ = true;
         diagonal_ = lost_ = false;
     }
@@ -131,21 +168,31 @@ private:
         if (!open_) return;
         row();
         open_ = false;
-        const std::size_t high = rows_.size(), wide = rows_.empty() ? 0 : rows_[0].size();
-        if (high == 0)
+        const std::size_t high = rows_.size();
+        const std::size_t wide = rows_.empty() ? 0 : rows_[0].size();
+        if (high == 0) {
             report_at(current_.begin, current_.end, "'" + current_.name + "' has no numbers",
-                "write them after the =, or in the lines below it");
-        if (diagonal_ && high > 1)
-            report_at(current_.begin, current_.end, "'" + current_.name + "' has several rows after diag", "write one row after diag: diag 1 2 3");
+                      "write them after the =, or in the lines below it");
+        }
+        if (diagonal_ && high > 1) {
+            report_at(current_.begin, current_.end,
+                      "'" + current_.name + "' has several rows after diag",
+                      "write one row after diag: diag 1 2 3");
+        }
         const auto index = [](std::size_t i) { return static_cast<Eigen::Index>(i); };
         if (problems.empty()) {
             current_.value = Eigen::MatrixXd::Zero(index(diagonal_ ? wide : high), index(wide));
-            for (std::size_t i = 0; i < high; ++i)
-                for (std::size_t j = 0; j < wide; ++j) current_.value(index(diagonal_ ? j : i), index(j)) = rows_[i][j];
-            if (current_.value.rows() > most || current_.value.cols() > most)
+            for (std::size_t i = 0; i < high; ++i) {
+                for (std::size_t j = 0; j < wide; ++j) {
+                    current_.value(index(diagonal_ ? j : i), index(j)) = rows_[i][j];
+                }
+            }
+            if (current_.value.rows() > most || current_.value.cols() > most) {
                 report_at(current_.begin, current_.end,
-                    current_.name + " is " + std::to_string(current_.value.rows()) + " x " + std::to_string(current_.value.cols()),
-                    "matrices have at most " + std::to_string(most) + " rows and columns");
+                          current_.name + " is " + std::to_string(current_.value.rows()) + " x " +
+                              std::to_string(current_.value.cols()),
+                          "matrices have at most " + std::to_string(most) + " rows and columns");
+            }
         }
         rows_.clear();
         found.push_back(std::move(current_));
@@ -154,18 +201,21 @@ private:
         text::add(problems, begin, end, std::move(sentence), std::move(help));
     }
 
-    std::string_view                 text_;
-    Given                            current_;
-    std::map<std::string, unsigned>  defined_;  // by name in lower case: how often
-    bool                             open_ = false, diagonal_ = false, lost_ = false;
-    std::vector<double>              numbers_;
+    std::string_view text_;
+    Given current_;
+    std::map<std::string, unsigned> defined_;  // by name in lower case: how often
+    bool open_ = false;
+    bool diagonal_ = false;
+    bool lost_ = false;
+    std::vector<double> numbers_;
     std::vector<std::vector<double>> rows_;
-    std::size_t                      row_begin_ = 0, row_end_ = 0;
+    std::size_t row_begin_ = 0;
+    std::size_t row_end_ = 0;
 };
 
 /// A matrix that a component needs.
 struct Wanted {
-    const char* name;     ///< in a file; the load argument is the same in lower case
+    const char* name;  ///< in a file; the load argument is the same in lower case
     const char* example;  ///< default for a `loadrt` without any matrix; "" for none
     const char* doc;
 };
@@ -174,23 +224,32 @@ struct Wanted {
 class Matrices {
 public:
     Matrices(hal::Component& component, std::initializer_list<Wanted> wanted)
-        : texts_(component), file_(component, "file", "", "file with the matrices, beside the netlist; an argument takes precedence") {
+        : texts_(component),
+          file_(component, "file", "",
+                "file with the matrices, beside the netlist; an argument takes precedence") {
         std::vector<std::pair<const Wanted*, std::string>> arguments;
-        bool                                               any = !file_.get().empty();
+        bool any = !file_.get().empty();
         for (const Wanted& w : wanted) {
             arguments.emplace_back(&w, hal::Argument::ask(lower(w.name).c_str(), "", w.doc, {}));
             any = any || !arguments.back().second.empty();
         }
-        if (!file_.get().empty()) read_file();
+        if (!file_.get().empty()) {
+            read_file();
+        }
         for (const auto& [w, text] : arguments) {
             if (text.empty() && (any || *w->example == '\0')) continue;
             MatrixText reader;
             reader.read_rows(w->name, text.empty() ? w->example : text);
-            const bool  whole = text.size() <= 40;
+            const bool whole = text.size() <= 40;
             std::string argument = lower(w->name);
-            argument.append("=").append(text, 0, whole ? text.size() : 37).append(whole ? "" : "...");
-            if (!reader.problems.empty())
-                throw hal::ArgumentError(lower(w->name), argument + ": " + reader.problems[0].sentence + "; " + reader.problems[0].help);
+            argument.append("=")
+                .append(text, 0, whole ? text.size() : 37)
+                .append(whole ? "" : "...");
+            if (!reader.problems.empty()) {
+                throw hal::ArgumentError(
+                    lower(w->name),
+                    argument + ": " + reader.problems[0].sentence + "; " + reader.problems[0].help);
+            }
             reader.found[0].argument = argument;
             given_[lower(w->name)] = std::move(reader.found[0]);
         }
@@ -199,49 +258,67 @@ public:
     /// Returns a matrix; throws if it is missing. [setup]
     const Given& at(const char* name) const {
         const auto found = given_.find(lower(name));
-        if (found == given_.end())
-            throw std::invalid_argument(std::string(name) + " is missing: give it as " + lower(name) + "=1,0;0,1 or, in a file, as " +
-                                        name + " = 1 0");
+        if (found == given_.end()) {
+            throw std::invalid_argument(std::string(name) + " is missing: give it as " +
+                                        lower(name) + "=1,0;0,1 or, in a file, as " + name +
+                                        " = 1 0");
+        }
         return found->second;
     }
     /// Returns a matrix that must have this size. [setup]
-    const Eigen::MatrixXd& at(const char* name, Eigen::Index rows, Eigen::Index columns, const std::string& why) const {
+    const Eigen::MatrixXd& at(const char* name, Eigen::Index rows, Eigen::Index columns,
+                              const std::string& why) const {
         const Given& given = at(name);
-        if (given.value.rows() != rows || given.value.cols() != columns)
-            refuse(given, given.name + " is " + size(given.value.rows(), given.value.cols()) + ", not " + size(rows, columns), why);
+        if (given.value.rows() != rows || given.value.cols() != columns) {
+            refuse(given,
+                   given.name + " is " + size(given.value.rows(), given.value.cols()) + ", not " +
+                       size(rows, columns),
+                   why);
+        }
         return given.value;
     }
     /// Returns a square matrix; its size is the number of states. [setup]
     const Eigen::MatrixXd& square(const char* name) const {
         const Given& given = at(name);
-        if (given.value.rows() != given.value.cols())
-            refuse(given, given.name + " is " + size(given.value.rows(), given.value.cols()) + ", not square",
-                   "it has a row and a column per state");
+        if (given.value.rows() != given.value.cols()) {
+            refuse(
+                given,
+                given.name + " is " + size(given.value.rows(), given.value.cols()) + ", not square",
+                "it has a row and a column per state");
+        }
         return given.value;
     }
     /// Returns a vector of `count` values, written as a row or as a column. [setup]
     Eigen::VectorXd vector(const char* name, Eigen::Index count, const std::string& why) const {
         const Given& given = at(name);
-        if (given.value.size() != count || (given.value.rows() != 1 && given.value.cols() != 1))
-            refuse(given, given.name + " is " + size(given.value.rows(), given.value.cols()) + ", not a row of " + std::to_string(count),
+        if (given.value.size() != count || (given.value.rows() != 1 && given.value.cols() != 1)) {
+            refuse(given,
+                   given.name + " is " + size(given.value.rows(), given.value.cols()) +
+                       ", not a row of " + std::to_string(count),
                    why);
+        }
         return given.value.reshaped();
     }
     /// Reports an error of a matrix that was read and ends the constructor. [setup]
-    [[noreturn]] void refuse(const Given& given, const std::string& sentence, const std::string& help) const {
+    [[noreturn]] void refuse(const Given& given, const std::string& sentence,
+                             const std::string& help) const {
         if (given.in_file && texts_.offered()) {
-            texts_.report(HAL_SEVERITY_ERROR, "matrix-value", given.begin, given.end, sentence, "", help);
+            texts_.report(HAL_SEVERITY_ERROR, "matrix-value", given.begin, given.end, sentence, "",
+                          help);
             hal::Texts::fail();
         }
         if (given.argument.empty()) throw std::invalid_argument(sentence + "; " + help);
         throw hal::ArgumentError(lower(given.name), given.argument + ": " + sentence + "; " + help);
     }
-    [[noreturn]] void refuse(const char* name, const std::string& sentence, const std::string& help) const {
+    [[noreturn]] void refuse(const char* name, const std::string& sentence,
+                             const std::string& help) const {
         refuse(at(name), sentence, help);
     }
 
 private:
-    static std::string size(Eigen::Index rows, Eigen::Index columns) { return std::to_string(rows) + " x " + std::to_string(columns); }
+    static std::string size(Eigen::Index rows, Eigen::Index columns) {
+        return std::to_string(rows) + " x " + std::to_string(columns);
+    }
 
     void read_file() {
         const std::string text = texts_.read("file", file_.get());
@@ -249,11 +326,13 @@ private:
         MatrixText reader;
         reader.read_file(text);
         texts_.reject(file_.get(), text, "matrix-text", reader.problems);
-        for (Given& given : reader.found) given_[lower(given.name)] = std::move(given);
+        for (Given& given : reader.found) {
+            given_[lower(given.name)] = std::move(given);
+        }
     }
 
-    hal::Texts                   texts_;
-    hal::TextArgument            file_;
+    hal::Texts texts_;
+    hal::TextArgument file_;
     std::map<std::string, Given> given_;
 };
 

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "estimation/mill_kinematics.hpp"
 
-HAL_COMPONENT(hal::estimation::MillKinematics, "mill_kinematics", "Forward and inverse kinematics of a five-axis mill with a trunnion table", R"(
+HAL_COMPONENT(hal::estimation::MillKinematics, "mill_kinematics",
+              "Forward and inverse kinematics of a five-axis mill with a trunnion table", R"(
 X Y Z move the tool. The table rotates the workpiece by C about z, on a trunnion that rotates by A about x; the two axes meet in `pivot`. Joints and commands
 0 to 4 are X Y Z A C. Targets are the position of the tool tip and the direction of the tool in the workpiece's frame. Of the two solutions the one nearer to
 the last C is chosen, and C takes the shorter way round. With the tool upright C does not move.

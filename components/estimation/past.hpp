@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A Kalman filter with a history: a late measurement is applied at its own time, and the later steps are repeated.
+// A Kalman filter with a history: a late measurement is applied at its own time, and the later
+// steps are repeated.
 #pragma once
 
 #include <cmath>
@@ -14,10 +15,10 @@ namespace hal::estimation {
 
 /// The estimate at one time, and the inputs and measurements of that time.
 struct Moment {
-    Vector        x;                 ///< after the measurements of this moment
-    Matrix        p;                 ///< covariance of x
-    Vector        u;                 ///< the input that acted since the moment before
-    Vector        z;                 ///< measurements of this moment, those that are in `measured`
+    Vector x;                 ///< after the measurements of this moment
+    Matrix p;                 ///< covariance of x
+    Vector u;                 ///< the input that acted since the moment before
+    Vector z;                 ///< measurements of this moment, those that are in `measured`
     std::uint32_t measured = 0;
     std::uint32_t fresh = 0;  ///< those of `measured` that were not counted yet
 };
@@ -25,48 +26,68 @@ struct Moment {
 /// The outcome of a measurement.
 enum class Fate { none, used, outlier, lost };
 
-/// x and P after a scalar measurement of cx with variance r, by Joseph's form (P. Joseph, in R. Bucy, *Filtering for Stochastic Processes*, 1968):
+/// x and P after a scalar measurement of cx with variance r, by Joseph's form (P. Joseph, in R.
+/// Bucy, *Filtering for Stochastic Processes*, 1968):
 ///     k = Pc / (c'Pc + r),  x <- x + k off,  P <- (I - kc')P(I - kc')' + k r k'
-/// which remains symmetric and positive where P - kc'P does not; the two halves are symmetrised. A deviation beyond `gate` standard
-/// deviations changes nothing; 0 disables the gate. [realtime]
-inline Fate correct(Vector& x, Matrix& p, const Vector& c, double off, double r, double gate) noexcept {
+/// which remains symmetric and positive where P - kc'P does not; the two halves are symmetrised. A
+/// deviation beyond `gate` standard deviations changes nothing; 0 disables the gate. [realtime]
+inline Fate correct(Vector& x, Matrix& p, const Vector& c, double off, double r,
+                    double gate) noexcept {
     const Eigen::Index n = x.size();
-    Vector             pc, k, mc;
+    Vector pc, k, mc;
     multiply(pc, p, c);
     double s = r;
-    for (Eigen::Index i = 0; i < n; ++i) s += c(i) * pc(i);
+    for (Eigen::Index i = 0; i < n; ++i) {
+        s += c(i) * pc(i);
+    }
     if (!(s > 0.0) || !std::isfinite(s)) return Fate::lost;
     if (gate > 0.0 && off * off > gate * gate * s) return Fate::outlier;
     k = pc / s;
     x += k * off;
     double* const all = p.data();
-    for (Eigen::Index j = 0; j < n; ++j)
-        for (Eigen::Index i = 0; i < n; ++i) all[i + j * n] -= k.data()[i] * pc.data()[j];
+    for (Eigen::Index j = 0; j < n; ++j) {
+        for (Eigen::Index i = 0; i < n; ++i) {
+            all[i + j * n] -= k.data()[i] * pc.data()[j];
+        }
+    }
     multiply(mc, p, c);
     mc = r * k - mc;
-    for (Eigen::Index j = 0; j < n; ++j)
-        for (Eigen::Index i = 0; i < n; ++i) all[i + j * n] += mc.data()[i] * k.data()[j];
-    for (Eigen::Index j = 0; j < n; ++j)
-        for (Eigen::Index i = 0; i < j; ++i) p(i, j) = p(j, i) = 0.5 * (p(i, j) + p(j, i));
+    for (Eigen::Index j = 0; j < n; ++j) {
+        for (Eigen::Index i = 0; i < n; ++i) {
+            all[i + j * n] += mc.data()[i] * k.data()[j];
+        }
+    }
+    for (Eigen::Index j = 0; j < n; ++j) {
+        for (Eigen::Index i = 0; i < j; ++i) {
+            p(i, j) = p(j, i) = 0.5 * (p(i, j) + p(j, i));
+        }
+    }
     return Fate::used;
 }
 
 /// to = A P A' + Q for a symmetric P, symmetric to the last bit. [realtime]
 inline void spread(Matrix& to, const Matrix& a, const Matrix& p, const Matrix& q) noexcept {
     const Eigen::Index n = a.rows();
-    Matrix             ap;
+    Matrix ap;
     multiply(ap, a, p);
     to = q;
     const double *const left = ap.data(), *const right = a.data();
     double* const all = to.data();
-    for (Eigen::Index j = 0; j < n; ++j)
+    for (Eigen::Index j = 0; j < n; ++j) {
         for (Eigen::Index k = 0; k < n; ++k) {
             const double factor = right[j + k * n];
-            if (factor != 0.0)
-                for (Eigen::Index i = 0; i <= j; ++i) all[i + j * n] += left[i + k * n] * factor;
+            if (factor != 0.0) {
+                for (Eigen::Index i = 0; i <= j; ++i) {
+                    all[i + j * n] += left[i + k * n] * factor;
+                }
+            }
         }
-    for (Eigen::Index j = 0; j < n; ++j)
-        for (Eigen::Index i = 0; i < j; ++i) all[j + i * n] = all[i + j * n];
+    }
+    for (Eigen::Index j = 0; j < n; ++j) {
+        for (Eigen::Index i = 0; i < j; ++i) {
+            all[j + i * n] = all[i + j * n];
+        }
+    }
 }
 
 /// The filter over its last `history` moments. `Model` has, all [realtime]:
@@ -76,8 +97,11 @@ template <class Model>
 class Past {
 public:
     /// Allocates the history. [setup]
-    Past(Model& model, std::size_t history, Vector x0, Matrix p0, Eigen::Index inputs, Eigen::Index channels)
-        : model_(model), start_{std::move(x0), std::move(p0), Vector::Zero(inputs), Vector::Zero(channels)}, moments_(history, start_) {}
+    Past(Model& model, std::size_t history, Vector x0, Matrix p0, Eigen::Index inputs,
+         Eigen::Index channels)
+        : model_(model),
+          start_{std::move(x0), std::move(p0), Vector::Zero(inputs), Vector::Zero(channels)},
+          moments_(history, start_) {}
 
     const Moment& now() const noexcept { return at(number_); }
 
@@ -92,31 +116,46 @@ public:
     }
     /// Adds measurement `channel`, `cycles` old. False if it is older than the history. [realtime]
     bool add(Eigen::Index channel, double z, std::int64_t cycles) noexcept {
-        if (cycles < 0) cycles = 0;
+        if (cycles < 0) {
+            cycles = 0;
+        }
         // the oldest step cannot be repeated: its predecessor is no longer stored
         if (cycles >= static_cast<std::int64_t>(known_) - (full() ? 1 : 0)) return false;
         const std::uint64_t where = number_ - static_cast<std::uint64_t>(cycles);
-        Moment&             moment = at(where);
+        Moment& moment = at(where);
         moment.z(channel) = z;
         moment.measured |= std::uint32_t{1} << channel;
         moment.fresh |= std::uint32_t{1} << channel;
-        if (where < first_) first_ = where;
+        if (where < first_) {
+            first_ = where;
+        }
         return true;
     }
     /// Repeats all steps from the oldest new measurement on. [realtime]
     void settle(double gate) noexcept {
         for (std::uint64_t k = first_; k <= number_; ++k) {
             Moment& moment = at(k);
-            if (k == 1) moment.x = start_.x, moment.p = start_.p;
-            else model_.predict(moment, at(k - 1));
+            if (k == 1) {
+                moment.x = start_.x;
+                moment.p = start_.p;
+            } else {
+                model_.predict(moment, at(k - 1));
+            }
             for (Eigen::Index i = 0; i < moment.z.size(); ++i) {
                 if ((moment.measured >> i & 1) == 0) continue;
                 const Fate fate = model_.measure(moment, i, gate);
-                if (moment.fresh >> i & 1) used += fate == Fate::used, outliers += fate == Fate::outlier;
-                if (fate == Fate::lost) renew(moment);
+                if (moment.fresh >> i & 1) {
+                    used += fate == Fate::used;
+                    outliers += fate == Fate::outlier;
+                }
+                if (fate == Fate::lost) {
+                    renew(moment);
+                }
             }
             moment.fresh = 0;
-            if (!finite(moment.x) || !finite(moment.p)) renew(moment);
+            if (!finite(moment.x) || !finite(moment.p)) {
+                renew(moment);
+            }
         }
     }
     /// Back to the start. [realtime]
@@ -124,23 +163,29 @@ public:
         number_ = 0;
         known_ = 0;
     }
-    std::uint32_t used = 0, outliers = 0, renewals = 0;  ///< counted; a measurement that is done again counts once
+    /// counted; a measurement that is done again counts once
+    std::uint32_t used = 0;
+    std::uint32_t outliers = 0;
+    std::uint32_t renewals = 0;
 
 private:
-    Moment&       at(std::uint64_t k) noexcept { return moments_[k % moments_.size()]; }
+    Moment& at(std::uint64_t k) noexcept { return moments_[k % moments_.size()]; }
     const Moment& at(std::uint64_t k) const noexcept { return moments_[k % moments_.size()]; }
-    bool          full() const noexcept { return number_ > moments_.size(); }
-    void          renew(Moment& moment) noexcept {
-        if (!finite(moment.x)) moment.x = start_.x;
+    bool full() const noexcept { return number_ > moments_.size(); }
+    void renew(Moment& moment) noexcept {
+        if (!finite(moment.x)) {
+            moment.x = start_.x;
+        }
         moment.p = start_.p;
         ++renewals;
     }
 
-    Model&              model_;
-    const Moment        start_;
+    Model& model_;
+    const Moment start_;
     std::vector<Moment> moments_;
-    std::uint64_t       number_ = 0, first_ = 0;
-    std::size_t         known_ = 0;
+    std::uint64_t number_ = 0;
+    std::uint64_t first_ = 0;
+    std::size_t known_ = 0;
 };
 
 }  // namespace hal::estimation

@@ -13,12 +13,15 @@ using namespace hal::estimation;
 struct StateSpace : hal::Component {
     explicit StateSpace(const hal_host* host)
         : Component(host),
-          plant(*this, "plant", "continuous", "continuous: x' = Ax + Bu; discrete: x(k+1) = Ax + Bu, a step per cycle"),
+          plant(*this, "plant", "continuous",
+                "continuous: x' = Ax + Bu; discrete: x(k+1) = Ax + Bu, a step per cycle"),
           model_(read()),
           u(*this, "u-#", model_.b.cols(), "input #"),
           y(*this, "y-#", model_.c.rows(), "output #: row # of Cx + Du", {.finite = true}),
           x(*this, "x-#", model_.a.rows(), "state #", {.finite = true}) {
-        for (std::size_t i = 0; i < x.size(); ++i) x[i] = state_(static_cast<Eigen::Index>(i));
+        for (std::size_t i = 0; i < x.size(); ++i) {
+            x[i] = state_(static_cast<Eigen::Index>(i));
+        }
     }
 
     hal::TextArgument plant;
@@ -27,75 +30,106 @@ private:
     struct Model {
         Matrix a, b, c, d;
     };
-    bool                  continuous_ = true;  // before the model: reading that sets these
-    Vector                start_, state_, input_;
-    Model                 model_;
-    Matrix                sampled_a_, sampled_b_;
+    bool continuous_ = true;  // before the model: reading that sets these
+    Vector start_, state_, input_;
+    Model model_;
+    Matrix sampled_a_, sampled_b_;
     hal::estimation::Hold hold_;
-    std::int64_t          period_ns_ = 0;
+    std::int64_t period_ns_ = 0;
 
 public:
-    hal::Ins<double>        u;
-    hal::Outs<double>       y, x;
-    hal::In<bool>           reset{*this, "reset", "TRUE sets the states to x0"};
-    hal::Out<std::uint32_t> bad_inputs{*this, "bad-inputs", "number of NaN or infinite inputs; the previous input is used"};
-    hal::Out<std::uint32_t> restarts{*this, "restarts", "number of times the states overflowed and were reset to x0"};
-    hal::Function           run{*this, "update", &StateSpace::update, "computes the states and outputs after one period"};
+    hal::Ins<double> u;
+    hal::Outs<double> y, x;
+    hal::In<bool> reset{*this, "reset", "TRUE sets the states to x0"};
+    hal::Out<std::uint32_t> bad_inputs{
+        *this, "bad-inputs", "number of NaN or infinite inputs; the previous input is used"};
+    hal::Out<std::uint32_t> restarts{*this, "restarts",
+                                     "number of times the states overflowed and were reset to x0"};
+    hal::Function run{*this, "update", &StateSpace::update,
+                      "computes the states and outputs after one period"};
 
     void update(hal::Cycle cycle) noexcept {
-        if (cycle.period_ns() != period_ns_) sample(cycle);
+        if (cycle.period_ns() != period_ns_) {
+            sample(cycle);
+        }
         for (std::size_t i = 0; i < u.size(); ++i) {
             const double value = u[i];
-            if (std::isfinite(value)) input_(static_cast<Eigen::Index>(i)) = value;
-            else bad_inputs = bad_inputs + 1;
+            if (std::isfinite(value)) {
+                input_(static_cast<Eigen::Index>(i)) = value;
+            } else {
+                bad_inputs = bad_inputs + 1;
+            }
         }
-        if (reset) state_ = start_;
-        else step();
+        if (reset) {
+            state_ = start_;
+        } else {
+            step();
+        }
         Vector out, through;
         multiply(out, model_.c, state_);
         multiply(through, model_.d, input_);
         out += through;
-        if (!finite(out)) out.setZero();
-        for (std::size_t i = 0; i < y.size(); ++i) y[i] = out(static_cast<Eigen::Index>(i));
-        for (std::size_t i = 0; i < x.size(); ++i) x[i] = state_(static_cast<Eigen::Index>(i));
+        if (!finite(out)) {
+            out.setZero();
+        }
+        for (std::size_t i = 0; i < y.size(); ++i) {
+            y[i] = out(static_cast<Eigen::Index>(i));
+        }
+        for (std::size_t i = 0; i < x.size(); ++i) {
+            x[i] = state_(static_cast<Eigen::Index>(i));
+        }
     }
 
 private:
     Model read() {
         const bool continuous = plant.get() == "continuous";
-        if (!continuous && plant.get() != "discrete")
-            throw hal::ArgumentError("plant", "plant=" + plant.get() + " is neither continuous nor discrete");
+        if (!continuous && plant.get() != "discrete") {
+            throw hal::ArgumentError(
+                "plant", "plant=" + plant.get() + " is neither continuous nor discrete");
+        }
         continuous_ = continuous;
-        const Matrices given(*this, {{"A", "0,1;-1,-1", "n x n: system matrix"},
-                                     {"B", "0;1", "n x m: input matrix"},
-                                     {"C", "1,0", "p x n: output matrix; default: the outputs are the states"},
-                                     {"D", "", "p x m: feedthrough matrix; default: 0"},
-                                     {"x0", "", "n: initial states; default: 0"}});
-        Model          model;
+        const Matrices given(
+            *this, {{"A", "0,1;-1,-1", "n x n: system matrix"},
+                    {"B", "0;1", "n x m: input matrix"},
+                    {"C", "1,0", "p x n: output matrix; default: the outputs are the states"},
+                    {"D", "", "p x m: feedthrough matrix; default: 0"},
+                    {"x0", "", "n: initial states; default: 0"}});
+        Model model;
         model.a = given.square("A");
         const auto n = model.a.rows();
         model.b = given.at("B", n, given.at("B").value.cols(), "it has a row per state, as A has");
-        model.c = given.has("C") ? given.at("C", given.at("C").value.rows(), n, "it has a column per state") : Dense(Dense::Identity(n, n));
+        model.c = given.has("C")
+                      ? given.at("C", given.at("C").value.rows(), n, "it has a column per state")
+                      : Dense(Dense::Identity(n, n));
         model.d = Matrix::Zero(model.c.rows(), model.b.cols());
-        if (given.has("D")) model.d = given.at("D", model.c.rows(), model.b.cols(), "it has a row per output and a column per input");
+        if (given.has("D")) {
+            model.d = given.at("D", model.c.rows(), model.b.cols(),
+                               "it has a row per output and a column per input");
+        }
         start_ = Vector::Zero(n);
-        if (given.has("x0")) start_ = given.vector("x0", n, "it has a number per state");
+        if (given.has("x0")) {
+            start_ = given.vector("x0", n, "it has a number per state");
+        }
         state_ = start_;
         input_ = Vector::Zero(model.b.cols());
         return model;
     }
     void sample(hal::Cycle cycle) noexcept {
         period_ns_ = cycle.period_ns();
-        sampled_a_ = model_.a, sampled_b_ = model_.b;
-        if (continuous_) hold_.sample(sampled_a_, sampled_b_, cycle.seconds());
+        sampled_a_ = model_.a;
+        sampled_b_ = model_.b;
+        if (continuous_) {
+            hold_.sample(sampled_a_, sampled_b_, cycle.seconds());
+        }
     }
     void step() noexcept {
         Vector next, pushed;
         multiply(next, sampled_a_, state_);
         multiply(pushed, sampled_b_, input_);
         next += pushed;
-        if (finite(next)) state_ = next;
-        else {
+        if (finite(next)) {
+            state_ = next;
+        } else {
             state_ = start_;
             restarts = restarts + 1;
         }

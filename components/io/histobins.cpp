@@ -11,35 +11,42 @@ constexpr std::int32_t most = 200;
 
 struct Histobins : hal::Component {
     using Component::Component;
-    hal::In<std::uint32_t> pintype{*this, "pintype", "input to use: 0 input, 1 input-s32, 2 input-u32, 3 input-bit"};
-    hal::In<double>        input{*this, "input", "value to count, of type float"};
-    hal::In<std::int32_t>  input_s32{*this, "input-s32", "value to count, of type s32"};
+    hal::In<std::uint32_t> pintype{*this, "pintype",
+                                   "input to use: 0 input, 1 input-s32, 2 input-u32, 3 input-bit"};
+    hal::In<double> input{*this, "input", "value to count, of type float"};
+    hal::In<std::int32_t> input_s32{*this, "input-s32", "value to count, of type s32"};
     hal::In<std::uint32_t> input_u32{*this, "input-u32", "value to count, of type u32"};
-    hal::In<bool>          input_bit{*this, "input-bit", "value to count, of type bit"};
+    hal::In<bool> input_bit{*this, "input-bit", "value to count, of type bit"};
     hal::In<std::uint32_t> nbins{*this, "nbins", "number of bins, 1..200", {.initial = 20}};
-    hal::In<double>        binsize{*this, "binsize", "width of a bin, above 0", {.initial = 1.0}};
-    hal::In<double>        minvalue{*this, "minvalue", "lower edge of the first bin"};
-    hal::In<std::int32_t>  index{*this, "index", "bin to show"};
+    hal::In<double> binsize{*this, "binsize", "width of a bin, above 0", {.initial = 1.0}};
+    hal::In<double> minvalue{*this, "minvalue", "lower edge of the first bin"};
+    hal::In<std::int32_t> index{*this, "index", "bin to show"};
     hal::Out<std::int32_t> check{*this, "check", "the index that is shown"};
-    hal::In<bool>          reset{*this, "reset", "TRUE clears the histogram"};
-    hal::In<bool>          method{*this, "method", "no effect; LinuxCNC's two methods for the variance give the same result here"};
-    hal::Out<bool>         input_error{*this, "input-error", "TRUE: invalid setting or value; nothing is counted and the outputs are held"};
-    hal::Out<double>       binvalue{*this, "binvalue", "number of values in this bin; -1: invalid index"};
-    hal::Out<double>       pextra{*this, "pextra", "number of values above the last bin"};
-    hal::Out<double>       nextra{*this, "nextra", "number of values below the first bin"};
-    hal::Out<double>       input_min{*this, "input-min", "smallest value"};
-    hal::Out<double>       input_max{*this, "input-max", "largest value"};
+    hal::In<bool> reset{*this, "reset", "TRUE clears the histogram"};
+    hal::In<bool> method{
+        *this, "method",
+        "no effect; LinuxCNC's two methods for the variance give the same result here"};
+    hal::Out<bool> input_error{
+        *this, "input-error",
+        "TRUE: invalid setting or value; nothing is counted and the outputs are held"};
+    hal::Out<double> binvalue{*this, "binvalue", "number of values in this bin; -1: invalid index"};
+    hal::Out<double> pextra{*this, "pextra", "number of values above the last bin"};
+    hal::Out<double> nextra{*this, "nextra", "number of values below the first bin"};
+    hal::Out<double> input_min{*this, "input-min", "smallest value"};
+    hal::Out<double> input_max{*this, "input-max", "largest value"};
     hal::Out<std::uint32_t> nsamples{*this, "nsamples", "number of values"};
-    hal::Out<double>       variance{*this, "variance", "variance of the values"};
-    hal::Out<double>       mean{*this, "mean", "mean of the values"};
-    hal::Out<std::int32_t> available{*this, "availablebins", "maximum number of bins", {.initial = most}};
-    hal::Function          run{*this, "", &Histobins::update, "counts the value"};
+    hal::Out<double> variance{*this, "variance", "variance of the values"};
+    hal::Out<double> mean{*this, "mean", "mean of the values"};
+    hal::Out<std::int32_t> available{
+        *this, "availablebins", "maximum number of bins", {.initial = most}};
+    hal::Function run{*this, "", &Histobins::update, "counts the value"};
 
     void update(hal::Cycle) noexcept {
         check = index.get();
         available = most;
         const double value = chosen();
-        const bool bins = nbins >= 1 && nbins <= most && binsize > 0.0 && std::isfinite(binsize) && std::isfinite(minvalue);
+        const bool bins = nbins >= 1 && nbins <= most && binsize > 0.0 && std::isfinite(binsize) &&
+                          std::isfinite(minvalue);
         input_error = !bins || !(std::fabs(value) <= 1e150);
         if (input_error) return;
 
@@ -66,7 +73,8 @@ private:
     }
     /// True in the first cycle and after a change of the bins.
     bool has_changed() noexcept {
-        const bool same = nbins == counted_bins_ && binsize == counted_size_ && minvalue == counted_minimum_;
+        const bool same =
+            nbins == counted_bins_ && binsize == counted_size_ && minvalue == counted_minimum_;
         counted_bins_ = nbins;
         counted_size_ = binsize;
         counted_minimum_ = minvalue;
@@ -87,7 +95,9 @@ private:
             above_ += 1.0;
         } else {
             const auto bin = static_cast<std::size_t>((value - minvalue) / binsize);
-            if (bin < nbins) bins_[bin] += 1.0;
+            if (bin < nbins) {
+                bins_[bin] += 1.0;
+            }
         }
     }
     void show() noexcept {
@@ -103,9 +113,13 @@ private:
     }
     measure::Statistics statistics_;
     std::array<double, most> bins_{};
-    double above_ = 0.0, below_ = 0.0, smallest_ = 0.0, largest_ = 0.0;
+    double above_ = 0.0;
+    double below_ = 0.0;
+    double smallest_ = 0.0;
+    double largest_ = 0.0;
     std::uint32_t counted_bins_ = 0;  // settings of the bins at the last value; 0: none yet
-    double counted_size_ = 0.0, counted_minimum_ = 0.0;
+    double counted_size_ = 0.0;
+    double counted_minimum_ = 0.0;
 };
 
 }  // namespace

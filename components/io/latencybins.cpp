@@ -12,27 +12,40 @@ using Bins = std::array<std::int32_t, most + 1>;
 
 struct Latencybins : hal::Component {
     using Component::Component;
-    hal::In<std::int32_t>  highest{*this, "maxbinnumber", "number of the last bin on either side, at most 1000", {.initial = most}};
-    hal::In<std::int32_t>  index{*this, "index", "bin to show"};
-    hal::In<bool>          reset{*this, "reset", "TRUE clears the histogram"};
-    hal::In<std::int32_t>  size{*this, "nsbinsize", "width of a bin; nothing is counted while it is not positive", {.unit = "ns"}};
+    hal::In<std::int32_t> highest{*this,
+                                  "maxbinnumber",
+                                  "number of the last bin on either side, at most 1000",
+                                  {.initial = most}};
+    hal::In<std::int32_t> index{*this, "index", "bin to show"};
+    hal::In<bool> reset{*this, "reset", "TRUE clears the histogram"};
+    hal::In<std::int32_t> size{*this,
+                               "nsbinsize",
+                               "width of a bin; nothing is counted while it is not positive",
+                               {.unit = "ns"}};
     hal::Out<std::int32_t> check{*this, "check", "the index that is shown"};
-    hal::Out<std::int32_t> latency{*this, "latency", "time since the last run minus the period", {.unit = "ns"}};
-    hal::Out<std::int32_t> latency_max{*this, "latency-max", "largest latency so far", {.unit = "ns"}};
-    hal::Out<std::int32_t> latency_min{*this, "latency-min", "smallest latency so far; negative", {.unit = "ns"}};
+    hal::Out<std::int32_t> latency{
+        *this, "latency", "time since the last run minus the period", {.unit = "ns"}};
+    hal::Out<std::int32_t> latency_max{
+        *this, "latency-max", "largest latency so far", {.unit = "ns"}};
+    hal::Out<std::int32_t> latency_min{
+        *this, "latency-min", "smallest latency so far; negative", {.unit = "ns"}};
     hal::Out<std::int32_t> positive{*this, "pbinvalue", "runs in bin +index; -1: invalid index"};
     hal::Out<std::int32_t> negative{*this, "nbinvalue", "runs in bin -index; -1: invalid index"};
     hal::Out<std::int32_t> positive_extra{*this, "pextra", "runs later than the last bin"};
     hal::Out<std::int32_t> negative_extra{*this, "nextra", "runs earlier than the last bin"};
     hal::Out<std::int32_t> variance{*this, "variance", "variance of the latency, in ns^2"};
-    hal::Out<std::int32_t> available{*this, "availablebins", "maximum number of bins", {.initial = most}};
-    hal::Function          run{*this, "", &Latencybins::update, "counts this run"};
+    hal::Out<std::int32_t> available{
+        *this, "availablebins", "maximum number of bins", {.initial = most}};
+    hal::Function run{*this, "", &Latencybins::update, "counts this run"};
 
     void update(hal::Cycle cycle) noexcept {
         const std::int64_t since = time_.since_last(cycle);
         const std::int32_t last = std::clamp(highest.get(), 0, most);
-        if (reset) clear();
-        else if (since >= 0) count(since - cycle.period_ns(), last);
+        if (reset) {
+            clear();
+        } else if (since >= 0) {
+            count(since - cycle.period_ns(), last);
+        }
         const bool inside = index >= 0 && index <= last;
         check = index.get();
         positive = inside ? above_[static_cast<std::size_t>(index)] : -1;
@@ -60,16 +73,26 @@ private:
         latest_ = std::max(latest_, now_);
         earliest_ = std::min(earliest_, now_);
         const std::int64_t bin = (late < 0 ? -late : late) / size;
-        if (bin > last) add(late < 0 ? earlier_ : later_);
-        else add((late < 0 && bin > 0 ? below_ : above_)[static_cast<std::size_t>(bin)]);
+        if (bin > last) {
+            add(late < 0 ? earlier_ : later_);
+        } else {
+            add((late < 0 && bin > 0 ? below_ : above_)[static_cast<std::size_t>(bin)]);
+        }
     }
     static void add(std::int32_t& count) noexcept {
-        if (count < INT32_MAX) ++count;
+        if (count < INT32_MAX) {
+            ++count;
+        }
     }
     measure::RunTime time_;
     measure::Statistics statistics_;
-    Bins above_{}, below_{};
-    std::int32_t later_ = 0, earlier_ = 0, now_ = 0, latest_ = 0, earliest_ = 0;
+    Bins above_{};
+    Bins below_{};
+    std::int32_t later_ = 0;
+    std::int32_t earlier_ = 0;
+    std::int32_t now_ = 0;
+    std::int32_t latest_ = 0;
+    std::int32_t earliest_ = 0;
 };
 
 }  // namespace

@@ -12,11 +12,18 @@ namespace {
 
 struct Message : hal::Component {
     using Component::Component;
-    hal::TextArgument text{*this, "messages", "message", "quoted texts separated by commas, one per instance", {.per_instance = true}};
-    hal::In<bool>     trigger{*this, "trigger", "an edge prints the message"};
-    hal::In<bool>     force{*this, "force", "a rising edge prints the message again while trigger is in the triggered state"};
-    hal::Param<bool>  edge{*this, "edge", "edge of trigger: TRUE is rising, FALSE is falling", {.initial = true}};
-    hal::Function     run{*this, "", &Message::update, "detects edges of trigger and force"};
+    hal::TextArgument text{*this,
+                           "messages",
+                           "message",
+                           "quoted texts separated by commas, one per instance",
+                           {.per_instance = true}};
+    hal::In<bool> trigger{*this, "trigger", "an edge prints the message"};
+    hal::In<bool> force{
+        *this, "force",
+        "a rising edge prints the message again while trigger is in the triggered state"};
+    hal::Param<bool> edge{
+        *this, "edge", "edge of trigger: TRUE is rising, FALSE is falling", {.initial = true}};
+    hal::Function run{*this, "", &Message::update, "detects edges of trigger and force"};
 
     void start() {
         ended_.store(false);
@@ -24,28 +31,37 @@ struct Message : hal::Component {
     }
     void stop() noexcept {
         ended_.store(true);
-        if (printer_ && printer_->joinable()) printer_->join();
+        if (printer_ && printer_->joinable()) {
+            printer_->join();
+        }
         printer_.reset();
         log_.close();
     }
 
     void update(hal::Cycle) noexcept {
         const bool is_active = trigger == edge;
-        const bool triggered = is_active && trigger != was_trigger_, forced = is_active && force && !was_forced_;
+        const bool triggered = is_active && trigger != was_trigger_;
+
+        const bool forced = is_active && force && !was_forced_;
         was_trigger_ = trigger;
         was_forced_ = force;
-        if (triggered || forced) wanted_.fetch_add(1, std::memory_order_relaxed);
+        if (triggered || forced) {
+            wanted_.fetch_add(1, std::memory_order_relaxed);
+        }
     }
 
 private:
     void print() noexcept {
         for (bool last = false; !last;) {
-            last = ended_.load();  // read before the count, so that all messages before the end are printed
+            // read before the count, so that all messages before the end are printed
+            last = ended_.load();
             for (; printed_ != wanted_.load(std::memory_order_relaxed); ++printed_) {
                 log_.print("", text.get());
             }
             log_.flush();
-            if (!last) std::this_thread::sleep_for(std::chrono::milliseconds(20));
+            if (!last) {
+                std::this_thread::sleep_for(std::chrono::milliseconds(20));
+            }
         }
     }
     hal::MessageLog log_{""};
@@ -53,7 +69,8 @@ private:
     std::uint32_t printed_ = 0;             // the printer only
     std::atomic<bool> ended_{false};
     std::optional<std::thread> printer_;
-    bool was_trigger_ = false, was_forced_ = false;
+    bool was_trigger_ = false;
+    bool was_forced_ = false;
 };
 
 }  // namespace

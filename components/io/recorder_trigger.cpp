@@ -9,7 +9,14 @@
 
 namespace {
 
-enum BitMode : std::uint32_t { bit_unused = 0, bit_rises = 1, bit_falls = 2, bit_changes = 3, bit_true = 4, bit_false = 5 };
+enum BitMode : std::uint32_t {
+    bit_unused = 0,
+    bit_rises = 1,
+    bit_falls = 2,
+    bit_changes = 3,
+    bit_true = 4,
+    bit_false = 5
+};
 enum ValueMode : std::uint32_t {
     value_unused = 0,
     value_rises = 1,
@@ -27,45 +34,63 @@ enum State : std::uint32_t { idle = 0, filling = 1, armed = 2, recording = 3, ho
 struct RecorderTrigger : hal::Component {
     using Component::Component;
 
-    hal::Argument channels{*this, "channels", 4, "number of values to delay", {.min = 0, .max = 64}};
+    hal::Argument channels{
+        *this, "channels", 4, "number of values to delay", {.min = 0, .max = 64}};
     hal::Argument bit_channels{*this, "bits", 0, "number of bits to delay", {.min = 0, .max = 64}};
-    hal::Argument depth{*this, "depth", 1000, "maximum pre-trigger in cycles", {.min = 1, .max = 10'000'000}};
+    hal::Argument depth{
+        *this, "depth", 1000, "maximum pre-trigger in cycles", {.min = 1, .max = 10'000'000}};
 
     hal::In<bool> arm{*this, "arm", "a rising edge arms; FALSE disarms"};
     hal::In<bool> again{*this, "auto-arm", "TRUE arms again after each record"};
     hal::In<bool> force{*this, "force", "a rising edge triggers regardless of the conditions"};
     hal::In<bool> bit{*this, "trigger-bit", "bit for the trigger condition"};
     hal::In<double> value{*this, "trigger-value", "value for the trigger condition"};
-    hal::Param<std::uint32_t> bit_mode{*this, "bit-mode",
-                                       "0 unused; trigger-bit 1 rises, 2 falls, 3 changes, 4 is TRUE, 5 is FALSE", {.initial = bit_rises}};
-    hal::Param<std::uint32_t> value_mode{*this, "value-mode",
-                                         "0 unused; trigger-value 1 rises, 2 falls, 3 crosses, 4 is above, 5 is below threshold; "
-                                         "6 is outside, 7 is inside threshold and threshold-2"};
+    hal::Param<std::uint32_t> bit_mode{
+        *this,
+        "bit-mode",
+        "0 unused; trigger-bit 1 rises, 2 falls, 3 changes, 4 is TRUE, 5 is FALSE",
+        {.initial = bit_rises}};
+    hal::Param<std::uint32_t> value_mode{
+        *this, "value-mode",
+        "0 unused; trigger-value 1 rises, 2 falls, 3 crosses, 4 is above, 5 is below threshold; "
+        "6 is outside, 7 is inside threshold and threshold-2"};
     hal::Param<double> threshold{*this, "threshold", "threshold for trigger-value"};
     hal::Param<double> threshold_2{*this, "threshold-2", "other limit of the window"};
     hal::Param<double> hysteresis{*this, "hysteresis",
-                                  "distance from threshold that trigger-value must reach on the other side before the next edge"};
-    hal::Param<bool> both{*this, "both", "TRUE: both conditions must be met in the same cycle; FALSE: either condition"};
-    hal::Param<std::uint32_t> pre{*this, "pre", "cycles to record before the trigger", {.initial = 100}};
-    hal::Param<std::uint32_t> post{*this, "post", "cycles to record from the trigger on", {.initial = 900}};
+                                  "distance from threshold that trigger-value must reach on the "
+                                  "other side before the next edge"};
+    hal::Param<bool> both{
+        *this, "both",
+        "TRUE: both conditions must be met in the same cycle; FALSE: either condition"};
+    hal::Param<std::uint32_t> pre{
+        *this, "pre", "cycles to record before the trigger", {.initial = 100}};
+    hal::Param<std::uint32_t> post{
+        *this, "post", "cycles to record from the trigger on", {.initial = 900}};
     hal::Param<double> hold_off{*this, "hold-off", "auto-arm: delay after a record", {.unit = "s"}};
 
     hal::Ins<double> in{*this, "in-##", channels, "value to record"};
     hal::Ins<bool> bit_in{*this, "bit-in-##", bit_channels, "bit to record"};
     hal::Outs<double> out{*this, "out-##", channels, "in-##, delayed by pre cycles"};
     hal::Outs<bool> bit_out{*this, "bit-out-##", bit_channels, "bit-in-##, delayed by pre cycles"};
-    hal::Out<bool> record{*this, "record", "TRUE for pre + post cycles; link it to the sampler's enable"};
+    hal::Out<bool> record{*this, "record",
+                          "TRUE for pre + post cycles; link it to the sampler's enable"};
     hal::Out<bool> triggered{*this, "triggered", "TRUE in the cycle of the trigger"};
-    hal::Out<bool> done{*this, "done", "TRUE: the record is complete and the trigger is not armed again"};
-    hal::Out<std::uint32_t> state{*this, "state", "0 idle; 1 filling the pre-trigger; 2 armed; 3 recording; 4 hold-off"};
-    hal::Out<std::int32_t> index{*this, "index", "cycle of out-## relative to the trigger: -pre at the start of the record"};
+    hal::Out<bool> done{*this, "done",
+                        "TRUE: the record is complete and the trigger is not armed again"};
+    hal::Out<std::uint32_t> state{
+        *this, "state", "0 idle; 1 filling the pre-trigger; 2 armed; 3 recording; 4 hold-off"};
+    hal::Out<std::int32_t> index{
+        *this, "index", "cycle of out-## relative to the trigger: -pre at the start of the record"};
     hal::Out<std::uint32_t> records{*this, "records", "number of records so far"};
 
-    hal::Function run{*this, "", &RecorderTrigger::update, "delays the values and detects the trigger"};
+    hal::Function run{*this, "", &RecorderTrigger::update,
+                      "delays the values and detects the trigger"};
 
     void update(hal::Cycle cycle) noexcept {
-        const bool armed_now = arm && !was_arm_, forced = force && !was_force_;
-        was_arm_ = arm, was_force_ = force;
+        const bool armed_now = arm && !was_arm_;
+        const bool forced = force && !was_force_;
+        was_arm_ = arm;
+        was_force_ = force;
         store();
         const bool fires = looks();
 
@@ -76,19 +101,28 @@ struct RecorderTrigger : hal::Component {
             state_ = filling;
             filled_ = 0;  // cycles before arming belong to no record
         }
-        if (state_ == holding_off && (waited_ += cycle.seconds()) > hold_off) state_ = filling;
+        if (state_ == holding_off && (waited_ += cycle.seconds()) > hold_off) {
+            state_ = filling;
+        }
         if (state_ == filling) {
-            if (filled_ >= before) state_ = armed;
-            else ++filled_;
+            if (filled_ >= before) {
+                state_ = armed;
+            } else {
+                ++filled_;
+            }
         }
         const bool starts = (state_ == armed && fires) || (forced && state_ != recording);
-        if (starts) begin(before);
+        if (starts) {
+            begin(before);
+        }
 
         give();
         record = state_ == recording;
         triggered = starts;
         index = state_ == recording ? static_cast<std::int32_t>(at_) : 0;
-        if (state_ == recording && ++at_ >= after_) finish();
+        if (state_ == recording && ++at_ >= after_) {
+            finish();
+        }
         done = have_ && state_ == idle && !record;
         state = record ? std::uint32_t{recording} : state_;
     }
@@ -109,69 +143,106 @@ private:
 
     void store() noexcept {
         newest_ = (newest_ + 1) % size_;
-        for (std::size_t i = 0; i < in.size(); ++i) values_[newest_ * in.size() + i] = in[i];
-        for (std::size_t i = 0; i < bit_in.size(); ++i) bits_[newest_ * bit_in.size() + i] = bit_in[i];
+        for (std::size_t i = 0; i < in.size(); ++i) {
+            values_[newest_ * in.size() + i] = in[i];
+        }
+        for (std::size_t i = 0; i < bit_in.size(); ++i) {
+            bits_[newest_ * bit_in.size() + i] = bit_in[i];
+        }
     }
     /// Returns the delay; during a record the delay at its trigger.
     void give() noexcept {
-        const std::size_t back = state_ == recording ? back_ : std::min<std::size_t>(pre, size_ - 1);
+        const std::size_t back =
+            state_ == recording ? back_ : std::min<std::size_t>(pre, size_ - 1);
         const std::size_t from = (newest_ + size_ - back) % size_;
-        for (std::size_t i = 0; i < out.size(); ++i) out[i] = values_[from * out.size() + i];
-        for (std::size_t i = 0; i < bit_out.size(); ++i) bit_out[i] = bits_[from * bit_out.size() + i];
+        for (std::size_t i = 0; i < out.size(); ++i) {
+            out[i] = values_[from * out.size() + i];
+        }
+        for (std::size_t i = 0; i < bit_out.size(); ++i) {
+            bit_out[i] = bits_[from * bit_out.size() + i];
+        }
     }
 
     bool looks() noexcept {
-        const bool b = bit_fires(), v = value_fires();
+        const bool b = bit_fires();
+        const bool v = value_fires();
         if (bit_mode == bit_unused || bit_mode > bit_false) return v;
         if (value_mode == value_unused || value_mode > value_inside) return b;
         return both ? b && v : b || v;
     }
     bool bit_fires() noexcept {
-        const bool now = bit, before = was_known_ ? was_bit_ : now;
+        const bool now = bit;
+        const bool before = was_known_ ? was_bit_ : now;
         was_bit_ = now;
         was_known_ = true;
         switch (bit_mode) {
-            case bit_rises: return now && !before;
-            case bit_falls: return !now && before;
-            case bit_changes: return now != before;
-            case bit_true: return now;
-            case bit_false: return !now;
-            default: return false;
+        case bit_rises: return now && !before;
+        case bit_falls: return !now && before;
+        case bit_changes: return now != before;
+        case bit_true: return now;
+        case bit_false: return !now;
+        default: return false;
         }
     }
     /// An edge counts only after the value has been beyond the hysteresis on the other side.
     bool value_fires() noexcept {
-        const double x = value, band = std::fabs(hysteresis);
-        const bool rises = was_below_ && x >= threshold, falls = was_above_ && x <= threshold;
-        if (rises) was_below_ = false;
-        if (falls) was_above_ = false;
-        if (x < threshold - band) was_below_ = true;
-        if (x > threshold + band) was_above_ = true;
-        const double low = std::min(threshold.get(), threshold_2.get()), high = std::max(threshold.get(), threshold_2.get());
+        const double x = value;
+        const double band = std::fabs(hysteresis);
+        const bool rises = was_below_ && x >= threshold;
+        const bool falls = was_above_ && x <= threshold;
+        if (rises) {
+            was_below_ = false;
+        }
+        if (falls) {
+            was_above_ = false;
+        }
+        if (x < threshold - band) {
+            was_below_ = true;
+        }
+        if (x > threshold + band) {
+            was_above_ = true;
+        }
+        const double low = std::min(threshold.get(), threshold_2.get());
+
+        const double high = std::max(threshold.get(), threshold_2.get());
         switch (value_mode) {
-            case value_rises: return rises;
-            case value_falls: return falls;
-            case value_crosses: return rises || falls;
-            case value_above: return x > threshold;
-            case value_below: return x < threshold;
-            case value_outside: return x < low || x > high;
-            case value_inside: return x >= low && x <= high;
-            default: return false;
+        case value_rises: return rises;
+        case value_falls: return falls;
+        case value_crosses: return rises || falls;
+        case value_above: return x > threshold;
+        case value_below: return x < threshold;
+        case value_outside: return x < low || x > high;
+        case value_inside: return x >= low && x <= high;
+        default: return false;
         }
     }
 
-    std::size_t size_ = static_cast<std::size_t>(depth) + 1, newest_ = 0, back_ = 0, filled_ = 0;
-    std::unique_ptr<double[]> values_ = std::make_unique<double[]>(size_ * static_cast<std::size_t>(channels));
-    std::unique_ptr<bool[]> bits_ = std::make_unique<bool[]>(size_ * static_cast<std::size_t>(bit_channels));
-    std::int64_t at_ = 0, after_ = 1;
+    std::size_t size_ = static_cast<std::size_t>(depth) + 1;
+    std::size_t newest_ = 0;
+    std::size_t back_ = 0;
+    std::size_t filled_ = 0;
+    std::unique_ptr<double[]> values_ =
+        std::make_unique<double[]>(size_ * static_cast<std::size_t>(channels));
+    std::unique_ptr<bool[]> bits_ =
+        std::make_unique<bool[]>(size_ * static_cast<std::size_t>(bit_channels));
+    std::int64_t at_ = 0;
+    std::int64_t after_ = 1;
     double waited_ = 0.0;
     std::uint32_t state_ = idle;
-    bool was_arm_ = false, was_force_ = false, was_bit_ = false, was_known_ = false, was_below_ = false, was_above_ = false, have_ = false;
+    bool was_arm_ = false;
+    bool was_force_ = false;
+    bool was_bit_ = false;
+    bool was_known_ = false;
+
+    bool was_below_ = false;
+    bool was_above_ = false;
+    bool have_ = false;
 };
 
 }  // namespace
 
-HAL_COMPONENT(RecorderTrigger, "recorder_trigger", "Triggers a record of the cycles before and after an event", R"(
+HAL_COMPONENT(RecorderTrigger, "recorder_trigger",
+              "Triggers a record of the cycles before and after an event", R"(
 Extends `sampler` to a transient recorder: the values are delayed by `pre` cycles, and `record` enables the sampler from the trigger
 on for `pre` + `post` cycles, so the record starts `pre` cycles before the trigger. `index` is the number of the cycle; record it, too.
 

@@ -9,8 +9,9 @@
 
 namespace measure {
 
-/// Time between the runs of a function. On a virtual clock a cycle runs exactly when it is due. The first cycle detects the kind of
-/// clock: a thread on the real clock is not minutes away from its due time.
+/// Time between the runs of a function. On a virtual clock a cycle runs exactly when it is due. The
+/// first cycle detects the kind of clock: a thread on the real clock is not minutes away from its
+/// due time.
 class RunTime {
 public:
     /// Returns the nanoseconds since the last run; negative in the first run. [realtime]
@@ -20,7 +21,9 @@ public:
             constexpr std::int64_t minute = 60'000'000'000;
             real_ = clock - cycle.start_ns() < minute && cycle.start_ns() - clock < minute;
         }
-        const std::int64_t time = real_ ? clock : cycle.start_ns(), since = started_ ? time - last_ : -1;
+        const std::int64_t time = real_ ? clock : cycle.start_ns();
+
+        const std::int64_t since = started_ ? time - last_ : -1;
         started_ = true;
         last_ = time;
         return since;
@@ -28,7 +31,8 @@ public:
 
 private:
     std::int64_t last_ = 0;
-    bool started_ = false, real_ = false;
+    bool started_ = false;
+    bool real_ = false;
 };
 
 /// Limits `value` to the range of s32.
@@ -47,11 +51,14 @@ public:
     }
     std::uint64_t count() const noexcept { return count_; }
     double mean() const noexcept { return mean_; }
-    double variance() const noexcept { return count_ > 1 ? squares_ / static_cast<double>(count_ - 1) : 0.0; }
+    double variance() const noexcept {
+        return count_ > 1 ? squares_ / static_cast<double>(count_ - 1) : 0.0;
+    }
 
 private:
     std::uint64_t count_ = 0;
-    double mean_ = 0.0, squares_ = 0.0;
+    double mean_ = 0.0;
+    double squares_ = 0.0;
 };
 
 }  // namespace measure

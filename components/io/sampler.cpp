@@ -7,15 +7,27 @@ namespace {
 struct Sampler : hal::Component {
     using Component::Component;
 
-    hal::TextArgument cfg{*this, "cfg", "f", "one letter per pin: b bit, f float, s s32, u u32, l s64, k u64", {.per_instance = true}};
-    hal::Argument depth{*this, "depth", 4000, "slots of the FIFO; it holds one record less", {.per_instance = true, .min = 2, .max = 1 << 26}};
+    hal::TextArgument cfg{*this,
+                          "cfg",
+                          "f",
+                          "one letter per pin: b bit, f float, s s32, u u32, l s64, k u64",
+                          {.per_instance = true}};
+    hal::Argument depth{*this,
+                        "depth",
+                        4000,
+                        "slots of the FIFO; it holds one record less",
+                        {.per_instance = true, .min = 2, .max = 1 << 26}};
 
     stream::Columns<stream::AnyIn> columns{*this, cfg.get(), depth, false, "value to record"};
     hal::In<bool> enable{*this, "enable", "FALSE pauses the recording", {.initial = true}};
-    hal::Out<std::int32_t> waiting{*this, "curr-depth", "records in the FIFO; depth if the record of this cycle is lost"};
-    hal::Out<bool> full{*this, "full", "TRUE: the FIFO was full, and the record of this cycle is lost"};
-    hal::Io<std::int32_t> overruns{*this, "overruns", "records lost because the FIFO was full; may be set"};
-    hal::Io<std::int32_t> sample_number{*this, "sample-num", "number of the next record; may be set"};
+    hal::Out<std::int32_t> waiting{
+        *this, "curr-depth", "records in the FIFO; depth if the record of this cycle is lost"};
+    hal::Out<bool> full{*this, "full",
+                        "TRUE: the FIFO was full, and the record of this cycle is lost"};
+    hal::Io<std::int32_t> overruns{*this, "overruns",
+                                   "records lost because the FIFO was full; may be set"};
+    hal::Io<std::int32_t> sample_number{*this, "sample-num",
+                                        "number of the next record; may be set"};
 
     hal::Function run{*this, "", &Sampler::sample, "writes a record of all pins to the FIFO"};
 
@@ -24,7 +36,8 @@ struct Sampler : hal::Component {
         columns.publish(host);
     }
 
-    /// Producer of the FIFO: writes the record, then head (release). The consumer outside writes tail after copying.
+    /// Producer of the FIFO: writes the record, then head (release). The consumer outside writes
+    /// tail after copying.
     void sample(hal::Cycle cycle) noexcept {
         hal_stream& fifo = columns.fifo();
         const std::uint64_t head = fifo.head;
@@ -47,13 +60,17 @@ struct Sampler : hal::Component {
     }
 
 private:
-    static std::int32_t next(std::int32_t number) noexcept { return static_cast<std::int32_t>(static_cast<std::uint32_t>(number) + 1); }
+    static std::int32_t next(std::int32_t number) noexcept {
+        return static_cast<std::int32_t>(static_cast<std::uint32_t>(number) + 1);
+    }
 
     void write(hal_value* to, std::int32_t number) noexcept {
         for (const auto& pin : columns.pins()) {
             to->raw = 0;
             std::visit([to](const auto& p) {
-                if constexpr (requires { p.get(); }) *to = hal::detail::to_value(p.get());
+                if constexpr (requires { p.get(); }) {
+                    *to = hal::detail::to_value(p.get());
+                }
             }, pin);
             ++to;
         }

@@ -15,25 +15,37 @@
 
 namespace stream {
 
-constexpr std::string_view letters = "bfsulk";  // of the types below, as cfg= and hal_stream::types have them
+// of the types below, as cfg= and hal_stream::types have them
+constexpr std::string_view letters = "bfsulk";
 
 /// A pin of any type; the alternatives are in the order of `letters`.
-using AnyIn = std::variant<std::monostate, hal::In<bool>, hal::In<double>, hal::In<std::int32_t>, hal::In<std::uint32_t>, hal::In<std::int64_t>,
-                           hal::In<std::uint64_t>>;
-using AnyOut = std::variant<std::monostate, hal::Out<bool>, hal::Out<double>, hal::Out<std::int32_t>, hal::Out<std::uint32_t>,
-                            hal::Out<std::int64_t>, hal::Out<std::uint64_t>>;
+using AnyIn = std::variant<std::monostate, hal::In<bool>, hal::In<double>, hal::In<std::int32_t>,
+                           hal::In<std::uint32_t>, hal::In<std::int64_t>, hal::In<std::uint64_t>>;
+using AnyOut =
+    std::variant<std::monostate, hal::Out<bool>, hal::Out<double>, hal::Out<std::int32_t>,
+                 hal::Out<std::uint32_t>, hal::Out<std::int64_t>, hal::Out<std::uint64_t>>;
 
-/// The pins `pin.0`, `pin.1` … one per letter of cfg, and the memory of the FIFO. As in LinuxCNC, a FIFO of depth N holds N - 1 records.
+/// The pins `pin.0`, `pin.1` … one per letter of cfg, and the memory of the FIFO. As in LinuxCNC, a
+/// FIFO of depth N holds N - 1 records.
 template <class AnyPin>
 class Columns {
 public:
-    /// Throws when cfg has another letter than b f s u l k (either case) or the FIFO would be too large. [setup]
-    Columns(hal::Component& component, const std::string& cfg, std::int64_t depth, bool to_machine, const char* doc) {
-        if (cfg.empty()) throw hal::ArgumentError("cfg", "cfg= is empty; give one letter per pin, of b f s u l k");
+    /// Throws when cfg has another letter than b f s u l k (either case) or the FIFO would be too
+    /// large. [setup]
+    Columns(hal::Component& component, const std::string& cfg, std::int64_t depth, bool to_machine,
+            const char* doc) {
+        if (cfg.empty()) {
+            throw hal::ArgumentError("cfg",
+                                     "cfg= is empty; give one letter per pin, of b f s u l k");
+        }
         constexpr std::size_t most_values = std::size_t{1} << 26;  // half a gigabyte
-        if (static_cast<std::size_t>(depth) > most_values / (cfg.size() + 1)) 
-            throw hal::ArgumentError("depth", "depth=" + std::to_string(depth) + " records of this cfg need more than 512 MB");
-        for (const char letter : cfg) add(component, letter, doc);
+        if (static_cast<std::size_t>(depth) > most_values / (cfg.size() + 1)) {
+            throw hal::ArgumentError("depth", "depth=" + std::to_string(depth) +
+                                                  " records of this cfg need more than 512 MB");
+        }
+        for (const char letter : cfg) {
+            add(component, letter, doc);
+        }
         const std::int64_t capacity = depth - 1;
         values_.resize(static_cast<std::size_t>(capacity) * (cfg.size() + 1));
         fifo_.size = sizeof fifo_;
@@ -44,7 +56,8 @@ public:
         fifo_.data = values_.data();
     }
 
-    /// Each record carries a time and the number of losses: the producer calls stamp() before it moves the head. In the constructor. [setup]
+    /// Each record carries a time and the number of losses: the producer calls stamp() before it
+    /// moves the head. In the constructor. [setup]
     void keep_times() {
         times_.resize(fifo_.depth);
         losses_.resize(fifo_.depth);
@@ -53,11 +66,13 @@ public:
         fifo_.size = sizeof timed_;
     }
 
-    /// Makes the FIFO known to the programs outside as the instance's own name; a host without streams is all right.
-    /// In start(). [setup]
+    /// Makes the FIFO known to the programs outside as the instance's own name; a host without
+    /// streams is all right. In start(). [setup]
     void publish(const hal_host& host) {
         const auto* streams = hal::extension<hal_stream_host>("hal.stream/1");
-        if (streams != nullptr && !streams->publish(&host, "", &fifo_)) throw std::runtime_error("the stream could not be published");
+        if (streams != nullptr && !streams->publish(&host, "", &fifo_)) {
+            throw std::runtime_error("the stream could not be published");
+        }
     }
 
     hal_stream& fifo() noexcept { return fifo_; }
@@ -68,21 +83,26 @@ public:
         losses_[number % fifo_.depth] = fifo_.lost;
     }
     /// The record with a running number: a value per column, then the sample number. [realtime]
-    hal_value* record(std::uint64_t number) noexcept { return &fifo_.data[number % fifo_.depth * (fifo_.columns + 1)]; }
+    hal_value* record(std::uint64_t number) noexcept {
+        return &fifo_.data[number % fifo_.depth * (fifo_.columns + 1)];
+    }
 
 private:
     void add(hal::Component& component, char letter, const char* doc) {
-        const char lower = letter >= 'A' && letter <= 'Z' ? static_cast<char>(letter - 'A' + 'a') : letter;
+        const char lower =
+            letter >= 'A' && letter <= 'Z' ? static_cast<char>(letter - 'A' + 'a') : letter;
         const std::string name = "pin." + std::to_string(pins_.size());
         AnyPin& pin = pins_.emplace_back();
         switch (letters.find(lower)) {
-            case 0: pin.template emplace<1>(component, name.c_str(), doc); break;
-            case 1: pin.template emplace<2>(component, name.c_str(), doc); break;
-            case 2: pin.template emplace<3>(component, name.c_str(), doc); break;
-            case 3: pin.template emplace<4>(component, name.c_str(), doc); break;
-            case 4: pin.template emplace<5>(component, name.c_str(), doc); break;
-            case 5: pin.template emplace<6>(component, name.c_str(), doc); break;
-            default: throw std::invalid_argument(std::string("cfg has the letter '") + letter + "'; valid letters are b f s u l k");
+        case 0: pin.template emplace<1>(component, name.c_str(), doc); break;
+        case 1: pin.template emplace<2>(component, name.c_str(), doc); break;
+        case 2: pin.template emplace<3>(component, name.c_str(), doc); break;
+        case 3: pin.template emplace<4>(component, name.c_str(), doc); break;
+        case 4: pin.template emplace<5>(component, name.c_str(), doc); break;
+        case 5: pin.template emplace<6>(component, name.c_str(), doc); break;
+        default:
+            throw std::invalid_argument(std::string("cfg has the letter '") + letter +
+                                        "'; valid letters are b f s u l k");
         }
         types_ += lower;
     }

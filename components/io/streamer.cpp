@@ -8,22 +8,37 @@ struct Streamer : hal::Component {
     using Component::Component;
     enum ClockMode { falling = 1, rising, both };
 
-    hal::TextArgument cfg{*this, "cfg", "f", "one letter per pin: b bit, f float, s s32, u u32, l s64, k u64", {.per_instance = true}};
-    hal::Argument depth{*this, "depth", 4000, "slots of the FIFO; it holds one record less", {.per_instance = true, .min = 2, .max = 1 << 26}};
+    hal::TextArgument cfg{*this,
+                          "cfg",
+                          "f",
+                          "one letter per pin: b bit, f float, s s32, u u32, l s64, k u64",
+                          {.per_instance = true}};
+    hal::Argument depth{*this,
+                        "depth",
+                        4000,
+                        "slots of the FIFO; it holds one record less",
+                        {.per_instance = true, .min = 2, .max = 1 << 26}};
 
-    stream::Columns<stream::AnyOut> columns{*this, cfg.get(), depth, true, "value of the newest record"};
+    stream::Columns<stream::AnyOut> columns{*this, cfg.get(), depth, true,
+                                            "value of the newest record"};
     hal::In<bool> enable{*this, "enable", "FALSE holds the pins", {.initial = true}};
     hal::In<bool> clock{*this, "clock", "clock for the next record; see clock-mode"};
-    hal::In<std::int32_t> clock_mode{*this, "clock-mode", "one record per edge of clock: 1 falling, 2 rising, 3 both; otherwise one per cycle"};
-    hal::Out<std::int32_t> waiting{*this, "curr-depth", "records in the FIFO at the beginning of the cycle"};
-    hal::Out<bool> empty{*this, "empty", "TRUE: no record was available for this cycle", {.initial = true}};
-    hal::Io<std::int32_t> underruns{*this, "underruns", "times a record was due but not available; may be set"};
+    hal::In<std::int32_t> clock_mode{
+        *this, "clock-mode",
+        "one record per edge of clock: 1 falling, 2 rising, 3 both; otherwise one per cycle"};
+    hal::Out<std::int32_t> waiting{*this, "curr-depth",
+                                   "records in the FIFO at the beginning of the cycle"};
+    hal::Out<bool> empty{
+        *this, "empty", "TRUE: no record was available for this cycle", {.initial = true}};
+    hal::Io<std::int32_t> underruns{*this, "underruns",
+                                    "times a record was due but not available; may be set"};
 
     hal::Function run{*this, "", &Streamer::play, "writes the next record to the pins"};
 
     void start(const hal_host& host) { columns.publish(host); }
 
-    /// Consumer of the FIFO: reads the record, then writes tail (release). The producer outside writes head after filling.
+    /// Consumer of the FIFO: reads the record, then writes tail (release). The producer outside
+    /// writes head after filling.
     void play(hal::Cycle) noexcept {
         hal_stream& fifo = columns.fifo();
         const std::uint64_t tail = fifo.tail;
@@ -35,7 +50,8 @@ struct Streamer : hal::Component {
                 read(columns.record(tail));
                 __atomic_store_n(&fifo.tail, tail + 1, __ATOMIC_RELEASE);
             } else {
-                underruns = static_cast<std::int32_t>(static_cast<std::uint32_t>(underruns.get()) + 1);
+                underruns =
+                    static_cast<std::int32_t>(static_cast<std::uint32_t>(underruns.get()) + 1);
                 __atomic_store_n(&fifo.lost, fifo.lost + 1, __ATOMIC_RELAXED);
             }
         }
@@ -43,20 +59,23 @@ struct Streamer : hal::Component {
 
 private:
     bool due() noexcept {
-        const bool level = clock, before = was_clock_;
+        const bool level = clock;
+        const bool before = was_clock_;
         was_clock_ = level;
         switch (clock_mode) {
-            case falling: return before && !level;
-            case rising: return level && !before;
-            case both: return level != before;
-            default: return true;
+        case falling: return before && !level;
+        case rising: return level && !before;
+        case both: return level != before;
+        default: return true;
         }
     }
 
     void read(const hal_value* from) noexcept {
         for (auto& pin : columns.pins()) {
             std::visit([from](auto& p) {
-                if constexpr (requires { p.get(); }) p = hal::detail::load<decltype(p.get()), false>(from);
+                if constexpr (requires { p.get(); }) {
+                    p = hal::detail::load<decltype(p.get()), false>(from);
+                }
             }, pin);
             ++from;
         }

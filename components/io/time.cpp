@@ -8,7 +8,8 @@ namespace {
 struct Time : hal::Component {
     using Component::Component;
 
-    hal::In<bool> begin{*this, "start", "a rising edge resets the time; TRUE runs it, FALSE holds it"};
+    hal::In<bool> begin{*this, "start",
+                        "a rising edge resets the time; TRUE runs it, FALSE holds it"};
     hal::In<bool> pause{*this, "pause", "TRUE holds the time"};
     hal::Out<std::uint32_t> seconds{*this, "seconds", "seconds, 0..59", {.unit = "s"}};
     hal::Out<std::uint32_t> minutes{*this, "minutes", "minutes, 0..59", {.unit = "min"}};
@@ -18,7 +19,9 @@ struct Time : hal::Component {
 
     void update(hal::Cycle cycle) noexcept {
         const bool running = begin || pause;
-        if (running && !was_running_) elapsed_ns_ = 0;
+        if (running && !was_running_) {
+            elapsed_ns_ = 0;
+        }
         was_running_ = running;
         if (!begin || pause) return;
         elapsed_ns_ += cycle.period_ns();

@@ -9,19 +9,23 @@ namespace {
 struct Timedelta : hal::Component {
     using Component::Component;
     hal::Out<std::int32_t> jitter{*this, "jitter", "largest current-jitter so far", {.unit = "ns"}};
-    hal::Out<std::int32_t> current_jitter{*this, "current-jitter", "magnitude of current-error", {.unit = "ns"}};
-    hal::Out<std::int32_t> current_error{*this, "current-error", "out - period: positive when it ran late", {.unit = "ns"}};
+    hal::Out<std::int32_t> current_jitter{
+        *this, "current-jitter", "magnitude of current-error", {.unit = "ns"}};
+    hal::Out<std::int32_t> current_error{
+        *this, "current-error", "out - period: positive when it ran late", {.unit = "ns"}};
     hal::Out<std::int32_t> min{*this, "min", "shortest time between two runs", {.unit = "ns"}};
     hal::Out<std::int32_t> max{*this, "max", "longest time between two runs", {.unit = "ns"}};
-    hal::In<bool>          reset{*this, "reset", "TRUE resets jitter, min, max, err and avg-err"};
+    hal::In<bool> reset{*this, "reset", "TRUE resets jitter, min, max, err and avg-err"};
     hal::Out<std::int32_t> out{*this, "out", "time since the last run", {.unit = "ns"}};
     hal::Out<std::int32_t> err{*this, "err", "sum of all errors", {.unit = "ns"}};
-    hal::Out<double>       average{*this, "avg-err", "mean of all errors", {.unit = "ns"}};
-    hal::Function          run{*this, "", &Timedelta::update, "measures the time since the last run"};
+    hal::Out<double> average{*this, "avg-err", "mean of all errors", {.unit = "ns"}};
+    hal::Function run{*this, "", &Timedelta::update, "measures the time since the last run"};
 
     void update(hal::Cycle cycle) noexcept {
         const std::int64_t since = time_.since_last(cycle);
-        if (since < 0) return;  // the first run
+        if (since < 0) {
+            return;  // the first run
+        }
         const std::int64_t error = since - cycle.period_ns();
         if (reset || runs_ == 0) {
             runs_ = 0;
@@ -46,7 +50,11 @@ struct Timedelta : hal::Component {
 
 private:
     measure::RunTime time_;
-    std::int64_t runs_ = 0, sum_ = 0, worst_ = 0, shortest_ = 0, longest_ = 0;
+    std::int64_t runs_ = 0;
+    std::int64_t sum_ = 0;
+    std::int64_t worst_ = 0;
+    std::int64_t shortest_ = 0;
+    std::int64_t longest_ = 0;
 };
 
 }  // namespace

@@ -5,9 +5,9 @@ namespace {
 
 struct Bin2gray : hal::Component {
     using Component::Component;
-    hal::In<std::uint32_t>  in{*this, "in", "binary number"};
+    hal::In<std::uint32_t> in{*this, "in", "binary number"};
     hal::Out<std::uint32_t> out{*this, "out", "Gray code of the number"};
-    hal::Function           run{*this, "", hal::step<&Bin2gray::update>, "converts"};
+    hal::Function run{*this, "", hal::step<&Bin2gray::update>, "converts"};
 
     void update(hal::Cycle) noexcept { out = in ^ in >> 1; }
 };

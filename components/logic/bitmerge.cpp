@@ -5,14 +5,20 @@ namespace {
 
 struct Bitmerge : hal::Component {
     using Component::Component;
-    hal::Argument           count{*this, "personality", 32, "number of bits, from the least significant", {.min = 1, .max = 32}};
-    hal::Ins<bool>          in{*this, "in-##", count, "bit # of out"};
+    hal::Argument count{*this,
+                        "personality",
+                        32,
+                        "number of bits, from the least significant",
+                        {.min = 1, .max = 32}};
+    hal::Ins<bool> in{*this, "in-##", count, "bit # of out"};
     hal::Out<std::uint32_t> out{*this, "out", "word"};
-    hal::Function           run{*this, "", hal::step<&Bitmerge::update>, "merges the bits"};
+    hal::Function run{*this, "", hal::step<&Bitmerge::update>, "merges the bits"};
 
     void update(hal::Cycle) noexcept {
         std::uint32_t word = 0;
-        for (std::size_t i = in.size(); i-- > 0;) word = word << 1 | (in[i] ? 1u : 0u);
+        for (std::size_t i = in.size(); i-- > 0;) {
+            word = word << 1 | (in[i] ? 1u : 0u);
+        }
         out = word;
     }
 };

@@ -5,10 +5,14 @@ namespace {
 
 struct Bitslice : hal::Component {
     using Component::Component;
-    hal::Argument          personality{*this, "personality", 32, "number of bits, from the least significant", {.min = 1, .max = 32}};
+    hal::Argument personality{*this,
+                              "personality",
+                              32,
+                              "number of bits, from the least significant",
+                              {.min = 1, .max = 32}};
     hal::In<std::uint32_t> in{*this, "in", "word"};
-    hal::Outs<bool>        out{*this, "out-##", personality, "bit # of in"};
-    hal::Function          run{*this, "", hal::step<&Bitslice::update>, "splits the word"};
+    hal::Outs<bool> out{*this, "out-##", personality, "bit # of in"};
+    hal::Function run{*this, "", hal::step<&Bitslice::update>, "splits the word"};
 
     void update(hal::Cycle) noexcept {
         std::uint32_t rest = in;

@@ -5,20 +5,28 @@ namespace {
 
 struct Dbounce : hal::Component {
     using Component::Component;
-    hal::In<bool>          in{*this, "in", "noisy input"};
-    hal::Out<bool>         out{*this, "out", "debounced input"};
-    hal::In<std::uint32_t> delay{*this, "delay", "cycles for which the input must be stable after a change; 0 copies in to out", {.initial = 5}};
-    hal::Function          run{*this, "", hal::step<&Dbounce::update>, "samples the input"};
+    hal::In<bool> in{*this, "in", "noisy input"};
+    hal::Out<bool> out{*this, "out", "debounced input"};
+    hal::In<std::uint32_t> delay{
+        *this,
+        "delay",
+        "cycles for which the input must be stable after a change; 0 copies in to out",
+        {.initial = 5}};
+    hal::Function run{*this, "", hal::step<&Dbounce::update>, "samples the input"};
 
     void update(hal::Cycle) noexcept {
         const bool level = in;
         const bool settled = level ? count_ >= delay : count_ == 0;
-        if (settled) out = level;
-        else count_ += level ? 1 : -1;
+        if (settled) {
+            out = level;
+        } else {
+            count_ += level ? 1 : -1;
+        }
     }
 
 private:
-    std::uint32_t count_ = 0;  // cycles in which in was TRUE, minus those in which it was not: 0 to delay
+    // cycles in which in was TRUE, minus those in which it was not: 0 to delay
+    std::uint32_t count_ = 0;
 };
 
 }  // namespace

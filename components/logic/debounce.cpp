@@ -5,25 +5,40 @@
 namespace {
 
 struct Debounce : hal::Component {
-    hal::Argument             size{*this, "cfg", 4, "number of filters, for each group", {.per_instance = true, .min = 1, .max = 100'000}};
-    hal::Ins<bool>            in{*this, "#.in", size, "noisy input of filter #"};
-    hal::Outs<bool>           out{*this, "#.out", size, "debounced input of filter #"};
-    hal::CorrectedParam<std::int32_t> delay{*this, "delay", "cycles for which an input must be stable after a change; 0 copies it to its output", {.initial = 5}};
-    hal::Function             run{*this, "", hal::step<&Debounce::update>, "samples all inputs of the group"};
+    hal::Argument size{*this,
+                       "cfg",
+                       4,
+                       "number of filters, for each group",
+                       {.per_instance = true, .min = 1, .max = 100'000}};
+    hal::Ins<bool> in{*this, "#.in", size, "noisy input of filter #"};
+    hal::Outs<bool> out{*this, "#.out", size, "debounced input of filter #"};
+    hal::CorrectedParam<std::int32_t> delay{
+        *this,
+        "delay",
+        "cycles for which an input must be stable after a change; 0 copies it to its output",
+        {.initial = 5}};
+    hal::Function run{*this, "", hal::step<&Debounce::update>, "samples all inputs of the group"};
 
     explicit Debounce(const hal_host* host)
-        : Component(host), counts_(static_cast<std::int32_t*>(host->allocate(host, in.size() * sizeof(std::int32_t), alignof(std::int32_t)))) {
+        : Component(host),
+          counts_(static_cast<std::int32_t*>(
+              host->allocate(host, in.size() * sizeof(std::int32_t), alignof(std::int32_t)))) {
         if (counts_ == nullptr) throw std::bad_alloc();
     }
 
     void update(hal::Cycle) noexcept {
-        if (delay < 0) delay.correct(1);
+        if (delay < 0) {
+            delay.correct(1);
+        }
         for (std::size_t i = 0; i < in.size(); ++i) {
             const bool level = in[i];
             std::int32_t& count = counts_[i];
             const bool settled = level ? count >= delay : count <= 0;
-            if (settled) out[i] = level;
-            else count += level ? 1 : -1;
+            if (settled) {
+                out[i] = level;
+            } else {
+                count += level ? 1 : -1;
+            }
         }
     }
 

@@ -5,19 +5,25 @@ namespace {
 
 struct Demux : hal::Component {
     using Component::Component;
-    hal::Argument          count{*this, "personality", 32, "number of outputs", {.min = 1, .max = 32}};
-    hal::Ins<bool>         sel_bit{*this, "sel-bit-##", 5, "bit # of the selection"};
+    hal::Argument count{*this, "personality", 32, "number of outputs", {.min = 1, .max = 32}};
+    hal::Ins<bool> sel_bit{*this, "sel-bit-##", 5, "bit # of the selection"};
     hal::In<std::uint32_t> sel{*this, "sel-u32", "number added to that of the sel-bit pins"};
-    hal::Outs<bool>        out{*this, "out-##", count, "TRUE while # is selected; with bargraph, while the selection is above #"};
-    hal::Param<bool>       bargraph{*this, "bargraph", "TRUE: the selection is the number of outputs that are TRUE"};
-    hal::Function          run{*this, "", hal::step<&Demux::update>, "sets the outputs"};
+    hal::Outs<bool> out{*this, "out-##", count,
+                        "TRUE while # is selected; with bargraph, while the selection is above #"};
+    hal::Param<bool> bargraph{*this, "bargraph",
+                              "TRUE: the selection is the number of outputs that are TRUE"};
+    hal::Function run{*this, "", hal::step<&Demux::update>, "sets the outputs"};
 
     void update(hal::Cycle) noexcept {
         std::uint64_t chosen = sel;
-        for (std::size_t i = 0; i < sel_bit.size(); ++i) chosen += sel_bit[i] ? std::uint64_t{1} << i : 0;
+        for (std::size_t i = 0; i < sel_bit.size(); ++i) {
+            chosen += sel_bit[i] ? std::uint64_t{1} << i : 0;
+        }
         const bool bar = bargraph;
         const std::uint64_t one = std::min<std::uint64_t>(chosen, out.size() - 1);
-        for (std::size_t i = 0; i < out.size(); ++i) out[i] = bar ? i < chosen : i == one;
+        for (std::size_t i = 0; i < out.size(); ++i) {
+            out[i] = bar ? i < chosen : i == one;
+        }
     }
 };
 

@@ -5,15 +5,18 @@ namespace {
 
 struct Edge : hal::Component {
     using Component::Component;
-    hal::In<bool>            in{*this, "in", "the input"};
-    hal::Out<bool>           out{*this, "out", "TRUE during the pulse after an edge"};
-    hal::Out<bool>           out_invert{*this, "out-invert", "inverse of out"};
-    hal::Param<bool>         both{*this, "both", "TRUE detects both edges, regardless of in-edge"};
-    hal::Param<bool>         in_edge{*this, "in-edge", "edge to detect: TRUE is falling, FALSE is rising", {.initial = true}};
-    hal::Param<std::int32_t> width_ns{*this, "out-width-ns", "duration of the output pulse; 0 is one cycle", {.unit = "ns"}};
-    hal::Out<std::int32_t>   time_left_ns{*this, "time-left-ns", "remaining time of the output pulse", {.unit = "ns"}};
-    hal::Out<bool>           last_in{*this, "last-in", "input of the previous cycle"};
-    hal::Function            run{*this, "", hal::step<&Edge::update>, "detects edges"};
+    hal::In<bool> in{*this, "in", "the input"};
+    hal::Out<bool> out{*this, "out", "TRUE during the pulse after an edge"};
+    hal::Out<bool> out_invert{*this, "out-invert", "inverse of out"};
+    hal::Param<bool> both{*this, "both", "TRUE detects both edges, regardless of in-edge"};
+    hal::Param<bool> in_edge{
+        *this, "in-edge", "edge to detect: TRUE is falling, FALSE is rising", {.initial = true}};
+    hal::Param<std::int32_t> width_ns{
+        *this, "out-width-ns", "duration of the output pulse; 0 is one cycle", {.unit = "ns"}};
+    hal::Out<std::int32_t> time_left_ns{
+        *this, "time-left-ns", "remaining time of the output pulse", {.unit = "ns"}};
+    hal::Out<bool> last_in{*this, "last-in", "input of the previous cycle"};
+    hal::Function run{*this, "", hal::step<&Edge::update>, "detects edges"};
 
     void update(hal::Cycle cycle) noexcept {
         const bool now = in;
@@ -35,7 +38,9 @@ struct Edge : hal::Component {
 
 private:
     std::int64_t left_ns_ = 0;
-    bool started_ = false, was_in_ = false, pulse_ = false;
+    bool started_ = false;
+    bool was_in_ = false;
+    bool pulse_ = false;
 };
 
 }  // namespace

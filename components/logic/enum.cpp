@@ -16,52 +16,79 @@ struct Config {
     std::vector<Label> labels;
 
     explicit Config(const std::string& text) {
-        const auto refuse = [&](const char* why) { throw hal::ArgumentError("enums", "enums=" + text + " " + why); };
+        const auto refuse = [&](const char* why) {
+            throw hal::ArgumentError("enums", "enums=" + text + " " + why);
+        };
         const char kind = text.empty() ? '\0' : text[0];
-        if ((kind != 'D' && kind != 'E') || text.size() < 2 || text[1] != ';') refuse("does not begin with D; (decode) or E; (encode)");
+        if ((kind != 'D' && kind != 'E') || text.size() < 2 || text[1] != ';') {
+            refuse("does not begin with D; (decode) or E; (encode)");
+        }
         decode = kind == 'D';
         std::uint32_t value = 0;
         for (std::size_t from = 2; from <= text.size(); ++value) {
             const std::size_t end = std::min(text.find(';', from), text.size());
-            if (end > from) labels.push_back({text.substr(from, end - from), value});
+            if (end > from) {
+                labels.push_back({text.substr(from, end - from), value});
+            }
             from = end + 1;
         }
-        if (labels.empty()) refuse("has no label; write it like D;stop;forward;;jog");
+        if (labels.empty()) {
+            refuse("has no label; write it like D;stop;forward;;jog");
+        }
     }
 };
 
 /// The pins of a label: its bit and its value.
 template <class Bit>
 struct Entry {
-    Entry(hal::Component& component, const Config::Label& label, const char* suffix, const char* doc)
+    Entry(hal::Component& component, const Config::Label& label, const char* suffix,
+          const char* doc)
         : bit(component, (label.name + suffix).c_str(), doc),
-          value(component, (label.name + "-val").c_str(), "value of this label", {.initial = label.value}) {}
+          value(component, (label.name + "-val").c_str(), "value of this label",
+                {.initial = label.value}) {}
     Bit bit;
     hal::In<std::uint32_t> value;
 };
 
 struct Enum : hal::Component {
-    hal::TextArgument        text{*this, "enums", "D;zero;one", "for each instance: D (decode) or E (encode), then a label per value, separated by ;",
-                                  {.per_instance = true}};
-    Config                   config{text.get()};
-    hal::InstanceName        name{*this, config.decode ? "enum-decode" : "enum-encode", 2};
-    hal::Ins<std::uint32_t>  input{*this, "input", config.decode ? 1 : 0, "value to decode"};
-    hal::Outs<std::uint32_t> output{*this, "output", config.decode ? 0 : 1, "value of the last label whose input is TRUE; 0 if none is"};
-    hal::Function            run{*this, "", hal::step<&Enum::update>, "decodes or encodes"};
+    hal::TextArgument text{
+        *this,
+        "enums",
+        "D;zero;one",
+        "for each instance: D (decode) or E (encode), then a label per value, separated by ;",
+        {.per_instance = true}};
+    Config config{text.get()};
+    hal::InstanceName name{*this, config.decode ? "enum-decode" : "enum-encode", 2};
+    hal::Ins<std::uint32_t> input{*this, "input", config.decode ? 1 : 0, "value to decode"};
+    hal::Outs<std::uint32_t> output{*this, "output", config.decode ? 0 : 1,
+                                    "value of the last label whose input is TRUE; 0 if none is"};
+    hal::Function run{*this, "", hal::step<&Enum::update>, "decodes or encodes"};
 
     explicit Enum(const hal_host* host) : Component(host) {
         for (const Config::Label& label : config.labels) {
-            if (config.decode) outs.emplace_back(*this, label, "-out", "TRUE while input equals the value of this label");
-            else ins.emplace_back(*this, label, "-in", "TRUE sets output to the value of this label");
+            if (config.decode) {
+                outs.emplace_back(*this, label, "-out",
+                                  "TRUE while input equals the value of this label");
+            } else {
+                ins.emplace_back(*this, label, "-in",
+                                 "TRUE sets output to the value of this label");
+            }
         }
     }
 
     void update(hal::Cycle) noexcept {
-        for (auto& entry : outs) entry.bit = input[0] == entry.value;
+        for (auto& entry : outs) {
+            entry.bit = input[0] == entry.value;
+        }
         std::uint32_t found = 0;
-        for (const auto& entry : ins)
-            if (entry.bit) found = entry.value;
-        for (auto& pin : output) pin = found;
+        for (const auto& entry : ins) {
+            if (entry.bit) {
+                found = entry.value;
+            }
+        }
+        for (auto& pin : output) {
+            pin = found;
+        }
     }
 
 private:

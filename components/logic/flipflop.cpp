@@ -15,10 +15,16 @@ struct Flipflop : hal::Component {
 
     void update(hal::Cycle) noexcept {
         bool stored = out;
-        if (clk && !was_clk_) stored = data;
+        if (clk && !was_clk_) {
+            stored = data;
+        }
         was_clk_ = clk;
-        if (set) stored = true;
-        if (reset) stored = false;
+        if (set) {
+            stored = true;
+        }
+        if (reset) {
+            stored = false;
+        }
         out = stored;
         out_not = !stored;
     }

@@ -12,7 +12,9 @@ public:
     using CorrectedParam::CorrectedParam;
     /// Sets a negative time to 0. [realtime]
     void correct_sign() noexcept {
-        if (get() < 0.0) correct(0.0);
+        if (get() < 0.0) {
+            correct(0.0);
+        }
     }
 };
 

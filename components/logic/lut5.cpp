@@ -5,14 +5,16 @@ namespace {
 
 struct Lut5 : hal::Component {
     using Component::Component;
-    hal::Ins<bool>            in{*this, "in-#", 5, "bit # of the row number"};
-    hal::Out<bool>            out{*this, "out", "entry of the table for the inputs"};
+    hal::Ins<bool> in{*this, "in-#", 5, "bit # of the row number"};
+    hal::Out<bool> out{*this, "out", "entry of the table for the inputs"};
     hal::Param<std::uint32_t> function{*this, "function", "table: bit n is the output for row n"};
-    hal::Function             run{*this, "", hal::step<&Lut5::update>, "looks up the output"};
+    hal::Function run{*this, "", hal::step<&Lut5::update>, "looks up the output"};
 
     void update(hal::Cycle) noexcept {
         std::uint32_t row = 0;
-        for (std::size_t i = in.size(); i-- > 0;) row = row << 1 | (in[i] ? 1u : 0u);
+        for (std::size_t i = in.size(); i-- > 0;) {
+            row = row << 1 | (in[i] ? 1u : 0u);
+        }
         out = (function >> row & 1u) != 0;
     }
 };

@@ -5,12 +5,12 @@ namespace {
 
 struct Maj3 : hal::Component {
     using Component::Component;
-    hal::In<bool>    in1{*this, "in1", "first voter"};
-    hal::In<bool>    in2{*this, "in2", "second voter"};
-    hal::In<bool>    in3{*this, "in3", "third voter"};
-    hal::Out<bool>   out{*this, "out", "value of at least two inputs"};
+    hal::In<bool> in1{*this, "in1", "first voter"};
+    hal::In<bool> in2{*this, "in2", "second voter"};
+    hal::In<bool> in3{*this, "in3", "third voter"};
+    hal::Out<bool> out{*this, "out", "value of at least two inputs"};
     hal::Param<bool> invert{*this, "invert", "TRUE inverts out"};
-    hal::Function    run{*this, "", hal::step<&Maj3::update>, "counts the votes"};
+    hal::Function run{*this, "", hal::step<&Maj3::update>, "counts the votes"};
 
     void update(hal::Cycle) noexcept {
         const int votes = in1 + in2 + in3;

@@ -5,15 +5,20 @@ namespace {
 
 struct Match8 : hal::Component {
     using Component::Component;
-    hal::In<bool>  in{*this, "in", "output of the previous match8 in a chain; FALSE sets out to FALSE", {.initial = true}};
+    hal::In<bool> in{*this,
+                     "in",
+                     "output of the previous match8 in a chain; FALSE sets out to FALSE",
+                     {.initial = true}};
     hal::Ins<bool> a{*this, "a#", 8, "bit # of the first number"};
     hal::Ins<bool> b{*this, "b#", 8, "bit # of the second number"};
     hal::Out<bool> out{*this, "out", "TRUE while in is TRUE and both numbers are equal"};
-    hal::Function  run{*this, "", hal::step<&Match8::update>, "compares"};
+    hal::Function run{*this, "", hal::step<&Match8::update>, "compares"};
 
     void update(hal::Cycle) noexcept {
         bool equal = in;
-        for (std::size_t i = 0; i < a.size(); ++i) equal &= a[i] == b[i];
+        for (std::size_t i = 0; i < a.size(); ++i) {
+            equal &= a[i] == b[i];
+        }
         out = equal;
     }
 };

@@ -5,17 +5,29 @@ namespace {
 
 struct Momentary2nist : hal::Component {
     using Component::Component;
-    hal::In<bool>          in{*this, "in", "button; a rising edge is a request"};
-    hal::In<bool>          is_on{*this, "is-on", "feedback of the device: TRUE while it is on"};
-    hal::Out<bool>         on{*this, "on", "request to switch on, until is-on is TRUE"};
-    hal::Out<bool>         off{*this, "off", "request to switch off, until is-on is FALSE"};
-    hal::In<std::uint32_t> debounce{*this, "debounce", "cycles for which a change of in must be stable; 0 and 1: immediate", {.initial = 2}};
-    hal::In<std::uint32_t> timeout{*this, "max-pulse-length", "timeout of a request in cycles; 0: no timeout", {.initial = 1000}};
-    hal::Function          run{*this, "", hal::step<&Momentary2nist::update>, "reads the button and the device"};
+    hal::In<bool> in{*this, "in", "button; a rising edge is a request"};
+    hal::In<bool> is_on{*this, "is-on", "feedback of the device: TRUE while it is on"};
+    hal::Out<bool> on{*this, "on", "request to switch on, until is-on is TRUE"};
+    hal::Out<bool> off{*this, "off", "request to switch off, until is-on is FALSE"};
+    hal::In<std::uint32_t> debounce{
+        *this,
+        "debounce",
+        "cycles for which a change of in must be stable; 0 and 1: immediate",
+        {.initial = 2}};
+    hal::In<std::uint32_t> timeout{*this,
+                                   "max-pulse-length",
+                                   "timeout of a request in cycles; 0: no timeout",
+                                   {.initial = 1000}};
+    hal::Function run{*this, "", hal::step<&Momentary2nist::update>,
+                      "reads the button and the device"};
 
     void update(hal::Cycle) noexcept {
-        if (on && (is_on || expired())) on = false;
-        if (off && (!is_on || expired())) off = false;
+        if (on && (is_on || expired())) {
+            on = false;
+        }
+        if (off && (!is_on || expired())) {
+            off = false;
+        }
         pulse_ += pulse_ < UINT32_MAX ? 1 : 0;
         if (!changed() || !stable_) return;
         on = !is_on;
@@ -35,14 +47,15 @@ private:
         return true;
     }
 
-    std::uint32_t held_ = 0;   // cycles for which in has differed from stable_
+    std::uint32_t held_ = 0;  // cycles for which in has differed from stable_
     std::uint32_t pulse_ = 0;  // cycles for which on or off has been TRUE
     bool stable_ = false;
 };
 
 }  // namespace
 
-HAL_COMPONENT(Momentary2nist, "momentary2nist", "Push button for a device with inputs to switch on and off", R"(
+HAL_COMPONENT(Momentary2nist, "momentary2nist",
+              "Push button for a device with inputs to switch on and off", R"(
 Each press (rising edge of `in`) requests the other state of the device: `on` is TRUE until `is-on` is TRUE, or `off` is TRUE
 until `is-on` is FALSE. If the device does not follow within `max-pulse-length` cycles, the request ends.
 

@@ -5,21 +5,35 @@ namespace {
 
 struct Multiclick : hal::Component {
     using Component::Component;
-    hal::In<bool>  in{*this, "in", "button"};
+    hal::In<bool> in{*this, "in", "button"};
     hal::Out<bool> single{*this, "single-click", "pulse at the end of the first click"};
-    hal::Out<bool> single_only{*this, "single-click-only", "pulse after a first click without a second one"};
+    hal::Out<bool> single_only{*this, "single-click-only",
+                               "pulse after a first click without a second one"};
     hal::Out<bool> twice{*this, "double-click", "pulse at the end of the second click"};
-    hal::Out<bool> twice_only{*this, "double-click-only", "pulse after a second click without a third one"};
+    hal::Out<bool> twice_only{*this, "double-click-only",
+                              "pulse after a second click without a third one"};
     hal::Out<bool> triple{*this, "triple-click", "pulse at the end of the third click"};
-    hal::Out<bool> triple_only{*this, "triple-click-only", "pulse after a third click without a fourth one"};
+    hal::Out<bool> triple_only{*this, "triple-click-only",
+                               "pulse after a third click without a fourth one"};
     hal::Out<bool> quadruple{*this, "quadruple-click", "pulse at the end of the fourth click"};
-    hal::Out<bool> quadruple_only{*this, "quadruple-click-only", "pulse after a fourth click without a fifth one"};
-    hal::Out<std::int32_t>    state{*this, "state", "0 idle; 1, 3, 5, 7 pressed; 2, 4, 6, 8 released; 9 waiting for the release"};
-    hal::Param<bool>          invert{*this, "invert-input", "TRUE: clicks start with a falling edge"};
-    hal::Param<std::uint32_t> max_hold{*this, "max-hold-ns", "maximum duration of a press that counts as a click", {.initial = 250'000'000, .unit = "ns"}};
-    hal::Param<std::uint32_t> max_space{*this, "max-space-ns", "maximum pause between two clicks of a series",
+    hal::Out<bool> quadruple_only{*this, "quadruple-click-only",
+                                  "pulse after a fourth click without a fifth one"};
+    hal::Out<std::int32_t> state{
+        *this, "state",
+        "0 idle; 1, 3, 5, 7 pressed; 2, 4, 6, 8 released; 9 waiting for the release"};
+    hal::Param<bool> invert{*this, "invert-input", "TRUE: clicks start with a falling edge"};
+    hal::Param<std::uint32_t> max_hold{*this,
+                                       "max-hold-ns",
+                                       "maximum duration of a press that counts as a click",
+                                       {.initial = 250'000'000, .unit = "ns"}};
+    hal::Param<std::uint32_t> max_space{*this,
+                                        "max-space-ns",
+                                        "maximum pause between two clicks of a series",
                                         {.initial = 250'000'000, .unit = "ns"}};
-    hal::Param<std::uint32_t> output_hold{*this, "output-hold-ns", "duration of the output pulses", {.initial = 100'000'000, .unit = "ns"}};
+    hal::Param<std::uint32_t> output_hold{*this,
+                                          "output-hold-ns",
+                                          "duration of the output pulses",
+                                          {.initial = 100'000'000, .unit = "ns"}};
     hal::Function run{*this, "", hal::step<&Multiclick::update>, "detects clicks"};
 
     void update(hal::Cycle cycle) noexcept {
@@ -27,7 +41,9 @@ struct Multiclick : hal::Component {
         for (std::size_t i = 0; i < std::size(pulses_); ++i) {
             Pulse& pulse = pulses_[i];
             pulse.age_ns += pulse.age_ns < forever ? period : 0;
-            if (*pulse.out && pulse.age_ns >= pulse.hold_ns) *pulse.out = false;
+            if (*pulse.out && pulse.age_ns >= pulse.hold_ns) {
+                *pulse.out = false;
+            }
         }
         in_state_ns_ += in_state_ns_ < forever ? period : 0;
         step(in != invert);
@@ -36,7 +52,9 @@ struct Multiclick : hal::Component {
 
 private:
     static constexpr std::int64_t forever = std::int64_t{1} << 62;
-    static constexpr std::int32_t idle = 0, last_release = 8, waiting = 9;
+    static constexpr std::int32_t idle = 0;
+    static constexpr std::int32_t last_release = 8;
+    static constexpr std::int32_t waiting = 9;
 
     struct Pulse {
         hal::Out<bool>* out;
@@ -46,12 +64,16 @@ private:
 
     void step(bool pressed) {
         if (state_ == waiting) {
-            if (!pressed) enter(idle);
+            if (!pressed) {
+                enter(idle);
+            }
         } else if (state_ % 2 == 1) {
             if (!pressed) {
                 start(pulses_[state_ - 1]);
                 enter(state_ + 1);
-            } else if (in_state_ns_ > limit_ns_) enter(waiting);
+            } else if (in_state_ns_ > limit_ns_) {
+                enter(waiting);
+            }
         } else if (pressed) {
             enter(state_ == last_release ? waiting : state_ + 1);  // a fifth click is ignored
         } else if (state_ != idle && in_state_ns_ > limit_ns_) {
@@ -71,7 +93,8 @@ private:
     }
 
     // In the order of the states that start them.
-    Pulse pulses_[8] = {{&single}, {&single_only}, {&twice}, {&twice_only}, {&triple}, {&triple_only}, {&quadruple}, {&quadruple_only}};
+    Pulse pulses_[8] = {{&single}, {&single_only}, {&twice},     {&twice_only},
+                        {&triple}, {&triple_only}, {&quadruple}, {&quadruple_only}};
     std::int64_t in_state_ns_ = 0;
     std::int64_t limit_ns_ = 0;  // of this state: max-hold-ns or max-space-ns when it began
     std::int32_t state_ = idle;

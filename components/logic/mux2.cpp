@@ -5,12 +5,14 @@ namespace {
 
 struct Mux2 : hal::Component {
     using Component::Component;
-    hal::In<bool>    sel{*this, "sel", "selects the input"};
-    hal::In<double>  in[2]{{*this, "in0", "input for sel FALSE"}, {*this, "in1", "input for sel TRUE"}};
+    hal::In<bool> sel{*this, "sel", "selects the input"};
+    hal::In<double> in[2]{{*this, "in0", "input for sel FALSE"},
+                          {*this, "in1", "input for sel TRUE"}};
     hal::Out<double> out{*this, "out", "selected input"};
-    hal::Function    run{*this, "", hal::step<&Mux2::update>, "computes out"};
+    hal::Function run{*this, "", hal::step<&Mux2::update>, "computes out"};
 
-    void update(hal::Cycle) noexcept { out = in[sel].get(); }  // by index: a branch would be mispredicted
+    // by index: a branch would be mispredicted
+    void update(hal::Cycle) noexcept { out = in[sel].get(); }
 };
 
 }  // namespace

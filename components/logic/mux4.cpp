@@ -5,14 +5,14 @@ namespace {
 
 struct Mux4 : hal::Component {
     using Component::Component;
-    hal::In<bool>    sel0{*this, "sel0", "low bit of the choice"};
-    hal::In<bool>    sel1{*this, "sel1", "high bit of the choice"};
-    hal::In<double>  in0{*this, "in0", "goes to out while sel1 sel0 are FALSE FALSE"};
-    hal::In<double>  in1{*this, "in1", "goes to out while sel1 sel0 are FALSE TRUE"};
-    hal::In<double>  in2{*this, "in2", "goes to out while sel1 sel0 are TRUE FALSE"};
-    hal::In<double>  in3{*this, "in3", "goes to out while sel1 sel0 are TRUE TRUE"};
+    hal::In<bool> sel0{*this, "sel0", "low bit of the choice"};
+    hal::In<bool> sel1{*this, "sel1", "high bit of the choice"};
+    hal::In<double> in0{*this, "in0", "goes to out while sel1 sel0 are FALSE FALSE"};
+    hal::In<double> in1{*this, "in1", "goes to out while sel1 sel0 are FALSE TRUE"};
+    hal::In<double> in2{*this, "in2", "goes to out while sel1 sel0 are TRUE FALSE"};
+    hal::In<double> in3{*this, "in3", "goes to out while sel1 sel0 are TRUE TRUE"};
     hal::Out<double> out{*this, "out", "selected input"};
-    hal::Function    run{*this, "", hal::step<&Mux4::update>, "computes out"};
+    hal::Function run{*this, "", hal::step<&Mux4::update>, "computes out"};
 
     void update(hal::Cycle) noexcept {
         const hal::In<double>& low = sel0 ? in1 : in0;

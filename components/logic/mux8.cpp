@@ -5,12 +5,14 @@ namespace {
 
 struct Mux8 : hal::Component {
     using Component::Component;
-    hal::Ins<bool>   sel{*this, "sel#", 3, "bit # of the selection"};
+    hal::Ins<bool> sel{*this, "sel#", 3, "bit # of the selection"};
     hal::Out<double> out{*this, "out", "selected input"};
     hal::Ins<double> in{*this, "in#", 8, "input for selection #"};
-    hal::Function    run{*this, "", hal::step<&Mux8::update>, "computes out"};
+    hal::Function run{*this, "", hal::step<&Mux8::update>, "computes out"};
 
-    void update(hal::Cycle) noexcept { out = in[(sel[2] ? 4u : 0u) + (sel[1] ? 2u : 0u) + (sel[0] ? 1u : 0u)].get(); }
+    void update(hal::Cycle) noexcept {
+        out = in[(sel[2] ? 4u : 0u) + (sel[1] ? 2u : 0u) + (sel[0] ? 1u : 0u)].get();
+    }
 };
 
 }  // namespace

@@ -5,9 +5,9 @@ namespace {
 
 struct Not : hal::Component {
     using Component::Component;
-    hal::In<bool>  in{*this, "in", "the input"};
+    hal::In<bool> in{*this, "in", "the input"};
     hal::Out<bool> out{*this, "out", "the input, inverted"};
-    hal::Function  run{*this, "", hal::step<&Not::update>, "computes out"};
+    hal::Function run{*this, "", hal::step<&Not::update>, "computes out"};
 
     void update(hal::Cycle) noexcept { out = !in; }
 };

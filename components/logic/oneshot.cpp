@@ -5,16 +5,20 @@ namespace {
 
 struct Oneshot : hal::Component {
     using Component::Component;
-    hal::In<bool>    in{*this, "in", "an edge starts the pulse; TRUE in the first cycle is a rising edge"};
-    hal::In<bool>    reset{*this, "reset", "TRUE ends the pulse and prevents new ones; afterwards an input that is TRUE is a rising edge"};
-    hal::Out<bool>   out{*this, "out", "TRUE during the pulse"};
-    hal::Out<bool>   out_not{*this, "out-not", "FALSE during the pulse"};
-    hal::In<double>  width{*this, "width", "duration of the pulse", {.unit = "s"}};
+    hal::In<bool> in{*this, "in",
+                     "an edge starts the pulse; TRUE in the first cycle is a rising edge"};
+    hal::In<bool> reset{*this, "reset",
+                        "TRUE ends the pulse and prevents new ones; afterwards an input that is "
+                        "TRUE is a rising edge"};
+    hal::Out<bool> out{*this, "out", "TRUE during the pulse"};
+    hal::Out<bool> out_not{*this, "out-not", "FALSE during the pulse"};
+    hal::In<double> width{*this, "width", "duration of the pulse", {.unit = "s"}};
     hal::Out<double> time_left{*this, "time-left", "remaining time of the pulse", {.unit = "s"}};
-    hal::Param<bool> retriggerable{*this, "retriggerable", "TRUE: an edge during the pulse restarts it", {.initial = true}};
+    hal::Param<bool> retriggerable{
+        *this, "retriggerable", "TRUE: an edge during the pulse restarts it", {.initial = true}};
     hal::Param<bool> rising{*this, "rising", "TRUE: rising edges start a pulse", {.initial = true}};
     hal::Param<bool> falling{*this, "falling", "TRUE: falling edges start a pulse"};
-    hal::Function    run{*this, "", hal::step<&Oneshot::update>, "turns edges into pulses"};
+    hal::Function run{*this, "", hal::step<&Oneshot::update>, "turns edges into pulses"};
 
     void update(hal::Cycle cycle) noexcept {
         if (reset) {
@@ -29,8 +33,12 @@ struct Oneshot : hal::Component {
         was_in_ = now;
 
         const bool running = left_s_ > 0.0;
-        if (running) left_s_ = std::max(left_s_ - static_cast<double>(cycle.period_ns()) * 1e-9, 0.0);
-        if (edge && (!running || retriggerable)) left_s_ = width;
+        if (running) {
+            left_s_ = std::max(left_s_ - static_cast<double>(cycle.period_ns()) * 1e-9, 0.0);
+        }
+        if (edge && (!running || retriggerable)) {
+            left_s_ = width;
+        }
         time_left = left_s_;
         out = left_s_ > 0.0;  // FALSE for a width that is NaN
         out_not = !out;

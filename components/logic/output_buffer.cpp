@@ -5,15 +5,17 @@ namespace {
 
 struct OutputBuffer : hal::Component {
     using Component::Component;
-    hal::Argument   count{*this, "personality", 8, "number of bits", {.min = 1, .max = 64}};
-    hal::In<bool>   enable{*this, "enable", "FALSE sets all outputs to FALSE"};
-    hal::Ins<bool>  in{*this, "in-#", count, "input #"};
+    hal::Argument count{*this, "personality", 8, "number of bits", {.min = 1, .max = 64}};
+    hal::In<bool> enable{*this, "enable", "FALSE sets all outputs to FALSE"};
+    hal::Ins<bool> in{*this, "in-#", count, "input #"};
     hal::Outs<bool> out{*this, "out-#", count, "input # while enable is TRUE", {.safe = false}};
-    hal::Function   run{*this, "", hal::step<&OutputBuffer::update>, "copies the bits"};
+    hal::Function run{*this, "", hal::step<&OutputBuffer::update>, "copies the bits"};
 
     void update(hal::Cycle) noexcept {
         const bool pass = enable;
-        for (std::size_t i = 0; i < out.size(); ++i) out[i] = pass && in[i];
+        for (std::size_t i = 0; i < out.size(); ++i) {
+            out[i] = pass && in[i];
+        }
     }
 };
 

@@ -5,20 +5,25 @@ namespace {
 
 struct Radiobutton : hal::Component {
     using Component::Component;
-    hal::Argument   count{*this, "personality", 4, "number of buttons", {.min = 1, .max = 32}};
-    hal::Ins<bool>  in{*this, "in-##", count, "button #"};
-    hal::Outs<bool> out{*this, "out-##", count, "TRUE after a press of button # until another button is pressed"};
-    hal::Function   run{*this, "", hal::step<&Radiobutton::update>, "reads the buttons"};
+    hal::Argument count{*this, "personality", 4, "number of buttons", {.min = 1, .max = 32}};
+    hal::Ins<bool> in{*this, "in-##", count, "button #"};
+    hal::Outs<bool> out{*this, "out-##", count,
+                        "TRUE after a press of button # until another button is pressed"};
+    hal::Function run{*this, "", hal::step<&Radiobutton::update>, "reads the buttons"};
 
     void update(hal::Cycle) noexcept {
         std::size_t pressed = in.size();
         for (std::size_t i = in.size(); i-- > 0;) {
             const std::uint32_t bit = std::uint32_t{1} << i;
-            if (in[i] && (was_ & bit) == 0) pressed = i;
+            if (in[i] && (was_ & bit) == 0) {
+                pressed = i;
+            }
             was_ = in[i] ? was_ | bit : was_ & ~bit;
         }
         if (pressed == in.size()) return;
-        for (std::size_t i = 0; i < out.size(); ++i) out[i] = i == pressed;
+        for (std::size_t i = 0; i < out.size(); ++i) {
+            out[i] = i == pressed;
+        }
     }
 
 private:

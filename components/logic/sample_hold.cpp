@@ -5,13 +5,15 @@ namespace {
 
 struct SampleHold : hal::Component {
     using Component::Component;
-    hal::In<std::int32_t>  in{*this, "in", "value"};
-    hal::In<bool>          hold{*this, "hold", "TRUE holds out"};
+    hal::In<std::int32_t> in{*this, "in", "value"};
+    hal::In<bool> hold{*this, "hold", "TRUE holds out"};
     hal::Out<std::int32_t> out{*this, "out", "in, or its value when hold became TRUE"};
-    hal::Function          run{*this, "", hal::step<&SampleHold::update>, "copies in"};
+    hal::Function run{*this, "", hal::step<&SampleHold::update>, "copies in"};
 
     void update(hal::Cycle) noexcept {
-        if (!hold) out = in.get();
+        if (!hold) {
+            out = in.get();
+        }
     }
 };
 

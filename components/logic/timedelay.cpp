@@ -5,12 +5,22 @@ namespace {
 
 struct Timedelay : hal::Component {
     using Component::Component;
-    hal::In<bool>    in{*this, "in", "the input"};
-    hal::Out<bool>   out{*this, "out", "the input, delayed"};
-    hal::In<double>  on_delay{*this, "on-delay", "time for which in must be TRUE before out becomes TRUE", {.initial = 0.5, .unit = "s"}};
-    hal::In<double>  off_delay{*this, "off-delay", "time for which in must be FALSE before out becomes FALSE", {.initial = 0.5, .unit = "s"}};
-    hal::Out<double> elapsed{*this, "elapsed", "time for which in has differed from out; afterwards it keeps its value", {.unit = "s"}};
-    hal::Function    run{*this, "", hal::step<&Timedelay::update>, "measures the time"};
+    hal::In<bool> in{*this, "in", "the input"};
+    hal::Out<bool> out{*this, "out", "the input, delayed"};
+    hal::In<double> on_delay{*this,
+                             "on-delay",
+                             "time for which in must be TRUE before out becomes TRUE",
+                             {.initial = 0.5, .unit = "s"}};
+    hal::In<double> off_delay{*this,
+                              "off-delay",
+                              "time for which in must be FALSE before out becomes FALSE",
+                              {.initial = 0.5, .unit = "s"}};
+    hal::Out<double> elapsed{
+        *this,
+        "elapsed",
+        "time for which in has differed from out; afterwards it keeps its value",
+        {.unit = "s"}};
+    hal::Function run{*this, "", hal::step<&Timedelay::update>, "measures the time"};
 
     void update(hal::Cycle cycle) noexcept {
         const bool now = in;

@@ -5,11 +5,12 @@ namespace {
 
 struct Tof : hal::Component {
     using Component::Component;
-    hal::In<bool>      in{*this, "in", "the input"};
-    hal::Out<bool>     q{*this, "q", "TRUE with in, and until in has been FALSE for pt"};
-    hal::Out<double>   et{*this, "et", "time for which in has been FALSE, until q is FALSE", {.unit = "s"}};
-    iec::PresetTime    pt{*this, "pt", "delay", {.unit = "s"}};
-    hal::Function      run{*this, "", hal::step<&Tof::update>, "measures the time"};
+    hal::In<bool> in{*this, "in", "the input"};
+    hal::Out<bool> q{*this, "q", "TRUE with in, and until in has been FALSE for pt"};
+    hal::Out<double> et{
+        *this, "et", "time for which in has been FALSE, until q is FALSE", {.unit = "s"}};
+    iec::PresetTime pt{*this, "pt", "delay", {.unit = "s"}};
+    hal::Function run{*this, "", hal::step<&Tof::update>, "measures the time"};
 
     void update(hal::Cycle cycle) noexcept {
         pt.correct_sign();

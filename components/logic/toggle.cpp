@@ -6,28 +6,40 @@ namespace {
 
 struct Toggle : hal::Component {
     using Component::Component;
-    hal::In<bool>             in{*this, "in", "button"};
-    hal::Io<bool>             out{*this, "out", "inverted by each press; other components may write it, too"};
-    hal::CorrectedParam<std::uint32_t> debounce{*this, "debounce", "cycles for which a new state of the button must be stable, 1..10000",
-                                                {.initial = 2}};
-    hal::Function             run{*this, "", hal::step<&Toggle::update>, "reads the button and toggles out"};
+    hal::In<bool> in{*this, "in", "button"};
+    hal::Io<bool> out{*this, "out", "inverted by each press; other components may write it, too"};
+    hal::CorrectedParam<std::uint32_t> debounce{
+        *this,
+        "debounce",
+        "cycles for which a new state of the button must be stable, 1..10000",
+        {.initial = 2}};
+    hal::Function run{*this, "", hal::step<&Toggle::update>, "reads the button and toggles out"};
 
     void update(hal::Cycle) noexcept {
-        if (debounce < 1 || debounce > 10'000) debounce.correct(2);
+        if (debounce < 1 || debounce > 10'000) {
+            debounce.correct(2);
+        }
         if (!in) {
-            if (count_ > 0) --count_;
-            if (count_ == 0) pressed_ = false;
+            if (count_ > 0) {
+                --count_;
+            }
+            if (count_ == 0) {
+                pressed_ = false;
+            }
             return;
         }
         count_ = std::min(count_ + 1, debounce.get());
         if (count_ < debounce) return;
-        if (!pressed_) out = !out;
+        if (!pressed_) {
+            out = !out;
+        }
         pressed_ = true;
     }
 
 private:
     bool pressed_ = false;     // debounced state of the button
-    std::uint32_t count_ = 0;  // cycles in which in was TRUE, minus those in which it was not: 0 to debounce
+    // cycles in which in was TRUE, minus those in which it was not: 0 to debounce
+    std::uint32_t count_ = 0;
 };
 
 }  // namespace

@@ -5,13 +5,19 @@ namespace {
 
 struct Toggle2nist : hal::Component {
     using Component::Component;
-    hal::In<bool>          in{*this, "in", "switch: a rising edge requests on, a falling edge off"};
-    hal::In<bool>          is_on{*this, "is-on", "feedback of the device: TRUE while it is on"};
-    hal::Out<bool>         on{*this, "on", "request to switch on, until is-on is TRUE"};
-    hal::Out<bool>         off{*this, "off", "request to switch off, until is-on is FALSE"};
-    hal::In<std::uint32_t> debounce{*this, "debounce", "cycles for which a change of in must be stable, 1..10000; other values count as 2", {.initial = 2}};
-    hal::In<std::uint32_t> timeout{*this, "max-pulse-length", "timeout of a request in cycles", {.initial = 100}};
-    hal::Function          run{*this, "", hal::step<&Toggle2nist::update>, "reads the button and the device"};
+    hal::In<bool> in{*this, "in", "switch: a rising edge requests on, a falling edge off"};
+    hal::In<bool> is_on{*this, "is-on", "feedback of the device: TRUE while it is on"};
+    hal::Out<bool> on{*this, "on", "request to switch on, until is-on is TRUE"};
+    hal::Out<bool> off{*this, "off", "request to switch off, until is-on is FALSE"};
+    hal::In<std::uint32_t> debounce{
+        *this,
+        "debounce",
+        "cycles for which a change of in must be stable, 1..10000; other values count as 2",
+        {.initial = 2}};
+    hal::In<std::uint32_t> timeout{
+        *this, "max-pulse-length", "timeout of a request in cycles", {.initial = 100}};
+    hal::Function run{*this, "", hal::step<&Toggle2nist::update>,
+                      "reads the button and the device"};
 
     void update(hal::Cycle) noexcept {
         if (in != state_) {
@@ -19,7 +25,9 @@ struct Toggle2nist : hal::Component {
             if (held_ < stable_cycles()) return;
             held_ = 0;
             state_ = in;
-            if (is_on != state_) request(state_);
+            if (is_on != state_) {
+                request(state_);
+            }
             return;
         }
         held_ = 0;
@@ -51,7 +59,8 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(Toggle2nist, "toggle2nist", "Switch for a device with inputs to switch on and off", R"(
+HAL_COMPONENT(Toggle2nist, "toggle2nist", "Switch for a device with inputs to switch on and off",
+              R"(
 A rising edge of `in` while the device is off requests `on` until `is-on` is TRUE; a falling edge while it is on requests `off`
 until `is-on` is FALSE. If the device does not follow within `max-pulse-length` cycles, the request ends. For a button that
 is TRUE while pressed use `momentary2nist`.

@@ -5,11 +5,12 @@ namespace {
 
 struct Ton : hal::Component {
     using Component::Component;
-    hal::In<bool>      in{*this, "in", "the input"};
-    hal::Out<bool>     q{*this, "q", "TRUE after in has been TRUE for pt"};
-    hal::Out<double>   et{*this, "et", "time for which in has been TRUE, until q is TRUE", {.unit = "s"}};
-    iec::PresetTime    pt{*this, "pt", "delay", {.unit = "s"}};
-    hal::Function      run{*this, "", hal::step<&Ton::update>, "measures the time"};
+    hal::In<bool> in{*this, "in", "the input"};
+    hal::Out<bool> q{*this, "q", "TRUE after in has been TRUE for pt"};
+    hal::Out<double> et{
+        *this, "et", "time for which in has been TRUE, until q is TRUE", {.unit = "s"}};
+    iec::PresetTime pt{*this, "pt", "delay", {.unit = "s"}};
+    hal::Function run{*this, "", hal::step<&Ton::update>, "measures the time"};
 
     void update(hal::Cycle cycle) noexcept {
         pt.correct_sign();

@@ -5,11 +5,11 @@ namespace {
 
 struct Tp : hal::Component {
     using Component::Component;
-    hal::In<bool>      in{*this, "in", "a rising edge starts the pulse"};
-    hal::Out<bool>     q{*this, "q", "TRUE during the pulse"};
-    hal::Out<double>   et{*this, "et", "time since the start of the pulse", {.unit = "s"}};
-    iec::PresetTime    pt{*this, "pt", "duration of the pulse", {.unit = "s"}};
-    hal::Function      run{*this, "", hal::step<&Tp::update>, "measures the time"};
+    hal::In<bool> in{*this, "in", "a rising edge starts the pulse"};
+    hal::Out<bool> q{*this, "q", "TRUE during the pulse"};
+    hal::Out<double> et{*this, "et", "time since the start of the pulse", {.unit = "s"}};
+    iec::PresetTime pt{*this, "pt", "duration of the pulse", {.unit = "s"}};
+    hal::Function run{*this, "", hal::step<&Tp::update>, "measures the time"};
 
     void update(hal::Cycle cycle) noexcept {
         pt.correct_sign();
@@ -20,7 +20,9 @@ struct Tp : hal::Component {
             return;
         }
         q = et < pt;
-        if (q) et = et + cycle.seconds();
+        if (q) {
+            et = et + cycle.seconds();
+        }
     }
 
 private:

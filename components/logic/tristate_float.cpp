@@ -3,7 +3,8 @@
 
 using TristateFloat = Tristate<double>;
 
-HAL_COMPONENT(TristateFloat, "tristate_float", "Writes a number to a shared signal while enabled", R"(
+HAL_COMPONENT(TristateFloat, "tristate_float", "Writes a number to a shared signal while enabled",
+              R"(
 Several instances may write to one signal; the one that runs last in a cycle takes precedence. While none is enabled the signal keeps
 its value.
 

@@ -5,30 +5,43 @@ namespace {
 
 struct Updown : hal::Component {
     using Component::Component;
-    hal::In<bool>            count_up{*this, "countup", "a rising edge counts up"};
-    hal::In<bool>            count_down{*this, "countdown", "a rising edge counts down"};
-    hal::In<bool>            reset{*this, "reset", "TRUE sets the count to 0"};
-    hal::Out<std::int32_t>   count{*this, "count", "count"};
-    hal::Param<bool>         clamp{*this, "clamp", "TRUE limits the count to min and max"};
-    hal::Param<bool>         wrap{*this, "wrap", "TRUE: the count wraps around between max and min; takes precedence over clamp"};
+    hal::In<bool> count_up{*this, "countup", "a rising edge counts up"};
+    hal::In<bool> count_down{*this, "countdown", "a rising edge counts down"};
+    hal::In<bool> reset{*this, "reset", "TRUE sets the count to 0"};
+    hal::Out<std::int32_t> count{*this, "count", "count"};
+    hal::Param<bool> clamp{*this, "clamp", "TRUE limits the count to min and max"};
+    hal::Param<bool> wrap{
+        *this, "wrap",
+        "TRUE: the count wraps around between max and min; takes precedence over clamp"};
     hal::Param<std::int32_t> max{*this, "max", "largest count", {.initial = INT32_MAX}};
     hal::Param<std::int32_t> min{*this, "min", "smallest count"};
-    hal::Function            run{*this, "", hal::step<&Updown::update>, "counts edges"};
+    hal::Function run{*this, "", hal::step<&Updown::update>, "counts edges"};
 
     void update(hal::Cycle) noexcept {
-        const bool up = count_up, down = count_down;
+        const bool up = count_up;
+        const bool down = count_down;
         std::int64_t n = count_;
-        if (started_) n += (up && !was_up_ ? 1 : 0) - (down && !was_down_ ? 1 : 0);
-        if (reset) n = 0;
-        started_ = true, was_up_ = up, was_down_ = down;
-        if (wrap || clamp) n = n > max ? (wrap ? min : max).get() : n < min ? (wrap ? max : min).get() : n;
+        if (started_) {
+            n += (up && !was_up_ ? 1 : 0) - (down && !was_down_ ? 1 : 0);
+        }
+        if (reset) {
+            n = 0;
+        }
+        started_ = true;
+        was_up_ = up;
+        was_down_ = down;
+        if (wrap || clamp) {
+            n = n > max ? (wrap ? min : max).get() : n < min ? (wrap ? max : min).get() : n;
+        }
         count_ = static_cast<std::int32_t>(n);
         count = count_;
     }
 
 private:
     std::int32_t count_ = 0;
-    bool started_ = false, was_up_ = false, was_down_ = false;
+    bool started_ = false;
+    bool was_up_ = false;
+    bool was_down_ = false;
 };
 
 }  // namespace

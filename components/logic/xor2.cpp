@@ -5,10 +5,10 @@ namespace {
 
 struct Xor2 : hal::Component {
     using Component::Component;
-    hal::In<bool>  in0{*this, "in0", "first input"};
-    hal::In<bool>  in1{*this, "in1", "second input"};
+    hal::In<bool> in0{*this, "in0", "first input"};
+    hal::In<bool> in1{*this, "in1", "second input"};
     hal::Out<bool> out{*this, "out", "TRUE while the inputs differ"};
-    hal::Function  run{*this, "", hal::step<&Xor2::update>, "computes out"};
+    hal::Function run{*this, "", hal::step<&Xor2::update>, "computes out"};
 
     void update(hal::Cycle) noexcept { out = in0 != in1; }
 };

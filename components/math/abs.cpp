@@ -5,12 +5,12 @@ namespace {
 
 struct Abs : hal::Component {
     using Component::Component;
-    hal::In<double>  in{*this, "in", "the input"};
+    hal::In<double> in{*this, "in", "the input"};
     hal::Out<double> out{*this, "out", "absolute value of the input"};
-    hal::Out<bool>   sign{*this, "sign", "TRUE while in is below 0"};
-    hal::Out<bool>   is_positive{*this, "is-positive", "TRUE while in is above 1e-6"};
-    hal::Out<bool>   is_negative{*this, "is-negative", "TRUE while in is below -1e-6"};
-    hal::Function    run{*this, "", hal::step<&Abs::update>, "computes out and the sign"};
+    hal::Out<bool> sign{*this, "sign", "TRUE while in is below 0"};
+    hal::Out<bool> is_positive{*this, "is-positive", "TRUE while in is above 1e-6"};
+    hal::Out<bool> is_negative{*this, "is-negative", "TRUE while in is below -1e-6"};
+    hal::Function run{*this, "", hal::step<&Abs::update>, "computes out and the sign"};
 
     static constexpr double least = 1e-6;  // a smaller magnitude is neither positive nor negative
 

@@ -5,19 +5,21 @@ namespace {
 
 struct Comp : hal::Component {
     using Component::Component;
-    hal::In<double>    in0{*this, "in0", "inverting input"};
-    hal::In<double>    in1{*this, "in1", "non-inverting input"};
-    hal::Out<bool>     out{*this, "out", "TRUE while in1 is above in0, with hysteresis"};
-    hal::Out<bool>     equal{*this, "equal", "TRUE while the inputs differ by at most hyst / 2"};
+    hal::In<double> in0{*this, "in0", "inverting input"};
+    hal::In<double> in1{*this, "in1", "non-inverting input"};
+    hal::Out<bool> out{*this, "out", "TRUE while in1 is above in0, with hysteresis"};
+    hal::Out<bool> equal{*this, "equal", "TRUE while the inputs differ by at most hyst / 2"};
     hal::Param<double> hyst{*this, "hyst", "width of the hysteresis"};
-    hal::Function      run{*this, "", hal::step<&Comp::update>, "compares"};
+    hal::Function run{*this, "", hal::step<&Comp::update>, "compares"};
 
     void update(hal::Cycle) noexcept {
         const double difference = in1 - in0;
         const double half = 0.5 * hyst;
         const bool below = difference < -half;
         const bool above = difference > half && !below;
-        if (below || above) out = above;
+        if (below || above) {
+            out = above;
+        }
         equal = !below && !above && !std::isnan(difference);
     }
 };

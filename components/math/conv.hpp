@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The conv_* components: conversion between types, with wrap-around or clamping of values out of range.
+// The conv_* components: conversion between types, with wrap-around or clamping of values out of
+// range.
 #pragma once
 
 #include <limits>
@@ -12,22 +13,32 @@ namespace conv {
 /// True if every value of `From` is in the range of `To`.
 template <class To, class From>
 constexpr bool always_fits() {
-    if constexpr (std::same_as<To, double> || std::same_as<From, bool>) return true;
-    else if constexpr (std::same_as<From, double> || std::same_as<To, bool>) return false;
-    else return std::in_range<To>(std::numeric_limits<From>::min()) && std::in_range<To>(std::numeric_limits<From>::max());
+    if constexpr (std::same_as<To, double> || std::same_as<From, bool>) {
+        return true;
+    } else if constexpr (std::same_as<From, double> || std::same_as<To, bool>) {
+        return false;
+    } else {
+        return std::in_range<To>(std::numeric_limits<From>::min()) &&
+               std::in_range<To>(std::numeric_limits<From>::max());
+    }
 }
 
 /// Returns true if `value` is in the range of `To`; false for NaN. [any]
 template <class To, class From>
 constexpr bool fits(From value) noexcept {
-    if constexpr (always_fits<To, From>()) return true;
-    else if constexpr (std::same_as<To, bool>) return value == From{0} || value == From{1};
-    else if constexpr (std::same_as<From, double>) {
-        // min is 0 or a power of two, so it is exact; max + 1 is a power of two, max itself need not be exact.
+    if constexpr (always_fits<To, From>()) {
+        return true;
+    } else if constexpr (std::same_as<To, bool>) {
+        return value == From{0} || value == From{1};
+    } else if constexpr (std::same_as<From, double>) {
+        // min is 0 or a power of two, so it is exact; max + 1 is a power of two, max itself need
+        // not be exact.
         constexpr double min = static_cast<double>(std::numeric_limits<To>::min());
         constexpr double beyond = 2.0 * static_cast<double>(std::numeric_limits<To>::max() / 2 + 1);
         return value >= min && (sizeof(To) == 8 ? value < beyond : value <= beyond - 1.0);
-    } else return std::in_range<To>(value);
+    } else {
+        return std::in_range<To>(value);
+    }
 }
 
 /// Returns `value` truncated to an integer modulo 2^64; 0 for infinity and NaN. [any]
@@ -37,8 +48,8 @@ inline std::uint64_t wrapped(double value) noexcept {
     return value < 0.0 ? 0 - bits : bits;
 }
 
-/// Converts `value`. A value out of range wraps around (a bit is TRUE for all but 0), or is set to the nearest limit of the
-/// range if `clamp` is set. [any]
+/// Converts `value`. A value out of range wraps around (a bit is TRUE for all but 0), or is set to
+/// the nearest limit of the range if `clamp` is set. [any]
 template <class To, class From>
 constexpr To convert(From value, bool clamp) noexcept {
     if (clamp && !fits<To>(value)) {
@@ -46,9 +57,13 @@ constexpr To convert(From value, bool clamp) noexcept {
         if (value < From{0}) return std::numeric_limits<To>::lowest();
         return To{};  // NaN
     }
-    if constexpr (std::same_as<To, bool>) return value != From{0};
-    else if constexpr (std::same_as<From, double>) return fits<To>(value) ? static_cast<To>(value) : static_cast<To>(wrapped(value));
-    else return static_cast<To>(value);
+    if constexpr (std::same_as<To, bool>) {
+        return value != From{0};
+    } else if constexpr (std::same_as<From, double>) {
+        return fits<To>(value) ? static_cast<To>(value) : static_cast<To>(wrapped(value));
+    } else {
+        return static_cast<To>(value);
+    }
 }
 
 /// A conversion without loss of range.
@@ -56,7 +71,7 @@ template <class From, class To>
 struct Widening : hal::Component {
     using Component::Component;
     hal::In<From> in{*this, "in", "value to convert"};
-    hal::Out<To>  out{*this, "out", "converted value"};
+    hal::Out<To> out{*this, "out", "converted value"};
     hal::Function run{*this, "", hal::step<&Widening::update>, "converts"};
 
     void update(hal::Cycle) noexcept { out = convert<To, From>(in, false); }
@@ -72,7 +87,8 @@ HAL does not convert between types implicitly; link this component between two s
 )";
 };
 
-/// Returns true if `converted` is exactly `value`: in range and without a lost fraction; false for NaN. [any]
+/// Returns true if `converted` is exactly `value`: in range and without a lost fraction; false for
+/// NaN. [any]
 template <class To, class From>
 constexpr bool exact(From value, To converted) noexcept {
     return fits<To>(value) && static_cast<From>(converted) == value;
@@ -82,18 +98,24 @@ constexpr bool exact(From value, To converted) noexcept {
 template <class From, class To>
 struct Narrowing : hal::Component {
     using Component::Component;
-    hal::In<From>    in{*this, "in", "value to convert"};
-    hal::Out<To>     out{*this, "out", "converted value"};
-    hal::Out<bool>   out_of_range{*this, "out-of-range", "clamp: TRUE while in is outside of the range of out; else: TRUE since a value was not converted exactly"};
-    hal::Param<bool> clamp{*this, "clamp", "TRUE limits values to the range of out; FALSE wraps them around"};
-    hal::Function    run{*this, "", hal::step<&Narrowing::update>, "converts"};
+    hal::In<From> in{*this, "in", "value to convert"};
+    hal::Out<To> out{*this, "out", "converted value"};
+    hal::Out<bool> out_of_range{*this, "out-of-range",
+                                "clamp: TRUE while in is outside of the range of out; else: TRUE "
+                                "since a value was not converted exactly"};
+    hal::Param<bool> clamp{*this, "clamp",
+                           "TRUE limits values to the range of out; FALSE wraps them around"};
+    hal::Function run{*this, "", hal::step<&Narrowing::update>, "converts"};
 
     void update(hal::Cycle) noexcept {
         const From value = in;
         const To converted = convert<To>(value, clamp);
         out = converted;
-        if (clamp) out_of_range = !fits<To>(value);
-        else if (!exact(value, converted)) out_of_range = true;
+        if (clamp) {
+            out_of_range = !fits<To>(value);
+        } else if (!exact(value, converted)) {
+            out_of_range = true;
+        }
     }
 
     static constexpr const char* manual = R"(
@@ -118,6 +140,7 @@ For example:
 };
 
 template <class From, class To>
-using Converter = std::conditional_t<always_fits<To, From>(), Widening<From, To>, Narrowing<From, To>>;
+using Converter =
+    std::conditional_t<always_fits<To, From>(), Widening<From, To>, Narrowing<From, To>>;
 
 }  // namespace conv

@@ -5,9 +5,9 @@ namespace {
 
 struct Ddt : hal::Component {
     using Component::Component;
-    hal::In<double>  in{*this, "in", "the input"};
+    hal::In<double> in{*this, "in", "the input"};
     hal::Out<double> out{*this, "out", "change of in per second"};
-    hal::Function    run{*this, "", hal::step<&Ddt::update>, "computes out"};
+    hal::Function run{*this, "", hal::step<&Ddt::update>, "computes out"};
 
     void update(hal::Cycle cycle) noexcept {
         const double value = in;

@@ -5,18 +5,23 @@ namespace {
 
 struct Deadzone : hal::Component {
     using Component::Component;
-    hal::In<double>    in{*this, "in", "the input"};
-    hal::Out<double>   out{*this, "out", "center inside the zone; outside, in reduced by half of threshold"};
+    hal::In<double> in{*this, "in", "the input"};
+    hal::Out<double> out{*this, "out",
+                         "center inside the zone; outside, in reduced by half of threshold"};
     hal::Param<double> center{*this, "center", "centre of the zone"};
     hal::Param<double> threshold{*this, "threshold", "width of the zone", {.initial = 1.0}};
-    hal::Function      run{*this, "", hal::step<&Deadzone::update>, "computes out"};
+    hal::Function run{*this, "", hal::step<&Deadzone::update>, "computes out"};
 
     void update(hal::Cycle) noexcept {
         const double value = in;
         const double half = 0.5 * threshold;
-        if (value < center - half) out = value + half;
-        else if (value > center + half) out = value - half;
-        else out = center;
+        if (value < center - half) {
+            out = value + half;
+        } else if (value > center + half) {
+            out = value - half;
+        } else {
+            out = center;
+        }
     }
 };
 

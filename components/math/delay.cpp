@@ -7,18 +7,22 @@ namespace {
 
 struct Delay : hal::Component {
     using Component::Component;
-    hal::Argument          depth{*this, "depth", 1000, "maximum delay in cycles", {.min = 1, .max = 10'000'000}};
-    hal::In<double>        in{*this, "in", "value"};
-    hal::In<bool>          bit_in{*this, "bit-in", "bit to delay with the value"};
+    hal::Argument depth{
+        *this, "depth", 1000, "maximum delay in cycles", {.min = 1, .max = 10'000'000}};
+    hal::In<double> in{*this, "in", "value"};
+    hal::In<bool> bit_in{*this, "bit-in", "bit to delay with the value"};
     hal::In<std::uint32_t> cycles{*this, "cycles", "delay in cycles"};
-    hal::In<double>        seconds{*this, "seconds", "delay added to cycles", {.unit = "s"}};
-    hal::In<bool>          interpolate{*this, "interpolate", "TRUE interpolates linearly between two cycles; FALSE takes the nearest cycle"};
-    hal::In<bool>          reset{*this, "reset", "TRUE passes the inputs and fills the memory with them"};
-    hal::Out<double>       out{*this, "out", "in, delayed"};
-    hal::Out<bool>         bit_out{*this, "bit-out", "bit-in, delayed"};
-    hal::Out<double>       delayed{*this, "delay", "delay in use", {.unit = "s", .finite = true}};
-    hal::Out<bool>         limited{*this, "limited", "TRUE: the requested delay is above depth or negative"};
-    hal::Function          run{*this, "", hal::step<&Delay::update>, "stores in and updates out"};
+    hal::In<double> seconds{*this, "seconds", "delay added to cycles", {.unit = "s"}};
+    hal::In<bool> interpolate{
+        *this, "interpolate",
+        "TRUE interpolates linearly between two cycles; FALSE takes the nearest cycle"};
+    hal::In<bool> reset{*this, "reset", "TRUE passes the inputs and fills the memory with them"};
+    hal::Out<double> out{*this, "out", "in, delayed"};
+    hal::Out<bool> bit_out{*this, "bit-out", "bit-in, delayed"};
+    hal::Out<double> delayed{*this, "delay", "delay in use", {.unit = "s", .finite = true}};
+    hal::Out<bool> limited{*this, "limited",
+                           "TRUE: the requested delay is above depth or negative"};
+    hal::Function run{*this, "", hal::step<&Delay::update>, "stores in and updates out"};
 
     void update(hal::Cycle cycle) noexcept {
         const double most = static_cast<double>(size_ - 1);
@@ -27,12 +31,18 @@ struct Delay : hal::Component {
         double back = wanted >= most ? most : wanted > 0.0 ? wanted : 0.0;  // 0 for NaN
         // Seconds that are a multiple of the period must not round down to one period less.
         const double whole = std::round(back);
-        if (!interpolate || std::fabs(back - whole) < 1e-6) back = whole;
+        if (!interpolate || std::fabs(back - whole) < 1e-6) {
+            back = whole;
+        }
 
         newest_ = (newest_ + 1) % size_;
         line_[newest_] = {in, bit_in};
-        if (reset) filled_ = 0;
-        if (filled_ < size_) ++filled_;
+        if (reset) {
+            filled_ = 0;
+        }
+        if (filled_ < size_) {
+            ++filled_;
+        }
         const auto n = static_cast<std::size_t>(back);
         const double share = back - static_cast<double>(n);
         const Sample& later = at(n);
@@ -48,9 +58,13 @@ private:
         bool bit;
     };
     /// Returns the input `n` cycles ago; before the first, the first.
-    const Sample& at(std::size_t n) const noexcept { return line_[(newest_ + size_ - std::min(n, filled_ - 1)) % size_]; }
+    const Sample& at(std::size_t n) const noexcept {
+        return line_[(newest_ + size_ - std::min(n, filled_ - 1)) % size_];
+    }
 
-    std::size_t size_ = static_cast<std::size_t>(depth) + 1, newest_ = 0, filled_ = 0;
+    std::size_t size_ = static_cast<std::size_t>(depth) + 1;
+    std::size_t newest_ = 0;
+    std::size_t filled_ = 0;
     std::unique_ptr<Sample[]> line_ = std::make_unique<Sample[]>(size_);
 };
 

@@ -6,15 +6,19 @@ namespace {
 
 struct Div2 : hal::Component {
     using Component::Component;
-    hal::In<double>    in0{*this, "in0", "dividend"};
-    hal::In<double>    in1{*this, "in1", "divisor"};
-    hal::Out<double>   out{*this, "out", "in0 / in1"};
-    hal::CorrectedParam<double> deadband{*this, "deadband", "smallest absolute value of the divisor, at least 1e-12; a smaller one counts as this"};
-    hal::Function      run{*this, "", hal::step<&Div2::update>, "divides"};
+    hal::In<double> in0{*this, "in0", "dividend"};
+    hal::In<double> in1{*this, "in1", "divisor"};
+    hal::Out<double> out{*this, "out", "in0 / in1"};
+    hal::CorrectedParam<double> deadband{
+        *this, "deadband",
+        "smallest absolute value of the divisor, at least 1e-12; a smaller one counts as this"};
+    hal::Function run{*this, "", hal::step<&Div2::update>, "divides"};
 
     void update(hal::Cycle) noexcept {
         constexpr double min_deadband = 1e-12;
-        if (deadband < min_deadband) deadband.correct(min_deadband);
+        if (deadband < min_deadband) {
+            deadband.correct(min_deadband);
+        }
         const double smallest = in1 < 0.0 ? -deadband : deadband;
         out = in0 / (std::fabs(in1) < deadband ? smallest : in1);
     }

@@ -5,11 +5,11 @@ namespace {
 
 struct Hypot : hal::Component {
     using Component::Component;
-    hal::In<double>  in0{*this, "in0", "first component"};
-    hal::In<double>  in1{*this, "in1", "second component"};
-    hal::In<double>  in2{*this, "in2", "third component"};
+    hal::In<double> in0{*this, "in0", "first component"};
+    hal::In<double> in1{*this, "in1", "second component"};
+    hal::In<double> in2{*this, "in2", "third component"};
     hal::Out<double> out{*this, "out", "length of the vector (in0, in1, in2)"};
-    hal::Function    run{*this, "", hal::step<&Hypot::update>, "computes out"};
+    hal::Function run{*this, "", hal::step<&Hypot::update>, "computes out"};
 
     void update(hal::Cycle) noexcept { out = std::hypot(in0, in1, in2); }
 };

@@ -5,15 +5,18 @@ namespace {
 
 struct Ilowpass : hal::Component {
     using Component::Component;
-    hal::In<std::int32_t>  in{*this, "in", "counts, for example of a handwheel"};
-    hal::Out<std::int32_t> out{*this, "out", "in * scale, smoothed; wraps around at the limits of the type"};
-    hal::Param<double>     scale{*this, "scale", "steps of out per count", {.initial = 1024.0}};
-    hal::Param<double>     gain{*this, "gain", "filter gain per cycle, 0..1", {.initial = 0.5}};
-    hal::Function          run{*this, "", hal::step<&Ilowpass::update>, "filters the counts"};
+    hal::In<std::int32_t> in{*this, "in", "counts, for example of a handwheel"};
+    hal::Out<std::int32_t> out{*this, "out",
+                               "in * scale, smoothed; wraps around at the limits of the type"};
+    hal::Param<double> scale{*this, "scale", "steps of out per count", {.initial = 1024.0}};
+    hal::Param<double> gain{*this, "gain", "filter gain per cycle, 0..1", {.initial = 0.5}};
+    hal::Function run{*this, "", hal::step<&Ilowpass::update>, "filters the counts"};
 
     void update(hal::Cycle) noexcept {
         const double next = state_ + (in - state_) * gain;
-        if (std::isfinite(next)) state_ = next;
+        if (std::isfinite(next)) {
+            state_ = next;
+        }
         const double rounded = std::floor(state_ * scale + 0.5);
         constexpr double past_s64 = 0x1p63;
         out = std::fabs(rounded) < past_s64 ? conv::convert<std::int32_t>(rounded, false) : 0;

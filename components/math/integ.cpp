@@ -6,19 +6,21 @@ namespace {
 
 struct Integ : hal::Component {
     using Component::Component;
-    hal::In<double>  in{*this, "in", "the input"};
-    hal::In<double>  gain{*this, "gain", "factor of in", {.initial = 1.0}};
+    hal::In<double> in{*this, "in", "the input"};
+    hal::In<double> gain{*this, "gain", "factor of in", {.initial = 1.0}};
     hal::Out<double> out{*this, "out", "integral of gain * in over time"};
-    hal::In<bool>    reset{*this, "reset", "TRUE sets out to 0, within min and max"};
-    hal::Limit       max{*this, "max", "highest output", {.initial = 1e20}};
-    hal::Limit       min{*this, "min", "lowest output", {.initial = -1e20}};
-    hal::Function    run{*this, "", hal::step<&Integ::update>, "integrates"};
+    hal::In<bool> reset{*this, "reset", "TRUE sets out to 0, within min and max"};
+    hal::Limit max{*this, "max", "highest output", {.initial = 1e20}};
+    hal::Limit min{*this, "min", "lowest output", {.initial = -1e20}};
+    hal::Function run{*this, "", hal::step<&Integ::update>, "integrates"};
 
     void update(hal::Cycle cycle) noexcept {
         const double sum = reset ? 0.0 : out + gain * in * cycle.seconds();
         const double upper = sum > max ? max.get() : sum;
         const double limited = upper < min ? min.get() : upper;
-        if (std::isfinite(limited)) out = limited;
+        if (std::isfinite(limited)) {
+            out = limited;
+        }
     }
 };
 

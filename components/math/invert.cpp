@@ -6,14 +6,18 @@ namespace {
 
 struct Invert : hal::Component {
     using Component::Component;
-    hal::In<double>    in{*this, "in", "the input"};
-    hal::Out<double>   out{*this, "out", "1 / in, limited close to 0"};
-    hal::CorrectedParam<double> deadband{*this, "deadband", "smallest absolute value of the divisor, at least 1e-12; a smaller one counts as this"};
-    hal::Function      run{*this, "", hal::step<&Invert::update>, "computes out"};
+    hal::In<double> in{*this, "in", "the input"};
+    hal::Out<double> out{*this, "out", "1 / in, limited close to 0"};
+    hal::CorrectedParam<double> deadband{
+        *this, "deadband",
+        "smallest absolute value of the divisor, at least 1e-12; a smaller one counts as this"};
+    hal::Function run{*this, "", hal::step<&Invert::update>, "computes out"};
 
     void update(hal::Cycle) noexcept {
         constexpr double min_deadband = 1e-12;
-        if (deadband < min_deadband) deadband.correct(min_deadband);
+        if (deadband < min_deadband) {
+            deadband.correct(min_deadband);
+        }
         const double value = in;
         const double smallest = value < 0.0 ? -deadband : deadband;
         out = 1.0 / (std::fabs(value) < deadband ? smallest : value);

@@ -6,24 +6,37 @@ namespace {
 
 // The curve is f(x) = a x^p + b x for deadband <= x <= 1, with f(deadband) = 0 and f(1) = 1:
 //     a = d / (d - d^p) = 1 / (1 - d^(p - 1)),  b = 1 - a
-// For p = 1 the two terms are equal: f is the straight line between these points, the limit for p -> 1
-// when d = 0, and the only solution otherwise.
+// For p = 1 the two terms are equal: f is the straight line between these points, the limit for p
+// -> 1 when d = 0, and the only solution otherwise.
 struct Joyhandle : hal::Component {
     using Component::Component;
-    hal::In<double>    in{*this, "in", "position of the joystick, -1..1"};
-    hal::Out<double>   out{*this, "out", "shaped value"};
-    hal::CorrectedParam<double> power{*this, "power", "exponent of the curve, at least 1", {.initial = 2.0}};
-    hal::CorrectedParam<double> deadband{*this, "deadband", "positions within ±deadband give 0; 0..0.99"};
-    hal::Param<double> scale{*this, "scale", "value of the curve at full deflection", {.initial = 1.0}};
-    hal::Param<double> offset{*this, "offset", "added to the absolute value of the curve outside the deadband"};
-    hal::Param<bool>   inverse{*this, "inverse", "TRUE: steep at the centre and flat at full deflection"};
-    hal::Function      run{*this, "", hal::step<&Joyhandle::update>, "shapes the value"};
+    hal::In<double> in{*this, "in", "position of the joystick, -1..1"};
+    hal::Out<double> out{*this, "out", "shaped value"};
+    hal::CorrectedParam<double> power{
+        *this, "power", "exponent of the curve, at least 1", {.initial = 2.0}};
+    hal::CorrectedParam<double> deadband{*this, "deadband",
+                                         "positions within ±deadband give 0; 0..0.99"};
+    hal::Param<double> scale{
+        *this, "scale", "value of the curve at full deflection", {.initial = 1.0}};
+    hal::Param<double> offset{*this, "offset",
+                              "added to the absolute value of the curve outside the deadband"};
+    hal::Param<bool> inverse{*this, "inverse",
+                             "TRUE: steep at the centre and flat at full deflection"};
+    hal::Function run{*this, "", hal::step<&Joyhandle::update>, "shapes the value"};
 
     void update(hal::Cycle) noexcept {
-        if (power < 1.0) power.correct(1.0);
-        if (deadband > 0.99) deadband.correct(0.99);
-        if (deadband < 0.0) deadband.correct(0.0);
-        const double x = std::fmin(std::fabs(in), 1.0), d = std::fmin(std::fmax(deadband, 0.0), 0.99);
+        if (power < 1.0) {
+            power.correct(1.0);
+        }
+        if (deadband > 0.99) {
+            deadband.correct(0.99);
+        }
+        if (deadband < 0.0) {
+            deadband.correct(0.0);
+        }
+        const double x = std::fmin(std::fabs(in), 1.0);
+
+        const double d = std::fmin(std::fmax(deadband, 0.0), 0.99);
         if (!(std::fabs(in) > d)) {
             out = 0.0;
             return;

@@ -6,11 +6,11 @@ namespace {
 
 struct Limit1 : hal::Component {
     using Component::Component;
-    hal::In<double>  in{*this, "in", "the value to limit"};
+    hal::In<double> in{*this, "in", "the value to limit"};
     hal::Out<double> out{*this, "out", "in, limited to min and max"};
-    hal::Limit       min{*this, "min", "lowest output", {.initial = -1e20}};
-    hal::Limit       max{*this, "max", "highest output", {.initial = 1e20}};
-    hal::Function    run{*this, "", hal::step<&Limit1::update>, "computes out"};
+    hal::Limit min{*this, "min", "lowest output", {.initial = -1e20}};
+    hal::Limit max{*this, "max", "highest output", {.initial = 1e20}};
+    hal::Function run{*this, "", hal::step<&Limit1::update>, "computes out"};
 
     // Not std::clamp: users may set min above max, and then max applies.
     void update(hal::Cycle) noexcept { out = std::min(std::max(in.get(), min.get()), max.get()); }

@@ -6,20 +6,24 @@ namespace {
 
 struct Limit2 : hal::Component {
     using Component::Component;
-    hal::In<double>  in{*this, "in", "target value"};
+    hal::In<double> in{*this, "in", "target value"};
     hal::Out<double> out{*this, "out", "follows in, within the limits"};
-    hal::In<bool>    load{*this, "load", "TRUE sets out to in immediately, regardless of maxv"};
-    hal::Limit       min{*this, "min", "lowest output", {.initial = -1e20}};
-    hal::Limit       max{*this, "max", "highest output", {.initial = 1e20}};
-    hal::Limit       maxv{*this, "maxv", "largest change of out per second", {.initial = 1e20}};
-    hal::Function    run{*this, "", hal::step<&Limit2::update>, "follows in"};
+    hal::In<bool> load{*this, "load", "TRUE sets out to in immediately, regardless of maxv"};
+    hal::Limit min{*this, "min", "lowest output", {.initial = -1e20}};
+    hal::Limit max{*this, "max", "highest output", {.initial = 1e20}};
+    hal::Limit maxv{*this, "maxv", "largest change of out per second", {.initial = 1e20}};
+    hal::Function run{*this, "", hal::step<&Limit2::update>, "follows in"};
 
     void update(hal::Cycle cycle) noexcept {
         const double goal = limited(in);
         if (std::isfinite(goal)) {
-            const double way = goal - state_, step = maxv * cycle.seconds();
-            if (load || std::abs(way) <= step) state_ = goal;
-            else if (step > 0.0) state_ += std::copysign(step, way);
+            const double way = goal - state_;
+            const double step = maxv * cycle.seconds();
+            if (load || std::abs(way) <= step) {
+                state_ = goal;
+            } else if (step > 0.0) {
+                state_ += std::copysign(step, way);
+            }
         }
         out = state_;
     }

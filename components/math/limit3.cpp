@@ -1,20 +1,23 @@
 // SPDX-License-Identifier: MIT
-// In one cycle `out` moves by its speed, and its speed changes by a = maxa * T^2 at most. So before it can stand on the goal
-// its moves must shrink to 0. Counted backwards from the stop, in units of a, they are
+// In one cycle `out` moves by its speed, and its speed changes by a = maxa * T^2 at most. So before
+// it can stand on the goal its moves must shrink to 0. Counted backwards from the stop, in units of
+// a, they are
 //     p(0) = 0,  p(k) = p(k-1) + min(1, k/m),  and  q(k) = p(1) + ... + p(k)  is the way they cover,
-// with m = 1 for the fastest stop; with a larger m braking fades out over the last m moves. If q(k-1) + t p(k) is left,
-// 0 <= t <= 1, the move p(k-1) + t (p(k) - p(k-1)) leaves q(k-2) + t p(k-1): the same t and one move fewer, down to
-// exactly 0. So the line through the points (q, p) is the largest speed that still stops on the goal, and braking along it
-// never takes more than a. Below the line `out` speeds up. Where a whole `a` more would lead above it, it brakes by a
-// whole `a`; what this leaves over is made up by the last moves, which lie on the line.
-// That leftover makes one move per stop that neither speeds up nor brakes by a whole `a`; it is avoided where whole ones end there, too.
-// With an input that moves at w the same holds for speed and way relative to it: `out` meets it at w.
+// with m = 1 for the fastest stop; with a larger m braking fades out over the last m moves. If
+// q(k-1) + t p(k) is left, 0 <= t <= 1, the move p(k-1) + t (p(k) - p(k-1)) leaves q(k-2) + t
+// p(k-1): the same t and one move fewer, down to exactly 0. So the line through the points (q, p)
+// is the largest speed that still stops on the goal, and braking along it never takes more than a.
+// Below the line `out` speeds up. Where a whole `a` more would lead above it, it brakes by a whole
+// `a`; what this leaves over is made up by the last moves, which lie on the line. That leftover
+// makes one move per stop that neither speeds up nor brakes by a whole `a`; it is avoided where
+// whole ones end there, too. With an input that moves at w the same holds for speed and way
+// relative to it: `out` meets it at w.
 #include "hal/component.hpp"
 #include "hal/limit.hpp"
 
 namespace {
 
-constexpr double largest = 1e150;    // what is larger counts as this: its square is finite
+constexpr double largest = 1e150;  // what is larger counts as this: its square is finite
 constexpr double rounding = 16e-16;  // of a few additions, relative
 
 double bounded(double value) { return std::clamp(value, -largest, largest); }
@@ -27,47 +30,69 @@ double speed_for(double q, double m) {
     if (q <= fading_way(m)) {  // q(k) = k (k+1) (k+2) / 6m
         const double y = 6.0 * m * q * (1.0 - rounding);
         double k = std::floor(std::cbrt(y));
-        if (k * (k + 1.0) * (k + 2.0) < y) k += 1.0;
+        if (k * (k + 1.0) * (k + 2.0) < y) {
+            k += 1.0;
+        }
         return 2.0 * q / (k + 1.0) + k * (k - 1.0) / (6.0 * m);
     }
-    const double p = (m + 1.0) / 2.0, way = q - fading_way(m), b = m + 2.0;  // q(m+j) = q(m) + j p(m) + j (j+1) / 2
-    const double j = std::max(1.0, std::ceil(4.0 * way / (b + std::sqrt(b * b + 8.0 * way)) * (1.0 - rounding)));
+    // q(m+j) = q(m) + j p(m) + j (j+1) / 2
+    const double p = (m + 1.0) / 2.0;
+    const double way = q - fading_way(m);
+    const double b = m + 2.0;
+    const double j =
+        std::max(1.0, std::ceil(4.0 * way / (b + std::sqrt(b * b + 8.0 * way)) * (1.0 - rounding)));
     return p + (j - 1.0) + (way - (j - 1.0) * (p + j / 2.0)) / (p + j);
 }
 
-// The largest speed that stops at the end of `way`, which may be negative. The last move covers all of it.
+// The largest speed that stops at the end of `way`, which may be negative. The last move covers all
+// of it.
 double stopping_speed(double way, double a, double m) {
     return std::abs(way) * m <= a ? way : std::copysign(a * speed_for(std::abs(way) / a, m), way);
 }
 
-// False when a stop from `speed` surely fits into `way`: it takes (speed + a/2)^2 / 2a at most. Saves the root.
+// False when a stop from `speed` surely fits into `way`: it takes (speed + a/2)^2 / 2a at most.
+// Saves the root.
 bool too_fast(double speed, double way, double a) {
     const double s = speed + a / 2.0;
     return speed > way || (speed > 0.0 && s * s > 2.0 * a * way);
 }
 
-// True when after a move of `speed` at most `moves` more, each faster or slower by a whole `a` than the one before, lead to where the last
-// one can end the way: it is of at most `a` and within `a` of the one before. None leads beyond the end or back.
+// True when after a move of `speed` at most `moves` more, each faster or slower by a whole `a` than
+// the one before, lead to where the last one can end the way: it is of at most `a` and within `a`
+// of the one before. None leads beyond the end or back.
 bool lands(double way, double speed, double a, int moves) {
     const double slack = 1e-9 * a;
     way -= speed;
     if (speed < -slack || way < -slack) return false;
     if (way <= a + slack && std::abs(way - speed) <= a + slack) return true;
-    return moves > 0 && (lands(way, speed - a, a, moves - 1) || lands(way, speed + a, a, moves - 1));
+    return moves > 0 &&
+           (lands(way, speed - a, a, moves - 1) || lands(way, speed + a, a, moves - 1));
 }
 
-// The speed after `before`, to go `way` by at most `most` in a cycle; speeds and way are relative to the goal, which may be moving.
+// The speed after `before`, to go `way` by at most `most` in a cycle; speeds and way are relative
+// to the goal, which may be moving.
 double next_speed(double way, double before, double most, double a, double m, bool moving = false) {
-    const double side = std::copysign(1.0, way), limit = side * stopping_speed(way, a, m), on_line = std::min(limit, most);
-    const double faster = side * before + a, slower = side * before - a, fastest = std::min(faster, most);
+    const double side = std::copysign(1.0, way);
+    const double limit = side * stopping_speed(way, a, m);
+
+    const double on_line = std::min(limit, most);
+    const double faster = side * before + a;
+    const double slower = side * before - a;
+
+    const double fastest = std::min(faster, most);
     const double last_moves = a * (fading_way(m) + m + 4.0);  // q(m+2)
     if (side * way - std::clamp(on_line, slower, faster) <= last_moves) {
-        // With a whole `a` in each cycle, when such moves end there as soon, or meet a moving goal at most two cycles later.
-        const int moves_on_line = static_cast<int>(std::min(8.0, std::ceil(on_line / a - rounding)));
-        if (m == 1.0 && limit < most && on_line > slower && on_line < faster && side * way > a)
-            for (int moves = 0; moves <= moves_on_line + (moving ? 0 : -2); ++moves)
-                for (const double speed : {slower, faster})
+        // With a whole `a` in each cycle, when such moves end there as soon, or meet a moving goal
+        // at most two cycles later.
+        const int moves_on_line =
+            static_cast<int>(std::min(8.0, std::ceil(on_line / a - rounding)));
+        if (m == 1.0 && limit < most && on_line > slower && on_line < faster && side * way > a) {
+            for (int moves = 0; moves <= moves_on_line + (moving ? 0 : -2); ++moves) {
+                for (const double speed : {slower, faster}) {
                     if (speed <= most && lands(side * way, speed, a, moves)) return side * speed;
+                }
+            }
+        }
         return side * on_line;
     }
     return side * (fastest <= limit * (1.0 + rounding) ? fastest : slower);
@@ -75,41 +100,60 @@ double next_speed(double way, double before, double most, double a, double m, bo
 
 struct Limit3 : hal::Component {
     using Component::Component;
-    hal::In<double>  in{*this, "in", "target value"};
+    hal::In<double> in{*this, "in", "target value"};
     hal::Out<double> out{*this, "out", "follows in, within the limits"};
-    hal::In<bool>    enable{*this, "enable", "TRUE: out follows in; FALSE: out returns to 0 within the limits", {.initial = true}};
-    hal::In<bool>    load{*this, "load", "TRUE sets out to in immediately, regardless of maxv and maxa"};
-    hal::Limit       min{*this, "min", "lowest output", {.initial = -1e20}};
-    hal::Limit       max{*this, "max", "highest output", {.initial = 1e20}};
-    hal::Limit       maxv{*this, "maxv", "largest first derivative of out", {.initial = 1e20}};
-    hal::Limit       maxa{*this, "maxa", "largest second derivative of out", {.initial = 1e20}};
-    hal::In<std::uint32_t> smooth_steps{*this, "smooth-steps", "cycles before a stop in which acceleration fades out; 2: the fastest stop",
-                                        {.initial = 2}};
-    hal::Function    run{*this, "", hal::step<&Limit3::update>, "follows in"};
+    hal::In<bool> enable{*this,
+                         "enable",
+                         "TRUE: out follows in; FALSE: out returns to 0 within the limits",
+                         {.initial = true}};
+    hal::In<bool> load{*this, "load",
+                       "TRUE sets out to in immediately, regardless of maxv and maxa"};
+    hal::Limit min{*this, "min", "lowest output", {.initial = -1e20}};
+    hal::Limit max{*this, "max", "highest output", {.initial = 1e20}};
+    hal::Limit maxv{*this, "maxv", "largest first derivative of out", {.initial = 1e20}};
+    hal::Limit maxa{*this, "maxa", "largest second derivative of out", {.initial = 1e20}};
+    hal::In<std::uint32_t> smooth_steps{
+        *this,
+        "smooth-steps",
+        "cycles before a stop in which acceleration fades out; 2: the fastest stop",
+        {.initial = 2}};
+    hal::Function run{*this, "", hal::step<&Limit3::update>, "follows in"};
 
     void update(hal::Cycle cycle) noexcept {
         const double period = cycle.seconds();
-        const double a = std::min(maxa * period * period, largest), v = maxv > 0.0 ? std::min(maxv * period, largest) : 0.0;
+        const double a = std::min(maxa * period * period, largest),
+                     v = maxv > 0.0 ? std::min(maxv * period, largest) : 0.0;
         const double w = look_at_input(v);
-        if (load) carry();
-        else if (a > 1.0 / largest) approach(a, v, w);
-        else stand();
+        if (load) {
+            carry();
+        } else if (a > 1.0 / largest) {
+            approach(a, v, w);
+        } else {
+            stand();
+        }
         carried_ = load;
         out = position_;
     }
 
 private:
-    // Reads in, min and max; a NaN input keeps the last value. Returns the speed at which to meet the input: the smaller of its last
-    // two, because a step or a jitter has a speed in one cycle and none or the opposite in the next. An
-    // input faster than maxv cannot be met and counts as stationary.
+    // Reads in, min and max; a NaN input keeps the last value. Returns the speed at which to meet
+    // the input: the smaller of its last two, because a step or a jitter has a speed in one cycle
+    // and none or the opposite in the next. An input faster than maxv cannot be met and counts as
+    // stationary.
     double look_at_input(double v) noexcept {
-        const double input = in, before = speed_in_;
+        const double input = in;
+        const double before = speed_in_;
         high_ = bounded(max);
         low_now_ = std::min(bounded(min), high_);
         speed_in_ = std::isnan(input) ? 0.0 : bounded(input) - input_;
-        if (!std::isnan(input)) input_ = bounded(input);
-        const double w = speed_in_ > 0.0 ? std::max(0.0, std::min(speed_in_, before)) : std::min(0.0, std::max(speed_in_, before));
-        return std::abs(w) <= v * (1.0 + 1e-9) + 8.0 * rounding * std::abs(input_) ? std::clamp(w, -v, v) : 0.0;
+        if (!std::isnan(input)) {
+            input_ = bounded(input);
+        }
+        const double w = speed_in_ > 0.0 ? std::max(0.0, std::min(speed_in_, before))
+                                         : std::min(0.0, std::max(speed_in_, before));
+        return std::abs(w) <= v * (1.0 + 1e-9) + 8.0 * rounding * std::abs(input_)
+                   ? std::clamp(w, -v, v)
+                   : 0.0;
     }
 
     void carry() noexcept {
@@ -128,13 +172,23 @@ private:
     void approach(double a, double v, double input_speed) noexcept {
         const double goal = std::clamp(enable ? input_ : 0.0, low_now_, high_);
         const double w = enable && goal == input_ ? input_speed : 0.0;
-        const double left = way_to(goal), down = way_to(low_now_), up = way_to(high_);
+        const double left = way_to(goal);
+        const double down = way_to(low_now_);
+        const double up = way_to(high_);
         // Once on the input it need not be gentle to what the input does within the limits.
-        const double m = arrived_ && std::abs(left - w) <= a ? 1.0 : std::max<double>(smooth_steps, 2.0) - 1.0;
+        const double m =
+            arrived_ && std::abs(left - w) <= a ? 1.0 : std::max<double>(smooth_steps, 2.0) - 1.0;
 
-        double wanted = w + next_speed(left - w, speed_ - w, left < w ? v + w : v - w, a, m, w != 0.0);
-        if (too_fast(-wanted, -down, a)) wanted = std::max(wanted, down < 0.0 ? next_speed(down, speed_, v, a, 1.0) : stopping_speed(down, a, 1.0));
-        if (too_fast(wanted, up, a)) wanted = std::min(wanted, up > 0.0 ? next_speed(up, speed_, v, a, 1.0) : stopping_speed(up, a, 1.0));
+        double wanted =
+            w + next_speed(left - w, speed_ - w, left < w ? v + w : v - w, a, m, w != 0.0);
+        if (too_fast(-wanted, -down, a)) {
+            wanted = std::max(wanted, down < 0.0 ? next_speed(down, speed_, v, a, 1.0)
+                                                 : stopping_speed(down, a, 1.0));
+        }
+        if (too_fast(wanted, up, a)) {
+            wanted = std::min(
+                wanted, up > 0.0 ? next_speed(up, speed_, v, a, 1.0) : stopping_speed(up, a, 1.0));
+        }
         wanted = std::clamp(wanted, -v, v);
         const double possible = std::clamp(wanted, speed_ - a, speed_ + a);
         const double slack = 1e-12 * a + rounding * (std::abs(speed_) + std::abs(w));
@@ -143,9 +197,13 @@ private:
 
         const double tiny = rounding * (std::abs(goal) + std::abs(speed_));
         arrived_ = std::abs(left - speed_) <= tiny && std::abs(speed_ - w) <= a + tiny;
-        if (arrived_) stand_at(goal);
-        else if (up >= 0.0 && up < speed_ && speed_ - up <= slack) stand_at(high_);
-        else if (down <= 0.0 && down > speed_ && down - speed_ <= slack) stand_at(low_now_);
+        if (arrived_) {
+            stand_at(goal);
+        } else if (up >= 0.0 && up < speed_ && speed_ - up <= slack) {
+            stand_at(high_);
+        } else if (down <= 0.0 && down > speed_ && down - speed_ <= slack) {
+            stand_at(low_now_);
+        }
     }
 
     double way_to(double place) const noexcept { return (place - position_) - rest_; }
@@ -153,25 +211,31 @@ private:
         position_ = place;
         rest_ = 0.0;
     }
-    // Adds to the position and keeps the rounding error of the sum, so that stops after a long distance are exact.
+    // Adds to the position and keeps the rounding error of the sum, so that stops after a long
+    // distance are exact.
     void move(double by) noexcept {
         by += rest_;
-        const double sum = position_ + by, part = sum - position_;
+        const double sum = position_ + by;
+        const double part = sum - position_;
         rest_ = (position_ - (sum - part)) + (by - part);
         position_ = sum;
     }
 
-    double position_ = 0.0, rest_ = 0.0;             // out and its rounding error
-    double speed_ = 0.0;                             // of out, per cycle like all speeds here
-    double input_ = 0.0, speed_in_ = 0.0;            // last valid in, and its speed
-    double high_ = 0.0, low_now_ = 0.0;              // max; the lower of min and max
-    bool arrived_ = true;                            // out is on its goal
-    bool carried_ = false;                           // by load, in the last cycle
+    double position_ = 0.0;
+    double rest_ = 0.0;  // out and its rounding error
+    double speed_ = 0.0;  // of out, per cycle like all speeds here
+    double input_ = 0.0;
+    double speed_in_ = 0.0;  // last valid in, and its speed
+    double high_ = 0.0;
+    double low_now_ = 0.0;  // max; the lower of min and max
+    bool arrived_ = true;  // out is on its goal
+    bool carried_ = false;  // by load, in the last cycle
 };
 
 }  // namespace
 
-HAL_COMPONENT(Limit3, "limit3", "Follows a value within limits of position, velocity and acceleration", R"(
+HAL_COMPONENT(Limit3, "limit3",
+              "Follows a value within limits of position, velocity and acceleration", R"(
 `out` moves to `in` as fast as `min`, `max`, `maxv` and `maxa` allow, and stops there without overshoot; it meets a moving
 input at the input's speed, and follows an input within the limits without lag. It brakes in time for `min`
 and `max`. If a limit moves or the input reverses so that the output can no longer stop in time, the output overshoots within

@@ -5,26 +5,36 @@ namespace {
 
 struct LimitAxis : hal::Component {
     using Component::Component;
-    hal::Argument           count{*this, "personality", 2, "number of ranges", {.min = 1, .max = 10}};
-    hal::In<double>         fb{*this, "fb", "value that selects the range, usually the position of another axis"};
-    hal::Out<double>        min_output{*this, "min-output", "lower limit of the current range"};
-    hal::Out<double>        max_output{*this, "max-output", "upper limit of the current range"};
+    hal::Argument count{*this, "personality", 2, "number of ranges", {.min = 1, .max = 10}};
+    hal::In<double> fb{*this, "fb",
+                       "value that selects the range, usually the position of another axis"};
+    hal::Out<double> min_output{*this, "min-output", "lower limit of the current range"};
+    hal::Out<double> max_output{*this, "max-output", "upper limit of the current range"};
     hal::Out<std::uint32_t> current{*this, "current-range", "number of the current range"};
-    hal::Out<bool>          no_range{*this, "error-no-range", "TRUE: fb is in no enabled range; the limits are held"};
-    hal::Out<bool>          bad_limits{*this, "error-limits", "TRUE: the range's max-limit is below its min-limit; the limits are held"};
-    hal::Ins<double>        min_limit{*this, "min-limit-##", count, "lower limit of range #"};
-    hal::Ins<double>        max_limit{*this, "max-limit-##", count, "upper limit of range #"};
-    hal::Ins<double>        min_range{*this, "min-range-##", count, "lowest fb of range #"};
-    hal::Ins<double>        max_range{*this, "max-range-##", count, "highest fb of range #"};
-    hal::Ins<bool>          enable{*this, "enable-##", count, "FALSE disables range #", {.initial = true}};
-    hal::Ins<bool>          sticky{*this, "sticky-##", count, "TRUE: range # remains the current one while fb is in it", {.initial = true}};
-    hal::Function           run{*this, "", hal::step<&LimitAxis::update>, "selects the range"};
+    hal::Out<bool> no_range{*this, "error-no-range",
+                            "TRUE: fb is in no enabled range; the limits are held"};
+    hal::Out<bool> bad_limits{
+        *this, "error-limits",
+        "TRUE: the range's max-limit is below its min-limit; the limits are held"};
+    hal::Ins<double> min_limit{*this, "min-limit-##", count, "lower limit of range #"};
+    hal::Ins<double> max_limit{*this, "max-limit-##", count, "upper limit of range #"};
+    hal::Ins<double> min_range{*this, "min-range-##", count, "lowest fb of range #"};
+    hal::Ins<double> max_range{*this, "max-range-##", count, "highest fb of range #"};
+    hal::Ins<bool> enable{*this, "enable-##", count, "FALSE disables range #", {.initial = true}};
+    hal::Ins<bool> sticky{*this,
+                          "sticky-##",
+                          count,
+                          "TRUE: range # remains the current one while fb is in it",
+                          {.initial = true}};
+    hal::Function run{*this, "", hal::step<&LimitAxis::update>, "selects the range"};
 
     void update(hal::Cycle) noexcept {
         std::size_t chosen = current_;
         if (!(sticky[current_] && holds(current_))) {
             chosen = 0;
-            while (chosen < enable.size() && !holds(chosen)) ++chosen;
+            while (chosen < enable.size() && !holds(chosen)) {
+                ++chosen;
+            }
         }
         const bool none = chosen == enable.size();
         const bool bad = !none && !(max_limit[chosen] >= min_limit[chosen]);
@@ -38,7 +48,9 @@ struct LimitAxis : hal::Component {
     }
 
 private:
-    bool holds(std::size_t i) const noexcept { return enable[i] && fb >= min_range[i] && fb <= max_range[i]; }
+    bool holds(std::size_t i) const noexcept {
+        return enable[i] && fb >= min_range[i] && fb <= max_range[i];
+    }
 
     std::size_t current_ = 0;
 };

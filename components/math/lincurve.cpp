@@ -5,13 +5,14 @@ namespace {
 
 struct Lincurve : hal::Component {
     using Component::Component;
-    hal::Argument       count{*this, "personality", 2, "number of points", {.min = 1, .max = 16}};
-    hal::In<double>     in{*this, "in", "position on the x axis"};
-    hal::Out<double>    out{*this, "out", "value of the curve"};
-    hal::Io<double>     out_io{*this, "out-io", "like out, for signals with io pins"};
-    hal::Params<double> x{*this, "x-val-##", count, "x of point #; must not decrease from point to point"};
+    hal::Argument count{*this, "personality", 2, "number of points", {.min = 1, .max = 16}};
+    hal::In<double> in{*this, "in", "position on the x axis"};
+    hal::Out<double> out{*this, "out", "value of the curve"};
+    hal::Io<double> out_io{*this, "out-io", "like out, for signals with io pins"};
+    hal::Params<double> x{*this, "x-val-##", count,
+                          "x of point #; must not decrease from point to point"};
     hal::Params<double> y{*this, "y-val-##", count, "y of point #"};
-    hal::Function       run{*this, "", hal::step<&Lincurve::update>, "evaluates the curve"};
+    hal::Function run{*this, "", hal::step<&Lincurve::update>, "evaluates the curve"};
 
     void update(hal::Cycle) noexcept {
         const double value = in;
@@ -28,7 +29,9 @@ private:
         for (std::size_t i = 1; i < x.size(); ++i) {
             if (!(value < x[i])) continue;
             const double width = x[i] - x[i - 1];
-            return width > 0.0 && std::isfinite(width) ? y[i - 1] + (y[i] - y[i - 1]) * ((value - x[i - 1]) / width) : y[i - 1].get();
+            return width > 0.0 && std::isfinite(width)
+                       ? y[i - 1] + (y[i] - y[i - 1]) * ((value - x[i - 1]) / width)
+                       : y[i - 1].get();
         }
         return y[y.size() - 1];
     }

@@ -5,15 +5,17 @@ namespace {
 
 struct Lowpass : hal::Component {
     using Component::Component;
-    hal::In<double>  in{*this, "in", "the input"};
+    hal::In<double> in{*this, "in", "the input"};
     hal::Out<double> out{*this, "out", "filtered input"};
-    hal::In<bool>    load{*this, "load", "TRUE copies in to out"};
-    hal::In<double>  gain{*this, "gain", "weight of the new value, 0..1"};
-    hal::Function    run{*this, "", hal::step<&Lowpass::update>, "filters"};
+    hal::In<bool> load{*this, "load", "TRUE copies in to out"};
+    hal::In<double> gain{*this, "gain", "weight of the new value, 0..1"};
+    hal::Function run{*this, "", hal::step<&Lowpass::update>, "filters"};
 
     void update(hal::Cycle) noexcept {
         const double value = load ? in.get() : state_ + (in - state_) * gain;
-        if (std::isfinite(value)) state_ = value;
+        if (std::isfinite(value)) {
+            state_ = value;
+        }
         out = state_;
     }
 

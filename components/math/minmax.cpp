@@ -5,11 +5,11 @@ namespace {
 
 struct Minmax : hal::Component {
     using Component::Component;
-    hal::In<double>  in{*this, "in", "the input"};
-    hal::In<bool>    reset{*this, "reset", "TRUE sets min and max to in"};
+    hal::In<double> in{*this, "in", "the input"};
+    hal::In<bool> reset{*this, "reset", "TRUE sets min and max to in"};
     hal::Out<double> max{*this, "max", "highest input since the start or the reset"};
     hal::Out<double> min{*this, "min", "lowest input since the start or the reset"};
-    hal::Function    run{*this, "", hal::step<&Minmax::update>, "updates min and max"};
+    hal::Function run{*this, "", hal::step<&Minmax::update>, "updates min and max"};
 
     void update(hal::Cycle) noexcept {
         const double value = in;

@@ -5,10 +5,10 @@ namespace {
 
 struct Mult2 : hal::Component {
     using Component::Component;
-    hal::In<double>  in0{*this, "in0", "first factor"};
-    hal::In<double>  in1{*this, "in1", "second factor"};
+    hal::In<double> in0{*this, "in0", "first factor"};
+    hal::In<double> in1{*this, "in1", "second factor"};
     hal::Out<double> out{*this, "out", "in0 * in1"};
-    hal::Function    run{*this, "", hal::step<&Mult2::update>, "computes out"};
+    hal::Function run{*this, "", hal::step<&Mult2::update>, "computes out"};
 
     void update(hal::Cycle) noexcept { out = in0 * in1; }
 };

@@ -5,20 +5,27 @@ namespace {
 
 struct Mux16 : hal::Component {
     using Component::Component;
-    hal::In<bool>          gray{*this, "use-graycode", "TRUE: the sel inputs are Gray code"};
-    hal::In<bool>          keep{*this, "suppress-no-input", "TRUE holds the outputs while all sel inputs are FALSE; in00 cannot be selected"};
-    hal::In<double>        debounce_time{*this, "debounce-time", "time from a new selection until it is in use", {.unit = "s"}};
-    hal::Ins<bool>         sel{*this, "sel#", 4, "bit # of the selection"};
-    hal::Out<double>       out_f{*this, "out-f", "selected input"};
-    hal::Out<std::int32_t> out_s{*this, "out-s", "selected input, truncated and limited to the range of s32"};
-    hal::Ins<double>       in{*this, "in##", 16, "input for selection #"};
-    hal::Out<double>       elapsed{*this, "elapsed", "time for which the newest selection has been debounced", {.unit = "s"}};
+    hal::In<bool> gray{*this, "use-graycode", "TRUE: the sel inputs are Gray code"};
+    hal::In<bool> keep{
+        *this, "suppress-no-input",
+        "TRUE holds the outputs while all sel inputs are FALSE; in00 cannot be selected"};
+    hal::In<double> debounce_time{
+        *this, "debounce-time", "time from a new selection until it is in use", {.unit = "s"}};
+    hal::Ins<bool> sel{*this, "sel#", 4, "bit # of the selection"};
+    hal::Out<double> out_f{*this, "out-f", "selected input"};
+    hal::Out<std::int32_t> out_s{*this, "out-s",
+                                 "selected input, truncated and limited to the range of s32"};
+    hal::Ins<double> in{*this, "in##", 16, "input for selection #"};
+    hal::Out<double> elapsed{
+        *this, "elapsed", "time for which the newest selection has been debounced", {.unit = "s"}};
     hal::Out<std::int32_t> selected{*this, "selected", "selection, decoded"};
-    hal::Function          run{*this, "", hal::step<&Mux16::update>, "computes the outputs"};
+    hal::Function run{*this, "", hal::step<&Mux16::update>, "computes the outputs"};
 
     void update(hal::Cycle cycle) noexcept {
         unsigned bits = 0;
-        for (std::size_t i = sel.size(); i-- > 0;) bits = bits << 1 | (sel[i] ? 1u : 0u);
+        for (std::size_t i = sel.size(); i-- > 0;) {
+            bits = bits << 1 | (sel[i] ? 1u : 0u);
+        }
         if (keep && bits == 0) return;
         const unsigned choice = gray ? bits ^ bits >> 1 ^ bits >> 2 ^ bits >> 3 : bits;
         selected = static_cast<std::int32_t>(choice);

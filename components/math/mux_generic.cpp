@@ -5,19 +5,25 @@ namespace {
 
 struct MuxGeneric : hal::Component {
     using Component::Component;
-    hal::InstanceName           name{*this, "mux-gen", 2};
-    hal::TextArgument           text{*this, "config", "ff4", "type in, type out (b f s u) and number of inputs, for each instance",
-                                     {.per_instance = true}};
-    routed::Config              config{text.get()};
-    routed::Choice              choice{*this, config};
-    routed::AnyType<hal::Ins>   in{*this, config.from, "in-", "-##", config.ways, "input for selection #"};
-    routed::AnyType<hal::Outs>  out{*this, config.to, "out-", "", 1, "selected input"};
-    hal::Function               run{*this, "", hal::step<&MuxGeneric::update>, "computes the output"};
+    hal::InstanceName name{*this, "mux-gen", 2};
+    hal::TextArgument text{*this,
+                           "config",
+                           "ff4",
+                           "type in, type out (b f s u) and number of inputs, for each instance",
+                           {.per_instance = true}};
+    routed::Config config{text.get()};
+    routed::Choice choice{*this, config};
+    routed::AnyType<hal::Ins> in{*this, config.from, "in-",
+                                 "-##", config.ways, "input for selection #"};
+    routed::AnyType<hal::Outs> out{*this, config.to, "out-", "", 1, "selected input"};
+    hal::Function run{*this, "", hal::step<&MuxGeneric::update>, "computes the output"};
 
     void update(hal::Cycle cycle) noexcept {
         const std::uint64_t way = choice.update(cycle);
         if (way == choice.ways) return;
-        in.visit([&](const auto& from) { out.visit([&](auto& to) { routed::copy(from[way], to[0]); }); });
+        in.visit([&](const auto& from) {
+            out.visit([&](auto& to) { routed::copy(from[way], to[0]); });
+        });
     }
 };
 

@@ -5,12 +5,13 @@ namespace {
 
 struct Near : hal::Component {
     using Component::Component;
-    hal::In<double>    in1{*this, "in1", "first value"};
-    hal::In<double>    in2{*this, "in2", "second value"};
-    hal::Out<bool>     out{*this, "out", "TRUE while the values are nearly equal"};
-    hal::Param<double> scale{*this, "scale", "maximum ratio of the two; not above 1: not compared", {.initial = 1.0}};
+    hal::In<double> in1{*this, "in1", "first value"};
+    hal::In<double> in2{*this, "in2", "second value"};
+    hal::Out<bool> out{*this, "out", "TRUE while the values are nearly equal"};
+    hal::Param<double> scale{
+        *this, "scale", "maximum ratio of the two; not above 1: not compared", {.initial = 1.0}};
     hal::Param<double> difference{*this, "difference", "maximum difference of the two"};
-    hal::Function      run{*this, "", hal::step<&Near::update>, "compares"};
+    hal::Function run{*this, "", hal::step<&Near::update>, "compares"};
 
     void update(hal::Cycle) noexcept {
         const double first = std::fabs(in1);

@@ -5,13 +5,15 @@ namespace {
 
 struct Offset : hal::Component {
     using Component::Component;
-    hal::In<double>  offset{*this, "offset", "the offset"};
-    hal::In<double>  in{*this, "in", "the input"};
+    hal::In<double> offset{*this, "offset", "the offset"};
+    hal::In<double> in{*this, "in", "the input"};
     hal::Out<double> out{*this, "out", "in + offset"};
-    hal::In<double>  feedback_in{*this, "fb-in", "feedback, including the offset"};
+    hal::In<double> feedback_in{*this, "fb-in", "feedback, including the offset"};
     hal::Out<double> feedback_out{*this, "fb-out", "fb-in - offset"};
-    hal::Function    forward{*this, "update-output", hal::step<&Offset::update_output>, "adds the offset to the input"};
-    hal::Function    backward{*this, "update-feedback", hal::step<&Offset::update_feedback>, "subtracts the offset from the feedback"};
+    hal::Function forward{*this, "update-output", hal::step<&Offset::update_output>,
+                          "adds the offset to the input"};
+    hal::Function backward{*this, "update-feedback", hal::step<&Offset::update_feedback>,
+                           "subtracts the offset from the feedback"};
 
     void update_output(hal::Cycle) noexcept { out = in + offset; }
     void update_feedback(hal::Cycle) noexcept { feedback_out = feedback_in - offset; }
@@ -19,7 +21,8 @@ struct Offset : hal::Component {
 
 }  // namespace
 
-HAL_COMPONENT(Offset, "offset", "Adds an offset to a command and subtracts it from the feedback", R"(
+HAL_COMPONENT(Offset, "offset", "Adds an offset to a command and subtracts it from the feedback",
+              R"(
 `out = in + offset` and `fb-out = fb-in - offset`, in two functions, so that a loop is shifted without affecting the
 planner: run `update-feedback` before the controller and `update-output` after the planner.
 

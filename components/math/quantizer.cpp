@@ -8,31 +8,43 @@ enum Mode : std::uint32_t { nearest = 0, down = 1, up = 2, towards_zero = 3 };
 
 struct Quantizer : hal::Component {
     using Component::Component;
-    hal::In<double>        in{*this, "in", "value"};
-    hal::In<double>        step{*this, "step", "distance between two levels; 0 copies in to out", {.initial = 1.0}};
-    hal::In<double>        offset{*this, "offset", "value of level 0"};
-    hal::In<std::uint32_t> mode{*this, "mode", "rounding: 0 nearest; 1 down; 2 up; 3 towards level 0"};
-    hal::In<double>        hysteresis{*this, "hysteresis", "distance, in steps, by which in must pass the border of a level to leave it"};
-    hal::Limit             min{*this, "min-level", "lowest level", {.initial = -most}};
-    hal::Limit             max{*this, "max-level", "highest level", {.initial = most}};
-    hal::Out<double>       out{*this, "out", "level * step + offset", {.finite = true}};
-    hal::Out<double>       error{*this, "error", "in - out", {.finite = true}};
+    hal::In<double> in{*this, "in", "value"};
+    hal::In<double> step{
+        *this, "step", "distance between two levels; 0 copies in to out", {.initial = 1.0}};
+    hal::In<double> offset{*this, "offset", "value of level 0"};
+    hal::In<std::uint32_t> mode{*this, "mode",
+                                "rounding: 0 nearest; 1 down; 2 up; 3 towards level 0"};
+    hal::In<double> hysteresis{
+        *this, "hysteresis",
+        "distance, in steps, by which in must pass the border of a level to leave it"};
+    hal::Limit min{*this, "min-level", "lowest level", {.initial = -most}};
+    hal::Limit max{*this, "max-level", "highest level", {.initial = most}};
+    hal::Out<double> out{*this, "out", "level * step + offset", {.finite = true}};
+    hal::Out<double> error{*this, "error", "in - out", {.finite = true}};
     hal::Out<std::int64_t> level{*this, "level", "number of the level"};
-    hal::Out<bool>         limited{*this, "limited", "TRUE: in is below the lowest or above the highest level"};
-    hal::Function          run{*this, "", hal::step<&Quantizer::update>, "rounds in to a level"};
+    hal::Out<bool> limited{*this, "limited",
+                           "TRUE: in is below the lowest or above the highest level"};
+    hal::Function run{*this, "", hal::step<&Quantizer::update>, "rounds in to a level"};
 
     void update(hal::Cycle) noexcept {
-        if (std::isfinite(in)) in_ = in;
-        const double origin = std::isfinite(offset) ? offset.get() : 0.0, height = std::fabs(step);
+        if (std::isfinite(in)) {
+            in_ = in;
+        }
+        const double origin = std::isfinite(offset) ? offset.get() : 0.0;
+        const double height = std::fabs(step);
         const double exact = (in_ - origin) / height;
-        if (!(height > 0.0) || !std::isfinite(height) || !(std::fabs(exact) <= most)) {  // finer than any level
+        // finer than any level
+        if (!(height > 0.0) || !std::isfinite(height) || !(std::fabs(exact) <= most)) {
             show(in_, 0.0, false);
             return;
         }
         double wanted = rounded(exact);
         // Between two adjacent levels, change only once in is beyond the border by the hysteresis.
         if (hysteresis > 0.0 && known_ && std::fabs(level_) <= most) {
-            const double band = std::min(hysteresis.get(), 1e6), low = rounded(exact - band), high = rounded(exact + band);
+            const double band = std::min(hysteresis.get(), 1e6);
+            const double low = rounded(exact - band);
+
+            const double high = rounded(exact + band);
             wanted = low > level_ ? low : high < level_ ? high : level_;
         }
         const double low = std::isfinite(min) ? std::clamp(std::ceil(min), -most, most) : -most;
@@ -46,10 +58,10 @@ private:
     static constexpr double most = 9007199254740992.0;  // 2^53: whole numbers are exact up to here
     double rounded(double exact) const noexcept {
         switch (mode) {
-            case down: return std::floor(exact);
-            case up: return std::ceil(exact);
-            case towards_zero: return std::trunc(exact);
-            default: return std::round(exact);
+        case down: return std::floor(exact);
+        case up: return std::ceil(exact);
+        case towards_zero: return std::trunc(exact);
+        default: return std::round(exact);
         }
     }
     void show(double value, double at, bool beyond) noexcept {
@@ -59,13 +71,15 @@ private:
         level = static_cast<std::int64_t>(at);
         limited = beyond;
     }
-    double in_ = 0.0, level_ = 0.0;
+    double in_ = 0.0;
+    double level_ = 0.0;
     bool known_ = false;
 };
 
 }  // namespace
 
-HAL_COMPONENT(Quantizer, "quantizer", "Rounds a value to discrete levels, as an A/D converter or an encoder does", R"(
+HAL_COMPONENT(Quantizer, "quantizer",
+              "Rounds a value to discrete levels, as an A/D converter or an encoder does", R"(
     level = (in - offset) / step, rounded by mode and limited to min-level and max-level
     out   = level * step + offset
     error = in - out

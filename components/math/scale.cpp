@@ -5,11 +5,11 @@ namespace {
 
 struct Scale : hal::Component {
     using Component::Component;
-    hal::In<double>  in{*this, "in", "the input"};
-    hal::In<double>  gain{*this, "gain", "factor of in"};
-    hal::In<double>  offset{*this, "offset", "added after the gain"};
+    hal::In<double> in{*this, "in", "the input"};
+    hal::In<double> gain{*this, "gain", "factor of in"};
+    hal::In<double> offset{*this, "offset", "added after the gain"};
     hal::Out<double> out{*this, "out", "in * gain + offset"};
-    hal::Function    run{*this, "", hal::step<&Scale::update>, "computes out"};
+    hal::Function run{*this, "", hal::step<&Scale::update>, "computes out"};
 
     void update(hal::Cycle) noexcept { out = in * gain + offset; }
 };

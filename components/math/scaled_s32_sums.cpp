@@ -6,14 +6,16 @@ namespace {
 struct ScaledS32Sums : hal::Component {
     using Component::Component;
     hal::Ins<std::int32_t> in{*this, "in#", 4, "summand #"};
-    hal::Ins<double>       scale{*this, "scale#", 4, "factor of summand #", {.initial = 1.0}};
+    hal::Ins<double> scale{*this, "scale#", 4, "factor of summand #", {.initial = 1.0}};
     hal::Out<std::int32_t> out_s{*this, "out-s", "sum, truncated and limited to the range of s32"};
-    hal::Out<double>       out_f{*this, "out-f", "sum"};
-    hal::Function          run{*this, "", hal::step<&ScaledS32Sums::update>, "computes the sum"};
+    hal::Out<double> out_f{*this, "out-f", "sum"};
+    hal::Function run{*this, "", hal::step<&ScaledS32Sums::update>, "computes the sum"};
 
     void update(hal::Cycle) noexcept {
         double sum = 0.0;
-        for (std::size_t i = 0; i < in.size(); ++i) sum += in[i] * scale[i].get();
+        for (std::size_t i = 0; i < in.size(); ++i) {
+            sum += in[i] * scale[i].get();
+        }
         out_f = sum;
         out_s = conv::convert<std::int32_t>(sum, true);
     }

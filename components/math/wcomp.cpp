@@ -8,13 +8,15 @@ struct Wcomp : hal::Component {
     hal::In<double> in{*this, "in", "value to compare"};
     hal::In<double> min{*this, "min", "lower end of the window"};
     hal::In<double> max{*this, "max", "upper end of the window"};
-    hal::Out<bool>  out{*this, "out", "TRUE while in is strictly between min and max"};
-    hal::Out<bool>  under{*this, "under", "TRUE while in is at or below min"};
-    hal::Out<bool>  over{*this, "over", "TRUE while in is at or above max"};
-    hal::Function   run{*this, "", hal::step<&Wcomp::update>, "compares"};
+    hal::Out<bool> out{*this, "out", "TRUE while in is strictly between min and max"};
+    hal::Out<bool> under{*this, "under", "TRUE while in is at or below min"};
+    hal::Out<bool> over{*this, "over", "TRUE while in is at or above max"};
+    hal::Function run{*this, "", hal::step<&Wcomp::update>, "compares"};
 
     void update(hal::Cycle) noexcept {
-        const double value = in, low = min, high = max;
+        const double value = in;
+        const double low = min;
+        const double high = max;
         out = value > low && value < high;
         under = value <= low;
         over = value >= high;

@@ -4,15 +4,23 @@
 namespace {
 
 struct WeightedSum : hal::Component {
-    hal::InstanceName       name{*this, "wsum"};
+    hal::InstanceName name{*this, "wsum"};
     hal::WholeFunctionNames whole{*this};
-    hal::Argument           size{*this, "wsum_sizes", 8, "number of bits, for each sum", {.per_instance = true, .min = 1, .max = 32}};
-    hal::Ins<bool>          bit{*this, "bit.#.in", size, "TRUE adds the weight of bit #"};
-    hal::Ios<std::int32_t>  weight{*this, "bit.#.weight", size, "weight of bit #; initially 2^#"};
-    hal::In<bool>           hold{*this, "hold", "TRUE holds the sum"};
-    hal::Out<std::int32_t>  sum{*this, "sum", "sum"};
-    hal::Io<std::int32_t>   offset{*this, "offset", "constant added to the sum"};
-    hal::Function           run{*this, "process_wsums", hal::step<&WeightedSum::update>, "computes all sums", {.shared = true}};
+    hal::Argument size{*this,
+                       "wsum_sizes",
+                       8,
+                       "number of bits, for each sum",
+                       {.per_instance = true, .min = 1, .max = 32}};
+    hal::Ins<bool> bit{*this, "bit.#.in", size, "TRUE adds the weight of bit #"};
+    hal::Ios<std::int32_t> weight{*this, "bit.#.weight", size, "weight of bit #; initially 2^#"};
+    hal::In<bool> hold{*this, "hold", "TRUE holds the sum"};
+    hal::Out<std::int32_t> sum{*this, "sum", "sum"};
+    hal::Io<std::int32_t> offset{*this, "offset", "constant added to the sum"};
+    hal::Function run{*this,
+                      "process_wsums",
+                      hal::step<&WeightedSum::update>,
+                      "computes all sums",
+                      {.shared = true}};
 
     explicit WeightedSum(const hal_host* host) : Component(host) {
         std::uint32_t power = 1;
@@ -25,7 +33,9 @@ struct WeightedSum : hal::Component {
     void update(hal::Cycle) noexcept {
         if (hold) return;
         auto total = static_cast<std::uint32_t>(offset.get());
-        for (std::size_t i = 0; i < bit.size(); ++i) total += bit[i] ? static_cast<std::uint32_t>(weight[i].get()) : 0;
+        for (std::size_t i = 0; i < bit.size(); ++i) {
+            total += bit[i] ? static_cast<std::uint32_t>(weight[i].get()) : 0;
+        }
         sum = static_cast<std::int32_t>(total);
     }
 };

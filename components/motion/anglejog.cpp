@@ -11,30 +11,39 @@ namespace {
 
 struct Anglejog : hal::Component {
     using Component::Component;
-    hal::In<bool>          enable_in{*this, "enable-in", "TRUE: counts move the axes; FALSE: a new angle and scale are accepted"};
-    hal::In<std::int32_t>  counts_in{*this, "counts-in", "counts of the handwheel"};
-    hal::In<double>        angle_in{*this, "angle-degrees-in", "direction of the motion", {.unit = "deg"}};
-    hal::In<std::int32_t>  factor_in{*this, "iscale-factor", "output counts per input count, 10..100000", {.initial = 10000}};
-    hal::In<double>        scale_in{*this, "scale-in", "distance per count"};
-    hal::Limit             max_velocity{*this, "max-vel", "largest speed along the direction"};
-    hal::Limit             max_acceleration{*this, "max-accel", "largest acceleration along the direction"};
-    hal::In<double>        accel_fraction{*this, "accel-fraction-in", "fraction of the axes' acceleration to use", {.initial = 1.0}};
-    hal::Out<bool>         enable_out{*this, "enable-out", "for jog-enable of both axes"};
-    hal::Out<double>       current_scale{*this, "current-scale", "distance per count in use"};
-    hal::Out<double>       scale_out{*this, "current-scale-out", "for jog-scale of both axes"};
+    hal::In<bool> enable_in{
+        *this, "enable-in",
+        "TRUE: counts move the axes; FALSE: a new angle and scale are accepted"};
+    hal::In<std::int32_t> counts_in{*this, "counts-in", "counts of the handwheel"};
+    hal::In<double> angle_in{*this, "angle-degrees-in", "direction of the motion", {.unit = "deg"}};
+    hal::In<std::int32_t> factor_in{
+        *this, "iscale-factor", "output counts per input count, 10..100000", {.initial = 10000}};
+    hal::In<double> scale_in{*this, "scale-in", "distance per count"};
+    hal::Limit max_velocity{*this, "max-vel", "largest speed along the direction"};
+    hal::Limit max_acceleration{*this, "max-accel", "largest acceleration along the direction"};
+    hal::In<double> accel_fraction{
+        *this, "accel-fraction-in", "fraction of the axes' acceleration to use", {.initial = 1.0}};
+    hal::Out<bool> enable_out{*this, "enable-out", "for jog-enable of both axes"};
+    hal::Out<double> current_scale{*this, "current-scale", "distance per count in use"};
+    hal::Out<double> scale_out{*this, "current-scale-out", "for jog-scale of both axes"};
     hal::Out<std::int32_t> cosine_counts{*this, "coscounts", "for jog-counts of the first axis"};
     hal::Out<std::int32_t> sine_counts{*this, "sincounts", "for jog-counts of the second axis"};
-    hal::Out<double>       cosine_fraction{*this, "cos-accel-fraction", "for jog-accel-fraction of the first axis"};
-    hal::Out<double>       sine_fraction{*this, "sin-accel-fraction", "for jog-accel-fraction of the second axis"};
-    hal::Out<bool>         active{*this, "active", "TRUE while moving"};
-    hal::Out<double>       current_angle{*this, "current-angle-degrees", "direction in use", {.unit = "deg"}};
-    hal::Out<double>       current_magnitude{*this, "current-mag", "distance along the direction"};
-    hal::Out<double>       current_velocity{*this, "current-vel", "speed along the direction, signed"};
-    hal::Function          run{*this, "", &Anglejog::update, "computes the counts of both axes"};
+    hal::Out<double> cosine_fraction{*this, "cos-accel-fraction",
+                                     "for jog-accel-fraction of the first axis"};
+    hal::Out<double> sine_fraction{*this, "sin-accel-fraction",
+                                   "for jog-accel-fraction of the second axis"};
+    hal::Out<bool> active{*this, "active", "TRUE while moving"};
+    hal::Out<double> current_angle{
+        *this, "current-angle-degrees", "direction in use", {.unit = "deg"}};
+    hal::Out<double> current_magnitude{*this, "current-mag", "distance along the direction"};
+    hal::Out<double> current_velocity{*this, "current-vel", "speed along the direction, signed"};
+    hal::Function run{*this, "", &Anglejog::update, "computes the counts of both axes"};
 
     void update(hal::Cycle cycle) noexcept {
         const bool enabled = enable_in;
-        if (!started_) adopt();
+        if (!started_) {
+            adopt();
+        }
         started_ = true;
         const std::int64_t now = std::int64_t{factor_} * counts_in;
         if (enabled && !was_enabled_) {
@@ -45,9 +54,14 @@ struct Anglejog : hal::Component {
         const std::int64_t turned = now - last_counts_;
         last_counts_ = now;
         was_enabled_ = enabled;
-        if (turned != 0) waiting_ = false;
-        if (enabled) commanded_counts_ += turned;
-        else adopt();
+        if (turned != 0) {
+            waiting_ = false;
+        }
+        if (enabled) {
+            commanded_counts_ += turned;
+        } else {
+            adopt();
+        }
 
         const double distance = static_cast<double>(commanded_counts_) * unit_ - magnitude_;
         active = move(enabled && !waiting_ ? distance : 0.0, cycle.seconds());
@@ -60,29 +74,41 @@ private:
     static constexpr std::int32_t max_factor = 100'000;
     static constexpr double huge = 1e20;  // beyond it sums would lose all digits, or overflow
 
-    static double at_least_0(double limit) noexcept { return limit > 0.0 ? std::min(limit, huge) : 0.0; }
+    static double at_least_0(double limit) noexcept {
+        return limit > 0.0 ? std::min(limit, huge) : 0.0;
+    }
 
     /// Accepts the angle, the scale and the factor. NaN and a factor out of range change nothing.
     void adopt() noexcept {
-        if (std::isfinite(angle_in)) angle_ = angle_in;
+        if (std::isfinite(angle_in)) {
+            angle_ = angle_in;
+        }
         const bool valid = factor_in >= min_factor && factor_in <= max_factor;
-        if (valid) factor_ = factor_in;
-        if (std::fabs(scale_in) <= 1e9) scale_ = scale_in;
+        if (valid) {
+            factor_ = factor_in;
+        }
+        if (std::fabs(scale_in) <= 1e9) {
+            scale_ = scale_in;
+        }
         unit_ = scale_ / static_cast<double>(factor_);
         commanded_counts_ = counts_at(magnitude_);
     }
 
-    /// Moves for one cycle to a point `distance` ahead, or brakes to a stop if that is 0. Returns true while it moves.
+    /// Moves for one cycle to a point `distance` ahead, or brakes to a stop if that is 0. Returns
+    /// true while it moves.
     bool move(double distance, double period_s) noexcept {
         const double acceleration = at_least_0(max_acceleration);
         const double fastest = at_least_0(max_velocity);
         const double change = acceleration * period_s;
         const double negligible = change * period_s * 0.001;
         const bool going = std::fabs(distance) > negligible;
-        // The speed v from which braking by `change` in each cycle ends at the distance d: v * v + 2 v change = 2 a d.
-        const double braking = std::sqrt(2.0 * acceleration * std::fabs(distance) + change * change) - change;
+        // The speed v from which braking by `change` in each cycle ends at the distance d: v * v +
+        // 2 v change = 2 a d.
+        const double braking =
+            std::sqrt(2.0 * acceleration * std::fabs(distance) + change * change) - change;
         const double speed = going ? std::min(braking, fastest) : 0.0;
-        velocity_ = std::clamp(std::copysign(speed, distance), velocity_ - change, velocity_ + change);
+        velocity_ =
+            std::clamp(std::copysign(speed, distance), velocity_ - change, velocity_ + change);
         magnitude_ += velocity_ * period_s;
         return going || velocity_ != 0.0;
     }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Moves an axis for a test, by jogging or back and forth, for steptest and axistest. The commanded position is an end point;
-// the step generator or drive that follows it limits speed and acceleration.
+// Moves an axis for a test, by jogging or back and forth, for steptest and axistest. The commanded
+// position is an end point; the step generator or drive that follows it limits speed and
+// acceleration.
 #pragma once
 
 #include <cmath>
@@ -12,30 +13,43 @@ namespace axis_test {
 
 struct Mover : hal::Component {
     using Component::Component;
-    hal::In<bool>          jog_minus{*this, "jog-minus", "TRUE jogs in the negative direction"};
-    hal::In<bool>          jog_plus{*this, "jog-plus", "TRUE jogs in the positive direction"};
-    hal::In<bool>          run{*this, "run", "TRUE moves back and forth around the initial position; FALSE returns to it"};
-    hal::In<double>        max_velocity{*this, "maxvel", "maximum speed"};
-    hal::In<double>        amplitude{*this, "amplitude", "distance of each end from the initial position; negative: the ends are exchanged"};
-    hal::In<std::int32_t>  direction{*this, "dir", "0: both sides, 1: positive side, 2: negative side"};
-    hal::Out<double>       position_cmd{*this, "position-cmd", "commanded position"};
-    hal::In<double>        position_fb{*this, "position-fb", "position feedback of the axis"};
-    hal::Out<bool>         running{*this, "running", "TRUE from run until the axis is back at the initial position"};
-    hal::Out<double>       run_target{*this, "run-target", "position that the axis is moving to while running is TRUE"};
-    hal::Out<double>       run_start{*this, "run-start", "initial position: feedback when run became TRUE"};
-    hal::Out<double>       run_low{*this, "run-low", "lower end"};
-    hal::Out<double>       run_high{*this, "run-high", "upper end"};
-    hal::In<std::int32_t>  pause{*this, "pause", "pause at each end", {.unit = "s"}};
-    hal::Param<double>     epsilon{*this, "epsilon", "tolerance for reaching an end", {.initial = 0.001}};
-    hal::Out<double>       elapsed{*this, "elapsed", "time at this end", {.unit = "s"}};
+    hal::In<bool> jog_minus{*this, "jog-minus", "TRUE jogs in the negative direction"};
+    hal::In<bool> jog_plus{*this, "jog-plus", "TRUE jogs in the positive direction"};
+    hal::In<bool> run{*this, "run",
+                      "TRUE moves back and forth around the initial position; FALSE returns to it"};
+    hal::In<double> max_velocity{*this, "maxvel", "maximum speed"};
+    hal::In<double> amplitude{
+        *this, "amplitude",
+        "distance of each end from the initial position; negative: the ends are exchanged"};
+    hal::In<std::int32_t> direction{*this, "dir",
+                                    "0: both sides, 1: positive side, 2: negative side"};
+    hal::Out<double> position_cmd{*this, "position-cmd", "commanded position"};
+    hal::In<double> position_fb{*this, "position-fb", "position feedback of the axis"};
+    hal::Out<bool> running{*this, "running",
+                           "TRUE from run until the axis is back at the initial position"};
+    hal::Out<double> run_target{*this, "run-target",
+                                "position that the axis is moving to while running is TRUE"};
+    hal::Out<double> run_start{*this, "run-start",
+                               "initial position: feedback when run became TRUE"};
+    hal::Out<double> run_low{*this, "run-low", "lower end"};
+    hal::Out<double> run_high{*this, "run-high", "upper end"};
+    hal::In<std::int32_t> pause{*this, "pause", "pause at each end", {.unit = "s"}};
+    hal::Param<double> epsilon{
+        *this, "epsilon", "tolerance for reaching an end", {.initial = 0.001}};
+    hal::Out<double> elapsed{*this, "elapsed", "time at this end", {.unit = "s"}};
 
 protected:
-    /// Runs one cycle. Returns true in the cycles in which the axis is neither running nor returning: the caller then commands a jog. [realtime]
+    /// Runs one cycle. Returns true in the cycles in which the axis is neither running nor
+    /// returning: the caller then commands a jog. [realtime]
     bool free_to_jog(double dt) noexcept {
-        if (pausing_) paused_s_ += dt;
+        if (pausing_) {
+            paused_s_ += dt;
+        }
         elapsed = paused_s_;
         if (run) {
-            if (!running) begin();
+            if (!running) {
+                begin();
+            }
             to_and_fro();
         } else if (running) {
             go_back();
@@ -46,7 +60,9 @@ protected:
         return false;
     }
 
-    bool is_at(double position) const noexcept { return std::fabs(position_fb - position) < epsilon; }
+    bool is_at(double position) const noexcept {
+        return std::fabs(position_fb - position) < epsilon;
+    }
 
 private:
     void begin() noexcept {

@@ -11,8 +11,12 @@ struct Axistest : axis_test::Mover {
         if (!free_to_jog(cycle.seconds())) return;
         constexpr double lead = 10.0;
         double jog = 0.0;
-        if (jog_plus) jog = lead;
-        if (jog_minus) jog = -lead;
+        if (jog_plus) {
+            jog = lead;
+        }
+        if (jog_minus) {
+            jog = -lead;
+        }
         position_cmd = position_fb + jog;
         run_target = position_cmd.get();
     }
@@ -20,7 +24,8 @@ struct Axistest : axis_test::Mover {
 
 }  // namespace
 
-HAL_COMPONENT(Axistest, "axistest", "Moves an axis through a trajectory planner, to test speed and acceleration", R"(
+HAL_COMPONENT(Axistest, "axistest",
+              "Moves an axis through a trajectory planner, to test speed and acceleration", R"(
 While `run` is TRUE `position-cmd` alternates between the two ends `run-low` and `run-high`, at the distance
 `amplitude` from the initial position on the sides selected by `dir`. It changes after `position-fb` has been within `epsilon` of the end for `pause`
 seconds. After `run` the axis returns to the initial position, and `running` becomes FALSE there. A jog commands a position 10 units ahead of the

@@ -10,9 +10,12 @@ enum class Encoding : std::uint8_t { gray, binary, bcd, single, index, edge, cou
 
 Encoding encoding_of(const std::string& name) {
     constexpr const char* names[] = {"gray", "binary", "bcd", "single", "index", "edge", "counts"};
-    for (std::size_t i = 0; i < std::size(names); ++i)
+    for (std::size_t i = 0; i < std::size(names); ++i) {
         if (name == names[i]) return static_cast<Encoding>(i);
-    throw hal::ArgumentError("encoding", "encoding=" + name + " is none of gray, binary, bcd, single, index, edge, counts");
+    }
+    throw hal::ArgumentError(
+        "encoding",
+        "encoding=" + name + " is none of gray, binary, bcd, single, index, edge, counts");
 }
 
 struct Carousel : hal::Component {
@@ -20,56 +23,98 @@ struct Carousel : hal::Component {
     static constexpr hal::ArgumentOptions list(std::int64_t min, std::int64_t max) {
         return {.per_instance = true, .min = min, .max = max};
     }
-    hal::Argument     pockets{*this, "pockets", 8, "number of pockets", list(1, 1000)};
-    hal::TextArgument encoding_name{*this, "encoding", "gray", "gray, binary, bcd, single, index, edge or counts", {.per_instance = true}};
-    hal::Argument     num_sense{*this, "num_sense", 4, "number of position sensors; index has 2", list(1, 1000)};
-    hal::Argument     directions{*this, "dir", 2, "2: both directions, 1: forward only", list(1, 2)};
-    hal::Argument     parity_wanted{*this, "parity", 0, "1: odd, 0: even parity", list(0, 1)};
-    const Encoding    encoding = encoding_of(encoding_name.get());
+    hal::Argument pockets{*this, "pockets", 8, "number of pockets", list(1, 1000)};
+    hal::TextArgument encoding_name{*this,
+                                    "encoding",
+                                    "gray",
+                                    "gray, binary, bcd, single, index, edge or counts",
+                                    {.per_instance = true}};
+    hal::Argument num_sense{*this, "num_sense", 4, "number of position sensors; index has 2",
+                            list(1, 1000)};
+    hal::Argument directions{*this, "dir", 2, "2: both directions, 1: forward only", list(1, 2)};
+    hal::Argument parity_wanted{*this, "parity", 0, "1: odd, 0: even parity", list(0, 1)};
+    const Encoding encoding = encoding_of(encoding_name.get());
 
-    hal::In<std::int32_t>  pocket_number{*this, "pocket-number", "target pocket; wraps around above the last one; 0: no move"};
-    hal::In<bool>          enable{*this, "enable", "a rising edge starts the move to the target pocket; FALSE stops it"};
-    hal::Out<bool>         active{*this, "active", "TRUE while moving, homing, aligning or locking"};
-    hal::Out<bool>         ready{*this, "ready", "TRUE at the target pocket, until the next move"};
-    hal::In<bool>          strobe{*this, "strobe", "FALSE ignores the position sensors", {.initial = true}};
-    hal::In<bool>          parity{*this, "parity", "parity bit of the position encoder"};
-    hal::Ins<bool>         sense{*this, "sense-#", sensors(), "position sensor #"};
-    hal::In<double>        rev_pulse{*this, "rev-pulse", "duration of the reverse run that locks the carousel at the pocket", {.unit = "s"}};
-    hal::In<double>        fwd_dc{*this, "fwd-dc", "motor-vel while turning forward"};
-    hal::In<double>        rev_dc{*this, "rev-dc", "motor-vel while turning in reverse"};
-    hal::In<double>        hold_dc{*this, "hold-dc", "motor-vel at standstill"};
-    hal::In<double>        align_dc{*this, "align-dc", "speed of the final slow alignment to the marker; 0: no alignment"};
-    hal::In<double>        decel_time{*this, "decel-time", "pause before the alignment", {.unit = "s"}};
-    hal::In<std::int32_t>  counts{*this, "counts", "counts: rawcounts of the encoder or step generator"};
-    hal::In<std::int32_t>  scale{*this, "scale", "counts: counts from pocket to pocket", {.initial = 100}};
-    hal::In<std::int32_t>  width{*this, "width", "counts: distance from its centre within which a pocket is reached"};
-    hal::In<std::int32_t>  home_offset{*this, "home-offset", "counts: counts from the index to pocket 1"};
-    hal::Io<bool>          index_enable{*this, "index-enable", "counts: TRUE while waiting for the encoder's index"};
-    hal::In<bool>          jog_fwd{*this, "jog-fwd", "a rising edge moves one pocket forward"};
-    hal::In<bool>          jog_rev{*this, "jog-rev", "a rising edge moves one pocket back (with dir=2)"};
-    hal::Out<bool>         motor_fwd{*this, "motor-fwd", "TRUE drives the motor forward, to higher pocket numbers", {.safe = false}};
-    hal::Out<bool>         motor_rev{*this, "motor-rev", "TRUE drives the motor in reverse, to lower pocket numbers", {.safe = false}};
-    hal::Out<bool>         parity_error{*this, "parity-error", "TRUE: the sensors do not match the parity bit"};
-    hal::Out<std::int32_t> current_position{*this, "current-position", "current pocket; 0: unknown"};
-    hal::Out<double>       motor_vel{*this, "motor-vel", "speed command for the motor: fwd-dc, rev-dc, align-dc or hold-dc", {.safe = 0.0}};
-    hal::Out<bool>         homed{*this, "homed", "TRUE: the position of pocket 1 is known"};
-    hal::In<bool>          unhome{*this, "unhome", "TRUE clears homed"};
-    hal::Out<std::int32_t> state{*this, "state", "0 idle, 1 homing, 2 moving, 3 decelerating, 4 5 6 aligning, 7 locking, 8 jogging"};
-    hal::Out<bool>         homing{*this, "homing", "TRUE while homing to pocket 1"};
-    hal::Out<double>       timer{*this, "timer", "remaining time of decel-time or rev-pulse", {.unit = "s"}};
+    hal::In<std::int32_t> pocket_number{
+        *this, "pocket-number", "target pocket; wraps around above the last one; 0: no move"};
+    hal::In<bool> enable{*this, "enable",
+                         "a rising edge starts the move to the target pocket; FALSE stops it"};
+    hal::Out<bool> active{*this, "active", "TRUE while moving, homing, aligning or locking"};
+    hal::Out<bool> ready{*this, "ready", "TRUE at the target pocket, until the next move"};
+    hal::In<bool> strobe{*this, "strobe", "FALSE ignores the position sensors", {.initial = true}};
+    hal::In<bool> parity{*this, "parity", "parity bit of the position encoder"};
+    hal::Ins<bool> sense{*this, "sense-#", sensors(), "position sensor #"};
+    hal::In<double> rev_pulse{*this,
+                              "rev-pulse",
+                              "duration of the reverse run that locks the carousel at the pocket",
+                              {.unit = "s"}};
+    hal::In<double> fwd_dc{*this, "fwd-dc", "motor-vel while turning forward"};
+    hal::In<double> rev_dc{*this, "rev-dc", "motor-vel while turning in reverse"};
+    hal::In<double> hold_dc{*this, "hold-dc", "motor-vel at standstill"};
+    hal::In<double> align_dc{*this, "align-dc",
+                             "speed of the final slow alignment to the marker; 0: no alignment"};
+    hal::In<double> decel_time{*this, "decel-time", "pause before the alignment", {.unit = "s"}};
+    hal::In<std::int32_t> counts{*this, "counts",
+                                 "counts: rawcounts of the encoder or step generator"};
+    hal::In<std::int32_t> scale{
+        *this, "scale", "counts: counts from pocket to pocket", {.initial = 100}};
+    hal::In<std::int32_t> width{
+        *this, "width", "counts: distance from its centre within which a pocket is reached"};
+    hal::In<std::int32_t> home_offset{*this, "home-offset",
+                                      "counts: counts from the index to pocket 1"};
+    hal::Io<bool> index_enable{*this, "index-enable",
+                               "counts: TRUE while waiting for the encoder's index"};
+    hal::In<bool> jog_fwd{*this, "jog-fwd", "a rising edge moves one pocket forward"};
+    hal::In<bool> jog_rev{*this, "jog-rev", "a rising edge moves one pocket back (with dir=2)"};
+    hal::Out<bool> motor_fwd{*this,
+                             "motor-fwd",
+                             "TRUE drives the motor forward, to higher pocket numbers",
+                             {.safe = false}};
+    hal::Out<bool> motor_rev{*this,
+                             "motor-rev",
+                             "TRUE drives the motor in reverse, to lower pocket numbers",
+                             {.safe = false}};
+    hal::Out<bool> parity_error{*this, "parity-error",
+                                "TRUE: the sensors do not match the parity bit"};
+    hal::Out<std::int32_t> current_position{*this, "current-position",
+                                            "current pocket; 0: unknown"};
+    hal::Out<double> motor_vel{*this,
+                               "motor-vel",
+                               "speed command for the motor: fwd-dc, rev-dc, align-dc or hold-dc",
+                               {.safe = 0.0}};
+    hal::Out<bool> homed{*this, "homed", "TRUE: the position of pocket 1 is known"};
+    hal::In<bool> unhome{*this, "unhome", "TRUE clears homed"};
+    hal::Out<std::int32_t> state{
+        *this, "state",
+        "0 idle, 1 homing, 2 moving, 3 decelerating, 4 5 6 aligning, 7 locking, 8 jogging"};
+    hal::Out<bool> homing{*this, "homing", "TRUE while homing to pocket 1"};
+    hal::Out<double> timer{
+        *this, "timer", "remaining time of decel-time or rev-pulse", {.unit = "s"}};
     hal::Out<std::int32_t> motor_dir{*this, "motor-dir", "1 forward, -1 reverse, 0 stopped"};
-    hal::Param<std::uint32_t> debounce{*this, "debounce", "cycles for which a reading of gray, binary, bcd or single must be stable"};
+    hal::Param<std::uint32_t> debounce{
+        *this, "debounce",
+        "cycles for which a reading of gray, binary, bcd or single must be stable"};
     hal::Function run{*this, "", &Carousel::update, "reads the sensors and controls the motor"};
 
     void update(hal::Cycle cycle) noexcept {
-        if (unhome) homed = false;
+        if (unhome) {
+            homed = false;
+        }
         look();
-        if (!enable && state_ != State::homing && state_ != State::jogging && state_ != State::rests) enter(State::rests);
+        if (!enable && state_ != State::homing && state_ != State::jogging &&
+            state_ != State::rests) {
+            enter(State::rests);
+        }
         const bool called = enable && !was_enabled_;
-        const bool forward = jog_fwd && !was_jog_fwd_, back = jog_rev && !was_jog_rev_ && directions == 2;
-        was_enabled_ = enable, was_jog_fwd_ = jog_fwd, was_jog_rev_ = jog_rev;
-        if (called && (state_ == State::rests || state_ == State::jogging)) begin();
-        else if (state_ == State::rests && !enable && forward != back) {
+        const bool forward = jog_fwd && !was_jog_fwd_;
+
+        const bool back = jog_rev && !was_jog_rev_ && directions == 2;
+        was_enabled_ = enable;
+        was_jog_fwd_ = jog_fwd;
+        was_jog_rev_ = jog_rev;
+        if (called && (state_ == State::rests || state_ == State::jogging)) {
+            begin();
+        } else if (state_ == State::rests && !enable && forward != back) {
             direction_ = forward ? 1 : -1;
             from_ = position_;
             enter(State::jogging);
@@ -79,7 +124,17 @@ struct Carousel : hal::Component {
     }
 
 private:
-    enum class State : std::uint8_t { rests, homing, moves, slows, seeks, leaves, returns, locks, jogging };
+    enum class State : std::uint8_t {
+        rests,
+        homing,
+        moves,
+        slows,
+        seeks,
+        leaves,
+        returns,
+        locks,
+        jogging
+    };
 
     std::int64_t sensors() const noexcept {
         switch (encoding) {
@@ -92,21 +147,30 @@ private:
     bool absolute() const noexcept { return encoding < Encoding::index; }
     bool has_place() const noexcept { return absolute() || homed; }
     /// Returns `pocket` wrapped to 1..pockets.
-    std::int64_t wrapped(std::int64_t pocket) const noexcept { return ((pocket - 1) % pockets + pockets) % pockets + 1; }
+    std::int64_t wrapped(std::int64_t pocket) const noexcept {
+        return ((pocket - 1) % pockets + pockets) % pockets + 1;
+    }
     void enter(State next) noexcept { state_ = next; }
 
     // ---- where it is
 
     void look() noexcept {
         marker_ = false;
-        if (absolute()) look_at_code();
-        else if (encoding == Encoding::counts) look_at_counts();
-        else look_at_pulses();
+        if (absolute()) {
+            look_at_code();
+        } else if (encoding == Encoding::counts) {
+            look_at_counts();
+        } else {
+            look_at_pulses();
+        }
         const bool coded = absolute() && encoding != Encoding::single;
-        if (!coded) parity_error = false;
-        else if (strobe) {
+        if (!coded) {
+            parity_error = false;
+        } else if (strobe) {
             bool odd = parity;
-            for (const auto& s : sense) odd = odd != s.get();
+            for (const auto& s : sense) {
+                odd = odd != s.get();
+            }
             parity_error = odd != (parity_wanted != 0);
         }
     }
@@ -116,13 +180,20 @@ private:
         for (std::size_t i = 0; i < sense.size(); ++i) {
             if (!sense[i]) continue;
             if (encoding == Encoding::single) return static_cast<std::int64_t>(i) + 1;
-            if (i < 32) bits |= std::uint64_t{1} << i;
+            if (i < 32) {
+                bits |= std::uint64_t{1} << i;
+            }
         }
-        if (encoding == Encoding::gray)
-            for (unsigned shift = 1; shift < 32; shift *= 2) bits ^= bits >> shift;
+        if (encoding == Encoding::gray) {
+            for (unsigned shift = 1; shift < 32; shift *= 2) {
+                bits ^= bits >> shift;
+            }
+        }
         if (encoding != Encoding::bcd) return static_cast<std::int64_t>(bits);
         std::int64_t value = 0;
-        for (int digit = 7; digit >= 0; --digit) value = value * 10 + static_cast<std::int64_t>(bits >> (4 * digit) & 15u);
+        for (int digit = 7; digit >= 0; --digit) {
+            value = value * 10 + static_cast<std::int64_t>(bits >> (4 * digit) & 15u);
+        }
         return value;
     }
 
@@ -133,19 +204,29 @@ private:
         reading_ = reading;
         if (stable_ < debounce) return;
         marker_ = reading >= 1 && reading <= pockets;
-        if (marker_) position_ = reading;
+        if (marker_) {
+            position_ = reading;
+        }
     }
 
     void look_at_pulses() noexcept {
-        const bool index = sense[0], pulse = sense[1], changed = strobe && pulse != was_pulse_;
-        const bool aligning = state_ >= State::slows && state_ <= State::returns;  // it passes the same marker again
-        if (strobe) was_pulse_ = pulse;
+        const bool index = sense[0];
+        const bool pulse = sense[1];
+        const bool changed = strobe && pulse != was_pulse_;
+        // it passes the same marker again
+        const bool aligning = state_ >= State::slows && state_ <= State::returns;
+        if (strobe) {
+            was_pulse_ = pulse;
+        }
         marker_ = encoding == Encoding::edge || pulse;
         if (!strobe) return;
         if (state_ == State::homing ? index && pulse : changed && index && pulse && !aligning) {
             position_ = 1;
-            if (state_ == State::homing) homed = true;
-        } else if (changed && !aligning && (pulse || encoding == Encoding::edge) && position_ != 0) {
+            if (state_ == State::homing) {
+                homed = true;
+            }
+        } else if (changed && !aligning && (pulse || encoding == Encoding::edge) &&
+                   position_ != 0) {
             position_ = wrapped(position_ + direction_);
         }
     }
@@ -161,14 +242,25 @@ private:
         }
         if (!homed) return;
         const double step = scale != 0 ? static_cast<double>(scale) : 1.0;
-        const double turned = static_cast<double>(now - zero_), place = turned / step, nearest = std::floor(place + 0.5);
-        if (std::fabs(turned - nearest * step) <= std::fabs(static_cast<double>(width))) reach(nearest);
-        else if (std::floor(place) > std::floor(last_place_)) reach(std::floor(place));  // it has passed the centre between two cycles
-        else if (std::floor(place) < std::floor(last_place_)) reach(std::floor(place) + 1.0);
+        const double turned = static_cast<double>(now - zero_);
+        const double place = turned / step;
+
+        const double nearest = std::floor(place + 0.5);
+        if (std::fabs(turned - nearest * step) <= std::fabs(static_cast<double>(width))) {
+            reach(nearest);
+        }
+        // it has passed the centre between two cycles
+        else if (std::floor(place) > std::floor(last_place_)) {
+            reach(std::floor(place));
+        } else if (std::floor(place) < std::floor(last_place_)) {
+            reach(std::floor(place) + 1.0);
+        }
         last_place_ = place;
         marker_ = true;
     }
-    void reach(double place) noexcept { position_ = wrapped(1 + static_cast<std::int64_t>(std::clamp(place, -1e12, 1e12))); }
+    void reach(double place) noexcept {
+        position_ = wrapped(1 + static_cast<std::int64_t>(std::clamp(place, -1e12, 1e12)));
+    }
 
     // ---- what it does
 
@@ -193,28 +285,43 @@ private:
         case State::rests: break;
         case State::homing:
             direction_ = 1;
-            if (encoding == Encoding::counts && !asked_index_) index_enable = asked_index_ = true;
+            if (encoding == Encoding::counts && !asked_index_) {
+                index_enable = asked_index_ = true;
+            }
             if (!homed) break;
-            if (enable) set_out();
-            else enter(State::rests);
+            if (enable) {
+                set_out();
+            } else {
+                enter(State::rests);
+            }
             break;
         case State::moves:
-            if (position_ != target_ || !(marker_ || pocket_number == 0)) moved_ = true;
-            else if (moved_ && align_dc != 0.0) wait(State::slows, decel_time);
-            else arrive();
+            if (position_ != target_ || !(marker_ || pocket_number == 0)) {
+                moved_ = true;
+            } else if (moved_ && align_dc != 0.0) {
+                wait(State::slows, decel_time);
+            } else {
+                arrive();
+            }
             break;
         case State::slows:
             if (left_ > 0.0) break;
             enter(direction_ > 0 && !marker_ ? State::seeks : State::leaves);
             break;
         case State::seeks:
-            if (marker_) enter(State::leaves);
+            if (marker_) {
+                enter(State::leaves);
+            }
             break;
         case State::leaves:
-            if (!marker_) enter(State::returns);
+            if (!marker_) {
+                enter(State::returns);
+            }
             break;
         case State::returns:
-            if (marker_) arrive();
+            if (marker_) {
+                arrive();
+            }
             break;
         case State::locks:
             if (left_ > 0.0) break;
@@ -247,12 +354,24 @@ private:
         case State::rests: break;
         case State::homing:
         case State::moves:
-        case State::jogging: turns = direction_; velocity = turns > 0 ? fwd_dc : rev_dc; break;
+        case State::jogging:
+            turns = direction_;
+            velocity = turns > 0 ? fwd_dc : rev_dc;
+            break;
         case State::slows: velocity = 0.0; break;
         case State::seeks:
-        case State::leaves: turns = -1; velocity = -slow; break;
-        case State::returns: turns = 1; velocity = slow; break;
-        case State::locks: turns = -1; velocity = rev_dc; break;
+        case State::leaves:
+            turns = -1;
+            velocity = -slow;
+            break;
+        case State::returns:
+            turns = 1;
+            velocity = slow;
+            break;
+        case State::locks:
+            turns = -1;
+            velocity = rev_dc;
+            break;
         }
         motor_fwd = turns > 0;
         motor_rev = turns < 0;
@@ -266,13 +385,22 @@ private:
     }
 
     State state_ = State::rests;
-    bool was_enabled_ = false, was_jog_fwd_ = false, was_jog_rev_ = false, was_pulse_ = false;
+    bool was_enabled_ = false;
+    bool was_jog_fwd_ = false;
+    bool was_jog_rev_ = false;
+    bool was_pulse_ = false;
     bool marker_ = false;  // at the centre of a pocket
-    bool moved_ = false, asked_index_ = false;
+    bool moved_ = false;
+    bool asked_index_ = false;
     int direction_ = 1;
     std::uint32_t stable_ = 0;
-    std::int64_t reading_ = -1, position_ = 0, target_ = 0, from_ = 0, zero_ = 0;
-    double left_ = 0.0, last_place_ = 0.0;
+    std::int64_t reading_ = -1;
+    std::int64_t position_ = 0;
+    std::int64_t target_ = 0;
+    std::int64_t from_ = 0;
+    std::int64_t zero_ = 0;
+    double left_ = 0.0;
+    double last_place_ = 0.0;
 };
 
 }  // namespace

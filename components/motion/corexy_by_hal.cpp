@@ -5,15 +5,15 @@ namespace {
 
 struct CorexyByHal : hal::Component {
     using Component::Component;
-    hal::In<double>  alpha_fb{*this, "alpha-fb", "position of motor alpha"};
-    hal::In<double>  beta_fb{*this, "beta-fb", "position of motor beta"};
-    hal::In<double>  j0_cmd{*this, "j0-motor-pos-cmd", "commanded position of joint 0 (x)"};
-    hal::In<double>  j1_cmd{*this, "j1-motor-pos-cmd", "commanded position of joint 1 (y)"};
+    hal::In<double> alpha_fb{*this, "alpha-fb", "position of motor alpha"};
+    hal::In<double> beta_fb{*this, "beta-fb", "position of motor beta"};
+    hal::In<double> j0_cmd{*this, "j0-motor-pos-cmd", "commanded position of joint 0 (x)"};
+    hal::In<double> j1_cmd{*this, "j1-motor-pos-cmd", "commanded position of joint 1 (y)"};
     hal::Out<double> j0_fb{*this, "j0-motor-pos-fb", "position of joint 0 (x)"};
     hal::Out<double> j1_fb{*this, "j1-motor-pos-fb", "position of joint 1 (y)"};
     hal::Out<double> alpha_cmd{*this, "alpha-cmd", "commanded position of motor alpha"};
     hal::Out<double> beta_cmd{*this, "beta-cmd", "commanded position of motor beta"};
-    hal::Function    run{*this, "", &CorexyByHal::update, "computes commands and feedback"};
+    hal::Function run{*this, "", &CorexyByHal::update, "computes commands and feedback"};
 
     void update(hal::Cycle) noexcept {
         alpha_cmd = 0.5 * (j0_cmd + j1_cmd);

@@ -12,66 +12,135 @@ struct DiffDrive : hal::Component {
     using Component::Component;
 
     hal::In<double> linear{*this, "linear", "requested forward speed", {.unit = "m/s"}};
-    hal::In<double> angular{*this, "angular", "requested turning speed, positive to the left", {.unit = "rad/s"}};
-    hal::In<bool> enable{*this, "enable", "FALSE: both wheels are commanded to rest at once", {.initial = true}};
-    hal::In<double> left_angle{*this, "left-angle", "measured angle of the left wheel, positive forwards", {.unit = "rad"}};
-    hal::In<double> right_angle{*this, "right-angle", "measured angle of the right wheel, positive forwards", {.unit = "rad"}};
+    hal::In<double> angular{
+        *this, "angular", "requested turning speed, positive to the left", {.unit = "rad/s"}};
+    hal::In<bool> enable{
+        *this, "enable", "FALSE: both wheels are commanded to rest at once", {.initial = true}};
+    hal::In<double> left_angle{*this,
+                               "left-angle",
+                               "measured angle of the left wheel, positive forwards",
+                               {.unit = "rad"}};
+    hal::In<double> right_angle{*this,
+                                "right-angle",
+                                "measured angle of the right wheel, positive forwards",
+                                {.unit = "rad"}};
     hal::In<bool> load{*this, "load", "TRUE sets the pose to load-x, load-y, load-heading"};
     hal::In<double> load_x{*this, "load-x", "x of the robot to set", {.unit = "m"}};
     hal::In<double> load_y{*this, "load-y", "y of the robot to set", {.unit = "m"}};
-    hal::In<double> load_heading{*this, "load-heading", "heading of the robot to set", {.unit = "rad"}};
+    hal::In<double> load_heading{
+        *this, "load-heading", "heading of the robot to set", {.unit = "rad"}};
 
-    hal::Param<double> left_radius{*this, "left-radius", "radius of the left wheel", {.initial = 0.04, .unit = "m"}};
-    hal::Param<double> right_radius{*this, "right-radius", "radius of the right wheel", {.initial = 0.04, .unit = "m"}};
-    hal::Param<double> track{*this, "track", "distance between the wheels' contact points", {.initial = 0.25, .unit = "m"}};
-    hal::OptionalLimitParam max_rim{*this, "max-wheel-speed", "limit on the rim speed of each wheel; 0: no limit", {.unit = "m/s"}};
-    hal::OptionalLimitParam max_linear{*this, "max-linear", "limit on the forward speed; 0: no limit", {.unit = "m/s"}};
-    hal::OptionalLimitParam max_angular{*this, "max-angular", "limit on the turning speed; 0: no limit", {.unit = "rad/s"}};
-    hal::OptionalLimitParam max_linear_acceleration{*this, "max-linear-acceleration", "limit on the forward acceleration; 0: no limit", {.unit = "m/s^2"}};
-    hal::OptionalLimitParam max_angular_acceleration{*this, "max-angular-acceleration", "limit on the angular acceleration; 0: no limit", {.unit = "rad/s^2"}};
+    hal::Param<double> left_radius{
+        *this, "left-radius", "radius of the left wheel", {.initial = 0.04, .unit = "m"}};
+    hal::Param<double> right_radius{
+        *this, "right-radius", "radius of the right wheel", {.initial = 0.04, .unit = "m"}};
+    hal::Param<double> track{*this,
+                             "track",
+                             "distance between the wheels' contact points",
+                             {.initial = 0.25, .unit = "m"}};
+    hal::OptionalLimitParam max_rim{*this,
+                                    "max-wheel-speed",
+                                    "limit on the rim speed of each wheel; 0: no limit",
+                                    {.unit = "m/s"}};
+    hal::OptionalLimitParam max_linear{
+        *this, "max-linear", "limit on the forward speed; 0: no limit", {.unit = "m/s"}};
+    hal::OptionalLimitParam max_angular{
+        *this, "max-angular", "limit on the turning speed; 0: no limit", {.unit = "rad/s"}};
+    hal::OptionalLimitParam max_linear_acceleration{
+        *this,
+        "max-linear-acceleration",
+        "limit on the forward acceleration; 0: no limit",
+        {.unit = "m/s^2"}};
+    hal::OptionalLimitParam max_angular_acceleration{
+        *this,
+        "max-angular-acceleration",
+        "limit on the angular acceleration; 0: no limit",
+        {.unit = "rad/s^2"}};
 
-    hal::Out<double> left_speed{*this, "left-speed", "commanded speed of the left wheel", {.unit = "rad/s", .safe = 0.0, .finite = true}};
-    hal::Out<double> right_speed{*this, "right-speed",
-                                 "commanded speed of the right wheel", {.unit = "rad/s", .safe = 0.0, .finite = true}};
+    hal::Out<double> left_speed{*this,
+                                "left-speed",
+                                "commanded speed of the left wheel",
+                                {.unit = "rad/s", .safe = 0.0, .finite = true}};
+    hal::Out<double> right_speed{*this,
+                                 "right-speed",
+                                 "commanded speed of the right wheel",
+                                 {.unit = "rad/s", .safe = 0.0, .finite = true}};
     hal::Out<bool> limited{*this, "limited", "TRUE: a limit reduces the commanded speeds"};
     hal::Out<double> x{*this, "x", "x of the centre of the axle", {.unit = "m", .finite = true}};
     hal::Out<double> y{*this, "y", "y of the centre of the axle", {.unit = "m", .finite = true}};
-    hal::Out<double> heading{*this, "heading", "heading: 0 along x, positive to the left, -pi..pi", {.unit = "rad", .finite = true}};
-    hal::Out<double> turned{*this, "turned", "heading including whole turns", {.unit = "rad", .finite = true}};
-    hal::Out<double> distance{*this, "distance", "distance covered by the centre of the axle; negative backwards", {.unit = "m", .finite = true}};
-    hal::Out<double> actual_linear{*this, "actual-linear", "measured forward speed", {.unit = "m/s", .finite = true}};
-    hal::Out<double> actual_angular{*this, "actual-angular", "measured turning speed", {.unit = "rad/s", .finite = true}};
+    hal::Out<double> heading{*this,
+                             "heading",
+                             "heading: 0 along x, positive to the left, -pi..pi",
+                             {.unit = "rad", .finite = true}};
+    hal::Out<double> turned{
+        *this, "turned", "heading including whole turns", {.unit = "rad", .finite = true}};
+    hal::Out<double> distance{*this,
+                              "distance",
+                              "distance covered by the centre of the axle; negative backwards",
+                              {.unit = "m", .finite = true}};
+    hal::Out<double> actual_linear{
+        *this, "actual-linear", "measured forward speed", {.unit = "m/s", .finite = true}};
+    hal::Out<double> actual_angular{
+        *this, "actual-angular", "measured turning speed", {.unit = "rad/s", .finite = true}};
 
-    hal::Function measure{*this, "odometry", &DiffDrive::odometry, "computes pose and speeds from the wheel angles"};
-    hal::Function run{*this, "command", &DiffDrive::command, "computes the wheel speeds from the requested motion"};
+    hal::Function measure{*this, "odometry", &DiffDrive::odometry,
+                          "computes pose and speeds from the wheel angles"};
+    hal::Function run{*this, "command", &DiffDrive::command,
+                      "computes the wheel speeds from the requested motion"};
 
     void odometry(hal::Cycle cycle) noexcept {
-        const double left = left_angle, right = right_angle, base = width();
-        const bool good = std::fabs(left) <= most && std::fabs(right) <= most;  // FALSE for NaN, too
-        double way = 0.0, turn = 0.0;
+        const double left = left_angle;
+        const double right = right_angle;
+        const double base = width();
+        // FALSE for NaN, too
+        const bool good = std::fabs(left) <= most && std::fabs(right) <= most;
+        double way = 0.0;
+        double turn = 0.0;
         if (good && started_) {
-            const double l = (left - last_left_) * radius(left_radius), r = (right - last_right_) * radius(right_radius);
+            const double l = (left - last_left_) * radius(left_radius);
+
+            const double r = (right - last_right_) * radius(right_radius);
             way = (l + r) / 2;
             turn = (r - l) / base;
         }
-        if (good) last_left_ = left, last_right_ = right, started_ = true;
+        if (good) {
+            last_left_ = left;
+            last_right_ = right;
+            started_ = true;
+        }
         if (load) {
-            if (std::fabs(load_x) <= most) x_ = load_x;
-            if (std::fabs(load_y) <= most) y_ = load_y;
-            if (std::fabs(load_heading) <= most) heading_ = load_heading;
+            if (std::fabs(load_x) <= most) {
+                x_ = load_x;
+            }
+            if (std::fabs(load_y) <= most) {
+                y_ = load_y;
+            }
+            if (std::fabs(load_heading) <= most) {
+                heading_ = load_heading;
+            }
             distance_ = 0.0;
         } else {
-            // The chord of the arc, in the direction at its midpoint: exact while the ratio of the wheel speeds is constant.
-            const double half = turn / 2, chord = std::fabs(half) < 1e-4 ? 1 - half * half / 6 : std::sin(half) / half;
+            // The chord of the arc, in the direction at its midpoint: exact while the ratio of the
+            // wheel speeds is constant.
+            const double half = turn / 2;
+            const double chord =
+                std::fabs(half) < 1e-4 ? 1 - half * half / 6 : std::sin(half) / half;
             x_ += way * chord * std::cos(heading_ + half);
             y_ += way * chord * std::sin(heading_ + half);
             heading_ += turn;
             distance_ += way;
         }
-        if (!(std::fabs(x_) + std::fabs(y_) + std::fabs(heading_) + std::fabs(distance_) <= 1e60)) x_ = y_ = heading_ = distance_ = 0.0;
-        x = x_, y = y_, turned = heading_, distance = distance_;
+        if (!(std::fabs(x_) + std::fabs(y_) + std::fabs(heading_) + std::fabs(distance_) <= 1e60)) {
+            x_ = y_ = heading_ = distance_ = 0.0;
+        }
+        x = x_;
+        y = y_;
+        turned = heading_;
+        distance = distance_;
         double within = std::remainder(heading_, 2 * std::numbers::pi);
-        if (within <= -std::numbers::pi) within += 2 * std::numbers::pi;
+        if (within <= -std::numbers::pi) {
+            within += 2 * std::numbers::pi;
+        }
         heading = within;
         actual_linear = way / cycle.seconds();
         actual_angular = turn / cycle.seconds();
@@ -79,26 +148,34 @@ struct DiffDrive : hal::Component {
 
     void command(hal::Cycle cycle) noexcept {
         const double wanted_v = std::isfinite(linear) ? std::clamp(linear.get(), -most, most) : 0.0;
-        const double wanted_w = std::isfinite(angular) ? std::clamp(angular.get(), -most, most) : 0.0;
+        const double wanted_w =
+            std::isfinite(angular) ? std::clamp(angular.get(), -most, most) : 0.0;
         // All limits scale (v, w) as a vector, so that the robot stays on its curve.
         double share = 1.0;
         const auto within = [&](double value, double limit) {
-            if (limit > 0.0 && std::fabs(value) * share > limit) share = limit / std::fabs(value);
+            if (limit > 0.0 && std::fabs(value) * share > limit) {
+                share = limit / std::fabs(value);
+            }
         };
         within(wanted_v, max_linear);
         within(wanted_w, max_angular);
         within(std::fabs(wanted_v) + std::fabs(wanted_w) * width() / 2, max_rim);
-        const double v = share * wanted_v, w = share * wanted_w;
+        const double v = share * wanted_v;
+        const double w = share * wanted_w;
 
         double step = 1.0;
         const auto slowly = [&](double change, double limit) {
-            if (limit > 0.0 && std::fabs(change) * step > limit * cycle.seconds()) step = limit * cycle.seconds() / std::fabs(change);
+            if (limit > 0.0 && std::fabs(change) * step > limit * cycle.seconds()) {
+                step = limit * cycle.seconds() / std::fabs(change);
+            }
         };
         slowly(v - v_, max_linear_acceleration);
         slowly(w - w_, max_angular_acceleration);
         v_ = enable ? step < 1.0 ? v_ + step * (v - v_) : v : 0.0;
         w_ = enable ? step < 1.0 ? w_ + step * (w - w_) : w : 0.0;
-        if (!std::isfinite(v_ + w_)) v_ = w_ = 0.0;
+        if (!std::isfinite(v_ + w_)) {
+            v_ = w_ = 0.0;
+        }
         limited = enable && (v_ != wanted_v || w_ != wanted_w);
         left_speed = (v_ - w_ * width() / 2) / radius(left_radius);
         right_speed = (v_ + w_ * width() / 2) / radius(right_radius);
@@ -106,17 +183,26 @@ struct DiffDrive : hal::Component {
 
 private:
     static constexpr double most = 1e15;
-    static double radius(double given) noexcept { return given > 1e-9 ? std::min(given, 1e9) : 1e-9; }
+    static double radius(double given) noexcept {
+        return given > 1e-9 ? std::min(given, 1e9) : 1e-9;
+    }
     double width() const noexcept { return radius(track); }
 
-    double x_ = 0.0, y_ = 0.0, heading_ = 0.0, distance_ = 0.0;
-    double last_left_ = 0.0, last_right_ = 0.0, v_ = 0.0, w_ = 0.0;
+    double x_ = 0.0;
+    double y_ = 0.0;
+    double heading_ = 0.0;
+    double distance_ = 0.0;
+    double last_left_ = 0.0;
+    double last_right_ = 0.0;
+    double v_ = 0.0;
+    double w_ = 0.0;
     bool started_ = false;
 };
 
 }  // namespace
 
-HAL_COMPONENT(DiffDrive, "diff_drive", "Kinematics and odometry of a robot on two driven wheels", R"(
+HAL_COMPONENT(DiffDrive, "diff_drive", "Kinematics and odometry of a robot on two driven wheels",
+              R"(
     left-speed  = (linear - angular track / 2) / left-radius
     right-speed = (linear + angular track / 2) / right-radius
 

@@ -5,15 +5,18 @@ namespace {
 
 struct Differential : hal::Component {
     using Component::Component;
-    hal::In<double>  roll_cmd{*this, "roll-cmd", "commanded roll", {.unit = "deg"}};
-    hal::In<double>  pitch_cmd{*this, "pitch-cmd", "commanded pitch", {.unit = "deg"}};
+    hal::In<double> roll_cmd{*this, "roll-cmd", "commanded roll", {.unit = "deg"}};
+    hal::In<double> pitch_cmd{*this, "pitch-cmd", "commanded pitch", {.unit = "deg"}};
     hal::Out<double> roll_fb{*this, "roll-fb", "roll, from the motor positions", {.unit = "deg"}};
-    hal::Out<double> pitch_fb{*this, "pitch-fb", "pitch, from the motor positions", {.unit = "deg"}};
-    hal::Out<double> motor0_cmd{*this, "motor0-cmd", "commanded position of motor 0", {.unit = "deg"}};
-    hal::Out<double> motor1_cmd{*this, "motor1-cmd", "commanded position of motor 1", {.unit = "deg"}};
-    hal::In<double>  motor0_fb{*this, "motor0-fb", "position of motor 0", {.unit = "deg"}};
-    hal::In<double>  motor1_fb{*this, "motor1-fb", "position of motor 1", {.unit = "deg"}};
-    hal::Function    run{*this, "", &Differential::update, "computes commands and feedback"};
+    hal::Out<double> pitch_fb{
+        *this, "pitch-fb", "pitch, from the motor positions", {.unit = "deg"}};
+    hal::Out<double> motor0_cmd{
+        *this, "motor0-cmd", "commanded position of motor 0", {.unit = "deg"}};
+    hal::Out<double> motor1_cmd{
+        *this, "motor1-cmd", "commanded position of motor 1", {.unit = "deg"}};
+    hal::In<double> motor0_fb{*this, "motor0-fb", "position of motor 0", {.unit = "deg"}};
+    hal::In<double> motor1_fb{*this, "motor1-fb", "position of motor 1", {.unit = "deg"}};
+    hal::Function run{*this, "", &Differential::update, "computes commands and feedback"};
 
     void update(hal::Cycle) noexcept {
         roll_fb = 0.5 * (motor0_fb + motor1_fb);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What encoder and counter share: counting in a fast thread, with index and speed in the servo thread.
+// What encoder and counter share: counting in a fast thread, with index and speed in the servo
+// thread.
 #pragma once
 
 #include <algorithm>
@@ -15,15 +16,20 @@ namespace edge_count {
 /// What the fast function has counted at the end of one of its cycles. Counts are since the start.
 struct Sample {
     std::int64_t raw = 0;
-    std::int64_t now_ns = 0;                     // time of the fast function: the sum of its periods
+    // time of the fast function: the sum of its periods
+    std::int64_t now_ns = 0;
     std::int64_t tick_ns = 0;                    // the last of these periods
-    std::int64_t edge = 0;                       // exact position of the newest edge: between count edge - 1 and count edge
+    // exact position of the newest edge: between count edge - 1 and count edge
+    std::int64_t edge = 0;
     std::int64_t edge_ns = 0;                    // time of the newest edge
-    std::uint32_t indexes = 0, latches = 0;      // accepted index pulses and latch edges so far
-    std::int64_t index_raw = 0, latch_raw = 0;   // raw at the newest of each
+    std::uint32_t indexes = 0;
+    std::uint32_t latches = 0;      // accepted index pulses and latch edges so far
+    std::int64_t index_raw = 0;
+    std::int64_t latch_raw = 0;   // raw at the newest of each
 };
 
-/// The fast thread's side calls begin, move, index, latch and publish; the servo thread's side calls capture and the others.
+/// The fast thread's side calls begin, move, index, latch and publish; the servo thread's side
+/// calls capture and the others.
 class Count {
 public:
     /// Starts a cycle of the fast function. [realtime] fast
@@ -53,8 +59,8 @@ public:
         return sample_;
     }
 
-    /// Returns the newest sample after moving the zero to the index or, while `reset`, to the current count. Clears `index_enable` at
-    /// the index. [realtime] servo
+    /// Returns the newest sample after moving the zero to the index or, while `reset`, to the
+    /// current count. Clears `index_enable` at the index. [realtime] servo
     const Sample& capture(hal::Io<bool>& index_enable, bool reset) noexcept {
         const Sample& now = handed_.get();
         if (index_enable && waiting_ && now.indexes != indexes_) {
@@ -66,17 +72,23 @@ public:
             waiting_ = !waiting_;
             armed_.store(waiting_, std::memory_order_relaxed);
         }
-        if (reset) zero_ = now.raw;
+        if (reset) {
+            zero_ = now.raw;
+        }
         return now;
     }
     std::int64_t zero() const noexcept { return zero_; }
 
-    /// Returns the speed in counts per second: the distance between the newest edges of two cycles, each at its exact position, divided
-    /// by the time between them. A shaft that trembles across one edge has speed 0, and so has one after its first edge. Without
-    /// an edge the speed is limited to what an edge in the next cycle of the fast function would give. [realtime] servo
+    /// Returns the speed in counts per second: the distance between the newest edges of two cycles,
+    /// each at its exact position, divided by the time between them. A shaft that trembles across
+    /// one edge has speed 0, and so has one after its first edge. Without an edge the speed is
+    /// limited to what an edge in the next cycle of the fast function would give. [realtime] servo
     double speed(const Sample& now) noexcept {
         if (now.edge_ns != edge_ns_) {
-            if (edge_ns_ > 0) speed_ = static_cast<double>(now.edge - edge_) * 1e9 / static_cast<double>(now.edge_ns - edge_ns_);
+            if (edge_ns_ > 0) {
+                speed_ = static_cast<double>(now.edge - edge_) * 1e9 /
+                         static_cast<double>(now.edge_ns - edge_ns_);
+            }
             edge_ = now.edge;
             edge_ns_ = now.edge_ns;
         }
@@ -89,24 +101,31 @@ public:
     /// Returns the position in counts at `speed` between two edges. [realtime] servo
     double interpolate(const Sample& now) const noexcept {
         const double travelled = speed_ * 1e-9 * static_cast<double>(now.now_ns - edge_ns_);
-        const double position = static_cast<double>(now.edge) + travelled, cell = static_cast<double>(now.raw);
+        const double position = static_cast<double>(now.edge) + travelled;
+
+        const double cell = static_cast<double>(now.raw);
         return std::clamp(position, cell, cell + 1.0) - static_cast<double>(zero_);
     }
 
 private:
-    Sample sample_;                // fast thread
+    Sample sample_;  // fast thread
     hal::Mailbox<Sample> handed_;  // written by the fast thread, read by the servo thread
-    std::atomic<bool> armed_{false};  // set by the servo thread while index-enable waits, cleared by the fast thread at the index
+    // set by the servo thread while index-enable waits, cleared by the fast thread at the index
+    std::atomic<bool> armed_{false};
     // servo thread
     bool waiting_ = false;
     std::uint32_t indexes_ = 0;
-    std::int64_t zero_ = 0, edge_ = 0, edge_ns_ = 0;
+    std::int64_t zero_ = 0;
+    std::int64_t edge_ = 0;
+    std::int64_t edge_ns_ = 0;
     double speed_ = 0.0;
 };
 
 /// Returns the scale, after setting an invalid one (0, NaN, infinite) to 1. [realtime]
 inline double valid_scale(hal::Io<double>& scale) noexcept {
-    if (std::fabs(scale) < 1e-20 || !std::isfinite(scale)) scale = 1.0;
+    if (std::fabs(scale) < 1e-20 || !std::isfinite(scale)) {
+        scale = 1.0;
+    }
     return scale;
 }
 

@@ -8,45 +8,95 @@ struct Encoder : hal::Component {
     using Component::Component;
     static constexpr hal::Traits traits{.default_count = 3};
 
-    hal::Function count{*this, "update-counters", &Encoder::update_counters, "samples the phases and counts; belongs in the fastest thread", {.shared = true}};
+    hal::Function count{*this,
+                        "update-counters",
+                        &Encoder::update_counters,
+                        "samples the phases and counts; belongs in the fastest thread",
+                        {.shared = true}};
     hal::In<bool> phase_a{*this, count, "phase-A", "encoder phase A"};
     hal::In<bool> phase_b{*this, count, "phase-B", "encoder phase B"};
     hal::In<bool> phase_z{*this, count, "phase-Z", "encoder index pulse"};
-    hal::Io<bool> x4_mode{*this, count, "x4-mode", "TRUE counts every edge, FALSE one per full cycle", {.initial = true}};
-    hal::Io<bool> counter_mode{*this, count, "counter-mode", "TRUE counts rising edges of phase-A and ignores phase-B"};
-    hal::In<std::int32_t> missing_teeth{*this, count, "missing-teeth", "counter-mode: teeth missing from the wheel; the gap is the index"};
-    hal::In<bool> latch_input{*this, count, "latch-input", "an edge of this input latches the position"};
-    hal::In<bool> latch_rising{*this, count, "latch-rising", "TRUE: rising edges of latch-input latch", {.initial = true}};
-    hal::In<bool> latch_falling{*this, count, "latch-falling", "TRUE: falling edges of latch-input latch", {.initial = true}};
-    hal::Out<std::int32_t> raw_counts{*this, count, "rawcounts", "counts since the start, unaffected by reset and index"};
-    hal::Out<std::uint32_t> lost{*this, count, "quad-errors", "times both phases changed at once: edges were lost because the thread is too slow"};
+    hal::Io<bool> x4_mode{*this,
+                          count,
+                          "x4-mode",
+                          "TRUE counts every edge, FALSE one per full cycle",
+                          {.initial = true}};
+    hal::Io<bool> counter_mode{*this, count, "counter-mode",
+                               "TRUE counts rising edges of phase-A and ignores phase-B"};
+    hal::In<std::int32_t> missing_teeth{
+        *this, count, "missing-teeth",
+        "counter-mode: teeth missing from the wheel; the gap is the index"};
+    hal::In<bool> latch_input{*this, count, "latch-input",
+                              "an edge of this input latches the position"};
+    hal::In<bool> latch_rising{
+        *this, count, "latch-rising", "TRUE: rising edges of latch-input latch", {.initial = true}};
+    hal::In<bool> latch_falling{*this,
+                                count,
+                                "latch-falling",
+                                "TRUE: falling edges of latch-input latch",
+                                {.initial = true}};
+    hal::Out<std::int32_t> raw_counts{*this, count, "rawcounts",
+                                      "counts since the start, unaffected by reset and index"};
+    hal::Out<std::uint32_t> lost{
+        *this, count, "quad-errors",
+        "times both phases changed at once: edges were lost because the thread is too slow"};
 
-    hal::Function capture{*this, "capture-position", &Encoder::capture_position, "scales the counts; belongs in the servo thread", {.shared = true}};
-    hal::Io<bool> index_enable{*this, capture, "index-enable", "TRUE: the next rising edge of phase-Z sets counts and position to 0 and this pin to FALSE"};
+    hal::Function capture{*this,
+                          "capture-position",
+                          &Encoder::capture_position,
+                          "scales the counts; belongs in the servo thread",
+                          {.shared = true}};
+    hal::Io<bool> index_enable{*this, capture, "index-enable",
+                               "TRUE: the next rising edge of phase-Z sets counts and position to "
+                               "0 and this pin to FALSE"};
     hal::In<bool> reset{*this, capture, "reset", "TRUE holds counts and position at 0"};
-    hal::Io<double> position_scale{*this, capture, "position-scale", "counts per position unit", {.initial = 1.0}};
-    hal::CorrectedIn<double> min_speed{*this, capture, "min-speed-estimate", "below this speed velocity is 0 and position-interpolated equals position", {.initial = 1.0}};
+    hal::Io<double> position_scale{
+        *this, capture, "position-scale", "counts per position unit", {.initial = 1.0}};
+    hal::CorrectedIn<double> min_speed{
+        *this,
+        capture,
+        "min-speed-estimate",
+        "below this speed velocity is 0 and position-interpolated equals position",
+        {.initial = 1.0}};
     hal::Out<std::int32_t> counts{*this, capture, "counts", "position in counts"};
-    hal::Out<std::int32_t> counts_latched{*this, capture, "counts-latched", "counts at the newest edge of latch-input"};
+    hal::Out<std::int32_t> counts_latched{*this, capture, "counts-latched",
+                                          "counts at the newest edge of latch-input"};
     hal::Out<double> position{*this, capture, "position", "counts / position-scale"};
-    hal::Out<double> position_latched{*this, capture, "position-latched", "position at the newest edge of latch-input"};
-    hal::Out<double> position_interpolated{*this, capture, "position-interpolated", "position interpolated between counts; not for position control"};
+    hal::Out<double> position_latched{*this, capture, "position-latched",
+                                      "position at the newest edge of latch-input"};
+    hal::Out<double> position_interpolated{
+        *this, capture, "position-interpolated",
+        "position interpolated between counts; not for position control"};
     hal::Out<double> velocity{*this, capture, "velocity", "speed in position units per second"};
     hal::Out<double> velocity_rpm{*this, capture, "velocity-rpm", "velocity * 60"};
 
     void update_counters(hal::Cycle cycle) noexcept {
         count_.begin(cycle.period_ns());
-        const bool a = phase_a, b = phase_b, z = phase_z, latch = latch_input;
-        if (!started_) {  // the first sample is the initial state of the phases; nothing has moved yet
+        const bool a = phase_a;
+        const bool b = phase_b;
+        const bool z = phase_z;
+        const bool latch = latch_input;
+        // the first sample is the initial state of the phases; nothing has moved yet
+        if (!started_) {
             started_ = true;
-            a_ = a, b_ = b, z_ = z, latch_ = latch;
+            a_ = a;
+            b_ = b;
+            z_ = z;
+            latch_ = latch;
         }
         now_ns_ += cycle.period_ns();
         bool index = z && !z_;
         count_.move(counter_mode ? teeth(a, index) : edges(a, b));
-        if (index) count_.index();
-        if ((latch && !latch_ && latch_rising) || (!latch && latch_ && latch_falling)) count_.latch();
-        a_ = a, b_ = b, z_ = z, latch_ = latch;
+        if (index) {
+            count_.index();
+        }
+        if ((latch && !latch_ && latch_rising) || (!latch && latch_ && latch_falling)) {
+            count_.latch();
+        }
+        a_ = a;
+        b_ = b;
+        z_ = z;
+        latch_ = latch;
         raw_counts = static_cast<std::int32_t>(count_.publish().raw);
     }
 
@@ -54,7 +104,9 @@ struct Encoder : hal::Component {
         const auto& now = count_.capture(index_enable, reset);
         const std::int64_t zero = count_.zero();
         const double scale = edge_count::valid_scale(position_scale);
-        if (min_speed == 0.0) min_speed.correct(1.0);
+        if (min_speed == 0.0) {
+            min_speed.correct(1.0);
+        }
 
         if (now.latches != latches_) {
             latches_ = now.latches;
@@ -64,15 +116,17 @@ struct Encoder : hal::Component {
         counts = static_cast<std::int32_t>(now.raw - zero);
         position = static_cast<double>(now.raw - zero) / scale;
 
-        const double estimated = count_.speed(now) / scale, speed = std::fabs(estimated) < min_speed ? 0.0 : estimated;
+        const double estimated = count_.speed(now) / scale;
+
+        const double speed = std::fabs(estimated) < min_speed ? 0.0 : estimated;
         velocity = speed;
         velocity_rpm = speed * 60.0;
         position_interpolated = speed == 0.0 ? position.get() : count_.interpolate(now) / scale;
     }
 
 private:
-    /// Returns the counts of this cycle in quadrature. Without x4-mode the one count per cycle is where A changes while B is low: at the
-    /// same position in both directions.
+    /// Returns the counts of this cycle in quadrature. Without x4-mode the one count per cycle is
+    /// where A changes while B is low: at the same position in both directions.
     std::int64_t edges(bool a, bool b) noexcept {
         if (a == a_ && b == b_) return 0;
         if (a != a_ && b != b_) {
@@ -84,23 +138,37 @@ private:
         return forward ? 1 : -1;
     }
 
-    /// Returns the counts of this cycle on a toothed wheel. A gap as wide as the missing teeth counts for them and is the index.
+    /// Returns the counts of this cycle on a toothed wheel. A gap as wide as the missing teeth
+    /// counts for them and is the index.
     std::int64_t teeth(bool a, bool& index) noexcept {
         if (!a || a_) return 0;
         const std::int64_t missing = std::max(0, missing_teeth.get());
         const std::int64_t pitch_ns = now_ns_ - tooth_ns_;
-        const bool gap = missing > 0 && tooth_pitch_ns_ > 0 && 2 * pitch_ns > (missing + 2) * tooth_pitch_ns_;
+        const bool gap =
+            missing > 0 && tooth_pitch_ns_ > 0 && 2 * pitch_ns > (missing + 2) * tooth_pitch_ns_;
         tooth_ns_ = now_ns_;
-        if (seen_tooth_ && !gap) tooth_pitch_ns_ = pitch_ns;
+        if (seen_tooth_ && !gap) {
+            tooth_pitch_ns_ = pitch_ns;
+        }
         seen_tooth_ = true;
-        if (missing > 0) index = gap;
+        if (missing > 0) {
+            index = gap;
+        }
         return gap ? missing + 1 : 1;
     }
 
     edge_count::Count count_;
     // update-counters
-    bool started_ = false, a_ = false, b_ = false, z_ = false, latch_ = false, seen_tooth_ = false;
-    std::int64_t now_ns_ = 0, tooth_ns_ = 0, tooth_pitch_ns_ = 0;  // time of the newest tooth; time from tooth to tooth
+    bool started_ = false;
+    bool a_ = false;
+    bool b_ = false;
+    bool z_ = false;
+    bool latch_ = false;
+    bool seen_tooth_ = false;
+    // time of the newest tooth; time from tooth to tooth
+    std::int64_t now_ns_ = 0;
+    std::int64_t tooth_ns_ = 0;
+    std::int64_t tooth_pitch_ns_ = 0;
     // capture-position
     std::uint32_t latches_ = 0;
 };

@@ -10,10 +10,14 @@ namespace {
 class Edges {
 public:
     int operator()(bool a, bool b) noexcept {
-        const unsigned now = (a != b ? 1u : 0u) | (b ? 2u : 0u);  // 0 1 2 3 in the order in which A leads B
+        // 0 1 2 3 in the order in which A leads B
+        const unsigned now = (a != b ? 1u : 0u) | (b ? 2u : 0u);
         const unsigned moved = (now - last_) & 3u;
         last_ = now;
-        if (!started_) return started_ = true, 0;  // the first sample has no edges
+        if (!started_) {
+            started_ = true;
+            return 0;  // the first sample has no edges
+        }
         return moved == 1 ? 1 : moved == 3 ? -1 : 0;
     }
 
@@ -30,31 +34,53 @@ struct Counted {
 struct EncoderRatio : hal::Component {
     using Component::Component;
 
-    hal::Function sample{*this, "sample", &EncoderRatio::sample_phases, "samples and counts; belongs in the fastest thread", {.shared = true}};
+    hal::Function sample{*this,
+                         "sample",
+                         &EncoderRatio::sample_phases,
+                         "samples and counts; belongs in the fastest thread",
+                         {.shared = true}};
     hal::In<bool> master_a{*this, sample, "master-A", "phase A of the master's encoder"};
     hal::In<bool> master_b{*this, sample, "master-B", "phase B of the master's encoder"};
     hal::In<bool> slave_a{*this, sample, "slave-A", "phase A of the slave's encoder"};
     hal::In<bool> slave_b{*this, sample, "slave-B", "phase B of the slave's encoder"};
-    hal::In<bool> enable{*this, sample, "enable", "TRUE: the slave follows the master; FALSE: the master's motion is ignored"};
+    hal::In<bool> enable{
+        *this, sample, "enable",
+        "TRUE: the slave follows the master; FALSE: the master's motion is ignored"};
 
-    hal::Function update{*this, "update", &EncoderRatio::update_error, "computes the error; belongs in the servo thread", {.shared = true}};
-    hal::Out<double> error{*this, update, "error", "position error of the slave, positive when ahead", {.unit = "turn", .finite = true}};
-    hal::Io<std::uint32_t> master_ppr{*this, update, "master-ppr", "counts per revolution of the master, four per pulse"};
-    hal::Io<std::uint32_t> slave_ppr{*this, update, "slave-ppr", "counts per revolution of the slave, four per pulse"};
-    hal::Io<std::uint32_t> master_teeth{*this, update, "master-teeth", "teeth of the master's gear"};
+    hal::Function update{*this,
+                         "update",
+                         &EncoderRatio::update_error,
+                         "computes the error; belongs in the servo thread",
+                         {.shared = true}};
+    hal::Out<double> error{*this,
+                           update,
+                           "error",
+                           "position error of the slave, positive when ahead",
+                           {.unit = "turn", .finite = true}};
+    hal::Io<std::uint32_t> master_ppr{*this, update, "master-ppr",
+                                      "counts per revolution of the master, four per pulse"};
+    hal::Io<std::uint32_t> slave_ppr{*this, update, "slave-ppr",
+                                     "counts per revolution of the slave, four per pulse"};
+    hal::Io<std::uint32_t> master_teeth{*this, update, "master-teeth",
+                                        "teeth of the master's gear"};
     hal::Io<std::uint32_t> slave_teeth{*this, update, "slave-teeth", "teeth of the slave's gear"};
 
     void sample_phases(hal::Cycle) noexcept {
         const int master = master_edges_(master_a, master_b);
-        if (enable) counted_.master += master;
+        if (enable) {
+            counted_.master += master;
+        }
         counted_.slave += slave_edges_(slave_a, slave_b);
         handed_.put(counted_);
     }
 
     void update_error(hal::Cycle) noexcept {
         const Counted& now = handed_.get();
-        const double master = turns(now.master, master_ppr), slave = turns(now.slave, slave_ppr);
-        const double ratio = slave_teeth != 0 ? static_cast<double>(master_teeth) / static_cast<double>(slave_teeth) : 0.0;
+        const double master = turns(now.master, master_ppr);
+        const double slave = turns(now.slave, slave_ppr);
+        const double ratio =
+            slave_teeth != 0 ? static_cast<double>(master_teeth) / static_cast<double>(slave_teeth)
+                             : 0.0;
         error = slave - master * ratio;
     }
 
@@ -70,7 +96,8 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(EncoderRatio, "encoder_ratio", "Electronic gear: the error of a slave axis that follows a master", R"(
+HAL_COMPONENT(EncoderRatio, "encoder_ratio",
+              "Electronic gear: the error of a slave axis that follows a master", R"(
 Counts the encoders of both axes and computes the error for the position loop of the slave:
 
     error = slave / slave-ppr - master / master-ppr * master-teeth / slave-teeth

@@ -5,23 +5,33 @@ namespace {
 
 struct Gantry : hal::Component {
     using Component::Component;
-    hal::Argument personality{*this, "personality", 2, "number of joints", {.per_instance = true, .min = 1, .max = 64}};
+    hal::Argument personality{
+        *this, "personality", 2, "number of joints", {.per_instance = true, .min = 1, .max = 64}};
 
-    hal::Function read{*this, "read", &Gantry::read_joints, "computes feedback and combined switches; add it before the motion controller"};
-    hal::Function write{*this, "write", &Gantry::write_joints, "computes the joint commands; add it after the motion controller"};
-    hal::Outs<double> pos_cmd{*this, "joint.##.pos-cmd", personality, "commanded position of joint ##"};
-    hal::Ins<double>  pos_fb{*this, "joint.##.pos-fb", personality, "position of joint ##"};
-    hal::Ins<bool>    joint_home{*this, "joint.##.home", personality, "home switch of joint ##"};
-    hal::Outs<double> offset{*this, "joint.##.offset", personality, "position-cmd - pos-cmd of joint ##, found while homing"};
-    hal::In<double>   position_cmd{*this, "position-cmd", "commanded position"};
-    hal::Out<double>  position_fb{*this, "position-fb", "position, from a joint that moves"};
-    hal::Out<bool>    home{*this, "home", "TRUE after all home switches were on, until all are off again"};
-    hal::Out<bool>    limit{*this, "limit", "TRUE while any home switch is on"};
-    hal::In<double>   search_vel{*this, "search-vel", "search velocity; its sign is the direction of the home switches"};
+    hal::Function read{
+        *this, "read", &Gantry::read_joints,
+        "computes feedback and combined switches; add it before the motion controller"};
+    hal::Function write{*this, "write", &Gantry::write_joints,
+                        "computes the joint commands; add it after the motion controller"};
+    hal::Outs<double> pos_cmd{*this, "joint.##.pos-cmd", personality,
+                              "commanded position of joint ##"};
+    hal::Ins<double> pos_fb{*this, "joint.##.pos-fb", personality, "position of joint ##"};
+    hal::Ins<bool> joint_home{*this, "joint.##.home", personality, "home switch of joint ##"};
+    hal::Outs<double> offset{*this, "joint.##.offset", personality,
+                             "position-cmd - pos-cmd of joint ##, found while homing"};
+    hal::In<double> position_cmd{*this, "position-cmd", "commanded position"};
+    hal::Out<double> position_fb{*this, "position-fb", "position, from a joint that moves"};
+    hal::Out<bool> home{*this, "home",
+                        "TRUE after all home switches were on, until all are off again"};
+    hal::Out<bool> limit{*this, "limit", "TRUE while any home switch is on"};
+    hal::In<double> search_vel{*this, "search-vel",
+                               "search velocity; its sign is the direction of the home switches"};
 
     void read_joints(hal::Cycle) noexcept {
         watch_switches();
-        if (!home && joint_home[feedback_joint_]) feedback_joint_ = moving_joint();
+        if (!home && joint_home[feedback_joint_]) {
+            feedback_joint_ = moving_joint();
+        }
         position_fb = pos_fb[feedback_joint_] + offset[feedback_joint_];
     }
 
@@ -32,7 +42,9 @@ struct Gantry : hal::Component {
         const double moved = started_ ? command - last_command_ : 0.0;
         const bool homing = !home && limit && moved * search_vel > 0.0;
         for (std::size_t joint = 0; joint < pos_cmd.size(); ++joint) {
-            if (homing && joint_home[joint]) offset[joint] = offset[joint] + moved;
+            if (homing && joint_home[joint]) {
+                offset[joint] = offset[joint] + moved;
+            }
             pos_cmd[joint] = command - offset[joint];
         }
         last_command_ = command;
@@ -41,7 +53,8 @@ struct Gantry : hal::Component {
 
 private:
     void watch_switches() noexcept {
-        bool all = true, any = false;
+        bool all = true;
+        bool any = false;
         for (const auto& on : joint_home) {
             all = all && on;
             any = any || on;
@@ -65,7 +78,8 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(Gantry, "gantry", "Drives several joints from one axis and squares them while homing", R"(
+HAL_COMPONENT(Gantry, "gantry", "Drives several joints from one axis and squares them while homing",
+              R"(
 All joints follow `position-cmd`, each with its own offset: pos-cmd = position-cmd - offset. While `position-cmd` moves in the
 direction of `search-vel` and some but not all home switches are on, the joints whose switch is on do not move, and their offset absorbs
 the motion. Once the last switch is on, the offsets are known and all joints move together, until all switches have

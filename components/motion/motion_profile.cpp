@@ -13,19 +13,25 @@ namespace {
 enum Mode : std::uint32_t { follow = 0, set_points = 1, table = 2, velocity_mode = 3 };
 
 struct SetPoint {
-    double position = 0.0, velocity = 0.0;  // velocity 0: max-velocity
+    double position = 0.0;
+    double velocity = 0.0;  // velocity 0: max-velocity
     bool flying = false;                    // the previous set-point is passed without a stop
 };
 
 /// A ring of queued set-points, allocated once.
 class Queue {
 public:
-    explicit Queue(std::int64_t depth) : depth_(static_cast<std::size_t>(depth)), ring_(std::make_unique<SetPoint[]>(depth_)) {}
+    explicit Queue(std::int64_t depth)
+        : depth_(static_cast<std::size_t>(depth)), ring_(std::make_unique<SetPoint[]>(depth_)) {}
     std::size_t size() const noexcept { return size_; }
     bool full() const noexcept { return size_ == depth_; }
-    const SetPoint& operator[](std::size_t i) const noexcept { return ring_[(first_ + i) % depth_]; }
+    const SetPoint& operator[](std::size_t i) const noexcept {
+        return ring_[(first_ + i) % depth_];
+    }
     void push(const SetPoint& point) noexcept {
-        if (!full()) ring_[(first_ + size_++) % depth_] = point;
+        if (!full()) {
+            ring_[(first_ + size_++) % depth_] = point;
+        }
     }
     SetPoint pop() noexcept {
         const SetPoint point = ring_[first_];
@@ -43,49 +49,84 @@ private:
 struct MotionProfile : hal::Component {
     using Component::Component;
 
-    hal::Argument depth{*this, "queue", 8, "capacity of the set-point queue", {.min = 1, .max = 256}};
-    hal::Argument rows{*this, "table", 0, "rows of the table of set-points", {.min = 0, .max = 256}};
+    hal::Argument depth{
+        *this, "queue", 8, "capacity of the set-point queue", {.min = 1, .max = 256}};
+    hal::Argument rows{
+        *this, "table", 0, "rows of the table of set-points", {.min = 0, .max = 256}};
 
-    hal::In<std::uint32_t> mode{*this, "mode", "0 follow target; 1 set-points by handshake; 2 table; 3 target-velocity"};
+    hal::In<std::uint32_t> mode{
+        *this, "mode", "0 follow target; 1 set-points by handshake; 2 table; 3 target-velocity"};
     hal::In<double> target{*this, "target", "target position (modes 0 and 1)"};
-    hal::In<double> target_velocity{*this, "target-velocity", "mode 3: target speed; mode 1: speed of this set-point, 0: max-velocity"};
-    hal::In<double> max_velocity{*this, "max-velocity", "maximum speed", {.initial = 1.0, .unit = "1/s"}};
-    hal::In<double> max_acceleration{*this, "max-acceleration", "maximum acceleration", {.initial = 1.0, .unit = "1/s^2"}};
-    hal::In<double> max_deceleration{*this, "max-deceleration", "maximum deceleration; 0: max-acceleration", {.unit = "1/s^2"}};
-    hal::In<double> max_jerk{*this, "max-jerk", "maximum jerk; 0: no limit (trapezoidal profile)", {.unit = "1/s^3"}};
-    hal::In<bool> new_set_point{*this, "new-set-point", "mode 1: a rising edge submits target and target-velocity"};
-    hal::In<bool> change_immediately{*this, "change-immediately", "TRUE: the new set-point replaces the current one and the queue"};
-    hal::In<bool> change_on_set_point{*this, "change-on-set-point", "TRUE: no stop at the previous set-point before the new one"};
-    hal::In<bool> relative{*this, "relative", "TRUE: the new set-point is relative to the previous one"};
-    hal::In<bool> run_table{*this, "run-table", "mode 2: a rising edge starts the table, FALSE stops"};
+    hal::In<double> target_velocity{
+        *this, "target-velocity",
+        "mode 3: target speed; mode 1: speed of this set-point, 0: max-velocity"};
+    hal::In<double> max_velocity{
+        *this, "max-velocity", "maximum speed", {.initial = 1.0, .unit = "1/s"}};
+    hal::In<double> max_acceleration{
+        *this, "max-acceleration", "maximum acceleration", {.initial = 1.0, .unit = "1/s^2"}};
+    hal::In<double> max_deceleration{
+        *this, "max-deceleration", "maximum deceleration; 0: max-acceleration", {.unit = "1/s^2"}};
+    hal::In<double> max_jerk{
+        *this, "max-jerk", "maximum jerk; 0: no limit (trapezoidal profile)", {.unit = "1/s^3"}};
+    hal::In<bool> new_set_point{*this, "new-set-point",
+                                "mode 1: a rising edge submits target and target-velocity"};
+    hal::In<bool> change_immediately{
+        *this, "change-immediately",
+        "TRUE: the new set-point replaces the current one and the queue"};
+    hal::In<bool> change_on_set_point{*this, "change-on-set-point",
+                                      "TRUE: no stop at the previous set-point before the new one"};
+    hal::In<bool> relative{*this, "relative",
+                           "TRUE: the new set-point is relative to the previous one"};
+    hal::In<bool> run_table{*this, "run-table",
+                            "mode 2: a rising edge starts the table, FALSE stops"};
     hal::In<bool> repeat_table{*this, "repeat-table", "TRUE restarts the table after its last row"};
     hal::In<std::uint32_t> table_length{*this, "table-length", "rows in use; 0: all"};
     hal::In<bool> halt{*this, "halt", "TRUE brakes to a stop; FALSE resumes"};
     hal::In<bool> stop_in{*this, "stop", "TRUE brakes to a stop and discards all set-points"};
-    hal::In<bool> quick_stop{*this, "quick-stop", "like stop, with quick-deceleration and quick-jerk"};
-    hal::In<double> quick_deceleration{*this, "quick-deceleration",
-                                       "deceleration of a quick stop; 0: max-deceleration", {.unit = "1/s^2"}};
-    hal::In<double> quick_jerk{*this, "quick-jerk", "jerk of a quick stop; 0: no limit", {.unit = "1/s^3"}};
-    hal::In<bool> load{*this, "load", "TRUE sets the position to load-position, at standstill, and discards all set-points"};
+    hal::In<bool> quick_stop{*this, "quick-stop",
+                             "like stop, with quick-deceleration and quick-jerk"};
+    hal::In<double> quick_deceleration{*this,
+                                       "quick-deceleration",
+                                       "deceleration of a quick stop; 0: max-deceleration",
+                                       {.unit = "1/s^2"}};
+    hal::In<double> quick_jerk{
+        *this, "quick-jerk", "jerk of a quick stop; 0: no limit", {.unit = "1/s^3"}};
+    hal::In<bool> load{
+        *this, "load",
+        "TRUE sets the position to load-position, at standstill, and discards all set-points"};
     hal::In<double> load_position{*this, "load-position", "position to load"};
 
-    hal::Ins<double> row_position{*this, "row-##-position", rows, "position of row ## of the table"};
-    hal::Ins<double> row_velocity{*this, "row-##-velocity", rows, "speed to row ##; 0: max-velocity"};
+    hal::Ins<double> row_position{*this, "row-##-position", rows,
+                                  "position of row ## of the table"};
+    hal::Ins<double> row_velocity{*this, "row-##-velocity", rows,
+                                  "speed to row ##; 0: max-velocity"};
     hal::Ins<double> row_dwell{*this, "row-##-dwell", rows, "dwell at row ##", {.unit = "s"}};
 
     hal::Out<double> position{*this, "position", "position of the profile", {.finite = true}};
-    hal::Out<double> velocity{*this, "velocity", "velocity of the profile", {.unit = "1/s", .finite = true}};
-    hal::Out<double> acceleration{*this, "acceleration", "acceleration of the profile", {.unit = "1/s^2", .finite = true}};
-    hal::Out<double> jerk{*this, "jerk", "jerk of the profile; 0 in trapezoidal profiles", {.unit = "1/s^3", .finite = true}};
+    hal::Out<double> velocity{
+        *this, "velocity", "velocity of the profile", {.unit = "1/s", .finite = true}};
+    hal::Out<double> acceleration{
+        *this, "acceleration", "acceleration of the profile", {.unit = "1/s^2", .finite = true}};
+    hal::Out<double> jerk{*this,
+                          "jerk",
+                          "jerk of the profile; 0 in trapezoidal profiles",
+                          {.unit = "1/s^3", .finite = true}};
     hal::Out<bool> done{*this, "done", "TRUE: target (mode 3: speed) reached and queue empty"};
     hal::Out<bool> moving{*this, "moving", "TRUE while the speed or the acceleration is not 0"};
-    hal::Out<bool> acknowledge{*this, "set-point-acknowledge", "TRUE: the set-point was accepted; FALSE: ready for the next one"};
-    hal::Out<std::uint32_t> queue_length{*this, "queue-length", "number of queued set-points, without the current one"};
-    hal::Out<bool> queue_full{*this, "queue-full", "TRUE: the next set-point is accepted only after the queue has space"};
-    hal::Out<std::uint32_t> passed{*this, "set-points-done", "number of set-points or rows reached since load"};
+    hal::Out<bool> acknowledge{*this, "set-point-acknowledge",
+                               "TRUE: the set-point was accepted; FALSE: ready for the next one"};
+    hal::Out<std::uint32_t> queue_length{*this, "queue-length",
+                                         "number of queued set-points, without the current one"};
+    hal::Out<bool> queue_full{
+        *this, "queue-full", "TRUE: the next set-point is accepted only after the queue has space"};
+    hal::Out<std::uint32_t> passed{*this, "set-points-done",
+                                   "number of set-points or rows reached since load"};
     hal::Out<std::uint32_t> row{*this, "table-row", "current row of the table"};
-    hal::Out<double> time_left{*this, "time-left", "time until the target is reached", {.unit = "s", .finite = true}};
-    hal::Out<bool> bad_limit{*this, "limit-error", "TRUE: invalid limit or mode; the profile stops with the last valid limits"};
+    hal::Out<double> time_left{
+        *this, "time-left", "time until the target is reached", {.unit = "s", .finite = true}};
+    hal::Out<bool> bad_limit{
+        *this, "limit-error",
+        "TRUE: invalid limit or mode; the profile stops with the last valid limits"};
 
     hal::Function run{*this, "", &MotionProfile::update, "computes the next point of the profile"};
 
@@ -93,21 +134,26 @@ struct MotionProfile : hal::Component {
         const double dt = cycle.seconds();
         const bool sound = take_limits();
         take_edges();
-        if (mode != last_mode_) forget();
+        if (mode != last_mode_) {
+            forget();
+        }
         last_mode_ = mode;
 
         const bool stopping = stop_in || quick_stop;
         if (load) {
             forget();
             passed = 0;
-            generator_.put(std::isfinite(load_position) ? load_position.get() : generator_.state().position);
+            generator_.put(std::isfinite(load_position) ? load_position.get()
+                                                        : generator_.state().position);
         } else if (stopping || !sound) {
             forget();
             generator_.go_at(0.0, quick_stop ? quick_limits() : limits_);
         } else {
             want();
         }
-        if (!load) generator_.advance(dt);
+        if (!load) {
+            generator_.advance(dt);
+        }
         const bool there = generator_.arrived() && !load && !stopping && sound && !halt;
         show(there && arrive(dt), sound);
     }
@@ -115,14 +161,21 @@ struct MotionProfile : hal::Component {
 private:
     bool take_limits() noexcept {
         motion::Limits taken;
-        if (!motion::Limits::from(max_velocity, max_acceleration, max_deceleration, max_jerk, taken) || mode > velocity_mode) return false;
+        if (!motion::Limits::from(max_velocity, max_acceleration, max_deceleration, max_jerk,
+                                  taken) ||
+            mode > velocity_mode) {
+            return false;
+        }
         limits_ = taken;
         return true;
     }
     motion::Limits quick_limits() const noexcept {
         motion::Limits quick;
-        const double by = quick_deceleration > 0.0 ? quick_deceleration.get() : limits_.deceleration;
-        return motion::Limits::from(limits_.velocity, limits_.acceleration, by, quick_jerk, quick) ? quick : limits_;
+        const double by =
+            quick_deceleration > 0.0 ? quick_deceleration.get() : limits_.deceleration;
+        return motion::Limits::from(limits_.velocity, limits_.acceleration, by, quick_jerk, quick)
+                   ? quick
+                   : limits_;
     }
     void take_edges() noexcept {
         waiting_ = mode == set_points && new_set_point && (waiting_ || !was_new_);
@@ -134,46 +187,72 @@ private:
     void forget() noexcept {
         queue_.clear();
         has_goal_ = in_table_ = false;
-        if (load || stop_in || quick_stop) waiting_ = false;  // an edge meanwhile is discarded
+        if (load || stop_in || quick_stop) {
+            waiting_ = false;  // an edge meanwhile is discarded
+        }
     }
 
     void want() noexcept {
         switch (mode) {
-            case follow:
-                if (std::isfinite(target)) goal_ = {clamped(target), 0.0, false}, has_goal_ = true;
-                break;
-            case set_points: take_set_point(); break;
-            case table:
-                if (start_table_ && row_count() > 0) in_table_ = true, to_row(0);
-                if (!run_table) in_table_ = has_goal_ = false;
-                break;
-            default: {
-                has_goal_ = false;
-                if (std::isfinite(target_velocity)) speed_ = target_velocity;
-                speed_ = std::clamp(speed_, -limits_.velocity, limits_.velocity);
-                return generator_.go_at(halt ? 0.0 : speed_, limits_);
+        case follow:
+            if (std::isfinite(target)) {
+                goal_ = {clamped(target), 0.0, false};
+                has_goal_ = true;
             }
+            break;
+        case set_points: take_set_point(); break;
+        case table:
+            if (start_table_ && row_count() > 0) {
+                in_table_ = true;
+                to_row(0);
+            }
+            if (!run_table) {
+                in_table_ = has_goal_ = false;
+            }
+            break;
+        default: {
+            has_goal_ = false;
+            if (std::isfinite(target_velocity)) {
+                speed_ = target_velocity;
+            }
+            speed_ = std::clamp(speed_, -limits_.velocity, limits_.velocity);
+            return generator_.go_at(halt ? 0.0 : speed_, limits_);
         }
-        if (mode == set_points) fly();
+        }
+        if (mode == set_points) {
+            fly();
+        }
         if (!has_goal_ || halt) return generator_.go_at(0.0, limits_);
         motion::Limits limits = limits_;
-        if (goal_.velocity > 0.0) limits.velocity = std::min(limits.velocity, std::max(goal_.velocity, 1e-18));
+        if (goal_.velocity > 0.0) {
+            limits.velocity = std::min(limits.velocity, std::max(goal_.velocity, 1e-18));
+        }
         generator_.go_to(last_of_flight(), limits);
     }
 
     void take_set_point() noexcept {
-        if (waiting_ && std::isfinite(target) && (change_immediately || !has_goal_ || !queue_.full())) {
+        if (waiting_ && std::isfinite(target) &&
+            (change_immediately || !has_goal_ || !queue_.full())) {
             const double last = has_goal_ ? goal_.position : generator_.end_position();
             const double before = queue_.size() > 0 ? queue_[queue_.size() - 1].position : last;
             const double speed = std::isfinite(target_velocity) ? std::fabs(target_velocity) : 0.0;
-            const SetPoint point{clamped(relative ? before + target : target.get()), speed, change_on_set_point};
-            if (change_immediately) queue_.clear(), has_goal_ = false;
-            if (has_goal_) queue_.push(point);
-            else begin(point);
+            const SetPoint point{clamped(relative ? before + target : target.get()), speed,
+                                 change_on_set_point};
+            if (change_immediately) {
+                queue_.clear();
+                has_goal_ = false;
+            }
+            if (has_goal_) {
+                queue_.push(point);
+            } else {
+                begin(point);
+            }
             waiting_ = false;
             acknowledge_ = true;
         }
-        if (!new_set_point && !queue_.full()) acknowledge_ = false;
+        if (!new_set_point && !queue_.full()) {
+            acknowledge_ = false;
+        }
     }
     void begin(const SetPoint& point) noexcept {
         goal_ = point;
@@ -183,36 +262,47 @@ private:
     }
     /// Advances to the next set-point when the current one is passed without a stop.
     void fly() noexcept {
-        while (has_goal_ && flies_to(goal_.position, 0) && side_ * (generator_.state().position - goal_.position) >= 0.0) {
+        while (has_goal_ && flies_to(goal_.position, 0) &&
+               side_ * (generator_.state().position - goal_.position) >= 0.0) {
             count();
             begin(queue_.pop());
         }
     }
     /// Called once when the current set-point is reached.
     void count() noexcept {
-        if (!counted_) passed = passed + 1;
+        if (!counted_) {
+            passed = passed + 1;
+        }
         counted_ = true;
     }
-    /// Returns true if queued set-point `i` follows without a stop at `before`: it is further in the same direction.
+    /// Returns true if queued set-point `i` follows without a stop at `before`: it is further in
+    /// the same direction.
     bool flies_to(double before, std::size_t i) const noexcept {
         return i < queue_.size() && queue_[i].flying && side_ * (queue_[i].position - before) > 0.0;
     }
-    /// Returns the position of the next stop. Planning to it at the speed of the current set-point leaves the distance to stop.
+    /// Returns the position of the next stop. Planning to it at the speed of the current set-point
+    /// leaves the distance to stop.
     double last_of_flight() const noexcept {
         double last = goal_.position;
-        if (mode == set_points)
-            for (std::size_t i = 0; flies_to(last, i); ++i) last = queue_[i].position;
+        if (mode == set_points) {
+            for (std::size_t i = 0; flies_to(last, i); ++i) {
+                last = queue_[i].position;
+            }
+        }
         return last;
     }
 
     std::size_t row_count() const noexcept {
-        return table_length == 0 ? row_position.size() : std::min<std::size_t>(table_length, row_position.size());
+        return table_length == 0 ? row_position.size()
+                                 : std::min<std::size_t>(table_length, row_position.size());
     }
     void to_row(std::size_t i) noexcept {
         row_ = i;
         rested_ = 0.0;
-        const double to = row_position[i], speed = row_velocity[i];
-        begin({std::isfinite(to) ? clamped(to) : generator_.state().position, std::isfinite(speed) ? std::fabs(speed) : 0.0, false});
+        const double to = row_position[i];
+        const double speed = row_velocity[i];
+        begin({std::isfinite(to) ? clamped(to) : generator_.state().position,
+               std::isfinite(speed) ? std::fabs(speed) : 0.0, false});
     }
 
     /// Advances at the end of a path; true if there is nothing to follow.
@@ -233,9 +323,13 @@ private:
                 rested_ += dt;
                 return false;
             }
-            if (row_ + 1 < row_count()) to_row(row_ + 1);
-            else if (repeat_table) to_row(0);
-            else in_table_ = false;
+            if (row_ + 1 < row_count()) {
+                to_row(row_ + 1);
+            } else if (repeat_table) {
+                to_row(0);
+            } else {
+                in_table_ = false;
+            }
             return !in_table_;
         }
         return true;
@@ -257,22 +351,34 @@ private:
         bad_limit = !sound;
     }
 
-    static double clamped(double position) noexcept { return std::clamp(position, -motion::farthest, motion::farthest); }
+    static double clamped(double position) noexcept {
+        return std::clamp(position, -motion::farthest, motion::farthest);
+    }
 
     motion::Generator generator_;
     motion::Limits limits_;
     Queue queue_{depth};
     SetPoint goal_;
-    double side_ = 1.0, speed_ = 0.0, rested_ = 0.0;
+    double side_ = 1.0;
+    double speed_ = 0.0;
+    double rested_ = 0.0;
     std::size_t row_ = 0;
     std::uint32_t last_mode_ = 0;
-    bool has_goal_ = false, waiting_ = false, was_new_ = false, acknowledge_ = false, counted_ = false;
-    bool in_table_ = false, start_table_ = false, was_run_ = false;
+    bool has_goal_ = false;
+    bool waiting_ = false;
+    bool was_new_ = false;
+    bool acknowledge_ = false;
+
+    bool counted_ = false;
+    bool in_table_ = false;
+    bool start_table_ = false;
+    bool was_run_ = false;
 };
 
 }  // namespace
 
-HAL_COMPONENT(MotionProfile, "motion_profile", "Motion to a target within limits of speed, acceleration, deceleration and jerk", R"(
+HAL_COMPONENT(MotionProfile, "motion_profile",
+              "Motion to a target within limits of speed, acceleration, deceleration and jerk", R"(
 `position` moves to its target as fast as the limits allow and stops there exactly. With `max-jerk` 0 the speed profile is trapezoidal, else an
 S-curve of up to seven segments. Target and limits may change in any cycle and in any state of motion. The units are up to the user: mm gives mm/s,
 mm/s^2, mm/s^3.

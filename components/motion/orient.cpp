@@ -5,15 +5,20 @@ namespace {
 
 struct Orient : hal::Component {
     using Component::Component;
-    hal::In<bool>         enable{*this, "enable", "a rising edge computes the command; while TRUE the error is monitored"};
-    hal::In<std::int32_t> mode{*this, "mode", "0: shortest direction, 1: clockwise (increasing position), 2: counterclockwise"};
-    hal::In<double>       position{*this, "position", "position of the spindle", {.unit = "turn"}};
-    hal::In<double>       angle{*this, "angle", "target angle", {.unit = "deg"}};
-    hal::Out<double>      command{*this, "command", "commanded position", {.unit = "turn"}};
-    hal::Out<double>      poserr{*this, "poserr", "position - command", {.unit = "deg"}};
-    hal::Out<bool>        is_oriented{*this, "is-oriented", "TRUE while enabled, after 101 cycles within tolerance"};
-    hal::In<double>       tolerance{*this, "tolerance", "maximum error for is-oriented", {.initial = 0.5, .unit = "deg"}};
-    hal::Function         run{*this, "", &Orient::update, "computes command and the error"};
+    hal::In<bool> enable{*this, "enable",
+                         "a rising edge computes the command; while TRUE the error is monitored"};
+    hal::In<std::int32_t> mode{
+        *this, "mode",
+        "0: shortest direction, 1: clockwise (increasing position), 2: counterclockwise"};
+    hal::In<double> position{*this, "position", "position of the spindle", {.unit = "turn"}};
+    hal::In<double> angle{*this, "angle", "target angle", {.unit = "deg"}};
+    hal::Out<double> command{*this, "command", "commanded position", {.unit = "turn"}};
+    hal::Out<double> poserr{*this, "poserr", "position - command", {.unit = "deg"}};
+    hal::Out<bool> is_oriented{*this, "is-oriented",
+                               "TRUE while enabled, after 101 cycles within tolerance"};
+    hal::In<double> tolerance{
+        *this, "tolerance", "maximum error for is-oriented", {.initial = 0.5, .unit = "deg"}};
+    hal::Function run{*this, "", &Orient::update, "computes command and the error"};
 
     void update(hal::Cycle) noexcept {
         if (enable && !was_enabled_) {
@@ -26,7 +31,9 @@ struct Orient : hal::Component {
             return;
         }
         poserr = (position - command) * 360.0;
-        if (settled_cycles_ < required_cycles && std::fabs(poserr) < tolerance) ++settled_cycles_;
+        if (settled_cycles_ < required_cycles && std::fabs(poserr) < tolerance) {
+            ++settled_cycles_;
+        }
         is_oriented = settled_cycles_ >= required_cycles;
     }
 
@@ -49,7 +56,8 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(Orient, "orient", "Stops a spindle at an angle: the command for its position loop", R"(
+HAL_COMPONENT(Orient, "orient", "Stops a spindle at an angle: the command for its position loop",
+              R"(
 A rising edge of `enable` sets the command to a position whose fraction of a turn is `angle` / 360:
 
 | mode | command |

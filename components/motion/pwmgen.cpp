@@ -23,22 +23,44 @@ struct Order {
 struct Pwmgen : hal::Component {
     enum Type { single, with_direction, up_down };
 
-    hal::Argument type{*this, "output_type", 0, "0: one output, 1: output and direction, 2: up and down; one number per instance",
-                       {.per_instance = true, .min = 0, .max = 2}};
+    hal::Argument type{
+        *this,
+        "output_type",
+        0,
+        "0: one output, 1: output and direction, 2: up and down; one number per instance",
+        {.per_instance = true, .min = 0, .max = 2}};
 
-    hal::Function make{*this, "make-pulses", &Pwmgen::make_pulses, "generates the waveforms; belongs in the fastest thread", {.shared = true}};
+    hal::Function make{*this,
+                       "make-pulses",
+                       &Pwmgen::make_pulses,
+                       "generates the waveforms; belongs in the fastest thread",
+                       {.shared = true}};
     std::optional<hal::Out<bool>> pwm, dir, up, down;
 
-    hal::Function run{*this, "update", &Pwmgen::update, "computes the duty cycles; belongs in the servo thread", {.shared = true}};
+    hal::Function run{*this,
+                      "update",
+                      &Pwmgen::update,
+                      "computes the duty cycles; belongs in the servo thread",
+                      {.shared = true}};
     hal::In<bool> enable{*this, run, "enable", "FALSE sets all outputs low"};
-    hal::In<double> value{*this, run, "value", "commanded value: scale is full duty forward, -scale in reverse"};
+    hal::In<double> value{*this, run, "value",
+                          "commanded value: scale is full duty forward, -scale in reverse"};
     hal::Io<double> scale{*this, run, "scale", "value for full duty", {.initial = 1.0}};
-    hal::Io<double> offset{*this, run, "offset", "added to the duty cycle: dc = value / scale + offset"};
-    hal::LimitIo    min_duty{*this, run, "min-dc", "minimum duty cycle while enabled, 0..1"};
-    hal::LimitIo    max_duty{*this, run, "max-dc", "maximum duty cycle, 0..1", {.initial = 1.0}};
-    hal::Io<double> frequency{*this, run, "pwm-freq", "PWM frequency, rounded to a possible one; 0: pulse density modulation", {.unit = "Hz"}};
-    hal::Io<bool> dither{*this, run, "dither-pwm", "TRUE: the duty cycle alternates between two steps so that its average is exact"};
-    hal::Out<double> duty{*this, run, "curr-dc", "duty cycle after scaling, limits and rounding, -1..1"};
+    hal::Io<double> offset{*this, run, "offset",
+                           "added to the duty cycle: dc = value / scale + offset"};
+    hal::LimitIo min_duty{*this, run, "min-dc", "minimum duty cycle while enabled, 0..1"};
+    hal::LimitIo max_duty{*this, run, "max-dc", "maximum duty cycle, 0..1", {.initial = 1.0}};
+    hal::Io<double> frequency{
+        *this,
+        run,
+        "pwm-freq",
+        "PWM frequency, rounded to a possible one; 0: pulse density modulation",
+        {.unit = "Hz"}};
+    hal::Io<bool> dither{
+        *this, run, "dither-pwm",
+        "TRUE: the duty cycle alternates between two steps so that its average is exact"};
+    hal::Out<double> duty{*this, run, "curr-dc",
+                          "duty cycle after scaling, limits and rounding, -1..1"};
 
     explicit Pwmgen(const hal_host* host) : Component(host) {
         const hal::PinOptions<bool> off{.safe = false};
@@ -48,7 +70,9 @@ struct Pwmgen : hal::Component {
             return;
         }
         pwm.emplace(*this, make, "pwm", "waveform", off);
-        if (type == with_direction) dir.emplace(*this, make, "dir", "direction: low forward, high in reverse", off);
+        if (type == with_direction) {
+            dir.emplace(*this, make, "dir", "direction: low forward, high in reverse", off);
+        }
     }
 
     void make_pulses(hal::Cycle cycle) noexcept {
@@ -60,33 +84,42 @@ struct Pwmgen : hal::Component {
             drive(false, false);
             return;
         }
-        const bool level = wanted.period > 0.0 ? pulse(wanted) : dense(wanted);  // decides on reverse_ too, so it comes first
+        // decides on reverse_ too, so it comes first
+        const bool level = wanted.period > 0.0 ? pulse(wanted) : dense(wanted);
         drive(level, reverse_);
     }
 
     void update(hal::Cycle) noexcept {
         const auto tick_ns = static_cast<double>(tick_ns_.load(std::memory_order_relaxed));
         Order next;
-        if (tick_ns > 0.0) next = order(tick_ns);
+        if (tick_ns > 0.0) {
+            next = order(tick_ns);
+        }
         duty = next.reverse ? -next.duty : next.duty;
         orders_.put(next);
     }
 
 private:
     Order order(double tick_ns) noexcept {
-        if (scale == 0.0 || !std::isfinite(scale)) scale = 1.0;
+        if (scale == 0.0 || !std::isfinite(scale)) {
+            scale = 1.0;
+        }
         max_duty = std::clamp(max_duty.get(), 0.0, 1.0);
         min_duty = std::clamp(min_duty.get(), 0.0, max_duty.get());
 
         const double raw = value / scale + offset;
-        if (!enable || !std::isfinite(raw)) return {};
+        if (!enable || !std::isfinite(raw)) {
+            return {};
+        }
         Order next;
         next.on = true;
         next.dither = dither;
         next.reverse = type != single && raw < 0.0;
         next.duty = std::clamp(next.reverse ? -raw : raw, min_duty.get(), max_duty.get());
 
-        if (!std::isfinite(frequency) || frequency < 0.0) frequency = 0.0;
+        if (!std::isfinite(frequency) || frequency < 0.0) {
+            frequency = 0.0;
+        }
         if (frequency == 0.0) return next;
         const double tick_hz = 1e9 / tick_ns;
         double period = std::max(2.0, tick_hz / frequency);
@@ -95,16 +128,20 @@ private:
             next.duty = std::round(next.duty * period) / period;
         }
         // Written only on a change: repeated rounding must not let the frequency drift.
-        if (std::fabs(tick_hz / period - frequency) > 1e-9 * frequency) frequency = tick_hz / period;
+        if (std::fabs(tick_hz / period - frequency) > 1e-9 * frequency) {
+            frequency = tick_hz / period;
+        }
         next.period = period;
         return next;
     }
 
-    /// Runs one tick of PWM. A period takes the newest command at its start only, as hardware with buffered registers does;
-    /// the next period compensates its rounding to whole ticks.
+    /// Runs one tick of PWM. A period takes the newest command at its start only, as hardware with
+    /// buffered registers does; the next period compensates its rounding to whole ticks.
     bool pulse(const Order& wanted) noexcept {
         if (tick_ == 0) {
-            const double length = wanted.period + length_rest_, high = wanted.duty * wanted.period + (wanted.dither ? high_rest_ : 0.0);
+            const double length = wanted.period + length_rest_;
+
+            const double high = wanted.duty * wanted.period + (wanted.dither ? high_rest_ : 0.0);
             length_ = std::max<std::int64_t>(1, std::llround(length));
             high_ = std::clamp<std::int64_t>(std::llround(high), 0, length_);
             length_rest_ = length - static_cast<double>(length_);
@@ -116,13 +153,16 @@ private:
         return level;
     }
 
-    /// Runs one tick of pulse density modulation: the duty cycle accumulates, and each whole one is a pulse.
+    /// Runs one tick of pulse density modulation: the duty cycle accumulates, and each whole one is
+    /// a pulse.
     bool dense(const Order& wanted) noexcept {
         tick_ = 0;
         reverse_ = wanted.reverse;
         density_ += wanted.duty;
         const bool level = density_ >= 1.0 - 1e-12;
-        if (level) density_ -= 1.0;
+        if (level) {
+            density_ -= 1.0;
+        }
         return level;
     }
 
@@ -133,14 +173,20 @@ private:
             return;
         }
         *pwm = level;
-        if (dir) *dir = reverse;
+        if (dir) {
+            *dir = reverse;
+        }
     }
 
-    hal::Mailbox<Order> orders_;            // update writes, make-pulses reads
+    hal::Mailbox<Order> orders_;  // update writes, make-pulses reads
     std::atomic<std::int64_t> tick_ns_{0};  // period of make-pulses: it writes, update reads
     // make-pulses only
-    std::int64_t tick_ = 0, length_ = 1, high_ = 0;
-    double length_rest_ = 0.0, high_rest_ = 0.0, density_ = 0.0;
+    std::int64_t tick_ = 0;
+    std::int64_t length_ = 1;
+    std::int64_t high_ = 0;
+    double length_rest_ = 0.0;
+    double high_rest_ = 0.0;
+    double density_ = 0.0;
     bool reverse_ = false;
 };
 

@@ -23,66 +23,114 @@ enum Error : std::uint32_t {
 struct PxmcAxis : hal::Component {
     using Component::Component;
 
-    hal::In<bool> enable{*this, "enable", "TRUE closes the loop at the current position; FALSE sets output to 0"};
-    hal::In<bool> reset{*this, "reset", "a rising edge clears the error if its cause no longer exists"};
+    hal::In<bool> enable{*this, "enable",
+                         "TRUE closes the loop at the current position; FALSE sets output to 0"};
+    hal::In<bool> reset{*this, "reset",
+                        "a rising edge clears the error if its cause no longer exists"};
     hal::In<double> actual_position{*this, "actual-position", "measured position"};
     hal::In<bool> go{*this, "go", "a rising edge starts a move to requested-position"};
     hal::In<double> requested_position{*this, "requested-position", "target of the next go"};
     hal::In<bool> speed_mode{*this, "speed-mode", "TRUE moves at requested-speed instead"};
-    hal::In<double> requested_speed{*this, "requested-speed",
-                                    "speed in speed-mode; otherwise speed of the move, 0: max-speed", {.unit = "1/s"}};
+    hal::In<double> requested_speed{
+        *this,
+        "requested-speed",
+        "speed in speed-mode; otherwise speed of the move, 0: max-speed",
+        {.unit = "1/s"}};
     hal::In<bool> stop_in{*this, "stop", "TRUE brakes to a stop and discards the move"};
 
-    hal::In<double> max_speed{*this, "max-speed", "maximum speed of the trajectory", {.initial = 1.0, .unit = "1/s"}};
-    hal::In<double> max_acceleration{*this, "max-acceleration", "maximum acceleration of the trajectory", {.initial = 1.0, .unit = "1/s^2"}};
-    hal::In<double> max_jerk{*this, "max-jerk", "maximum jerk of the trajectory; 0: no limit", {.unit = "1/s^3"}};
-    hal::In<double> p_gain{*this, "P", "proportional gain: output per following error", {.initial = 1.0}};
+    hal::In<double> max_speed{
+        *this, "max-speed", "maximum speed of the trajectory", {.initial = 1.0, .unit = "1/s"}};
+    hal::In<double> max_acceleration{*this,
+                                     "max-acceleration",
+                                     "maximum acceleration of the trajectory",
+                                     {.initial = 1.0, .unit = "1/s^2"}};
+    hal::In<double> max_jerk{
+        *this, "max-jerk", "maximum jerk of the trajectory; 0: no limit", {.unit = "1/s^3"}};
+    hal::In<double> p_gain{
+        *this, "P", "proportional gain: output per following error", {.initial = 1.0}};
     hal::In<double> i_gain{*this, "I", "integral gain: output per following error and second"};
     hal::In<double> d_gain{*this, "D", "derivative gain: output per speed error"};
     hal::In<double> feed_forward{*this, "FF", "feed-forward: output per commanded speed"};
     hal::OptionalLimit max_output{*this, "max-output", "limit on the output; 0: no limit"};
 
-    hal::OptionalLimit max_following_error{*this, "max-following-error", "following error at which the axis faults; 0: not monitored"};
-    hal::In<double> min_position{*this, "min-position", "lowest position", {.initial = -motion::farthest}};
-    hal::In<double> max_position{*this, "max-position", "highest position", {.initial = motion::farthest}};
-    hal::OptionalLimit position_margin{*this, "position-margin", "permitted overtravel beyond min-position and max-position; 0: not monitored"};
-    hal::OptionalLimit overspeed{*this, "overspeed", "measured speed, as a multiple of max-speed, at which the axis faults; 0: not monitored"};
-    hal::In<double> speed_filter{*this, "speed-filter", "time constant of actual-speed", {.unit = "s"}};
-    hal::In<double> window{*this, "position-window", "distance to the target at which busy ends; 0: busy ends with the trajectory"};
+    hal::OptionalLimit max_following_error{
+        *this, "max-following-error", "following error at which the axis faults; 0: not monitored"};
+    hal::In<double> min_position{
+        *this, "min-position", "lowest position", {.initial = -motion::farthest}};
+    hal::In<double> max_position{
+        *this, "max-position", "highest position", {.initial = motion::farthest}};
+    hal::OptionalLimit position_margin{
+        *this, "position-margin",
+        "permitted overtravel beyond min-position and max-position; 0: not monitored"};
+    hal::OptionalLimit overspeed{
+        *this, "overspeed",
+        "measured speed, as a multiple of max-speed, at which the axis faults; 0: not monitored"};
+    hal::In<double> speed_filter{
+        *this, "speed-filter", "time constant of actual-speed", {.unit = "s"}};
+    hal::In<double> window{
+        *this, "position-window",
+        "distance to the target at which busy ends; 0: busy ends with the trajectory"};
 
     hal::Out<double> output{*this, "output", "command to the motor", {.safe = 0.0, .finite = true}};
-    hal::Out<double> position{*this, "commanded-position", "position of the trajectory", {.finite = true}};
-    hal::Out<double> speed{*this, "commanded-speed", "speed of the trajectory", {.unit = "1/s", .finite = true}};
-    hal::Out<double> actual_speed{*this, "actual-speed", "measured speed", {.unit = "1/s", .finite = true}};
-    hal::Out<double> error_out{*this, "following-error", "commanded - actual position", {.finite = true}};
+    hal::Out<double> position{
+        *this, "commanded-position", "position of the trajectory", {.finite = true}};
+    hal::Out<double> speed{
+        *this, "commanded-speed", "speed of the trajectory", {.unit = "1/s", .finite = true}};
+    hal::Out<double> actual_speed{
+        *this, "actual-speed", "measured speed", {.unit = "1/s", .finite = true}};
+    hal::Out<double> error_out{
+        *this, "following-error", "commanded - actual position", {.finite = true}};
     hal::Out<bool> busy{*this, "busy", "TRUE while moving"};
     hal::Out<bool> error{*this, "error", "TRUE: a fault has disabled the axis; see error-code"};
     hal::Out<std::uint32_t> error_code{*this, "error-code", "cause of the fault; see the table"};
-    hal::Out<bool> request_limited{*this, "request-limited", "TRUE: the requested position or speed exceeds a limit and is reduced"};
+    hal::Out<bool> request_limited{
+        *this, "request-limited",
+        "TRUE: the requested position or speed exceeds a limit and is reduced"};
 
-    hal::Function run{*this, "do-control", &PxmcAxis::update, "measures, monitors, plans and controls"};
+    hal::Function run{*this, "do-control", &PxmcAxis::update,
+                      "measures, monitors, plans and controls"};
 
     void update(hal::Cycle cycle) noexcept {
         const double dt = cycle.seconds();
-        const bool gone = go && !was_go_, cleared = reset && !was_reset_;
-        was_go_ = go, was_reset_ = reset;
+        const bool gone = go && !was_go_;
+        const bool cleared = reset && !was_reset_;
+        was_go_ = go;
+        was_reset_ = reset;
 
-        const bool measured = std::isfinite(actual_position) && std::fabs(actual_position) <= motion::farthest;
-        if (measured) measure(dt);
+        const bool measured =
+            std::isfinite(actual_position) && std::fabs(actual_position) <= motion::farthest;
+        if (measured) {
+            measure(dt);
+        }
         motion::Limits limits;
-        const bool sound = motion::Limits::from(max_speed, max_acceleration, 0.0, max_jerk, limits) && min_position <= max_position;
+        const bool sound =
+            motion::Limits::from(max_speed, max_acceleration, 0.0, max_jerk, limits) &&
+            min_position <= max_position;
 
         std::uint32_t found = none;  // a disabled axis has no error
-        if (!sound) found = bad_parameter;
-        else if (!measured) found = bad_feedback;
-        if (cleared && found == none) code_ = none;
+        if (!sound) {
+            found = bad_parameter;
+        } else if (!measured) {
+            found = bad_feedback;
+        }
+        if (cleared && found == none) {
+            code_ = none;
+        }
         const bool on = enable && code_ == none;
-        if (on && found == none && was_on_) found = watch(limits);
-        if (on && found != none) code_ = found;
+        if (on && found == none && was_on_) {
+            found = watch(limits);
+        }
+        if (on && found != none) {
+            code_ = found;
+        }
         was_on_ = enable && code_ == none;
         if (!was_on_) return rest();
 
-        if (closing_) generator_.put(measured_), integral_ = 0.0, moves_ = false;
+        if (closing_) {
+            generator_.put(measured_);
+            integral_ = 0.0;
+            moves_ = false;
+        }
         closing_ = false;
         command(limits, gone);
         generator_.advance(dt);
@@ -94,27 +142,42 @@ private:
         const double raw = has_measured_ ? (actual_position - measured_) / dt : 0.0;
         const double share = speed_filter > 0.0 ? dt / (speed_filter + dt) : 1.0;
         speed_ += share * (raw - speed_);
-        if (!std::isfinite(speed_)) speed_ = 0.0;
+        if (!std::isfinite(speed_)) {
+            speed_ = 0.0;
+        }
         measured_ = actual_position;
         has_measured_ = true;
         actual_speed = speed_;
     }
 
     std::uint32_t watch(const motion::Limits& limits) const noexcept {
-        if (position_margin > 0.0) {  // returning from beyond a limit is not a fault, moving further outwards is
-            if (measured_ < min_position - position_margin && generator_.state().velocity <= 0.0 && speed_ < 0.0) return below_min;
-            if (measured_ > max_position + position_margin && generator_.state().velocity >= 0.0 && speed_ > 0.0) return above_max;
+        // returning from beyond a limit is not a fault, moving further outwards is
+        if (position_margin > 0.0) {
+            if (measured_ < min_position - position_margin && generator_.state().velocity <= 0.0 &&
+                speed_ < 0.0) {
+                return below_min;
+            }
+            if (measured_ > max_position + position_margin && generator_.state().velocity >= 0.0 &&
+                speed_ > 0.0) {
+                return above_max;
+            }
         }
         if (overspeed > 0.0 && std::fabs(speed_) > overspeed * limits.velocity) return too_fast;
-        if (max_following_error > 0.0 && std::fabs(generator_.state().position - measured_) > max_following_error) return following_error;
+        if (max_following_error > 0.0 &&
+            std::fabs(generator_.state().position - measured_) > max_following_error) {
+            return following_error;
+        }
         return none;
     }
 
     void command(motion::Limits limits, bool gone) noexcept {
-        const double low = std::max(min_position.get(), -motion::farthest), high = std::min(max_position.get(), motion::farthest);
+        const double low = std::max(min_position.get(), -motion::farthest);
+
+        const double high = std::min(max_position.get(), motion::farthest);
         const double asked = std::isfinite(requested_speed) ? requested_speed.get() : 0.0;
-        if (stop_in) moves_ = false;
-        else if (speed_mode) {
+        if (stop_in) {
+            moves_ = false;
+        } else if (speed_mode) {
             // Towards the position limit at that speed, so that it also stops there in time.
             moves_ = false;
             request_limited = std::fabs(asked) > limits.velocity;
@@ -129,20 +192,26 @@ private:
         if (!moves_) return generator_.go_at(0.0, limits);
         const double to = std::clamp(target_, low, high);
         request_limited = to != target_ || std::fabs(asked) > limits.velocity;
-        if (asked != 0.0) limits.velocity = std::clamp(std::fabs(asked), 1e-18, limits.velocity);
+        if (asked != 0.0) {
+            limits.velocity = std::clamp(std::fabs(asked), 1e-18, limits.velocity);
+        }
         generator_.go_to(to, limits);
     }
 
     void control(double dt) noexcept {
         const motion::State& now = generator_.state();
-        const double e = now.position - measured_, most = std::fabs(max_output);
+        const double e = now.position - measured_;
+        const double most = std::fabs(max_output);
         double integral = integral_ + e * dt;
         const auto effort = [&](double sum) {
-            return p_gain * e + i_gain * sum + d_gain * (now.velocity - speed_) + feed_forward * now.velocity;
+            return p_gain * e + i_gain * sum + d_gain * (now.velocity - speed_) +
+                   feed_forward * now.velocity;
         };
         double wanted = effort(integral);
         // Anti-windup: do not integrate further into saturation.
-        if (most > 0.0 && std::fabs(wanted) > most && i_gain * e * wanted > 0.0) wanted = effort(integral = integral_);
+        if (most > 0.0 && std::fabs(wanted) > most && i_gain * e * wanted > 0.0) {
+            wanted = effort(integral = integral_);
+        }
         if (!std::isfinite(wanted)) {
             code_ = bad_parameter;
             was_on_ = false;
@@ -150,7 +219,8 @@ private:
         }
         integral_ = integral;
         output = most > 0.0 ? std::clamp(wanted, -most, most) : wanted;
-        busy = (!generator_.arrived() || generator_.moving() || (moves_ && window > 0.0 && std::fabs(e) > window));
+        busy = (!generator_.arrived() || generator_.moving() ||
+                (moves_ && window > 0.0 && std::fabs(e) > window));
         show();
     }
 
@@ -172,14 +242,24 @@ private:
     }
 
     motion::Generator generator_;
-    double measured_ = 0.0, speed_ = 0.0, integral_ = 0.0, target_ = 0.0;
+    double measured_ = 0.0;
+    double speed_ = 0.0;
+    double integral_ = 0.0;
+    double target_ = 0.0;
     std::uint32_t code_ = none;
-    bool was_go_ = false, was_reset_ = false, was_on_ = false, closing_ = true, moves_ = false, has_measured_ = false;
+    bool was_go_ = false;
+    bool was_reset_ = false;
+    bool was_on_ = false;
+    bool closing_ = true;
+    bool moves_ = false;
+
+    bool has_measured_ = false;
 };
 
 }  // namespace
 
-HAL_COMPONENT(PxmcAxis, "pxmc_axis", "Position controller of one axis: trajectory, PID, supervision", R"(
+HAL_COMPONENT(PxmcAxis, "pxmc_axis",
+              "Position controller of one axis: trajectory, PID, supervision", R"(
 One axis as in the motion controllers of small mobile robots: it takes a position or a speed, plans the trajectory, closes the loop and
 monitors it.
 

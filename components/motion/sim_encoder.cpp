@@ -11,16 +11,28 @@ namespace {
 struct SimEncoder : hal::Component {
     using Component::Component;
 
-    hal::Function make{*this, "make-pulses", &SimEncoder::make_pulses, "generates the phases; belongs in the fastest thread", {.shared = true}};
+    hal::Function make{*this,
+                       "make-pulses",
+                       &SimEncoder::make_pulses,
+                       "generates the phases; belongs in the fastest thread",
+                       {.shared = true}};
     hal::Out<bool> phase_a{*this, make, "phase-A", "phase A, leading while speed is positive"};
     hal::Out<bool> phase_b{*this, make, "phase-B", "phase B"};
-    hal::Out<bool> phase_z{*this, make, "phase-Z", "index pulse, one count wide, once per revolution"};
-    hal::Out<std::int32_t> raw_counts{*this, make, "rawcounts", "counts since the start, four per pulse"};
+    hal::Out<bool> phase_z{*this, make, "phase-Z",
+                           "index pulse, one count wide, once per revolution"};
+    hal::Out<std::int32_t> raw_counts{*this, make, "rawcounts",
+                                      "counts since the start, four per pulse"};
 
-    hal::Function run{*this, "update-speed", &SimEncoder::update_speed, "reads the speed; belongs in the servo thread", {.shared = true}};
+    hal::Function run{*this,
+                      "update-speed",
+                      &SimEncoder::update_speed,
+                      "reads the speed; belongs in the servo thread",
+                      {.shared = true}};
     hal::In<double> speed{*this, run, "speed", "speed in user units per second"};
-    hal::Io<std::uint32_t> pulses{*this, run, "ppr", "pulses per revolution, four counts each", {.initial = 100}};
-    hal::Io<double> scale{*this, run, "scale", "user units per revolution; 0 is set to 1", {.initial = 1.0}};
+    hal::Io<std::uint32_t> pulses{
+        *this, run, "ppr", "pulses per revolution, four counts each", {.initial = 100}};
+    hal::Io<double> scale{
+        *this, run, "scale", "user units per revolution; 0 is set to 1", {.initial = 1.0}};
 
     void make_pulses(hal::Cycle cycle) noexcept {
         const std::int64_t per_turn = per_turn_.load(std::memory_order_relaxed);
@@ -38,11 +50,14 @@ struct SimEncoder : hal::Component {
     }
 
     void update_speed(hal::Cycle) noexcept {
-        if (std::fabs(scale) < 1e-20) scale = 1.0;
+        if (std::fabs(scale) < 1e-20) {
+            scale = 1.0;
+        }
         const double turns = speed / scale;
         const std::int64_t per_turn = 4 * static_cast<std::int64_t>(pulses.get());
         per_turn_.store(per_turn, std::memory_order_relaxed);
-        counts_per_second_.store(std::isfinite(turns) ? turns * static_cast<double>(per_turn) : 0.0, std::memory_order_relaxed);
+        counts_per_second_.store(std::isfinite(turns) ? turns * static_cast<double>(per_turn) : 0.0,
+                                 std::memory_order_relaxed);
     }
 
 private:
@@ -59,7 +74,8 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(SimEncoder, "sim_encoder", "Simulated quadrature encoder that turns at a commanded speed", R"(
+HAL_COMPONENT(SimEncoder, "sim_encoder",
+              "Simulated quadrature encoder that turns at a commanded speed", R"(
 Generates the phases of an encoder with `ppr` pulses per revolution whose shaft turns at `speed` / `scale` revolutions per second.
 `sim-encoder.update-speed` belongs in the servo thread, `sim-encoder.make-pulses` in the fastest thread; it generates at most one
 edge per period T, so the speed is limited to 1 / (4 ppr T) revolutions per second. It starts with `phase-A` TRUE, at the index.

@@ -9,14 +9,14 @@ namespace {
 
 struct SimpleTp : hal::Component {
     using Component::Component;
-    hal::In<double>  target{*this, "target-pos", "target position"};
-    hal::Limit       max_velocity{*this, "maxvel", "maximum speed"};
-    hal::Limit       max_acceleration{*this, "maxaccel", "maximum acceleration"};
-    hal::In<bool>    enable{*this, "enable", "FALSE brakes to a stop"};
+    hal::In<double> target{*this, "target-pos", "target position"};
+    hal::Limit max_velocity{*this, "maxvel", "maximum speed"};
+    hal::Limit max_acceleration{*this, "maxaccel", "maximum acceleration"};
+    hal::In<bool> enable{*this, "enable", "FALSE brakes to a stop"};
     hal::Out<double> position{*this, "current-pos", "current position"};
     hal::Out<double> velocity{*this, "current-vel", "current velocity"};
-    hal::Out<bool>   active{*this, "active", "TRUE until the target is reached"};
-    hal::Function    run{*this, "update", &SimpleTp::update, "computes the next position"};
+    hal::Out<bool> active{*this, "active", "TRUE until the target is reached"};
+    hal::Function run{*this, "update", &SimpleTp::update, "computes the next position"};
 
     void update(hal::Cycle cycle) noexcept {
         const double dt = cycle.seconds();
@@ -38,9 +38,12 @@ struct SimpleTp : hal::Component {
 private:
     static constexpr double huge = 1e20;  // beyond it sums would lose all digits, or overflow
 
-    static double at_least_0(double limit) noexcept { return limit > 0.0 ? std::min(limit, huge) : 0.0; }
+    static double at_least_0(double limit) noexcept {
+        return limit > 0.0 ? std::min(limit, huge) : 0.0;
+    }
 
-    /// The speed from which braking by `change` in each cycle ends at `distance`: v * v + 2 v change = 2 a distance.
+    /// The speed from which braking by `change` in each cycle ends at `distance`: v * v + 2 v
+    /// change = 2 a distance.
     static double braking_speed(double distance, double acceleration, double change) noexcept {
         return std::sqrt(2.0 * acceleration * distance + change * change) - change;
     }
@@ -48,7 +51,8 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(SimpleTp, "simple_tp", "Trajectory planner for one axis: trapezoidal speed to a target", R"(
+HAL_COMPONENT(SimpleTp, "simple_tp",
+              "Trajectory planner for one axis: trapezoidal speed to a target", R"(
 Moves `current-pos` to `target-pos` with at most `maxvel` and `maxaccel`, and stops there without overshoot. The target and the limits
 may change at any time: the axis reverses or decelerates within `maxaccel`. While `enable` is FALSE, or the target is NaN or
 beyond 1e20, it brakes with `maxaccel` and stops. The initial position is 0. It stops within a thousandth of the distance of the first cycle of

@@ -5,8 +5,9 @@ namespace {
 
 struct Steptest : axis_test::Mover {
     using Mover::Mover;
-    hal::In<double> max_acceleration{*this, "maxaccel", "maximum acceleration; not used, as in LinuxCNC"};
-    hal::Function   step{*this, "", &Steptest::update, "computes the commanded position"};
+    hal::In<double> max_acceleration{*this, "maxaccel",
+                                     "maximum acceleration; not used, as in LinuxCNC"};
+    hal::Function step{*this, "", &Steptest::update, "computes the commanded position"};
 
     void update(hal::Cycle cycle) noexcept {
         if (!free_to_jog(cycle.seconds())) return;
@@ -24,7 +25,8 @@ struct Steptest : axis_test::Mover {
 
 }  // namespace
 
-HAL_COMPONENT(Steptest, "steptest", "Moves an axis with a step generator, to test speed and acceleration", R"(
+HAL_COMPONENT(Steptest, "steptest",
+              "Moves an axis with a step generator, to test speed and acceleration", R"(
 While `run` is TRUE `position-cmd` alternates between the two ends `run-low` and `run-high`, at the distance
 `amplitude` from the initial position on the sides selected by `dir`. It changes after `position-fb` has been within `epsilon` of the end for `pause`
 seconds. After `run` the axis returns to the initial position, and `running` becomes FALSE there. A jog commands a position two cycles at `maxvel`

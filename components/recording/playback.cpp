@@ -19,40 +19,54 @@
 
 namespace {
 
-using AnyOut = std::variant<std::monostate, hal::Out<bool>, hal::Out<double>, hal::Out<std::int32_t>, hal::Out<std::uint32_t>,
-                            hal::Out<std::int64_t>, hal::Out<std::uint64_t>>;
+using AnyOut =
+    std::variant<std::monostate, hal::Out<bool>, hal::Out<double>, hal::Out<std::int32_t>,
+                 hal::Out<std::uint32_t>, hal::Out<std::int64_t>, hal::Out<std::uint64_t>>;
 
 struct Playback : hal::Component {
     explicit Playback(const hal_host* host)
         : Component(host),
           file(*this, "file", "", "recording to play: .mcap or .csv, beside the netlist"),
           values(*this, "values", "*", "values to play, as patterns separated by commas"),
-          types(*this, "types", "", "types of values of a .csv, NAME:TYPE separated by commas; the others are float") {
+          types(*this, "types", "",
+                "types of values of a .csv, NAME:TYPE separated by commas; the others are float") {
         read();
-        for (Track& track : tracks_) declare(track);
+        for (Track& track : tracks_) {
+            declare(track);
+        }
     }
 
     hal::TextArgument file, values, types;
-    hal::In<bool>     enable{*this, "enable", "FALSE holds the time and the values", {.initial = true}};
-    hal::In<bool>     restart{*this, "restart", "a rising edge starts again at the beginning"};
-    hal::Param<bool>  loop{*this, "loop", "TRUE starts again after the end"};
-    hal::Out<double>  time{*this, "time", "time since the beginning of the recording", {.unit = "s"}};
-    hal::Out<bool>    done{*this, "done", "TRUE: the last row has been played"};
-    hal::Function     run{*this, "update", &Playback::update, "sets the outputs to the values recorded at this time"};
+    hal::In<bool> enable{*this, "enable", "FALSE holds the time and the values", {.initial = true}};
+    hal::In<bool> restart{*this, "restart", "a rising edge starts again at the beginning"};
+    hal::Param<bool> loop{*this, "loop", "TRUE starts again after the end"};
+    hal::Out<double> time{
+        *this, "time", "time since the beginning of the recording", {.unit = "s"}};
+    hal::Out<bool> done{*this, "done", "TRUE: the last row has been played"};
+    hal::Function run{*this, "update", &Playback::update,
+                      "sets the outputs to the values recorded at this time"};
 
     void update(hal::Cycle cycle) noexcept {
         const bool again = restart && !was_restart_;
         was_restart_ = restart;
-        if (again || (loop && done)) rewind();
+        if (again || (loop && done)) {
+            rewind();
+        }
         if (!enable) return;
-        if (begun_) elapsed_ns_ += cycle.period_ns();
+        if (begun_) {
+            elapsed_ns_ += cycle.period_ns();
+        }
         begun_ = true;
         bool more = false;
         for (Track& track : tracks_) {
             const std::vector<std::int64_t>& times = track.table.times_ns;
-            const std::size_t                before = track.next;
-            while (track.next < times.size() && times[track.next] - begin_ns_ <= elapsed_ns_) ++track.next;
-            if (track.next != before) show(track, track.next - 1);
+            const std::size_t before = track.next;
+            while (track.next < times.size() && times[track.next] - begin_ns_ <= elapsed_ns_) {
+                ++track.next;
+            }
+            if (track.next != before) {
+                show(track, track.next - 1);
+            }
             more = more || track.next < times.size();
         }
         time = static_cast<double>(elapsed_ns_) * 1e-9;
@@ -61,8 +75,8 @@ struct Playback : hal::Component {
 
 private:
     struct Track {
-        hal::mcap::Table                             table;
-        std::size_t                                  next = 0;
+        hal::mcap::Table table;
+        std::size_t next = 0;
         std::vector<std::pair<std::size_t, AnyOut*>> pins = {};  // column and pin
     };
 
@@ -78,16 +92,24 @@ private:
 
     std::map<std::string, hal_type> given_types() const {
         std::map<std::string, hal_type> given;
-        const std::string&              all = types.get();
-        if (!all.empty() && !file.get().ends_with(".csv"))
-            throw hal::ArgumentError("types", "types=" + all + ": the recording has types of its own; only a .csv needs them");
+        const std::string& all = types.get();
+        if (!all.empty() && !file.get().ends_with(".csv")) {
+            throw hal::ArgumentError(
+                "types",
+                "types=" + all + ": the recording has types of its own; only a .csv needs them");
+        }
         for (std::size_t at = 0; at < all.size();) {
             const std::size_t end = std::min(all.find(',', at), all.size());
             const std::string one = all.substr(at, end - at);
             const std::size_t colon = one.rfind(':');
-            const auto        type = hal::mcap::type_of_word(colon == one.npos ? "" : std::string_view(one).substr(colon + 1));
-            if (!type)
-                throw hal::ArgumentError("types", "types=" + one + ": type NAME:TYPE; the types are bit, float, s32, u32, s64 and u64");
+            const auto type = hal::mcap::type_of_word(
+                colon == one.npos ? "" : std::string_view(one).substr(colon + 1));
+            if (!type) {
+                throw hal::ArgumentError(
+                    "types",
+                    "types=" + one +
+                        ": type NAME:TYPE; the types are bit, float, s32, u32, s64 and u64");
+            }
             given[one.substr(0, colon)] = *type;
             at = end + 1;
         }
@@ -99,14 +121,20 @@ private:
         const hal::Texts texts(*this);
         if (!texts.offered()) return;
         hal::mcap::Recording recording;
-        std::string          problem;
-        if (!hal::mcap::load(texts.find(file.get()), recording, problem, {.types = given_types()}))
+        std::string problem;
+        if (!hal::mcap::load(texts.find(file.get()), recording, problem,
+                             {.types = given_types()})) {
             throw hal::ArgumentError("file", "file=" + file.get() + ": " + problem);
-        if (recording.tables.empty())
-            throw hal::ArgumentError(
-                "file", "file=" + file.get() + ": the recording has no rows" + (recording.unread.empty() ? "" : "; " + recording.unread));
+        }
+        if (recording.tables.empty()) {
+            throw hal::ArgumentError("file",
+                                     "file=" + file.get() + ": the recording has no rows" +
+                                         (recording.unread.empty() ? "" : "; " + recording.unread));
+        }
         begin_ns_ = recording.begin_ns();
-        for (hal::mcap::Table& table : recording.tables) tracks_.push_back({std::move(table)});
+        for (hal::mcap::Table& table : recording.tables) {
+            tracks_.push_back({std::move(table)});
+        }
     }
 
     // A value that several tables have, because an edit moved it to another thread, is one pin.
@@ -114,14 +142,16 @@ private:
         for (std::size_t c = 0; c < track.table.columns.size(); ++c) {
             const hal::mcap::Column& column = track.table.columns[c];
             if (!wanted(column.name)) continue;
-            const bool own = column.name == "enable" || column.name == "restart" || column.name == "loop" || column.name == "time" ||
+            const bool own = column.name == "enable" || column.name == "restart" ||
+                             column.name == "loop" || column.name == "time" ||
                              column.name == "done";
             const std::string name = own ? "value-" + column.name : column.name;
             const auto [at, made] = by_name_.try_emplace(name, nullptr);
             if (made) {
                 AnyOut& pin = pins_.emplace_back();
                 at->second = &pin;
-                emplace(pin, column.type, units_.emplace_back(name).c_str(), units_.emplace_back(column.unit).c_str());
+                emplace(pin, column.type, units_.emplace_back(name).c_str(),
+                        units_.emplace_back(column.unit).c_str());
             }
             track.pins.emplace_back(c, at->second);
         }
@@ -131,7 +161,9 @@ private:
         const char* const doc = "value of the recording";
         switch (type) {
         case HAL_TYPE_BIT: pin.emplace<1>(*this, name, doc); break;
-        case HAL_TYPE_FLOAT: pin.emplace<2>(*this, name, doc, hal::PinOptions<double>{.unit = unit}); break;
+        case HAL_TYPE_FLOAT:
+            pin.emplace<2>(*this, name, doc, hal::PinOptions<double>{.unit = unit});
+            break;
         case HAL_TYPE_S32: pin.emplace<3>(*this, name, doc); break;
         case HAL_TYPE_U32: pin.emplace<4>(*this, name, doc); break;
         case HAL_TYPE_S64: pin.emplace<5>(*this, name, doc); break;
@@ -145,26 +177,34 @@ private:
             std::visit([word](auto& out) {
                 if constexpr (requires { out.get(); }) {
                     using T = std::remove_cvref_t<decltype(out.get())>;
-                    if constexpr (std::is_same_v<T, double>) out = std::bit_cast<double>(word);
-                    else if constexpr (std::is_same_v<T, bool>) out = word != 0;
-                    else out = static_cast<T>(word);
+                    if constexpr (std::is_same_v<T, double>) {
+                        out = std::bit_cast<double>(word);
+                    } else if constexpr (std::is_same_v<T, bool>) {
+                        out = word != 0;
+                    } else {
+                        out = static_cast<T>(word);
+                    }
                 }
             }, *pin);
         }
     }
 
     void rewind() noexcept {
-        for (Track& track : tracks_) track.next = 0;
+        for (Track& track : tracks_) {
+            track.next = 0;
+        }
         elapsed_ns_ = 0;
         begun_ = false;
     }
 
-    std::vector<Track>             tracks_;
-    std::deque<AnyOut>             pins_;
-    std::deque<std::string>        units_;
+    std::vector<Track> tracks_;
+    std::deque<AnyOut> pins_;
+    std::deque<std::string> units_;
     std::map<std::string, AnyOut*> by_name_;
-    std::int64_t                   begin_ns_ = 0, elapsed_ns_ = 0;
-    bool                           begun_ = false, was_restart_ = false;
+    std::int64_t begin_ns_ = 0;
+    std::int64_t elapsed_ns_ = 0;
+    bool begun_ = false;
+    bool was_restart_ = false;
 };
 
 }  // namespace

@@ -17,7 +17,9 @@ struct ChargePump : hal::Component {
     hal::Function run{*this, "", &ChargePump::update, "generates the next half wave"};
 
     void update(hal::Cycle) noexcept {
-        if (enable) ++phase_;
+        if (enable) {
+            ++phase_;
+        }
         out = enable && (phase_ & 1) != 0;
         half = enable && (phase_ & 2) != 0;
         quarter = enable && (phase_ & 4) != 0;

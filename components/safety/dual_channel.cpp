@@ -8,7 +8,15 @@
 namespace {
 
 /// Values of the public pin `reason`: never renumber them.
-enum Reason : std::uint32_t { agree = 0, differ = 1, values_differ = 2, bits_differ = 3, no_number = 4, bad_parameter = 5, not_reset = 6 };
+enum Reason : std::uint32_t {
+    agree = 0,
+    differ = 1,
+    values_differ = 2,
+    bits_differ = 3,
+    no_number = 4,
+    bad_parameter = 5,
+    not_reset = 6
+};
 
 enum Choice : std::uint32_t { channel_a = 0, mean = 1, lower = 2, higher = 3, nearer_0 = 4 };
 
@@ -22,57 +30,94 @@ struct DualChannel : hal::Component {
     hal::In<bool> reset{*this, "reset", "a rising edge clears a fault once the channels agree"};
 
     hal::Param<double> tolerance{*this, "tolerance", "permitted difference of the values"};
-    hal::Param<double> relative{*this, "relative-tolerance", "additional permitted difference as a fraction of the larger value"};
-    hal::Param<double> time{*this, "discrepancy-time", "time for which the channels may differ by more", {.unit = "s"}};
+    hal::Param<double> relative{
+        *this, "relative-tolerance",
+        "additional permitted difference as a fraction of the larger value"};
+    hal::Param<double> time{
+        *this, "discrepancy-time", "time for which the channels may differ by more", {.unit = "s"}};
     hal::Param<double> scale_b{*this, "scale-b", "scale of b", {.initial = 1.0}};
     hal::Param<double> offset_b{*this, "offset-b", "offset added to b after scaling"};
     hal::Param<bool> antivalent{*this, "antivalent", "TRUE: bit-b is the inverse of bit-a"};
-    hal::Param<bool> latch{*this, "latch", "TRUE: a fault remains until reset; FALSE: until the channels agree", {.initial = true}};
-    hal::Param<std::uint32_t> choice{*this, "choice",
-                                     "value for out: 0 a; 1 mean; 2 smaller; 3 larger; 4 nearer to 0", {.initial = mean}};
-    hal::Param<double> substitute{*this, "substitute", "value of out while ok is FALSE, with use-substitute"};
-    hal::Param<bool> use_substitute{*this, "use-substitute", "TRUE: out is substitute while ok is FALSE; FALSE: the last valid value"};
+    hal::Param<bool> latch{*this,
+                           "latch",
+                           "TRUE: a fault remains until reset; FALSE: until the channels agree",
+                           {.initial = true}};
+    hal::Param<std::uint32_t> choice{
+        *this,
+        "choice",
+        "value for out: 0 a; 1 mean; 2 smaller; 3 larger; 4 nearer to 0",
+        {.initial = mean}};
+    hal::Param<double> substitute{*this, "substitute",
+                                  "value of out while ok is FALSE, with use-substitute"};
+    hal::Param<bool> use_substitute{
+        *this, "use-substitute",
+        "TRUE: out is substitute while ok is FALSE; FALSE: the last valid value"};
 
     hal::Out<bool> ok{*this, "ok", "TRUE: both channels agree", {.safe = false}};
-    hal::Out<bool> fault{*this, "fault", "TRUE: the channels differed for longer than discrepancy-time"};
+    hal::Out<bool> fault{*this, "fault",
+                         "TRUE: the channels differed for longer than discrepancy-time"};
     hal::Out<bool> differs{*this, "differs", "TRUE: the channels differ in this cycle"};
-    hal::Out<std::uint32_t> reason{*this, "reason", "reason why ok is FALSE: see the table", {.initial = not_reset}};
+    hal::Out<std::uint32_t> reason{
+        *this, "reason", "reason why ok is FALSE: see the table", {.initial = not_reset}};
     hal::Out<double> out{*this, "out", "checked value", {.finite = true}};
     hal::Out<bool> bit_out{*this, "bit-out", "TRUE: both bits are TRUE, and ok", {.safe = false}};
     hal::Out<double> difference{*this, "difference", "a - b", {.finite = true}};
-    hal::Out<double> largest{*this, "largest-difference", "largest difference since the last reset", {.finite = true}};
-    hal::Out<double> since{*this, "differs-for", "time for which the channels have differed", {.unit = "s", .finite = true}};
+    hal::Out<double> largest{
+        *this, "largest-difference", "largest difference since the last reset", {.finite = true}};
+    hal::Out<double> since{*this,
+                           "differs-for",
+                           "time for which the channels have differed",
+                           {.unit = "s", .finite = true}};
 
     hal::Function run{*this, "", &DualChannel::update, "compares the channels"};
 
     void update(hal::Cycle cycle) noexcept {
         const bool pressed = reset && !was_reset_;
         was_reset_ = reset;
-        if (latch && fault_ == agree && !ok && was_ok_) fault_ = not_reset;  // the host wrote the safe value
+        // the host wrote the safe value
+        if (latch && fault_ == agree && !ok && was_ok_) {
+            fault_ = not_reset;
+        }
 
-        const double second = b * scale_b + offset_b, apart = a - second;
+        const double second = b * scale_b + offset_b;
+        const double apart = a - second;
         const bool numbers = std::isfinite(apart) && std::isfinite(a + second);
-        const bool sound = tolerance >= 0.0 && relative >= 0.0 && time >= 0.0 && std::isfinite(scale_b + offset_b) && choice <= nearer_0;
+        const bool sound = tolerance >= 0.0 && relative >= 0.0 && time >= 0.0 &&
+                           std::isfinite(scale_b + offset_b) && choice <= nearer_0;
         const double allowed = tolerance + relative * std::max(std::fabs(a), std::fabs(second));
-        const bool first_bit = bit_a, second_bit = bit_b != antivalent;
+        const bool first_bit = bit_a;
+        const bool second_bit = bit_b != antivalent;
         std::uint32_t found = agree;
-        if (!sound) found = bad_parameter;
-        else if (!numbers) found = no_number;
-        else if (std::fabs(apart) > allowed * (1 + 1e-15)) found = values_differ;
-        else if (first_bit != second_bit) found = bits_differ;
+        if (!sound) {
+            found = bad_parameter;
+        } else if (!numbers) {
+            found = no_number;
+        } else if (std::fabs(apart) > allowed * (1 + 1e-15)) {
+            found = values_differ;
+        } else if (first_bit != second_bit) {
+            found = bits_differ;
+        }
 
         for_ = found == agree ? 0.0 : std::min(for_ + cycle.seconds(), 1e9);
         const bool late = for_ > time + cycle.seconds() * 1e-6 || time == 0.0;
         if (found == agree) {
-            if (pressed || !latch) fault_ = agree;
+            if (pressed || !latch) {
+                fault_ = agree;
+            }
         } else if ((late || found >= no_number) && fault_ == agree) {
             fault_ = found;
         }
-        if (pressed) largest_ = 0.0;
-        if (numbers) largest_ = std::max(largest_, std::fabs(apart));
+        if (pressed) {
+            largest_ = 0.0;
+        }
+        if (numbers) {
+            largest_ = std::max(largest_, std::fabs(apart));
+        }
 
         // Within the discrepancy time the value is held, and the bit is FALSE if one of the two is.
-        if (found == agree) good_ = chosen(second);
+        if (found == agree) {
+            good_ = chosen(second);
+        }
         const bool healthy = fault_ == agree;
         was_ok_ = healthy;
         ok = healthy;
@@ -89,16 +134,19 @@ struct DualChannel : hal::Component {
 private:
     double chosen(double second) const noexcept {
         switch (choice) {
-            case channel_a: return a;
-            case lower: return std::min(a.get(), second);
-            case higher: return std::max(a.get(), second);
-            case nearer_0: return std::fabs(a) <= std::fabs(second) ? a.get() : second;
-            default: return a / 2 + second / 2;
+        case channel_a: return a;
+        case lower: return std::min(a.get(), second);
+        case higher: return std::max(a.get(), second);
+        case nearer_0: return std::fabs(a) <= std::fabs(second) ? a.get() : second;
+        default: return a / 2 + second / 2;
         }
     }
-    double for_ = 0.0, good_ = 0.0, largest_ = 0.0;
+    double for_ = 0.0;
+    double good_ = 0.0;
+    double largest_ = 0.0;
     std::uint32_t fault_ = agree;
-    bool was_reset_ = false, was_ok_ = false;
+    bool was_reset_ = false;
+    bool was_ok_ = false;
 };
 
 }  // namespace

@@ -6,11 +6,15 @@ namespace {
 struct EstopLatch : hal::Component {
     using Component::Component;
 
-    hal::In<bool> ok_in{*this, "ok-in", "TRUE while the chain before this latch is OK", {.initial = true}};
+    hal::In<bool> ok_in{
+        *this, "ok-in", "TRUE while the chain before this latch is OK", {.initial = true}};
     hal::In<bool> fault_in{*this, "fault-in", "TRUE trips the latch"};
-    hal::In<bool> reset{*this, "reset", "a rising edge leaves the faulted state, if ok-in is TRUE and fault-in FALSE"};
+    hal::In<bool> reset{
+        *this, "reset",
+        "a rising edge leaves the faulted state, if ok-in is TRUE and fault-in FALSE"};
     hal::Out<bool> ok_out{*this, "ok-out", "TRUE in the OK state", {.safe = false}};
-    hal::Out<bool> fault_out{*this, "fault-out", "TRUE in the faulted state", {.initial = true, .safe = true}};
+    hal::Out<bool> fault_out{
+        *this, "fault-out", "TRUE in the faulted state", {.initial = true, .safe = true}};
     hal::Out<bool> watchdog{*this, "watchdog", "toggles in every cycle of the OK state"};
 
     hal::Function run{*this, "", &EstopLatch::update, "updates the state"};
@@ -22,7 +26,9 @@ struct EstopLatch : hal::Component {
         const bool ok = healthy && (ok_out || pressed);
         ok_out = ok;
         fault_out = !ok;
-        if (ok) watchdog = !watchdog;
+        if (ok) {
+            watchdog = !watchdog;
+        }
     }
 
 private:
@@ -31,7 +37,8 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(EstopLatch, "estop_latch", "Emergency stop latch: holds a fault until it is reset", R"(
+HAL_COMPONENT(EstopLatch, "estop_latch", "Emergency stop latch: holds a fault until it is reset",
+              R"(
 The latch has two states: "faulted" (initial) and "OK". A rising edge of `reset` with `ok-in` TRUE and `fault-in` FALSE enters OK.
 `ok-in` FALSE or `fault-in` TRUE enters faulted in the same cycle. In the OK state `watchdog` toggles every cycle, for a `watchdog`
 or a charge pump that trips when this function stops running. Chain latches by linking `ok-out` to the next `ok-in`.

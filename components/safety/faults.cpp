@@ -8,19 +8,27 @@ struct Faults : hal::Component {
     using Component::Component;
     static constexpr hal::Traits traits{.singleton = true};
 
-    hal::In<bool> reset{*this, "reset", "a rising edge acknowledges all faults; those that last, once they are over while it is TRUE"};
-    hal::Out<bool> active{*this, "active", "TRUE while a fault is not acknowledged", {.safe = true}};
+    hal::In<bool> reset{*this, "reset",
+                        "a rising edge acknowledges all faults; those that last, once they are "
+                        "over while it is TRUE"};
+    hal::Out<bool> active{
+        *this, "active", "TRUE while a fault is not acknowledged", {.safe = true}};
     hal::Out<bool> ok{*this, "ok", "inverse of active", {.safe = false}};
     hal::Out<std::uint64_t> count{*this, "count", "number of faults since the start"};
     hal::Out<std::uint32_t> last_code{*this, "last-code", "code of the newest fault"};
-    hal::Out<std::uint64_t> last_cycle{*this, "last-cycle", "cycle of its thread in which the newest fault occurred"};
-    hal::Out<bool> alive{*this, "alive", "toggles while all supervised threads make progress; for a watchdog"};
+    hal::Out<std::uint64_t> last_cycle{*this, "last-cycle",
+                                       "cycle of its thread in which the newest fault occurred"};
+    hal::Out<bool> alive{*this, "alive",
+                         "toggles while all supervised threads make progress; for a watchdog"};
 
     hal::Function run{*this, "", &Faults::update, "reads the fault record of the runtime"};
 
     void start() {
         record_ = hal::extension<hal_faults>("hal.faults/1");
-        if (record_ == nullptr) throw std::runtime_error("the host does not support the extension hal.faults/1 (fault record)");
+        if (record_ == nullptr) {
+            throw std::runtime_error(
+                "the host does not support the extension hal.faults/1 (fault record)");
+        }
         supervision_ = hal::extension<hal_supervision>(HAL_SUPERVISION);
     }
 
@@ -34,18 +42,25 @@ struct Faults : hal::Component {
         last_cycle = __atomic_load_n(&record_->last_cycle, __ATOMIC_RELAXED);
         if (supervision_ == nullptr) return;
         const std::uint64_t progress = __atomic_load_n(&supervision_->progress, __ATOMIC_ACQUIRE);
-        if (progress != seen_) alive = !alive;
+        if (progress != seen_) {
+            alive = !alive;
+        }
         seen_ = progress;
     }
 
 private:
-    // A button often resets drives by the same edge: their faults are over some cycles later. A fault that comes while the button is pressed is
-    // not acknowledged, and ends that.
+    // A button often resets drives by the same edge: their faults are over some cycles later. A
+    // fault that comes while the button is pressed is not acknowledged, and ends that.
     void acknowledge() noexcept {
-        if (reset && !was_reset_) acknowledged_ = count;
+        if (reset && !was_reset_) {
+            acknowledged_ = count;
+        }
         was_reset_ = reset;
-        if (reset && active && acknowledged_ == count) record_->clear(record_);
-        else if (acknowledged_ != count) acknowledged_ = no_count;
+        if (reset && active && acknowledged_ == count) {
+            record_->clear(record_);
+        } else if (acknowledged_ != count) {
+            acknowledged_ = no_count;
+        }
     }
 
     static constexpr std::uint64_t no_count = UINT64_MAX;

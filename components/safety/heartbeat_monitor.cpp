@@ -19,35 +19,61 @@ enum Reason : std::uint32_t {
     not_reset = 7,
 };
 
-enum Mode : std::uint32_t { toggle_edges = 0, rising_edges = 1, any_change = 2, counts_by_step = 3 };
+enum Mode : std::uint32_t {
+    toggle_edges = 0,
+    rising_edges = 1,
+    any_change = 2,
+    counts_by_step = 3
+};
 
 struct HeartbeatMonitor : hal::Component {
     using Component::Component;
 
     hal::In<bool> toggle{*this, "toggle", "modes 0 and 1: heartbeat bit"};
     hal::In<std::uint32_t> counter{*this, "counter", "modes 2 and 3: heartbeat counter"};
-    hal::In<bool> enable{*this, "enable", "FALSE disables the monitor; ok is FALSE", {.initial = true}};
-    hal::In<bool> reset{*this, "reset", "a rising edge clears a fault and waits for the next heartbeat"};
+    hal::In<bool> enable{
+        *this, "enable", "FALSE disables the monitor; ok is FALSE", {.initial = true}};
+    hal::In<bool> reset{*this, "reset",
+                        "a rising edge clears a fault and waits for the next heartbeat"};
 
     hal::Param<std::uint32_t> mode{*this, "mode",
-                                   "heartbeat: 0 each edge of toggle; 1 rising edge; 2 change of counter; 3 increment of counter by step"};
-    hal::Param<std::uint32_t> step{*this, "step", "mode 3: increment of the counter", {.initial = 1}};
-    hal::Param<std::uint32_t> bits{*this, "counter-bits", "mode 3: width of the counter; it wraps at 2^counter-bits", {.initial = 32}};
-    hal::Param<double> timeout{*this, "timeout", "maximum time between two heartbeats", {.initial = 0.1, .unit = "s"}};
-    hal::Param<double> min_time{*this, "min-time", "minimum time between two heartbeats; 0: not monitored", {.unit = "s"}};
-    hal::Param<double> start_time{*this, "start-time", "timeout of the first heartbeat; 0: timeout", {.unit = "s"}};
-    hal::Param<std::uint32_t> beats_needed{*this, "heartbeats-needed", "consecutive heartbeats in time before ok is TRUE", {.initial = 2}};
-    hal::Param<std::uint32_t> misses_allowed{*this, "misses-allowed", "tolerated consecutive heartbeats that are early or skipped"};
-    hal::Param<bool> latch{*this, "latch",
-                           "TRUE: a fault remains until reset; FALSE: until the next valid heartbeats", {.initial = true}};
+                                   "heartbeat: 0 each edge of toggle; 1 rising edge; 2 change of "
+                                   "counter; 3 increment of counter by step"};
+    hal::Param<std::uint32_t> step{
+        *this, "step", "mode 3: increment of the counter", {.initial = 1}};
+    hal::Param<std::uint32_t> bits{*this,
+                                   "counter-bits",
+                                   "mode 3: width of the counter; it wraps at 2^counter-bits",
+                                   {.initial = 32}};
+    hal::Param<double> timeout{
+        *this, "timeout", "maximum time between two heartbeats", {.initial = 0.1, .unit = "s"}};
+    hal::Param<double> min_time{
+        *this, "min-time", "minimum time between two heartbeats; 0: not monitored", {.unit = "s"}};
+    hal::Param<double> start_time{
+        *this, "start-time", "timeout of the first heartbeat; 0: timeout", {.unit = "s"}};
+    hal::Param<std::uint32_t> beats_needed{*this,
+                                           "heartbeats-needed",
+                                           "consecutive heartbeats in time before ok is TRUE",
+                                           {.initial = 2}};
+    hal::Param<std::uint32_t> misses_allowed{
+        *this, "misses-allowed", "tolerated consecutive heartbeats that are early or skipped"};
+    hal::Param<bool> latch{
+        *this,
+        "latch",
+        "TRUE: a fault remains until reset; FALSE: until the next valid heartbeats",
+        {.initial = true}};
 
     hal::Out<bool> ok{*this, "ok", "TRUE: the heartbeat is valid", {.safe = false}};
     hal::Out<bool> fault{*this, "fault", "TRUE: the heartbeat failed"};
-    hal::Out<std::uint32_t> reason{*this, "reason", "reason why ok is FALSE: see the table", {.initial = waiting}};
-    hal::Out<double> age{*this, "age", "time since the last heartbeat", {.unit = "s", .finite = true}};
-    hal::Out<double> interval{*this, "interval", "time between the last two heartbeats", {.unit = "s", .finite = true}};
+    hal::Out<std::uint32_t> reason{
+        *this, "reason", "reason why ok is FALSE: see the table", {.initial = waiting}};
+    hal::Out<double> age{
+        *this, "age", "time since the last heartbeat", {.unit = "s", .finite = true}};
+    hal::Out<double> interval{
+        *this, "interval", "time between the last two heartbeats", {.unit = "s", .finite = true}};
     hal::Out<std::uint32_t> beats{*this, "heartbeats", "number of heartbeats so far"};
-    hal::Out<std::uint32_t> misses{*this, "misses", "number of early or skipped heartbeats and timeouts so far"};
+    hal::Out<std::uint32_t> misses{*this, "misses",
+                                   "number of early or skipped heartbeats and timeouts so far"};
 
     hal::Function run{*this, "", &HeartbeatMonitor::update, "monitors the heartbeat"};
 
@@ -55,21 +81,31 @@ struct HeartbeatMonitor : hal::Component {
         const bool pressed = reset && !was_reset_;
         was_reset_ = reset;
         const bool watched = enable && sound();
-        if (!watched || (pressed && fault_ != alive) || !was_watched_) begin();
-        if (was_ok_ && !ok && watched && fault_ == alive && latch) fault_ = not_reset;  // the host wrote the safe value
+        if (!watched || (pressed && fault_ != alive) || !was_watched_) {
+            begin();
+        }
+        // the host wrote the safe value
+        if (was_ok_ && !ok && watched && fault_ == alive && latch) {
+            fault_ = not_reset;
+        }
         std::uint32_t wrong = alive;
         const bool beat = watched && beaten(wrong);
         was_watched_ = watched;
         remember();
-        if (watched) judge(beat, wrong, cycle.period_ns());
+        if (watched) {
+            judge(beat, wrong, cycle.period_ns());
+        }
         show(watched);
     }
 
 private:
-    static std::int64_t ns(double seconds) noexcept { return std::llround(std::min(seconds, 1e6) * 1e9); }
+    static std::int64_t ns(double seconds) noexcept {
+        return std::llround(std::min(seconds, 1e6) * 1e9);
+    }
 
     bool sound() const noexcept {
-        const bool times = timeout > 0.0 && min_time >= 0.0 && start_time >= 0.0 && min_time <= timeout;
+        const bool times =
+            timeout > 0.0 && min_time >= 0.0 && start_time >= 0.0 && min_time <= timeout;
         return times && mode <= counts_by_step && bits >= 1 && bits <= 32;
     }
 
@@ -80,19 +116,22 @@ private:
         first_ = true;
     }
 
-    /// Returns whether there is a heartbeat in this cycle; sets `wrong` if it is not the expected one. The first cycle has none.
+    /// Returns whether there is a heartbeat in this cycle; sets `wrong` if it is not the expected
+    /// one. The first cycle has none.
     bool beaten(std::uint32_t& wrong) noexcept {
         if (!was_watched_) return false;
         switch (mode) {
-            case toggle_edges: return toggle != last_toggle_;
-            case rising_edges: return toggle && !last_toggle_;
-            case any_change: return counter != last_counter_;
-            default: {
-                const std::uint32_t mask = bits >= 32 ? UINT32_MAX : (std::uint32_t{1} << bits) - 1;
-                const std::uint32_t moved = (counter - last_counter_) & mask;
-                if (moved != 0 && moved != (step & mask) && !first_) wrong = skipped;
-                return moved != 0;
+        case toggle_edges: return toggle != last_toggle_;
+        case rising_edges: return toggle && !last_toggle_;
+        case any_change: return counter != last_counter_;
+        default: {
+            const std::uint32_t mask = bits >= 32 ? UINT32_MAX : (std::uint32_t{1} << bits) - 1;
+            const std::uint32_t moved = (counter - last_counter_) & mask;
+            if (moved != 0 && moved != (step & mask) && !first_) {
+                wrong = skipped;
             }
+            return moved != 0;
+        }
         }
     }
     void remember() noexcept {
@@ -103,24 +142,40 @@ private:
     void judge(bool beat, std::uint32_t wrong, std::int64_t period_ns) noexcept {
         age_ns_ = std::min(age_ns_ + period_ns, std::int64_t{1} << 60);
         if (beat) {
-            if (!first_ && wrong == alive && age_ns_ < ns(min_time)) wrong = too_early;
-            if (!first_) interval_ns_ = age_ns_;
+            if (!first_ && wrong == alive && age_ns_ < ns(min_time)) {
+                wrong = too_early;
+            }
+            if (!first_) {
+                interval_ns_ = age_ns_;
+            }
             beats = beats + 1;
             age_ns_ = 0;
             first_ = false;
-            if (wrong == alive) bad_ = 0, good_ = std::min(good_ + 1, UINT32_MAX - 1);
-            else miss(wrong, bad_ >= misses_allowed);
-            if (!latch && fault_ != alive && wrong == alive && good_ >= beats_needed) fault_ = alive;
+            if (wrong == alive) {
+                bad_ = 0;
+                good_ = std::min(good_ + 1, UINT32_MAX - 1);
+            } else {
+                miss(wrong, bad_ >= misses_allowed);
+            }
+            if (!latch && fault_ != alive && wrong == alive && good_ >= beats_needed) {
+                fault_ = alive;
+            }
         } else if (age_ns_ > ns(first_ && start_time > 0.0 ? start_time : timeout)) {
-            if (fault_ != silent) miss(silent, true);
+            if (fault_ != silent) {
+                miss(silent, true);
+            }
         }
     }
     void miss(std::uint32_t why, bool counts) noexcept {
         misses = misses + 1;
-        if (bad_ < UINT32_MAX) ++bad_;
+        if (bad_ < UINT32_MAX) {
+            ++bad_;
+        }
         if (!counts) return;
         good_ = 0;
-        if (fault_ == alive || !latch) fault_ = why;
+        if (fault_ == alive || !latch) {
+            fault_ = why;
+        }
     }
 
     void show(bool watched) noexcept {
@@ -128,20 +183,35 @@ private:
         was_ok_ = healthy;
         ok = healthy;
         fault = watched ? fault_ != alive : enable.get();
-        if (!watched) reason = enable ? bad_parameter : disabled;
-        else reason = fault_ != alive ? fault_ : healthy ? std::uint32_t{alive} : std::uint32_t{waiting};
+        if (!watched) {
+            reason = enable ? bad_parameter : disabled;
+        } else {
+            reason = fault_ != alive ? fault_
+                     : healthy       ? std::uint32_t{alive}
+                                     : std::uint32_t{waiting};
+        }
         age = static_cast<double>(age_ns_) * 1e-9;
         interval = static_cast<double>(interval_ns_) * 1e-9;
     }
 
-    std::int64_t age_ns_ = 0, interval_ns_ = 0;
-    std::uint32_t last_counter_ = 0, good_ = 0, bad_ = 0, fault_ = alive;
-    bool last_toggle_ = false, was_watched_ = false, was_reset_ = false, first_ = true, was_ok_ = false;
+    std::int64_t age_ns_ = 0;
+    std::int64_t interval_ns_ = 0;
+    std::uint32_t last_counter_ = 0;
+    std::uint32_t good_ = 0;
+    std::uint32_t bad_ = 0;
+    std::uint32_t fault_ = alive;
+    bool last_toggle_ = false;
+    bool was_watched_ = false;
+    bool was_reset_ = false;
+    bool first_ = true;
+
+    bool was_ok_ = false;
 };
 
 }  // namespace
 
-HAL_COMPONENT(HeartbeatMonitor, "heartbeat_monitor", "Monitors a heartbeat: a toggling bit or a counter", R"(
+HAL_COMPONENT(HeartbeatMonitor, "heartbeat_monitor",
+              "Monitors a heartbeat: a toggling bit or a counter", R"(
 Monitors a heartbeat, such as a toggling bit or an increasing counter (the life counter of a bus node, another computer, a user-space
 program). The time between two heartbeats must be within `min-time` and `timeout` (a window watchdog). `ok` becomes TRUE after
 `heartbeats-needed` valid heartbeats. A timeout is an immediate fault; early or skipped heartbeats are a fault if more than `misses-allowed`

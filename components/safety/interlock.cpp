@@ -13,36 +13,57 @@ struct Interlock : hal::Component {
 
     hal::Argument inputs{*this, "inputs", 8, "number of conditions", {.min = 1, .max = 64}};
     hal::Ins<bool> in{*this, "in-##", inputs, "condition ##: TRUE is good"};
-    hal::Ins<double> delay{*this, "delay-##", inputs, "time for which condition ## must be bad before it trips", {.unit = "s"}};
-    hal::In<std::uint64_t> use{*this, "use-mask", "bit n: condition n is monitored", {.initial = ~std::uint64_t{0}}};
+    hal::Ins<double> delay{*this,
+                           "delay-##",
+                           inputs,
+                           "time for which condition ## must be bad before it trips",
+                           {.unit = "s"}};
+    hal::In<std::uint64_t> use{
+        *this, "use-mask", "bit n: condition n is monitored", {.initial = ~std::uint64_t{0}}};
     hal::In<std::uint64_t> invert{*this, "invert-mask", "bit n: condition n is good when FALSE"};
-    hal::In<std::uint64_t> latch{*this, "latch-mask", "bit n: condition n is latched until reset", {.initial = ~std::uint64_t{0}}};
+    hal::In<std::uint64_t> latch{*this,
+                                 "latch-mask",
+                                 "bit n: condition n is latched until reset",
+                                 {.initial = ~std::uint64_t{0}}};
     hal::In<std::uint64_t> warn{*this, "warn-mask", "bit n: condition n only warns"};
-    hal::In<std::uint64_t> bypass{*this, "bypass-mask", "bit n: condition n is bypassed while bypass-enable is TRUE"};
+    hal::In<std::uint64_t> bypass{*this, "bypass-mask",
+                                  "bit n: condition n is bypassed while bypass-enable is TRUE"};
     hal::In<bool> bypass_enable{*this, "bypass-enable", "TRUE enables the bypass (key switch)"};
-    hal::OptionalLimit bypass_time{*this, "bypass-time", "maximum duration of a bypass; 0: no limit", {.unit = "s"}};
-    hal::In<bool> acknowledge{*this, "acknowledge", "a rising edge turns off the horn and stops the flashing"};
-    hal::In<bool> reset{*this, "reset", "a rising edge clears latched conditions that are good again"};
-    hal::In<bool> start_needs_reset{*this, "start-needs-reset", "TRUE: ok also requires a reset after the start", {.initial = true}};
+    hal::OptionalLimit bypass_time{
+        *this, "bypass-time", "maximum duration of a bypass; 0: no limit", {.unit = "s"}};
+    hal::In<bool> acknowledge{*this, "acknowledge",
+                              "a rising edge turns off the horn and stops the flashing"};
+    hal::In<bool> reset{*this, "reset",
+                        "a rising edge clears latched conditions that are good again"};
+    hal::In<bool> start_needs_reset{*this,
+                                    "start-needs-reset",
+                                    "TRUE: ok also requires a reset after the start",
+                                    {.initial = true}};
 
     hal::Out<bool> ok{*this, "ok", "TRUE: all monitored conditions are good", {.safe = false}};
     hal::Out<bool> ready{*this, "ready-to-reset", "TRUE: a reset would set ok"};
     hal::Out<bool> warning{*this, "warning", "TRUE: a condition in warn-mask is bad"};
     hal::Out<bool> bypassed{*this, "bypassed", "TRUE: a monitored condition is bypassed"};
     hal::Out<bool> horn{*this, "horn", "TRUE: a further condition has tripped; until acknowledge"};
-    hal::Out<std::int32_t> first{*this, "first", "number of the condition that cleared ok first; -1: none", {.initial = -1}};
-    hal::Out<std::uint64_t> first_mask{*this, "first-mask", "bits of all conditions that tripped in that cycle"};
+    hal::Out<std::int32_t> first{
+        *this, "first", "number of the condition that cleared ok first; -1: none", {.initial = -1}};
+    hal::Out<std::uint64_t> first_mask{*this, "first-mask",
+                                       "bits of all conditions that tripped in that cycle"};
     hal::Out<std::uint64_t> bad{*this, "bad-mask", "bits of the conditions that are bad"};
-    hal::Out<std::uint64_t> tripped{*this, "tripped-mask", "bits of the conditions that are bad or latched"};
-    hal::Out<double> since{*this, "since", "time for which ok has been FALSE", {.unit = "s", .finite = true}};
+    hal::Out<std::uint64_t> tripped{*this, "tripped-mask",
+                                    "bits of the conditions that are bad or latched"};
+    hal::Out<double> since{
+        *this, "since", "time for which ok has been FALSE", {.unit = "s", .finite = true}};
     hal::Out<std::uint32_t> trips{*this, "trips", "number of times ok became FALSE"};
     hal::Outs<bool> lamp{*this, "lamp-##", inputs, "lamp of condition ##: see the table"};
 
     hal::Function run{*this, "", &Interlock::update, "evaluates the conditions"};
 
     void update(hal::Cycle cycle) noexcept {
-        const bool pressed = reset && !was_reset_, heard = acknowledge && !was_acknowledged_;
-        was_reset_ = reset, was_acknowledged_ = acknowledge;
+        const bool pressed = reset && !was_reset_;
+        const bool heard = acknowledge && !was_acknowledged_;
+        was_reset_ = reset;
+        was_acknowledged_ = acknowledge;
         const double dt = cycle.seconds();
         phase_ns_ = (phase_ns_ + cycle.period_ns()) % second_ns;
         const std::uint64_t watched = use & everything();
@@ -51,17 +72,27 @@ struct Interlock : hal::Component {
         const bool key = bypass_enable && !(bypass_time > 0.0 && bypass_for_ > bypass_time);
         const std::uint64_t skipped = key ? bypass & watched : 0;
 
-        const std::uint64_t now = look(watched & ~skipped, dt), fresh = now & ~tripped_;
+        const std::uint64_t now = look(watched & ~skipped, dt);
+        const std::uint64_t fresh = now & ~tripped_;
         const std::uint64_t stops = ~warn.get();
         tripped_ = (tripped_ & latch & watched & ~skipped) | now;
-        if (pressed) tripped_ = now;
+        if (pressed) {
+            tripped_ = now;
+        }
         unheard_ = (unheard_ | fresh) & tripped_;
-        if (heard) unheard_ = 0;
+        if (heard) {
+            unheard_ = 0;
+        }
 
-        // After a stop of the runtime, which wrote the safe value, and at the start ok waits for a reset.
-        if (!has_run_ ? start_needs_reset.get() : was_ok_ && !ok) waits_ = true;
+        // After a stop of the runtime, which wrote the safe value, and at the start ok waits for a
+        // reset.
+        if (!has_run_ ? start_needs_reset.get() : was_ok_ && !ok) {
+            waits_ = true;
+        }
         has_run_ = true;
-        if (pressed && (tripped_ & stops) == 0) waits_ = false;
+        if (pressed && (tripped_ & stops) == 0) {
+            waits_ = false;
+        }
         const bool healthy = (tripped_ & stops) == 0 && !waits_;
         if (was_ok_ && !healthy) {
             trips = trips + 1;
@@ -69,15 +100,20 @@ struct Interlock : hal::Component {
         } else if (!healthy) {
             since_ = std::min(since_ + dt, 1e9);
         }
-        if (healthy || (tripped_ & stops) == 0) first_ = 0;
-        else if (first_ == 0) first_ = (fresh & stops) != 0 ? fresh & stops : tripped_ & stops;
+        if (healthy || (tripped_ & stops) == 0) {
+            first_ = 0;
+        } else if (first_ == 0) {
+            first_ = (fresh & stops) != 0 ? fresh & stops : tripped_ & stops;
+        }
         was_ok_ = healthy;
         show(healthy, now, stops, skipped != 0);
     }
 
 private:
     static constexpr std::int64_t second_ns = 1'000'000'000;
-    std::uint64_t everything() const noexcept { return in.size() >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << in.size()) - 1; }
+    std::uint64_t everything() const noexcept {
+        return in.size() >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << in.size()) - 1;
+    }
 
     /// The conditions among `watched` that are bad for as long as they have to be.
     std::uint64_t look(std::uint64_t watched, double dt) noexcept {
@@ -85,8 +121,12 @@ private:
         for (std::size_t i = 0; i < in.size(); ++i) {
             const std::uint64_t bit = std::uint64_t{1} << i;
             const bool healthy = in[i] != ((invert & bit) != 0);
-            if (healthy || (watched & bit) == 0) bad_for_[i] = 0.0;
-            else if (!(delay[i] > 0.0) || (bad_for_[i] = std::min(bad_for_[i] + dt, 1e9)) > delay[i] + dt * 1e-6) found |= bit;
+            if (healthy || (watched & bit) == 0) {
+                bad_for_[i] = 0.0;
+            } else if (!(delay[i] > 0.0) ||
+                       (bad_for_[i] = std::min(bad_for_[i] + dt, 1e9)) > delay[i] + dt * 1e-6) {
+                found |= bit;
+            }
         }
         return found;
     }
@@ -102,23 +142,36 @@ private:
         bad = now;
         tripped = tripped_;
         since = healthy ? 0.0 : since_;
-        const bool fast = phase_ns_ % (second_ns / 4) < second_ns / 8, slow = phase_ns_ < second_ns / 2;
+        const bool fast = phase_ns_ % (second_ns / 4) < second_ns / 8;
+
+        const bool slow = phase_ns_ < second_ns / 2;
         for (std::size_t i = 0; i < lamp.size(); ++i) {
             const std::uint64_t bit = std::uint64_t{1} << i;
-            const bool flashing = (unheard_ & bit) != 0, is_first = (first_ & bit) != 0;
-            lamp[i] = is_first && flashing ? fast : is_first || flashing ? slow : (tripped_ & bit) != 0;
+            const bool flashing = (unheard_ & bit) != 0;
+            const bool is_first = (first_ & bit) != 0;
+            lamp[i] = is_first && flashing   ? fast
+                      : is_first || flashing ? slow
+                                             : (tripped_ & bit) != 0;
         }
     }
 
     double bad_for_[64] = {}, since_ = 0.0, bypass_for_ = 0.0;
-    std::uint64_t tripped_ = 0, unheard_ = 0, first_ = 0;
+    std::uint64_t tripped_ = 0;
+    std::uint64_t unheard_ = 0;
+    std::uint64_t first_ = 0;
     std::int64_t phase_ns_ = 0;
-    bool was_reset_ = false, was_acknowledged_ = false, was_ok_ = false, waits_ = false, has_run_ = false;
+    bool was_reset_ = false;
+    bool was_acknowledged_ = false;
+    bool was_ok_ = false;
+    bool waits_ = false;
+
+    bool has_run_ = false;
 };
 
 }  // namespace
 
-HAL_COMPONENT(Interlock, "interlock", "Interlock of up to 64 conditions with first-out annunciation", R"(
+HAL_COMPONENT(Interlock, "interlock",
+              "Interlock of up to 64 conditions with first-out annunciation", R"(
 `ok` is TRUE while every monitored condition is good. When it becomes FALSE, `first` is the number of the condition that tripped first, regardless
 of later ones: the first-out sequence of ISA-18.1. Masks have a bit per condition (bit 0 is `in-00`) and may be written in hexadecimal, as in 0x11.
 

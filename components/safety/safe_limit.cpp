@@ -11,7 +11,13 @@ namespace {
 enum Reaction : std::uint32_t { off = 0, warn = 1, limit = 2, stop_2 = 3, stop_1 = 4, stop_0 = 5 };
 
 /// Values of pin `state`.
-enum State : std::uint32_t { running = 0, braking_2 = 1, standing_2 = 2, braking_1 = 3, powerless = 4 };
+enum State : std::uint32_t {
+    running = 0,
+    braking_2 = 1,
+    standing_2 = 2,
+    braking_1 = 3,
+    powerless = 4
+};
 
 /// Values of pin `reason`; the first cause of a stop is kept.
 enum Reason : std::uint32_t {
@@ -32,42 +38,85 @@ struct SafeLimit : hal::Component {
     using Component::Component;
 
     hal::In<double> position{*this, "position", "measured position"};
-    hal::In<double> velocity{*this, "velocity", "measured velocity; computed from position while unlinked", {.unit = "1/s"}};
+    hal::In<double> velocity{*this,
+                             "velocity",
+                             "measured velocity; computed from position while unlinked",
+                             {.unit = "1/s"}};
     hal::In<double> command{*this, "command", "requested speed", {.unit = "1/s"}};
     hal::In<bool> reset{*this, "reset", "a rising edge ends a stop if its cause no longer exists"};
     hal::In<bool> stop_in{*this, "stop-in", "TRUE requests a stop 1"};
 
     hal::In<double> min_position{*this, "min-position", "lowest position", {.initial = -1e15}};
     hal::In<double> max_position{*this, "max-position", "highest position", {.initial = 1e15}};
-    hal::In<double> max_speed{*this, "max-speed", "maximum speed", {.initial = 1e15, .unit = "1/s"}};
-    hal::In<double> max_slew{*this, "max-slew", "maximum rate of change of the speed", {.initial = 1e15, .unit = "1/s^2"}};
-    hal::Param<std::uint32_t> position_reaction{*this, "position-reaction",
-                                                "0 none; 1 warn; 2 limit; 3 stop 2; 4 stop 1; 5 stop 0", {.initial = stop_1}};
-    hal::Param<std::uint32_t> speed_reaction{*this, "speed-reaction",
-                                             "0 none; 1 warn; 2 limit; 3 stop 2; 4 stop 1; 5 stop 0", {.initial = stop_1}};
-    hal::Param<std::uint32_t> slew_reaction{*this, "slew-reaction",
-                                            "0 none; 1 warn; 2 limit; 3 stop 2; 4 stop 1; 5 stop 0", {.initial = warn}};
-    hal::Param<double> filter_time{*this, "filter-time", "time for which a limit may be exceeded; adds to the reaction time", {.unit = "s"}};
-    hal::Param<double> speed_filter{*this, "speed-filter", "time constant of the speed computed from position", {.unit = "s"}};
-    hal::Param<double> stop_deceleration{*this, "stop-deceleration",
-                                         "deceleration of the command in stops 1 and 2", {.initial = 1.0, .unit = "1/s^2"}};
-    hal::Param<double> stop_time{*this, "stop-time", "a stop 1 or 2 that lasts longer becomes a stop 0", {.initial = 5.0, .unit = "s"}};
-    hal::Param<double> standstill_speed{*this, "standstill-speed", "speed below which the axis counts as stopped", {.initial = 0.01, .unit = "1/s"}};
-    hal::Param<double> standstill_time{*this, "standstill-time",
-                                       "time for which the speed must be below standstill-speed, so that a reversal does not count", {.initial = 0.05, .unit = "s"}};
-    hal::Param<double> standstill_window{*this, "standstill-window", "permitted motion during a stop 2; 0: not monitored"};
+    hal::In<double> max_speed{
+        *this, "max-speed", "maximum speed", {.initial = 1e15, .unit = "1/s"}};
+    hal::In<double> max_slew{*this,
+                             "max-slew",
+                             "maximum rate of change of the speed",
+                             {.initial = 1e15, .unit = "1/s^2"}};
+    hal::Param<std::uint32_t> position_reaction{
+        *this,
+        "position-reaction",
+        "0 none; 1 warn; 2 limit; 3 stop 2; 4 stop 1; 5 stop 0",
+        {.initial = stop_1}};
+    hal::Param<std::uint32_t> speed_reaction{
+        *this,
+        "speed-reaction",
+        "0 none; 1 warn; 2 limit; 3 stop 2; 4 stop 1; 5 stop 0",
+        {.initial = stop_1}};
+    hal::Param<std::uint32_t> slew_reaction{*this,
+                                            "slew-reaction",
+                                            "0 none; 1 warn; 2 limit; 3 stop 2; 4 stop 1; 5 stop 0",
+                                            {.initial = warn}};
+    hal::Param<double> filter_time{
+        *this,
+        "filter-time",
+        "time for which a limit may be exceeded; adds to the reaction time",
+        {.unit = "s"}};
+    hal::Param<double> speed_filter{
+        *this, "speed-filter", "time constant of the speed computed from position", {.unit = "s"}};
+    hal::Param<double> stop_deceleration{*this,
+                                         "stop-deceleration",
+                                         "deceleration of the command in stops 1 and 2",
+                                         {.initial = 1.0, .unit = "1/s^2"}};
+    hal::Param<double> stop_time{*this,
+                                 "stop-time",
+                                 "a stop 1 or 2 that lasts longer becomes a stop 0",
+                                 {.initial = 5.0, .unit = "s"}};
+    hal::Param<double> standstill_speed{*this,
+                                        "standstill-speed",
+                                        "speed below which the axis counts as stopped",
+                                        {.initial = 0.01, .unit = "1/s"}};
+    hal::Param<double> standstill_time{*this,
+                                       "standstill-time",
+                                       "time for which the speed must be below standstill-speed, "
+                                       "so that a reversal does not count",
+                                       {.initial = 0.05, .unit = "s"}};
+    hal::Param<double> standstill_window{*this, "standstill-window",
+                                         "permitted motion during a stop 2; 0: not monitored"};
 
-    hal::Out<double> command_out{*this, "command-out", "permitted speed command", {.unit = "1/s", .safe = 0.0, .finite = true}};
+    hal::Out<double> command_out{*this,
+                                 "command-out",
+                                 "permitted speed command",
+                                 {.unit = "1/s", .safe = 0.0, .finite = true}};
     hal::Out<bool> power{*this, "power", "TRUE enables the power of the drive", {.safe = false}};
-    hal::Out<bool> ok{*this, "ok", "TRUE: no limit is exceeded and no stop is active", {.safe = false}};
+    hal::Out<bool> ok{
+        *this, "ok", "TRUE: no limit is exceeded and no stop is active", {.safe = false}};
     hal::Out<bool> warning{*this, "warning", "TRUE: a limit is exceeded"};
     hal::Out<bool> limiting{*this, "limiting", "TRUE: command-out is reduced"};
     hal::Out<bool> stopping{*this, "stop", "TRUE: a stop is active, until reset"};
-    hal::Out<std::uint32_t> state{*this, "state",
-                                  "0 running; 1 braking, 2 stopped in stop 2; 3 braking in stop 1; 4 power off", {.initial = powerless}};
-    hal::Out<std::uint32_t> reason{*this, "reason", "cause of the stop, or limit that is exceeded; see the table", {.initial = not_reset}};
+    hal::Out<std::uint32_t> state{
+        *this,
+        "state",
+        "0 running; 1 braking, 2 stopped in stop 2; 3 braking in stop 1; 4 power off",
+        {.initial = powerless}};
+    hal::Out<std::uint32_t> reason{*this,
+                                   "reason",
+                                   "cause of the stop, or limit that is exceeded; see the table",
+                                   {.initial = not_reset}};
     hal::Out<double> speed_out{*this, "speed", "monitored speed", {.unit = "1/s", .finite = true}};
-    hal::Out<double> slew_out{*this, "slew", "monitored rate of change of the speed", {.unit = "1/s^2", .finite = true}};
+    hal::Out<double> slew_out{
+        *this, "slew", "monitored rate of change of the speed", {.unit = "1/s^2", .finite = true}};
 
     hal::Function run{*this, "", &SafeLimit::update, "monitors the axis and passes the command"};
 
@@ -76,18 +125,28 @@ struct SafeLimit : hal::Component {
         const bool pressed = reset && !was_reset_;
         was_reset_ = reset;
         // The host wrote the safe value (stop, a fault): a reset is required.
-        if (state_ != powerless && !power && has_run_) trip(powerless, not_reset);
+        if (state_ != powerless && !power && has_run_) {
+            trip(powerless, not_reset);
+        }
         has_run_ = true;
 
         const bool measured = measure(dt);
         const std::uint32_t found = check(measured, dt);
         const bool sound = parameters_sound();
-        if (!sound) trip(powerless, bad_parameter);
-        else if (!measured) trip(powerless, no_number);
-        else if (stop_in) trip(braking_1, asked);
-        else if (pressed && state_ != running && (may_return_ || !stops(found))) release(found);
-        else if (stops(found)) trip(state_of(reaction(found)), found);
-        if (sound && measured) follow_stop(dt);
+        if (!sound) {
+            trip(powerless, bad_parameter);
+        } else if (!measured) {
+            trip(powerless, no_number);
+        } else if (stop_in) {
+            trip(braking_1, asked);
+        } else if (pressed && state_ != running && (may_return_ || !stops(found))) {
+            release(found);
+        } else if (stops(found)) {
+            trip(state_of(reaction(found)), found);
+        }
+        if (sound && measured) {
+            follow_stop(dt);
+        }
         pass(found, dt);
     }
 
@@ -95,9 +154,11 @@ private:
     static bool usable(double x) noexcept { return std::fabs(x) <= 1e15; }
 
     bool parameters_sound() const noexcept {
-        return min_position <= max_position && max_speed >= 0.0 && max_slew >= 0.0 && filter_time >= 0.0 && stop_deceleration > 0.0 &&
-               stop_time >= 0.0 && standstill_speed >= 0.0 && standstill_time >= 0.0 && standstill_window >= 0.0 &&
-               std::max({position_reaction.get(), speed_reaction.get(), slew_reaction.get()}) <= stop_0;
+        return min_position <= max_position && max_speed >= 0.0 && max_slew >= 0.0 &&
+               filter_time >= 0.0 && stop_deceleration > 0.0 && stop_time >= 0.0 &&
+               standstill_speed >= 0.0 && standstill_time >= 0.0 && standstill_window >= 0.0 &&
+               std::max({position_reaction.get(), speed_reaction.get(), slew_reaction.get()}) <=
+                   stop_0;
     }
 
     bool measure(double dt) noexcept {
@@ -105,25 +166,32 @@ private:
             known_ = 0;
             return false;
         }
-        const double raw = velocity.linked() ? velocity.get() : known_ > 0 ? (position - position_) / dt : 0.0;
-        const double share = !velocity.linked() && speed_filter > 0.0 ? dt / (speed_filter + dt) : 1.0;
+        const double raw = velocity.linked() ? velocity.get()
+                           : known_ > 0      ? (position - position_) / dt
+                                             : 0.0;
+        const double share =
+            !velocity.linked() && speed_filter > 0.0 ? dt / (speed_filter + dt) : 1.0;
         const double before = speed_;
         speed_ = known_ > 0 ? speed_ + share * (raw - speed_) : raw;
         slew_ = known_ > (velocity.linked() ? 0 : 1) ? (speed_ - before) / dt : 0.0;
-        if (!std::isfinite(slew_)) slew_ = 0.0;
+        if (!std::isfinite(slew_)) {
+            slew_ = 0.0;
+        }
         position_ = position;
         known_ = std::min(known_ + 1, 2);
         return true;
     }
 
     std::uint32_t reaction(std::uint32_t what) const noexcept {
-        if (what == returning_ && what != none) return std::min<std::uint32_t>(position_reaction, warn);
+        if (what == returning_ && what != none) {
+            return std::min<std::uint32_t>(position_reaction, warn);
+        }
         switch (what) {
-            case position_below:
-            case position_above: return position_reaction;
-            case speed: return speed_reaction;
-            case slew: return slew_reaction;
-            default: return off;
+        case position_below:
+        case position_above: return position_reaction;
+        case speed: return speed_reaction;
+        case slew: return slew_reaction;
+        default: return off;
         }
     }
     bool stops(std::uint32_t what) const noexcept { return reaction(what) >= stop_2; }
@@ -131,12 +199,16 @@ private:
         return of_reaction == stop_2 ? braking_2 : of_reaction == stop_1 ? braking_1 : powerless;
     }
 
-    /// What has been exceeded for longer than the filter time; of several what has the strongest reaction.
+    /// What has been exceeded for longer than the filter time; of several what has the strongest
+    /// reaction.
     std::uint32_t check(bool measured, double dt) noexcept {
-        const bool exceeded[] = {position < min_position, position > max_position, std::fabs(speed_) > max_speed,
-                                 std::fabs(slew_) > max_slew};
+        const bool exceeded[] = {position<min_position, position> max_position,
+                                 std::fabs(speed_) > max_speed, std::fabs(slew_) > max_slew};
         const double outwards = returning_ == position_above ? speed_ : -speed_;
-        if (returning_ != none && measured && (!exceeded[returning_ - 1] || outwards > standstill_speed)) returning_ = none;
+        if (returning_ != none && measured &&
+            (!exceeded[returning_ - 1] || outwards > standstill_speed)) {
+            returning_ = none;
+        }
         std::uint32_t worst = none;
         for (std::uint32_t what = position_below; what <= slew; ++what) {
             double& since = since_[what];
@@ -146,16 +218,21 @@ private:
             }
             since += dt;
             if (since <= filter_time + dt * 1e-6 && filter_time > 0.0) continue;
-            if (worst == none || reaction(what) > reaction(worst)) worst = what;
+            if (worst == none || reaction(what) > reaction(worst)) {
+                worst = what;
+            }
         }
-        may_return_ = (worst == position_below || worst == position_above) && std::fabs(speed_) <= standstill_speed;
+        may_return_ = (worst == position_below || worst == position_above) &&
+                      std::fabs(speed_) <= standstill_speed;
         return worst;
     }
 
     /// A stronger stop takes over from a weaker one; the first reason stays.
     void trip(std::uint32_t to, std::uint32_t why) noexcept {
         returning_ = none;
-        if (reason_ == not_reset) reason_ = why;  // what keeps the reset from helping
+        if (reason_ == not_reset) {
+            reason_ = why;  // what keeps the reset from helping
+        }
         if (state_ == running) {
             reason_ = why;
             lasted_ = stood_for_ = 0.0;
@@ -167,7 +244,9 @@ private:
         }
     }
     void release(std::uint32_t found) noexcept {
-        if (may_return_) returning_ = found;  // until it is back within, or moves outwards
+        if (may_return_) {
+            returning_ = found;  // until it is back within, or moves outwards
+        }
         state_ = running;
         reason_ = none;
         given_ = 0.0;
@@ -179,8 +258,12 @@ private:
         stood_for_ = std::fabs(speed_) <= standstill_speed && given_ == 0.0 ? stood_for_ + dt : 0.0;
         const bool stands = stood_for_ > standstill_time + dt * 1e-6;
         if (state_ == standing_2) {
-            const bool moved = standstill_window > 0.0 && std::fabs(position_ - stood_at_) > standstill_window;
-            if (moved) state_ = powerless, reason_ = did_not_stand;
+            const bool moved =
+                standstill_window > 0.0 && std::fabs(position_ - stood_at_) > standstill_window;
+            if (moved) {
+                state_ = powerless;
+                reason_ = did_not_stand;
+            }
         } else if (stands) {
             stood_at_ = position_;
             state_ = state_ == braking_2 ? standing_2 : powerless;
@@ -199,12 +282,20 @@ private:
             given_ = std::fabs(given_) <= less ? 0.0 : given_ - std::copysign(less, given_);
         } else {
             double allowed = wanted;
-            if (speed_reaction == limit) allowed = std::clamp(allowed, -max_speed, +max_speed);
-            if (slew_reaction == limit) allowed = std::clamp(allowed, given_ - max_slew * dt, given_ + max_slew * dt);
+            if (speed_reaction == limit) {
+                allowed = std::clamp(allowed, -max_speed, +max_speed);
+            }
+            if (slew_reaction == limit) {
+                allowed = std::clamp(allowed, given_ - max_slew * dt, given_ + max_slew * dt);
+            }
             // Inwards is always free; also out of a place in which a reset was given.
             if (position_reaction != off && position_reaction != warn) {
-                if (position_ >= max_position) allowed = std::min(allowed, 0.0);
-                if (position_ <= min_position) allowed = std::max(allowed, 0.0);
+                if (position_ >= max_position) {
+                    allowed = std::min(allowed, 0.0);
+                }
+                if (position_ <= min_position) {
+                    allowed = std::max(allowed, 0.0);
+                }
             }
             given_ = allowed;
         }
@@ -220,16 +311,28 @@ private:
         slew_out = slew_;
     }
 
-    double position_ = 0.0, speed_ = 0.0, slew_ = 0.0, given_ = 0.0, lasted_ = 0.0, stood_for_ = 0.0, stood_at_ = 0.0;
+    double position_ = 0.0;
+    double speed_ = 0.0;
+    double slew_ = 0.0;
+    double given_ = 0.0;
+    double lasted_ = 0.0;
+
+    double stood_for_ = 0.0;
+    double stood_at_ = 0.0;
     double since_[5] = {};
-    std::uint32_t state_ = powerless, reason_ = not_reset, returning_ = none;
+    std::uint32_t state_ = powerless;
+    std::uint32_t reason_ = not_reset;
+    std::uint32_t returning_ = none;
     int known_ = 0;  // measurements so far: speed needs two, slew three
-    bool was_reset_ = false, has_run_ = false, may_return_ = false;
+    bool was_reset_ = false;
+    bool has_run_ = false;
+    bool may_return_ = false;
 };
 
 }  // namespace
 
-HAL_COMPONENT(SafeLimit, "safe_limit", "Supervision of position, speed and slew, with warning, limiting and stops", R"(
+HAL_COMPONENT(SafeLimit, "safe_limit",
+              "Supervision of position, speed and slew, with warning, limiting and stops", R"(
 Limits the speed command of an axis before it reaches the drive, and monitors the axis. Every limit has a reaction as defined in
 IEC 60204-1 (9.2.2, stop categories) and IEC 61800-5-2 (SLP, SLS, SLA with STO, SS1, SS2):
 

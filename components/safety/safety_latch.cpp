@@ -5,26 +5,39 @@ namespace {
 
 struct SafetyLatch : hal::Component {
     using Component::Component;
-    hal::In<bool>          error_in{*this, "error-in", "TRUE: error in this cycle"};
-    hal::In<std::int32_t>  heal{*this, "heal", "decrement of the count in a cycle without error", {.initial = 1}};  // language: quoted (LinuxCNC's name)
-    hal::In<std::int32_t>  harm{*this, "harm", "increment of the count in a cycle with an error", {.initial = 1}};
-    hal::In<bool>          latching{*this, "latching", "TRUE: the error remains until reset; FALSE: until the count is at or below threshold",
-                                    {.initial = true}};
-    hal::In<bool>          reset{*this, "reset", "a rising edge clears the count and the error"};
-    hal::In<std::int32_t>  threshold{*this, "threshold", "a count above this is an error", {.initial = 100}};
-    hal::In<std::int32_t>  min{*this, "min", "smallest count", {.initial = 0}};
-    hal::In<std::int32_t>  max{*this, "max", "largest count", {.initial = 1000}};
-    hal::In<bool>          enable{*this, "enable", "FALSE copies error-in to error-out", {.initial = true}};
+    hal::In<bool> error_in{*this, "error-in", "TRUE: error in this cycle"};
+    // language: quoted (LinuxCNC's name)
+    hal::In<std::int32_t> heal{
+        *this, "heal", "decrement of the count in a cycle without error", {.initial = 1}};
+    hal::In<std::int32_t> harm{
+        *this, "harm", "increment of the count in a cycle with an error", {.initial = 1}};
+    hal::In<bool> latching{
+        *this,
+        "latching",
+        "TRUE: the error remains until reset; FALSE: until the count is at or below threshold",
+        {.initial = true}};
+    hal::In<bool> reset{*this, "reset", "a rising edge clears the count and the error"};
+    hal::In<std::int32_t> threshold{
+        *this, "threshold", "a count above this is an error", {.initial = 100}};
+    hal::In<std::int32_t> min{*this, "min", "smallest count", {.initial = 0}};
+    hal::In<std::int32_t> max{*this, "max", "largest count", {.initial = 1000}};
+    hal::In<bool> enable{*this, "enable", "FALSE copies error-in to error-out", {.initial = true}};
     hal::Out<std::int32_t> count{*this, "count", "current count"};
-    hal::Out<bool>         error_out{*this, "error-out", "TRUE: error", {.safe = true}};
-    hal::Out<bool>         ok_out{*this, "ok-out", "inverse of error-out", {.initial = true, .safe = false}};
-    hal::Function          run{*this, "", &SafetyLatch::update, "counts the errors"};
+    hal::Out<bool> error_out{*this, "error-out", "TRUE: error", {.safe = true}};
+    hal::Out<bool> ok_out{
+        *this, "ok-out", "inverse of error-out", {.initial = true, .safe = false}};
+    hal::Function run{*this, "", &SafetyLatch::update, "counts the errors"};
 
     void update(hal::Cycle) noexcept {
         const bool cleared = reset && !was_reset_;
         was_reset_ = reset;
-        if (!enable || cleared) count_ = 0, latched_ = false;
-        if (enable) count_ += error_in ? std::int64_t{harm} : -std::int64_t{heal};
+        if (!enable || cleared) {
+            count_ = 0;
+            latched_ = false;
+        }
+        if (enable) {
+            count_ += error_in ? std::int64_t{harm} : -std::int64_t{heal};
+        }
         count_ = std::min(std::max(count_, std::int64_t{min}), std::int64_t{max});
         const bool above = count_ > threshold;
         latched_ = above || (latched_ && latching);
@@ -36,7 +49,8 @@ struct SafetyLatch : hal::Component {
 
 private:
     std::int64_t count_ = 0;
-    bool latched_ = false, was_reset_ = false;
+    bool latched_ = false;
+    bool was_reset_ = false;
 };
 
 }  // namespace

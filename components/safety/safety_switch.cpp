@@ -7,7 +7,8 @@
 
 namespace {
 
-/// The values of the public pin `reason`; from `first_fault` on they are faults. Never renumber them.
+/// The values of the public pin `reason`; from `first_fault` on they are faults. Never renumber
+/// them.
 enum Reason : std::uint32_t {
     is_safe = 0,
     contacts_open = 1,
@@ -27,13 +28,21 @@ enum Reason : std::uint32_t {
 
 /// The parameters of a cycle in nanoseconds.
 struct Times {
-    std::int64_t discrepancy, debounce, filter, reset_min, reset_max, test_period, test_width, test_response;
+    std::int64_t discrepancy, debounce, filter, reset_min, reset_max, test_period, test_width,
+        test_response;
 
-    static std::int64_t ns(double seconds) noexcept { return seconds >= 0.0 && seconds <= 1e6 ? std::llround(seconds * 1e9) : -1; }
+    static std::int64_t ns(double seconds) noexcept {
+        return seconds >= 0.0 && seconds <= 1e6 ? std::llround(seconds * 1e9) : -1;
+    }
     /// True if no value is negative or NaN and both test pulses fit into their period.
     bool sound(std::int64_t period_ns) const noexcept {
-        if (std::min({discrepancy, debounce, filter, reset_min, test_period, test_width, test_response}) < 0 || reset_max < reset_min) return false;
-        return test_period == 0 || (test_width >= period_ns && 2 * (test_width + test_response + period_ns) <= test_period);
+        if (std::min({discrepancy, debounce, filter, reset_min, test_period, test_width,
+                      test_response}) < 0 ||
+            reset_max < reset_min) {
+            return false;
+        }
+        return test_period == 0 || (test_width >= period_ns &&
+                                    2 * (test_width + test_response + period_ns) <= test_period);
     }
 };
 
@@ -43,17 +52,27 @@ struct Contact {
     std::int64_t differs_ns = 0;
 
     void follow(bool now, const Times& times, std::int64_t period_ns) noexcept {
-        if (now == closed) differs_ns = 0;
-        else if (differs_ns >= (now ? times.debounce : times.filter)) closed = now, differs_ns = 0;
-        else differs_ns += period_ns;
+        if (now == closed) {
+            differs_ns = 0;
+        } else if (differs_ns >= (now ? times.debounce : times.filter)) {
+            closed = now;
+            differs_ns = 0;
+        } else {
+            differs_ns += period_ns;
+        }
     }
 };
 
-/// The test pulses on the two outputs that feed the contacts: on A at the start of a test period, on B half a period later.
+/// The test pulses on the two outputs that feed the contacts: on A at the start of a test period,
+/// on B half a period later.
 class PulseTest {
 public:
-    bool feed_a = true, feed_b = true;      // levels of the outputs
-    bool hides_a = false, hides_b = false;  // a test pulse makes this contact appear open
+    bool feed_a = true;
+
+public:
+    bool feed_b = true;      // levels of the outputs
+    bool hides_a = false;
+    bool hides_b = false;  // a test pulse makes this contact appear open
 
     /// Runs one cycle; returns the fault found or 0. `a` and `b` are the levels at the inputs.
     std::uint32_t step(bool a, bool b, const Times& times, std::int64_t period_ns) noexcept {
@@ -76,24 +95,38 @@ public:
         }
         idle_ns_ += period_ns;
         pulse_ns_ += period_ns;
-        const bool tested = on_b_ ? b : a, other = on_b_ ? a : b;
+        const bool tested = on_b_ ? b : a;
+        const bool other = on_b_ ? a : b;
         bool& feed = on_b_ ? feed_b : feed_a;
         if (!feed) {
             other_dropped_ = other_dropped_ || (other_was_high_ && !other);
             if (pulse_ns_ < times.test_width) return 0;
-            if (tested_was_high_ && tested) found = on_b_ ? test_b_failed : test_a_failed;
+            if (tested_was_high_ && tested) {
+                found = on_b_ ? test_b_failed : test_a_failed;
+            }
             feed = true;
         }
         if (pulse_ns_ < times.test_width + times.test_response) return found;
-        if (other_dropped_ && other) found = cross_short;  // it returned with the end of the pulse: it is fed by the same wire
+        // it returned with the end of the pulse: it is fed by the same wire
+        if (other_dropped_ && other) {
+            found = cross_short;
+        }
         hides_a = hides_b = false;
         pulse_ns_ = -1;
         return found;
     }
 
 private:
-    std::int64_t idle_ns_ = 0, pulse_ns_ = -1;  // since the start of the last pulse; since the start of this one, or -1
-    bool on_b_ = true, tested_was_high_ = false, other_was_high_ = false, other_dropped_ = false;
+    // since the start of the last pulse; since the start of this one, or -1
+    std::int64_t idle_ns_ = 0;
+
+private:
+    // since the start of the last pulse; since the start of this one, or -1
+    std::int64_t pulse_ns_ = -1;
+    bool on_b_ = true;
+    bool tested_was_high_ = false;
+    bool other_was_high_ = false;
+    bool other_dropped_ = false;
 };
 
 struct SafetySwitch : hal::Component {
@@ -103,40 +136,93 @@ struct SafetySwitch : hal::Component {
     hal::In<bool> in_b{*this, "in-b", "contact B: TRUE while closed"};
     hal::In<bool> reset{*this, "reset", "reset button"};
     hal::Out<bool> safe{*this, "safe", "TRUE: the machine may move", {.safe = false}};
-    hal::Out<bool> fault{*this, "fault", "TRUE: fault of the switch, its wiring, the button or a parameter"};
+    hal::Out<bool> fault{*this, "fault",
+                         "TRUE: fault of the switch, its wiring, the button or a parameter"};
     hal::Out<bool> ready{*this, "ready-to-reset", "TRUE: a reset would be accepted"};
-    hal::Out<std::uint32_t> reason{*this, "reason", "reason why safe is FALSE: see the table", {.initial = contacts_open}};
-    hal::Out<bool> test_a{*this, "test-a", "supply of contact A: TRUE, with short test pulses to FALSE", {.initial = true, .safe = false}};
-    hal::Out<bool> test_b{*this, "test-b", "supply of contact B: TRUE, with short test pulses to FALSE", {.initial = true, .safe = false}};
+    hal::Out<std::uint32_t> reason{
+        *this, "reason", "reason why safe is FALSE: see the table", {.initial = contacts_open}};
+    hal::Out<bool> test_a{*this,
+                          "test-a",
+                          "supply of contact A: TRUE, with short test pulses to FALSE",
+                          {.initial = true, .safe = false}};
+    hal::Out<bool> test_b{*this,
+                          "test-b",
+                          "supply of contact B: TRUE, with short test pulses to FALSE",
+                          {.initial = true, .safe = false}};
 
-    hal::Param<bool> antivalent{*this, "antivalent", "TRUE: A closed and B open is safe; FALSE: both closed are safe"};
-    hal::Param<double> discrepancy_time{*this, "discrepancy-time", "maximum time for which the contacts may disagree", {.initial = 0.5, .unit = "s"}};
-    hal::Param<double> debounce_time{*this, "debounce-time", "time for which a contact must be stable before it counts as safe", {.initial = 0.01, .unit = "s"}};
-    hal::Param<double> filter_time{*this, "filter-time", "time for which a contact must be unsafe before it trips; adds to the reaction time", {.unit = "s"}};
-    hal::Param<std::uint32_t> reset_mode{*this, "reset-mode", "0: no reset; 1: reset on press; 2: reset on release after a press of valid duration", {.initial = 2}};
-    hal::Param<double> reset_min{*this, "reset-min-time", "mode 2: minimum duration of a press", {.initial = 0.05, .unit = "s"}};
-    hal::Param<double> reset_max{*this, "reset-max-time", "mode 2: maximum duration of a press; after it the button counts as stuck", {.initial = 3.0, .unit = "s"}};
-    hal::Param<double> test_period{*this, "test-period", "period of the test pulses on a contact; 0: no test pulses", {.unit = "s"}};
-    hal::Param<double> test_width{*this, "test-width", "duration of a test pulse; must exceed the round trip through the I/O", {.initial = 0.003, .unit = "s"}};
-    hal::Param<double> test_response{*this, "test-response", "maximum time for an input to return after a test pulse", {.initial = 0.003, .unit = "s"}};
+    hal::Param<bool> antivalent{*this, "antivalent",
+                                "TRUE: A closed and B open is safe; FALSE: both closed are safe"};
+    hal::Param<double> discrepancy_time{*this,
+                                        "discrepancy-time",
+                                        "maximum time for which the contacts may disagree",
+                                        {.initial = 0.5, .unit = "s"}};
+    hal::Param<double> debounce_time{
+        *this,
+        "debounce-time",
+        "time for which a contact must be stable before it counts as safe",
+        {.initial = 0.01, .unit = "s"}};
+    hal::Param<double> filter_time{
+        *this,
+        "filter-time",
+        "time for which a contact must be unsafe before it trips; adds to the reaction time",
+        {.unit = "s"}};
+    hal::Param<std::uint32_t> reset_mode{
+        *this,
+        "reset-mode",
+        "0: no reset; 1: reset on press; 2: reset on release after a press of valid duration",
+        {.initial = 2}};
+    hal::Param<double> reset_min{*this,
+                                 "reset-min-time",
+                                 "mode 2: minimum duration of a press",
+                                 {.initial = 0.05, .unit = "s"}};
+    hal::Param<double> reset_max{
+        *this,
+        "reset-max-time",
+        "mode 2: maximum duration of a press; after it the button counts as stuck",
+        {.initial = 3.0, .unit = "s"}};
+    hal::Param<double> test_period{*this,
+                                   "test-period",
+                                   "period of the test pulses on a contact; 0: no test pulses",
+                                   {.unit = "s"}};
+    hal::Param<double> test_width{
+        *this,
+        "test-width",
+        "duration of a test pulse; must exceed the round trip through the I/O",
+        {.initial = 0.003, .unit = "s"}};
+    hal::Param<double> test_response{*this,
+                                     "test-response",
+                                     "maximum time for an input to return after a test pulse",
+                                     {.initial = 0.003, .unit = "s"}};
 
     hal::Function run{*this, "", &SafetySwitch::update, "monitors contacts, wiring and button"};
 
     void update(hal::Cycle cycle) noexcept {
         const std::int64_t period_ns = cycle.period_ns();
-        const Times times{Times::ns(discrepancy_time), Times::ns(debounce_time), Times::ns(filter_time), Times::ns(reset_min),
-                          Times::ns(reset_max), Times::ns(test_period), Times::ns(test_width), Times::ns(test_response)};
+        const Times times{Times::ns(discrepancy_time), Times::ns(debounce_time),
+                          Times::ns(filter_time),      Times::ns(reset_min),
+                          Times::ns(reset_max),        Times::ns(test_period),
+                          Times::ns(test_width),       Times::ns(test_response)};
         // The host wrote the safe value (stop, a fault): a reset is required as after opening.
-        if (state_ == is_safe && !safe) state_ = waits_for_reset;
+        if (state_ == is_safe && !safe) {
+            state_ = waits_for_reset;
+        }
 
         const bool sound = times.sound(period_ns) && reset_mode <= 2;
-        const std::uint32_t broken = !sound ? std::uint32_t{bad_parameters} : test_.step(in_a, in_b, times, period_ns);
-        if (!test_.hides_a) a_.follow(in_a, times, period_ns);
-        if (!test_.hides_b) b_.follow(antivalent ? !in_b : in_b.get(), times, period_ns);
+        const std::uint32_t broken =
+            !sound ? std::uint32_t{bad_parameters} : test_.step(in_a, in_b, times, period_ns);
+        if (!test_.hides_a) {
+            a_.follow(in_a, times, period_ns);
+        }
+        if (!test_.hides_b) {
+            b_.follow(antivalent ? !in_b : in_b.get(), times, period_ns);
+        }
 
         const bool accepted = press(times, period_ns);
-        if (broken != 0) state_ = broken;
-        else move(accepted, times, period_ns);
+        if (broken != 0) {
+            state_ = broken;
+        } else {
+            move(accepted, times, period_ns);
+        }
 
         test_a = test_.feed_a;
         test_b = test_.feed_b;
@@ -148,44 +234,68 @@ private:
     bool both_closed() const noexcept { return a_.closed && b_.closed; }
     bool latched() const noexcept { return state_ >= first_fault; }
     /// Returns whether a reset would be accepted.
-    bool resettable() const noexcept { return state_ == waits_for_reset || (latched() && both_open()); }
+    bool resettable() const noexcept {
+        return state_ == waits_for_reset || (latched() && both_open());
+    }
 
     void enter(std::uint32_t state) noexcept {
         state_ = state;
         disagree_ns_ = 0;
     }
 
-    /// The state machine, one cycle. Once a contact has opened, both must have been open before both may be closed.
+    /// The state machine, one cycle. Once a contact has opened, both must have been open before
+    /// both may be closed.
     void move(bool accepted, const Times& times, std::int64_t period_ns) noexcept {
         switch (state_) {
-            case contacts_open:
-                if (both_closed()) enter(waits_for_reset);
-                else if (!both_open()) enter(waits_for_closing);
-                break;
-            case waits_for_closing:
-                if (both_closed()) enter(waits_for_reset);
-                else if (both_open()) enter(contacts_open);
-                else if ((disagree_ns_ += period_ns) > times.discrepancy) enter(did_not_close);
-                break;
-            case waits_for_reset:
-            case is_safe:
-                if (both_open()) enter(contacts_open);
-                else if (!both_closed()) enter(waits_for_opening);
-                else if (accepted) enter(is_safe);
-                break;
-            case waits_for_opening:
-                if (both_open()) enter(contacts_open);
-                else if ((disagree_ns_ += period_ns) > times.discrepancy) enter(did_not_open);
-                break;
-            default:
-                if (accepted && both_open()) enter(contacts_open);
+        case contacts_open:
+            if (both_closed()) {
+                enter(waits_for_reset);
+            } else if (!both_open()) {
+                enter(waits_for_closing);
+            }
+            break;
+        case waits_for_closing:
+            if (both_closed()) {
+                enter(waits_for_reset);
+            } else if (both_open()) {
+                enter(contacts_open);
+            } else if ((disagree_ns_ += period_ns) > times.discrepancy) {
+                enter(did_not_close);
+            }
+            break;
+        case waits_for_reset:
+        case is_safe:
+            if (both_open()) {
+                enter(contacts_open);
+            } else if (!both_closed()) {
+                enter(waits_for_opening);
+            } else if (accepted) {
+                enter(is_safe);
+            }
+            break;
+        case waits_for_opening:
+            if (both_open()) {
+                enter(contacts_open);
+            } else if ((disagree_ns_ += period_ns) > times.discrepancy) {
+                enter(did_not_open);
+            }
+            break;
+        default:
+            if (accepted && both_open()) {
+                enter(contacts_open);
+            }
         }
-        if (state_ == waits_for_reset && reset_mode == 0) enter(is_safe);
+        if (state_ == waits_for_reset && reset_mode == 0) {
+            enter(is_safe);
+        }
     }
 
-    /// Follows the button; true in the cycle a reset is given. A press counts only if it began when it could help.
+    /// Follows the button; true in the cycle a reset is given. A press counts only if it began when
+    /// it could help.
     bool press(const Times& times, std::int64_t period_ns) noexcept {
-        const bool down = reset, pressed = down && !was_down_, released = !down && was_down_;
+        const bool down = reset;
+        const bool pressed = down && !was_down_;
+        const bool released = !down && was_down_;
         was_down_ = down;
         if (pressed) {
             counts_ = resettable();
@@ -193,17 +303,24 @@ private:
         } else if (down) {
             pressed_ns_ = std::min(pressed_ns_ + period_ns, std::int64_t{1} << 60);
         }
-        if (!resettable()) counts_ = false;
+        if (!resettable()) {
+            counts_ = false;
+        }
         stuck_ = down && reset_mode == 2 && pressed_ns_ > times.reset_max;
         if (reset_mode != 2) return pressed && counts_;
-        return released && counts_ && pressed_ns_ + period_ns >= times.reset_min && pressed_ns_ <= times.reset_max;
+        return released && counts_ && pressed_ns_ + period_ns >= times.reset_min &&
+               pressed_ns_ <= times.reset_max;
     }
 
     void show(bool sound) noexcept {
-        const bool useless = was_down_ && !(counts_ && reset_mode == 2);  // held, but this press gives no reset
+        // held, but this press gives no reset
+        const bool useless = was_down_ && !(counts_ && reset_mode == 2);
         std::uint32_t shown = state_;
-        if (stuck_ && !latched() && state_ != is_safe) shown = button_stuck;
-        else if (state_ == waits_for_reset && useless) shown = button_down;
+        if (stuck_ && !latched() && state_ != is_safe) {
+            shown = button_stuck;
+        } else if (state_ == waits_for_reset && useless) {
+            shown = button_down;
+        }
         safe = state_ == is_safe;
         ready = sound && resettable() && !stuck_ && !useless;
         reason = shown;
@@ -213,13 +330,17 @@ private:
     PulseTest test_;
     Contact a_, b_;
     std::uint32_t state_ = contacts_open;
-    std::int64_t disagree_ns_ = 0, pressed_ns_ = 0;
-    bool was_down_ = false, counts_ = false, stuck_ = false;
+    std::int64_t disagree_ns_ = 0;
+    std::int64_t pressed_ns_ = 0;
+    bool was_down_ = false;
+    bool counts_ = false;
+    bool stuck_ = false;
 };
 
 }  // namespace
 
-HAL_COMPONENT(SafetySwitch, "safety_switch", "Two-channel safety input with reset, discrepancy time and test pulses", R"(
+HAL_COMPONENT(SafetySwitch, "safety_switch",
+              "Two-channel safety input with reset, discrepancy time and test pulses", R"(
 Monitors a switch with two contacts (door, emergency stop button, light curtain) and enables
 the machine. It follows the practice of two-channel safety relays: ISO 13849-1 (category 3 and 4: a single
 fault must not lose the function and is found at the next demand; clause 5.2.2: a manual reset acts when the button is released),

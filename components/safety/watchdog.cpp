@@ -15,17 +15,32 @@ struct Watchdog : hal::Component {
 
     hal::Argument inputs{*this, "num_inputs", 1, "number of inputs", {.min = 1, .max = 1024}};
 
-    hal::Function process{*this, "process", &Watchdog::watch, "monitors the inputs; its thread must be fast enough to see each change"};
+    hal::Function process{*this, "process", &Watchdog::watch,
+                          "monitors the inputs; its thread must be fast enough to see each change"};
     hal::Ins<bool> input{*this, process, "input-#", inputs, "heartbeat input: must keep changing"};
-    hal::In<bool> enable{*this, process, "enable-in", "FALSE sets ok-out to FALSE; a rising edge restarts the watchdog"};
-    hal::Out<bool> ok{*this, process, "ok-out", "TRUE while enabled and no input has timed out", {.safe = false}};
-    hal::Out<std::int32_t> tripped{*this, process, "tripped-by", "number of the input that timed out; -1: none", {.initial = -1}};
+    hal::In<bool> enable{*this, process, "enable-in",
+                         "FALSE sets ok-out to FALSE; a rising edge restarts the watchdog"};
+    hal::Out<bool> ok{
+        *this, process, "ok-out", "TRUE while enabled and no input has timed out", {.safe = false}};
+    hal::Out<std::int32_t> tripped{*this,
+                                   process,
+                                   "tripped-by",
+                                   "number of the input that timed out; -1: none",
+                                   {.initial = -1}};
 
-    hal::Function run{*this, "set-timeouts", &Watchdog::set_timeouts, "reads the timeouts; in any thread"};
-    hal::Params<double> timeout{*this, run, "timeout-#", inputs, "maximum time between changes of input-#; 0 or less: always tripped", {.unit = "s"}};
+    hal::Function run{*this, "set-timeouts", &Watchdog::set_timeouts,
+                      "reads the timeouts; in any thread"};
+    hal::Params<double> timeout{
+        *this,
+        run,
+        "timeout-#",
+        inputs,
+        "maximum time between changes of input-#; 0 or less: always tripped",
+        {.unit = "s"}};
 
     void watch(hal::Cycle cycle) noexcept {
-        if (!limits_known_.load(std::memory_order_acquire)) return;  // a rising edge of enable-in is not lost: it is detected later
+        // a rising edge of enable-in is not lost: it is detected later
+        if (!limits_known_.load(std::memory_order_acquire)) return;
         const bool restart = enable && !was_enabled_;
         was_enabled_ = enable;
         const bool all_alive = note_signs_of_life();
@@ -33,7 +48,9 @@ struct Watchdog : hal::Component {
         if (!enable) {
             ok = false;
         } else if (starting_) {
-            if (all_alive) begin();
+            if (all_alive) {
+                begin();
+            }
         } else if (ok) {
             check(cycle.period_ns());
         }
@@ -42,7 +59,9 @@ struct Watchdog : hal::Component {
     void set_timeouts(hal::Cycle) noexcept {
         for (std::size_t i = 0; i < timeout.size(); ++i) {
             const double seconds = timeout[i];
-            watched_[i].limit_ns.store(seconds > 0.0 ? std::llround(std::min(seconds, 1e6) * 1e9) : 0, std::memory_order_relaxed);
+            watched_[i].limit_ns.store(
+                seconds > 0.0 ? std::llround(std::min(seconds, 1e6) * 1e9) : 0,
+                std::memory_order_relaxed);
         }
         limits_known_.store(true, std::memory_order_release);
     }
@@ -65,7 +84,9 @@ private:
         ok = true;
         for (std::size_t i = 0; i < input.size(); ++i) {
             watched_[i].silent_ns = 0;
-            if (watched_[i].limit_ns.load(std::memory_order_relaxed) == 0) trip(i);
+            if (watched_[i].limit_ns.load(std::memory_order_relaxed) == 0) {
+                trip(i);
+            }
         }
     }
 
@@ -76,12 +97,16 @@ private:
             w.silent_ns = input[i] == w.level ? w.silent_ns + period_ns : 0;
             w.level = input[i];
             w.dead = limit_ns > 0 && w.silent_ns > limit_ns;
-            if (limit_ns == 0 || w.dead) trip(i);
+            if (limit_ns == 0 || w.dead) {
+                trip(i);
+            }
         }
     }
 
     void trip(std::size_t i) noexcept {
-        if (ok) tripped = static_cast<std::int32_t>(i);
+        if (ok) {
+            tripped = static_cast<std::int32_t>(i);
+        }
         ok = false;
     }
 
@@ -89,12 +114,14 @@ private:
         std::atomic<std::int64_t> limit_ns{0};  // set-timeouts writes, process reads
         std::int64_t silent_ns = 0;
         bool level = false;
-        bool dead = false;                      // it tripped the watchdog and has not changed since
+        bool dead = false;  // it tripped the watchdog and has not changed since
     };
-    std::unique_ptr<Watched[]> watched_ = std::make_unique<Watched[]>(static_cast<std::size_t>(inputs));
-    std::atomic<bool> limits_known_{false};         // set-timeouts writes, process reads
+    std::unique_ptr<Watched[]> watched_ =
+        std::make_unique<Watched[]>(static_cast<std::size_t>(inputs));
+    std::atomic<bool> limits_known_{false};  // set-timeouts writes, process reads
     bool was_enabled_ = false;
-    bool starting_ = false;                         // enabled, and ok-out waits for an input that tripped the watchdog
+    // enabled, and ok-out waits for an input that tripped the watchdog
+    bool starting_ = false;
 };
 
 }  // namespace

@@ -15,72 +15,187 @@ struct Furuta : hal::Component {
 
     hal::Function run{*this, "update", &Furuta::update, "simulates one period"};
 
-    hal::In<double> voltage{*this, "voltage", "voltage at the motor; the pwm input adds to it", {.unit = "V"}};
+    hal::In<double> voltage{
+        *this, "voltage", "voltage at the motor; the pwm input adds to it", {.unit = "V"}};
     hal::In<bool> pwm{*this, "pwm", "TRUE: the amplifier applies the supply voltage to the motor"};
     hal::In<bool> direction{*this, "dir", "TRUE reverses the direction of pwm"};
-    hal::In<bool> enable{*this, "enable", "FALSE: the amplifier is off and the motor current is 0", {.initial = true}};
-    hal::Io<double> push{*this, "push", "a tap on the pendulum: the speed change of its centre of mass; set to 0 when done", {.unit = "m/s"}};
+    hal::In<bool> enable{*this,
+                         "enable",
+                         "FALSE: the amplifier is off and the motor current is 0",
+                         {.initial = true}};
+    hal::Io<double> push{
+        *this,
+        "push",
+        "a tap on the pendulum: the speed change of its centre of mass; set to 0 when done",
+        {.unit = "m/s"}};
     hal::In<bool> lift{*this, "lift", "TRUE lifts the base off the table"};
     hal::In<bool> reset{*this, "reset", "a rising edge sets the initial angles at standstill"};
 
     hal::Out<bool> arm_a{*this, "arm-phase-A", "arm encoder, phase A"};
     hal::Out<bool> arm_b{*this, "arm-phase-B", "arm encoder, phase B"};
-    hal::Out<bool> arm_z{*this, "arm-phase-Z", "arm encoder, index: TRUE at count 0 of every revolution"};
-    hal::Out<bool> pendulum_a{*this, "pendulum-phase-A", "pendulum encoder, phase A, after the radio link"};
-    hal::Out<bool> pendulum_b{*this, "pendulum-phase-B", "pendulum encoder, phase B, after the radio link"};
-    hal::Out<bool> pendulum_z{*this, "pendulum-phase-Z", "pendulum encoder, index: TRUE at count 0 of every revolution, after the radio link"};
+    hal::Out<bool> arm_z{*this, "arm-phase-Z",
+                         "arm encoder, index: TRUE at count 0 of every revolution"};
+    hal::Out<bool> pendulum_a{*this, "pendulum-phase-A",
+                              "pendulum encoder, phase A, after the radio link"};
+    hal::Out<bool> pendulum_b{*this, "pendulum-phase-B",
+                              "pendulum encoder, phase B, after the radio link"};
+    hal::Out<bool> pendulum_z{
+        *this, "pendulum-phase-Z",
+        "pendulum encoder, index: TRUE at count 0 of every revolution, after the radio link"};
     hal::Out<std::int32_t> arm_counts{*this, "arm-counts", "arm encoder, counts"};
-    hal::Out<std::int32_t> pendulum_counts{*this, "pendulum-counts", "pendulum encoder, counts, after the radio link"};
-    hal::Out<bool> base_down{*this, "base-down", "contact under the base: TRUE while the base is on the table", {.initial = true}};
-    hal::Out<bool> base_lifted{*this, "base-lifted", "second contact of that switch: TRUE while the base is off the table"};
-    hal::Out<double> tip_ratio{*this, "tip-ratio", "reaction moment as a fraction of the moment that tips the base; it lifts at 1"};
-    hal::Out<double> arm_angle{*this, "arm-angle", "true angle of the arm", {.unit = "rad", .finite = true}};
-    hal::Out<double> arm_velocity{*this, "arm-velocity", "true speed of the arm", {.unit = "rad/s", .finite = true}};
-    hal::Out<double> pendulum_angle{*this, "pendulum-angle", "true angle of the pendulum: 0 hanging down, pi upright", {.unit = "rad", .finite = true}};
-    hal::Out<double> pendulum_velocity{*this, "pendulum-velocity", "true speed of the pendulum", {.unit = "rad/s", .finite = true}};
-    hal::Out<double> motor_current{*this, "motor-current", "current in the motor", {.unit = "A", .finite = true}};
-    hal::Out<double> motor_torque{*this, "motor-torque", "torque of the motor on the arm", {.unit = "N*m", .finite = true}};
-    hal::Out<double> energy{*this, "energy", "kinetic and potential energy of arm and pendulum; 0 hanging at standstill", {.unit = "J"}};
+    hal::Out<std::int32_t> pendulum_counts{*this, "pendulum-counts",
+                                           "pendulum encoder, counts, after the radio link"};
+    hal::Out<bool> base_down{*this,
+                             "base-down",
+                             "contact under the base: TRUE while the base is on the table",
+                             {.initial = true}};
+    hal::Out<bool> base_lifted{
+        *this, "base-lifted",
+        "second contact of that switch: TRUE while the base is off the table"};
+    hal::Out<double> tip_ratio{
+        *this, "tip-ratio",
+        "reaction moment as a fraction of the moment that tips the base; it lifts at 1"};
+    hal::Out<double> arm_angle{
+        *this, "arm-angle", "true angle of the arm", {.unit = "rad", .finite = true}};
+    hal::Out<double> arm_velocity{
+        *this, "arm-velocity", "true speed of the arm", {.unit = "rad/s", .finite = true}};
+    hal::Out<double> pendulum_angle{*this,
+                                    "pendulum-angle",
+                                    "true angle of the pendulum: 0 hanging down, pi upright",
+                                    {.unit = "rad", .finite = true}};
+    hal::Out<double> pendulum_velocity{*this,
+                                       "pendulum-velocity",
+                                       "true speed of the pendulum",
+                                       {.unit = "rad/s", .finite = true}};
+    hal::Out<double> motor_current{
+        *this, "motor-current", "current in the motor", {.unit = "A", .finite = true}};
+    hal::Out<double> motor_torque{
+        *this, "motor-torque", "torque of the motor on the arm", {.unit = "N*m", .finite = true}};
+    hal::Out<double> energy{
+        *this,
+        "energy",
+        "kinetic and potential energy of arm and pendulum; 0 hanging at standstill",
+        {.unit = "J"}};
 
-    hal::Param<std::uint32_t> encoder_counts{*this, "encoder-counts", "counts per revolution of both encoders, after x4 decoding; as in the source rig", {.initial = usual.encoder_counts}};
-    hal::Param<double> radio_delay{*this, "radio-delay", "latency of the pendulum encoder's radio link; assumed", {.initial = usual.radio_delay, .unit = "s"}};
+    hal::Param<std::uint32_t> encoder_counts{
+        *this,
+        "encoder-counts",
+        "counts per revolution of both encoders, after x4 decoding; as in the source rig",
+        {.initial = usual.encoder_counts}};
+    hal::Param<double> radio_delay{*this,
+                                   "radio-delay",
+                                   "latency of the pendulum encoder's radio link; assumed",
+                                   {.initial = usual.radio_delay, .unit = "s"}};
 
-    hal::Param<double> supply{*this, "supply-voltage", "supply voltage of the amplifier; as in the source rig", {.initial = usual.supply, .unit = "V"}};
-    hal::OptionalLimitParam current_limit{*this, "current-limit", "current limit of the amplifier, 0: no limit; as in the source rig", {.initial = usual.current_limit, .unit = "A"}};
-    hal::Param<double> torque_constant{*this, "torque-constant", "motor: torque per current, and voltage per speed; from 85 W at 3000 rpm and 4 A", {.initial = usual.torque_constant, .unit = "N*m/A"}};
-    hal::Param<double> resistance{*this, "resistance", "motor: winding resistance; from 24 V at 3000 rpm and 4 A", {.initial = usual.resistance, .unit = "Ohm"}};
-    hal::Param<double> inductance{*this, "inductance", "motor: winding inductance; typical for this size", {.initial = usual.inductance, .unit = "H"}};
-    hal::Param<double> rotor_inertia{*this, "rotor-inertia", "motor: rotor inertia; typical for this size", {.initial = usual.rotor_inertia, .unit = "kg*m^2"}};
+    hal::Param<double> supply{*this,
+                              "supply-voltage",
+                              "supply voltage of the amplifier; as in the source rig",
+                              {.initial = usual.supply, .unit = "V"}};
+    hal::OptionalLimitParam current_limit{
+        *this,
+        "current-limit",
+        "current limit of the amplifier, 0: no limit; as in the source rig",
+        {.initial = usual.current_limit, .unit = "A"}};
+    hal::Param<double> torque_constant{
+        *this,
+        "torque-constant",
+        "motor: torque per current, and voltage per speed; from 85 W at 3000 rpm and 4 A",
+        {.initial = usual.torque_constant, .unit = "N*m/A"}};
+    hal::Param<double> resistance{*this,
+                                  "resistance",
+                                  "motor: winding resistance; from 24 V at 3000 rpm and 4 A",
+                                  {.initial = usual.resistance, .unit = "Ohm"}};
+    hal::Param<double> inductance{*this,
+                                  "inductance",
+                                  "motor: winding inductance; typical for this size",
+                                  {.initial = usual.inductance, .unit = "H"}};
+    hal::Param<double> rotor_inertia{*this,
+                                     "rotor-inertia",
+                                     "motor: rotor inertia; typical for this size",
+                                     {.initial = usual.rotor_inertia, .unit = "kg*m^2"}};
 
-    hal::Param<double> arm_length{*this, "arm-length", "distance from the motor axis to the pendulum pivot; assumed", {.initial = usual.arm_length, .unit = "m"}};
-    hal::Param<double> arm_mass{*this, "arm-mass", "mass of the arm; assumed", {.initial = usual.arm_mass, .unit = "kg"}};
-    hal::Param<double> arm_centre{*this, "arm-centre", "distance from the motor axis to the arm's centre of mass; uniform bar", {.initial = usual.arm_centre, .unit = "m"}};
-    hal::Param<double> arm_inertia{*this, "arm-inertia", "inertia of the arm about its centre of mass; uniform bar, m L^2 / 12", {.initial = usual.arm_inertia, .unit = "kg*m^2"}};
-    hal::Param<double> arm_viscous{*this, "arm-viscous", "viscous friction of arm and motor; assumed", {.initial = usual.arm_viscous, .unit = "N*m*s/rad"}};
-    hal::Param<double> arm_coulomb{*this, "arm-coulomb", "Coulomb friction of arm and motor; typical for brushes of this size", {.initial = usual.arm_coulomb, .unit = "N*m"}};
+    hal::Param<double> arm_length{*this,
+                                  "arm-length",
+                                  "distance from the motor axis to the pendulum pivot; assumed",
+                                  {.initial = usual.arm_length, .unit = "m"}};
+    hal::Param<double> arm_mass{
+        *this, "arm-mass", "mass of the arm; assumed", {.initial = usual.arm_mass, .unit = "kg"}};
+    hal::Param<double> arm_centre{
+        *this,
+        "arm-centre",
+        "distance from the motor axis to the arm's centre of mass; uniform bar",
+        {.initial = usual.arm_centre, .unit = "m"}};
+    hal::Param<double> arm_inertia{
+        *this,
+        "arm-inertia",
+        "inertia of the arm about its centre of mass; uniform bar, m L^2 / 12",
+        {.initial = usual.arm_inertia, .unit = "kg*m^2"}};
+    hal::Param<double> arm_viscous{*this,
+                                   "arm-viscous",
+                                   "viscous friction of arm and motor; assumed",
+                                   {.initial = usual.arm_viscous, .unit = "N*m*s/rad"}};
+    hal::Param<double> arm_coulomb{
+        *this,
+        "arm-coulomb",
+        "Coulomb friction of arm and motor; typical for brushes of this size",
+        {.initial = usual.arm_coulomb, .unit = "N*m"}};
 
-    hal::Param<double> pendulum_mass{*this, "pendulum-mass", "mass of the pendulum; assumed", {.initial = usual.pendulum_mass, .unit = "kg"}};
-    hal::Param<double> pendulum_centre{*this, "pendulum-centre", "distance from the pivot to the pendulum's centre of mass; uniform rod of 0.3 m", {.initial = usual.pendulum_centre, .unit = "m"}};
-    hal::Param<double> pendulum_inertia{*this, "pendulum-inertia", "inertia of the pendulum about its centre of mass; uniform rod, m L^2 / 12", {.initial = usual.pendulum_inertia, .unit = "kg*m^2"}};
-    hal::Param<double> pendulum_viscous{*this, "pendulum-viscous", "viscous friction of the pivot; a free oscillation halves in about 15 s", {.initial = usual.pendulum_viscous, .unit = "N*m*s/rad"}};
-    hal::Param<double> pendulum_coulomb{*this, "pendulum-coulomb", "Coulomb friction of the pivot; two small ball bearings", {.initial = usual.pendulum_coulomb, .unit = "N*m"}};
+    hal::Param<double> pendulum_mass{*this,
+                                     "pendulum-mass",
+                                     "mass of the pendulum; assumed",
+                                     {.initial = usual.pendulum_mass, .unit = "kg"}};
+    hal::Param<double> pendulum_centre{
+        *this,
+        "pendulum-centre",
+        "distance from the pivot to the pendulum's centre of mass; uniform rod of 0.3 m",
+        {.initial = usual.pendulum_centre, .unit = "m"}};
+    hal::Param<double> pendulum_inertia{
+        *this,
+        "pendulum-inertia",
+        "inertia of the pendulum about its centre of mass; uniform rod, m L^2 / 12",
+        {.initial = usual.pendulum_inertia, .unit = "kg*m^2"}};
+    hal::Param<double> pendulum_viscous{
+        *this,
+        "pendulum-viscous",
+        "viscous friction of the pivot; a free oscillation halves in about 15 s",
+        {.initial = usual.pendulum_viscous, .unit = "N*m*s/rad"}};
+    hal::Param<double> pendulum_coulomb{*this,
+                                        "pendulum-coulomb",
+                                        "Coulomb friction of the pivot; two small ball bearings",
+                                        {.initial = usual.pendulum_coulomb, .unit = "N*m"}};
 
-    hal::Param<double> base_mass{*this, "base-mass", "mass of base and motor; assumed", {.initial = usual.base_mass, .unit = "kg"}};
-    hal::Param<double> base_radius{*this, "base-radius", "radius of the foot of the base; assumed", {.initial = usual.base_radius, .unit = "m"}};
-    hal::Param<double> base_height{*this, "base-height", "height of the arm above the table; assumed", {.initial = usual.base_height, .unit = "m"}};
-    hal::Param<double> lift_hold{*this, "lift-hold", "time for which a tipped base remains off the table; assumed", {.initial = usual.lift_hold, .unit = "s"}};
-    hal::Param<double> gravity{*this, "gravity", "standard gravity", {.initial = usual.gravity, .unit = "m/s^2"}};
+    hal::Param<double> base_mass{*this,
+                                 "base-mass",
+                                 "mass of base and motor; assumed",
+                                 {.initial = usual.base_mass, .unit = "kg"}};
+    hal::Param<double> base_radius{*this,
+                                   "base-radius",
+                                   "radius of the foot of the base; assumed",
+                                   {.initial = usual.base_radius, .unit = "m"}};
+    hal::Param<double> base_height{*this,
+                                   "base-height",
+                                   "height of the arm above the table; assumed",
+                                   {.initial = usual.base_height, .unit = "m"}};
+    hal::Param<double> lift_hold{*this,
+                                 "lift-hold",
+                                 "time for which a tipped base remains off the table; assumed",
+                                 {.initial = usual.lift_hold, .unit = "s"}};
+    hal::Param<double> gravity{
+        *this, "gravity", "standard gravity", {.initial = usual.gravity, .unit = "m/s^2"}};
 
     explicit Furuta(const hal_host* host)
         : Component(host),
           arm_start(*this, "arm_angle", 0.0, "initial angle of the arm, also after reset, rad"),
-          pendulum_start(*this, "pendulum_angle", 0.0, "initial angle of the pendulum, also after reset, rad") {
+          pendulum_start(*this, "pendulum_angle", 0.0,
+                         "initial angle of the pendulum, also after reset, rad") {
         rest();
     }
 
     void update(hal::Cycle cycle) noexcept {
         const bool asked = reset;
-        if (asked && !asked_) rest();
+        if (asked && !asked_) {
+            rest();
+        }
         asked_ = asked;
 
         const sim::FurutaConstants now = constants();
@@ -89,7 +204,9 @@ struct Furuta : hal::Component {
             rig_.tap(now, given);
         }
         const double wanted = voltage + (pwm ? direction ? -supply : supply.get() : 0.0);
-        if (!rig_.step(now, wanted, enable, cycle.period_ns())) rest();
+        if (!rig_.step(now, wanted, enable, cycle.period_ns())) {
+            rest();
+        }
         rig_.show(now, cycle.period_ns());
         show(now);
     }
@@ -136,9 +253,14 @@ private:
         motor_torque = rig_.torque();
         energy = now.dynamics().energy(state);
 
-        const sim::Quadrature of_arm(rig_.arm_count(), now.encoder_counts), of_pendulum(rig_.pendulum_count(), now.encoder_counts);
-        arm_a = of_arm.a, arm_b = of_arm.b, arm_z = of_arm.z;
-        pendulum_a = of_pendulum.a, pendulum_b = of_pendulum.b, pendulum_z = of_pendulum.z;
+        const sim::Quadrature of_arm(rig_.arm_count(), now.encoder_counts),
+            of_pendulum(rig_.pendulum_count(), now.encoder_counts);
+        arm_a = of_arm.a;
+        arm_b = of_arm.b;
+        arm_z = of_arm.z;
+        pendulum_a = of_pendulum.a;
+        pendulum_b = of_pendulum.b;
+        pendulum_z = of_pendulum.z;
         arm_counts = static_cast<std::int32_t>(rig_.arm_count());
         pendulum_counts = static_cast<std::int32_t>(rig_.pendulum_count());
 
@@ -153,7 +275,8 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(Furuta, "furuta", "Simulated Furuta pendulum with motor, encoders, radio link and base", R"(
+HAL_COMPONENT(Furuta, "furuta",
+              "Simulated Furuta pendulum with motor, encoders, radio link and base", R"(
 A motor turns a horizontal arm; at its end a pendulum swings freely in the plane perpendicular to the arm. The component simulates
 the whole rig, from the inputs of the amplifier to the outputs of the encoders and of the switch under the base.
 

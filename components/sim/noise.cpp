@@ -10,13 +10,16 @@
 
 namespace {
 
-/// xorshift64*: G. Marsaglia, *Xorshift RNGs*, Journal of Statistical Software 8 (2003); S. Vigna, *An experimental exploration
-/// of Marsaglia's xorshift generators, scrambled*, ACM TOMS 42 (2016). Its state must not be 0.
+/// xorshift64*: G. Marsaglia, *Xorshift RNGs*, Journal of Statistical Software 8 (2003); S. Vigna,
+/// *An experimental exploration of Marsaglia's xorshift generators, scrambled*, ACM TOMS 42 (2016).
+/// Its state must not be 0.
 class Bits {
 public:
     void seed(std::uint32_t from) noexcept {
         state_ = (std::uint64_t{from} + 1) * 0x9E3779B97F4A7C15u;
-        for (int i = 0; i < 16; ++i) next();  // seeds that differ by one bit go apart
+        for (int i = 0; i < 16; ++i) {
+            next();  // seeds that differ by one bit go apart
+        }
     }
     std::uint64_t next() noexcept {
         state_ ^= state_ >> 12;
@@ -36,27 +39,35 @@ enum Type : std::uint32_t { uniform = 0, gauss = 1, pink = 2 };
 struct Noise : hal::Component {
     using Component::Component;
     hal::In<std::uint32_t> type{*this, "type", "0 uniform; 1 Gaussian; 2 pink"};
-    hal::In<double> amplitude{*this, "amplitude", "uniform: largest value; Gaussian and pink: standard deviation", {.initial = 1.0}};
+    hal::In<double> amplitude{*this,
+                              "amplitude",
+                              "uniform: largest value; Gaussian and pink: standard deviation",
+                              {.initial = 1.0}};
     hal::In<double> offset{*this, "offset", "added to it"};
     hal::In<double> in{*this, "in", "added to it: the signal that is to be noisy"};
     hal::In<bool> enable{*this, "enable", "FALSE: out is in + offset", {.initial = true}};
     hal::In<std::uint32_t> hold{*this, "hold", "cycles for which a value stays", {.initial = 1}};
     hal::OptionalLimit limit{*this, "limit", "largest noise; 0: none"};
-    hal::Param<std::uint32_t> seed{*this, "seed", "where the sequence starts; a change starts it anew"};
+    hal::Param<std::uint32_t> seed{*this, "seed",
+                                   "where the sequence starts; a change starts it anew"};
     hal::In<bool> restart{*this, "restart", "a rising edge starts the sequence anew"};
     hal::Out<double> out{*this, "out", "in + offset + noise"};
     hal::Out<double> noise{*this, "noise", "the noise alone", {.finite = true}};
     hal::Function run{*this, "", &Noise::update, "gives the next value"};
 
     void update(hal::Cycle) noexcept {
-        if (!started_ || seed != seed_ || (restart && !was_restart_)) begin();
+        if (!started_ || seed != seed_ || (restart && !was_restart_)) {
+            begin();
+        }
         was_restart_ = restart;
         if (age_ == 0 || age_ >= hold) {
             value_ = draw();
             age_ = 0;
         }
         ++age_;
-        const double size = std::fabs(amplitude) <= 1e300 ? amplitude.get() : 0.0, most = std::fabs(limit);
+        const double size = std::fabs(amplitude) <= 1e300 ? amplitude.get() : 0.0;
+
+        const double most = std::fabs(limit);
         const double wanted = size * value_;
         const double shown = !enable ? 0.0 : most > 0.0 ? std::clamp(wanted, -most, most) : wanted;
         noise = std::isfinite(shown) ? shown : 0.0;
@@ -71,23 +82,29 @@ private:
         spare_known_ = false;
         age_ = 0;
         count_ = 0;
-        for (double& row : rows_) row = bits_.even();
+        for (double& row : rows_) {
+            row = bits_.even();
+        }
     }
     double draw() noexcept {
         switch (type) {
-            case gauss: return normal();
-            case pink: return rows();
-            default: return bits_.even();
+        case gauss: return normal();
+        case pink: return rows();
+        default: return bits_.even();
         }
     }
-    /// G. Marsaglia, T. Bray, *A convenient method for generating normal variables*, SIAM Review 6 (1964).
+    /// G. Marsaglia, T. Bray, *A convenient method for generating normal variables*, SIAM Review 6
+    /// (1964).
     double normal() noexcept {
         if (spare_known_) {
             spare_known_ = false;
             return spare_;
         }
-        for (int tries = 0; tries < 64; ++tries) {  // one in five is rejected; 64 in a row do not occur
-            const double u = bits_.even(), v = bits_.even(), s = u * u + v * v;
+        // one in five is rejected; 64 in a row do not occur
+        for (int tries = 0; tries < 64; ++tries) {
+            const double u = bits_.even();
+            const double v = bits_.even();
+            const double s = u * u + v * v;
             if (!(s > 0.0 && s < 1.0)) continue;
             const double factor = std::sqrt(-2 * std::log(s) / s);
             spare_ = v * factor;
@@ -96,23 +113,31 @@ private:
         }
         return 0.0;
     }
-    /// Voss's sum of values that change every 1, 2, 4, 8 … draws, one at a time as McCartney arranged them (M. Gardner, *White
-    /// and brown music, fractal curves and one-over-f fluctuations*, Scientific American, April 1978). Even values have
-    /// the variance 1/3.
+    /// Voss's sum of values that change every 1, 2, 4, 8 … draws, one at a time as McCartney
+    /// arranged them (M. Gardner, *White and brown music, fractal curves and one-over-f
+    /// fluctuations*, Scientific American, April 1978). Even values have the variance 1/3.
     double rows() noexcept {
         const auto row = static_cast<std::size_t>(std::countr_zero(++count_));
-        if (row < rows_.size()) rows_[row] = bits_.even();
+        if (row < rows_.size()) {
+            rows_[row] = bits_.even();
+        }
         double sum = bits_.even();
-        for (const double x : rows_) sum += x;
+        for (const double x : rows_) {
+            sum += x;
+        }
         return sum * std::sqrt(3.0 / static_cast<double>(rows_.size() + 1));
     }
 
     Bits bits_;
     std::array<double, 20> rows_{};
-    double value_ = 0.0, spare_ = 0.0;
+    double value_ = 0.0;
+    double spare_ = 0.0;
     std::uint64_t count_ = 0;
-    std::uint32_t seed_ = 0, age_ = 0;
-    bool started_ = false, spare_known_ = false, was_restart_ = false;
+    std::uint32_t seed_ = 0;
+    std::uint32_t age_ = 0;
+    bool started_ = false;
+    bool spare_known_ = false;
+    bool was_restart_ = false;
 };
 
 }  // namespace

@@ -6,12 +6,20 @@ namespace {
 struct SimHomeSwitch : hal::Component {
     using Component::Component;
     hal::In<double> cur_pos{*this, "cur-pos", "position of the axis"};
-    hal::In<double> home_pos{*this, "home-pos", "position of the switch; its sign is the side on which the switch is on", {.initial = 1.0}};
-    hal::In<double> hysteresis{*this, "hysteresis", "distance back to the point where it turns off", {.initial = 0.1}};
-    hal::Out<bool>  home_sw{*this, "home-sw", "TRUE: the switch is on"};
-    hal::Io<bool>   index_enable{*this, "index-enable", "cleared index-delay-ms after it became TRUE, as by an encoder index"};
-    hal::In<double> index_delay{*this, "index-delay-ms", "delay of the index", {.initial = 10.0, .unit = "ms"}};
-    hal::Function   run{*this, "", &SimHomeSwitch::update, "updates the switch and the index"};
+    hal::In<double> home_pos{
+        *this,
+        "home-pos",
+        "position of the switch; its sign is the side on which the switch is on",
+        {.initial = 1.0}};
+    hal::In<double> hysteresis{
+        *this, "hysteresis", "distance back to the point where it turns off", {.initial = 0.1}};
+    hal::Out<bool> home_sw{*this, "home-sw", "TRUE: the switch is on"};
+    hal::Io<bool> index_enable{
+        *this, "index-enable",
+        "cleared index-delay-ms after it became TRUE, as by an encoder index"};
+    hal::In<double> index_delay{
+        *this, "index-delay-ms", "delay of the index", {.initial = 10.0, .unit = "ms"}};
+    hal::Function run{*this, "", &SimHomeSwitch::update, "updates the switch and the index"};
 
     void update(hal::Cycle cycle) noexcept {
         update_switch();
@@ -26,17 +34,23 @@ private:
             return;
         }
         const double off = upper_side ? home_pos - hysteresis : home_pos + hysteresis;
-        if (upper_side ? cur_pos <= off : cur_pos >= off) home_sw = false;
+        if (upper_side ? cur_pos <= off : cur_pos >= off) {
+            home_sw = false;
+        }
     }
 
     void update_index(double period_ms) noexcept {
         const bool waiting = left_ms_ > 0.0;
-        if (waiting) left_ms_ -= period_ms;
+        if (waiting) {
+            left_ms_ -= period_ms;
+        }
         if (waiting && left_ms_ <= 0.0) {
             index_enable = false;
             return;
         }
-        if (index_enable && !was_enabled_) left_ms_ = index_delay;
+        if (index_enable && !was_enabled_) {
+            left_ms_ = index_delay;
+        }
         was_enabled_ = index_enable;
     }
 

@@ -8,25 +8,33 @@
 
 namespace {
 
-constexpr std::uint32_t columns = 8, rows = 8;
+constexpr std::uint32_t columns = 8;
+constexpr std::uint32_t rows = 8;
 
 struct SimMatrixKb : hal::Component {
-    hal::Out<std::uint32_t> out{*this, "out", "key code: 0xC0 + key when pressed, 0x80 + key when released"};
+    hal::Out<std::uint32_t> out{*this, "out",
+                                "key code: 0xC0 + key when pressed, 0x80 + key when released"};
     std::array<std::optional<hal::In<bool>>, columns * rows> buttons;
     hal::Function run{*this, "", &SimMatrixKb::update, "encodes the buttons"};
 
     explicit SimMatrixKb(const hal_host* host) : Component(host) {
-        for (std::uint32_t column = 0; column < columns; ++column)
+        for (std::uint32_t column = 0; column < columns; ++column) {
             for (std::uint32_t row = 0; row < rows; ++row) {
-                const std::string name = "button.c0" + std::to_string(column) + ".r0" + std::to_string(row);
-                buttons[row * columns + column].emplace(*this, name.c_str(), "TRUE while this key is pressed");
+                const std::string name =
+                    "button.c0" + std::to_string(column) + ".r0" + std::to_string(row);
+                buttons[row * columns + column].emplace(*this, name.c_str(),
+                                                        "TRUE while this key is pressed");
             }
+        }
     }
 
     void update(hal::Cycle) noexcept {
         std::uint64_t now = 0;
-        for (std::uint32_t key = 0; key < buttons.size(); ++key)
-            if (*buttons[key]) now |= std::uint64_t{1} << key;
+        for (std::uint32_t key = 0; key < buttons.size(); ++key) {
+            if (*buttons[key]) {
+                now |= std::uint64_t{1} << key;
+            }
+        }
         if (const std::uint64_t changed = now ^ reported_; changed != 0) {  // one change per cycle
             const auto key = static_cast<std::uint32_t>(__builtin_ctzll(changed));
             const std::uint64_t bit = std::uint64_t{1} << key;

@@ -12,9 +12,12 @@ constexpr std::array out_pins = {1, 2, 3, 4, 5, 6, 7, 8, 9, 14, 16, 17};
 constexpr std::array in_pins = {2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 15};
 
 struct SimParport : hal::Component {
-    hal::Function read_function{*this, "read", &SimParport::read, "copies the -in-fake pins to the inputs"};
-    hal::Function write_function{*this, "write", &SimParport::write, "copies the outputs to the -out-fake pins"};
-    hal::Function reset_function{*this, "reset", &SimParport::reset, "no effect; the real port ends its pulses here"};
+    hal::Function read_function{*this, "read", &SimParport::read,
+                                "copies the -in-fake pins to the inputs"};
+    hal::Function write_function{*this, "write", &SimParport::write,
+                                 "copies the outputs to the -out-fake pins"};
+    hal::Function reset_function{*this, "reset", &SimParport::reset,
+                                 "no effect; the real port ends its pulses here"};
 
     struct Output {
         std::optional<hal::In<bool>> pin;
@@ -27,7 +30,11 @@ struct SimParport : hal::Component {
     };
     std::array<Output, out_pins.size()> outputs;
     std::array<Input, in_pins.size()> inputs;
-    hal::In<double> reset_time{*this, read_function, "reset-time", "no effect; the length of the real port's pulses", {.unit = "ns"}};
+    hal::In<double> reset_time{*this,
+                               read_function,
+                               "reset-time",
+                               "no effect; the length of the real port's pulses",
+                               {.unit = "ns"}};
 
     explicit SimParport(const hal_host* host) : Component(host) {
         for (std::size_t i = 0; i < out_pins.size(); ++i) {
@@ -35,13 +42,16 @@ struct SimParport : hal::Component {
             Output& o = outputs[i];
             o.pin.emplace(*this, write_function, name.c_str(), "output of the port");
             o.fake.emplace(*this, write_function, (name + "-fake").c_str(), "follows the output");
-            o.invert.emplace(*this, write_function, (name + "-invert").c_str(), "TRUE inverts the output");
-            o.reset.emplace(*this, write_function, (name + "-reset").c_str(), "no effect; the real port resets the output after a pulse");
+            o.invert.emplace(*this, write_function, (name + "-invert").c_str(),
+                             "TRUE inverts the output");
+            o.reset.emplace(*this, write_function, (name + "-reset").c_str(),
+                            "no effect; the real port resets the output after a pulse");
         }
         for (std::size_t i = 0; i < in_pins.size(); ++i) {
             const std::string name = numbered(in_pins[i]) + "-in";
             Input& in = inputs[i];
-            in.fake.emplace(*this, read_function, (name + "-fake").c_str(), "simulated level of the input");
+            in.fake.emplace(*this, read_function, (name + "-fake").c_str(),
+                            "simulated level of the input");
             in.pin.emplace(*this, read_function, name.c_str(), "input of the port");
             in.inverted.emplace(*this, read_function, (name + "-not").c_str(), "input, inverted");
         }
@@ -54,12 +64,16 @@ struct SimParport : hal::Component {
         }
     }
     void write(hal::Cycle) noexcept {
-        for (Output& o : outputs) *o.fake = o.pin->get() != o.invert->get();
+        for (Output& o : outputs) {
+            *o.fake = o.pin->get() != o.invert->get();
+        }
     }
     void reset(hal::Cycle) noexcept {}
 
 private:
-    static std::string numbered(int number) { return (number < 10 ? "pin-0" : "pin-") + std::to_string(number); }
+    static std::string numbered(int number) {
+        return (number < 10 ? "pin-0" : "pin-") + std::to_string(number);
+    }
 };
 
 }  // namespace

@@ -5,18 +5,24 @@ namespace {
 
 struct SimSpindle : hal::Component {
     using Component::Component;
-    hal::In<double>    velocity_cmd{*this, "velocity-cmd", "commanded speed"};
-    hal::Out<double>   position_fb{*this, "position-fb", "position", {.unit = "turn"}};
-    hal::Io<bool>      index_enable{*this, "index-enable", "TRUE: the next full turn sets position-fb to 0 and this pin to FALSE"};
-    hal::Param<double> scale{*this, "scale", "turns per second, per unit of velocity-cmd", {.initial = 1.0}};
-    hal::Function      run{*this, "", &SimSpindle::update, "turns the spindle"};
+    hal::In<double> velocity_cmd{*this, "velocity-cmd", "commanded speed"};
+    hal::Out<double> position_fb{*this, "position-fb", "position", {.unit = "turn"}};
+    hal::Io<bool> index_enable{
+        *this, "index-enable",
+        "TRUE: the next full turn sets position-fb to 0 and this pin to FALSE"};
+    hal::Param<double> scale{
+        *this, "scale", "turns per second, per unit of velocity-cmd", {.initial = 1.0}};
+    hal::Function run{*this, "", &SimSpindle::update, "turns the spindle"};
 
     void update(hal::Cycle cycle) noexcept {
         const double step = velocity_cmd * scale * cycle.seconds();
         const double next = position_fb + step;
-        if (!std::isfinite(next)) return;  // an infinite or invalid speed does not end in an invalid position
+        // an infinite or invalid speed does not end in an invalid position
+        if (!std::isfinite(next)) return;
         const bool indexed = index_enable && std::floor(position_fb) != std::floor(next);
-        if (indexed) index_enable = false;
+        if (indexed) {
+            index_enable = false;
+        }
         const double turns = velocity_cmd < 0.0 ? std::ceil(next) : std::floor(next);
         position_fb = indexed ? next - turns : next;
     }

@@ -14,8 +14,8 @@ struct Sphereprobe : hal::Component {
     hal::In<std::int32_t> cy{*this, "cy", "centre, y, in counts"};
     hal::In<std::int32_t> cz{*this, "cz", "centre, z, in counts"};
     hal::In<std::int32_t> r{*this, "r", "radius in counts"};
-    hal::Out<bool>        probe_out{*this, "probe-out", "TRUE while the probe touches"};
-    hal::Function         run{*this, "", &Sphereprobe::update, "detects contact of the probe"};
+    hal::Out<bool> probe_out{*this, "probe-out", "TRUE while the probe touches"};
+    hal::Function run{*this, "", &Sphereprobe::update, "detects contact of the probe"};
 
     void update(hal::Cycle) noexcept {
         const double x = away(px, cx);

@@ -10,28 +10,49 @@ struct SpringDamper : hal::Component {
     using Component::Component;
 
     hal::In<double> force{*this, "force", "force on the mass", {.unit = "N"}};
-    hal::In<double> base{*this, "base-position", "position of the base of spring and damper; linear within a period", {.unit = "m"}};
+    hal::In<double> base{*this,
+                         "base-position",
+                         "position of the base of spring and damper; linear within a period",
+                         {.unit = "m"}};
     hal::In<bool> reset{*this, "reset", "TRUE holds the mass at base-position"};
 
-    hal::Param<double> mass{*this, "mass", "mass; 0: spring and damper only", {.initial = 1.0, .unit = "kg"}};
-    hal::Param<double> stiffness{*this, "stiffness", "spring stiffness", {.initial = 100.0, .unit = "N/m"}};
-    hal::Param<double> damping{*this, "damping", "damping coefficient", {.initial = 2.0, .unit = "N*s/m"}};
+    hal::Param<double> mass{
+        *this, "mass", "mass; 0: spring and damper only", {.initial = 1.0, .unit = "kg"}};
+    hal::Param<double> stiffness{
+        *this, "stiffness", "spring stiffness", {.initial = 100.0, .unit = "N/m"}};
+    hal::Param<double> damping{
+        *this, "damping", "damping coefficient", {.initial = 2.0, .unit = "N*s/m"}};
 
-    hal::Out<double> position{*this, "position", "position of the mass", {.unit = "m", .finite = true}};
-    hal::Out<double> velocity{*this, "velocity", "velocity of the mass", {.unit = "m/s", .finite = true}};
-    hal::Out<double> reaction{*this, "reaction", "force of spring and damper on the mass", {.unit = "N", .finite = true}};
-    hal::Out<double> energy{*this, "energy", "energy of mass and spring", {.unit = "J", .finite = true}};
+    hal::Out<double> position{
+        *this, "position", "position of the mass", {.unit = "m", .finite = true}};
+    hal::Out<double> velocity{
+        *this, "velocity", "velocity of the mass", {.unit = "m/s", .finite = true}};
+    hal::Out<double> reaction{
+        *this, "reaction", "force of spring and damper on the mass", {.unit = "N", .finite = true}};
+    hal::Out<double> energy{
+        *this, "energy", "energy of mass and spring", {.unit = "J", .finite = true}};
 
     hal::Function run{*this, "update", &SpringDamper::update, "simulates one period"};
 
     void update(hal::Cycle cycle) noexcept {
-        const double h = cycle.seconds(), foot = sim::force(base), pull = sim::force(force);
-        const double c = sim::sane(stiffness, 0.0), d = sim::sane(damping, 0.0), m = sim::sane(mass, 0.0);
+        const double h = cycle.seconds();
+        const double foot = sim::force(base);
+        const double pull = sim::force(force);
+        const double c = sim::sane(stiffness, 0.0);
+        const double d = sim::sane(damping, 0.0);
+
+        const double m = sim::sane(mass, 0.0);
         const double foot_velocity = started_ ? (foot - foot_) / h : 0.0;
-        if (reset || !started_) heavy_.state = {reset ? 0.0 : -foot, 0.0};  // the elongation is relative to the base
+        // the elongation is relative to the base
+        if (reset || !started_) {
+            heavy_.state = {reset ? 0.0 : -foot, 0.0};
+        }
         if (!reset) {
-            if (m > 0.0) move(m, c, d, pull, foot_velocity, h);
-            else creep(c, d, pull, foot_velocity, h);
+            if (m > 0.0) {
+                move(m, c, d, pull, foot_velocity, h);
+            } else {
+                creep(c, d, pull, foot_velocity, h);
+            }
         }
         started_ = true;
         foot_ = foot;
@@ -57,8 +78,10 @@ private:
         double& stretch = heavy_.state[0];
         double slope = 0.0;
         if (d > 0.0) {
-            const double rate = c / d, gone = rate * h;
-            const double grown = gone > 1e-9 ? -std::expm1(-gone) / rate : h;  // integral of exp(-rate t)
+            const double rate = c / d;
+            const double gone = rate * h;
+            // integral of exp(-rate t)
+            const double grown = gone > 1e-9 ? -std::expm1(-gone) / rate : h;
             const double change = (pull / d - rate * stretch) * grown;
             stretch += change;
             slope = (pull - c * stretch) / d;
@@ -67,7 +90,9 @@ private:
             stretch = pull / c;
             slope = (stretch - before) / h;
         }
-        if (!(std::fabs(stretch) + std::fabs(slope) < 1e100)) stretch = slope = 0.0;
+        if (!(std::fabs(stretch) + std::fabs(slope) < 1e100)) {
+            stretch = slope = 0.0;
+        }
         heavy_.state[1] = foot_velocity + slope;
     }
 

@@ -11,40 +11,74 @@ struct TwoMass : hal::Component {
     using Component::Component;
 
     hal::In<double> torque{*this, "torque", "motor torque", {.unit = "N*m"}};
-    hal::In<double> load_torque{*this, "load-torque", "load torque, positive against positive rotation", {.unit = "N*m"}};
+    hal::In<double> load_torque{
+        *this, "load-torque", "load torque, positive against positive rotation", {.unit = "N*m"}};
     hal::In<bool> reset{*this, "reset", "TRUE holds both masses at 0"};
 
-    hal::Param<double> motor_inertia{*this, "motor-inertia", "inertia of the motor", {.initial = 2e-4, .unit = "kg*m^2"}};
-    hal::Param<double> load_inertia{*this, "load-inertia", "inertia of the load", {.initial = 1e-3, .unit = "kg*m^2"}};
-    hal::Param<double> stiffness{*this, "stiffness", "stiffness of the shaft between them", {.initial = 20.0, .unit = "N*m/rad"}};
-    hal::Param<double> damping{*this, "damping", "damping of the shaft between them", {.initial = 2e-3, .unit = "N*m*s/rad"}};
-    hal::Param<double> motor_viscous{*this, "motor-viscous", "viscous friction of the motor", {.initial = 1e-4, .unit = "N*m*s/rad"}};
-    hal::Param<double> load_viscous{*this, "load-viscous", "viscous friction of the load", {.initial = 1e-3, .unit = "N*m*s/rad"}};
-    hal::Param<double> pitch{*this, "pitch", "position units per revolution (a screw's pitch in mm)", {.initial = 1.0}};
+    hal::Param<double> motor_inertia{
+        *this, "motor-inertia", "inertia of the motor", {.initial = 2e-4, .unit = "kg*m^2"}};
+    hal::Param<double> load_inertia{
+        *this, "load-inertia", "inertia of the load", {.initial = 1e-3, .unit = "kg*m^2"}};
+    hal::Param<double> stiffness{*this,
+                                 "stiffness",
+                                 "stiffness of the shaft between them",
+                                 {.initial = 20.0, .unit = "N*m/rad"}};
+    hal::Param<double> damping{*this,
+                               "damping",
+                               "damping of the shaft between them",
+                               {.initial = 2e-3, .unit = "N*m*s/rad"}};
+    hal::Param<double> motor_viscous{*this,
+                                     "motor-viscous",
+                                     "viscous friction of the motor",
+                                     {.initial = 1e-4, .unit = "N*m*s/rad"}};
+    hal::Param<double> load_viscous{*this,
+                                    "load-viscous",
+                                    "viscous friction of the load",
+                                    {.initial = 1e-3, .unit = "N*m*s/rad"}};
+    hal::Param<double> pitch{
+        *this, "pitch", "position units per revolution (a screw's pitch in mm)", {.initial = 1.0}};
 
-    hal::Out<double> motor_angle{*this, "motor-angle", "angle of the motor", {.unit = "rad", .finite = true}};
-    hal::Out<double> motor_velocity{*this, "motor-velocity", "speed of the motor", {.unit = "rad/s", .finite = true}};
-    hal::Out<double> load_angle{*this, "load-angle", "angle of the load", {.unit = "rad", .finite = true}};
-    hal::Out<double> load_velocity{*this, "load-velocity", "speed of the load", {.unit = "rad/s", .finite = true}};
-    hal::Out<double> twist{*this, "twist", "twist of the shaft: motor angle - load angle", {.unit = "rad", .finite = true}};
-    hal::Out<double> shaft_torque{*this, "shaft-torque", "torque from the motor to the load", {.unit = "N*m", .finite = true}};
-    hal::Out<double> motor_position{*this, "motor-position", "revolutions of the motor * pitch", {.finite = true}};
-    hal::Out<double> load_position{*this, "load-position", "revolutions of the load * pitch", {.finite = true}};
+    hal::Out<double> motor_angle{
+        *this, "motor-angle", "angle of the motor", {.unit = "rad", .finite = true}};
+    hal::Out<double> motor_velocity{
+        *this, "motor-velocity", "speed of the motor", {.unit = "rad/s", .finite = true}};
+    hal::Out<double> load_angle{
+        *this, "load-angle", "angle of the load", {.unit = "rad", .finite = true}};
+    hal::Out<double> load_velocity{
+        *this, "load-velocity", "speed of the load", {.unit = "rad/s", .finite = true}};
+    hal::Out<double> twist{*this,
+                           "twist",
+                           "twist of the shaft: motor angle - load angle",
+                           {.unit = "rad", .finite = true}};
+    hal::Out<double> shaft_torque{*this,
+                                  "shaft-torque",
+                                  "torque from the motor to the load",
+                                  {.unit = "N*m", .finite = true}};
+    hal::Out<double> motor_position{
+        *this, "motor-position", "revolutions of the motor * pitch", {.finite = true}};
+    hal::Out<double> load_position{
+        *this, "load-position", "revolutions of the load * pitch", {.finite = true}};
 
     hal::Function run{*this, "update", &TwoMass::update, "simulates one period"};
 
     void update(hal::Cycle cycle) noexcept {
-        const double j1 = sim::sane(motor_inertia, 1e-12), j2 = sim::sane(load_inertia, 1e-12);
-        const double c = sim::sane(stiffness, 0.0), d = sim::sane(damping, 0.0);
-        const double b1 = sim::sane(motor_viscous, 0.0), b2 = sim::sane(load_viscous, 0.0);
+        const double j1 = sim::sane(motor_inertia, 1e-12);
+        const double j2 = sim::sane(load_inertia, 1e-12);
+        const double c = sim::sane(stiffness, 0.0);
+        const double d = sim::sane(damping, 0.0);
+        const double b1 = sim::sane(motor_viscous, 0.0);
+        const double b2 = sim::sane(load_viscous, 0.0);
         Plant::Equations equations;
         equations.a = {{{0, 1, 0, -1},  // twist, motor-velocity, load-angle, load-velocity
                         {-c / j1, -(d + b1) / j1, 0, d / j1},
                         {0, 0, 0, 1},
                         {c / j2, d / j2, 0, -(d + b2) / j2}}};
         equations.b = {{{0, 0}, {1 / j1, 0}, {0, 0}, {0, -1 / j2}}};
-        if (reset) plant_.state = {};
-        else plant_.step(equations, {sim::force(torque), sim::force(load_torque)}, cycle.seconds());
+        if (reset) {
+            plant_.state = {};
+        } else {
+            plant_.step(equations, {sim::force(torque), sim::force(load_torque)}, cycle.seconds());
+        }
 
         const auto& [angle, w1, load, w2] = plant_.state;
         const double scale = std::fabs(pitch) < 1e15 ? pitch / (2 * std::numbers::pi) : 0.0;

@@ -13,7 +13,7 @@ namespace hal::vision {
 /// Reads the calibration `file`, in the constructor of a component. [setup]
 inline Camera camera_from(const hal::Texts& texts, const std::string& file) {
     const std::string text = texts.read("camera", file);
-    CameraText        read = read_camera(text);
+    CameraText read = read_camera(text);
     texts.reject(file, text, "camera-text", read.problems);
     read.camera.file = file;
     return read.camera;

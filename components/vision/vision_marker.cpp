@@ -8,17 +8,21 @@ namespace {
 using namespace hal::vision;
 
 struct Found {
-    bool          found = false;
-    std::int32_t  id = -1;
+    bool found = false;
+    std::int32_t id = -1;
     std::uint32_t count = 0;
-    double        u = 0, v = 0, error_px = 0, ambiguity = 0;
-    Pose          pose;
+    double u = 0;
+    double v = 0;
+    double error_px = 0;
+    double ambiguity = 0;
+    Pose pose;
 };
 
 struct Settings {
     std::int32_t id = -1;
-    double       size_mm = 0, most_error = 0;
-    bool         operator==(const Settings&) const = default;
+    double size_mm = 0;
+    double most_error = 0;
+    bool operator==(const Settings&) const = default;
 };
 
 class VisionMarker : public CameraComponent<VisionMarker, Found, Settings> {
@@ -34,9 +38,12 @@ public:
 
     void detect(const Frame& frame, const Settings& of, Found& found) {
         const std::vector<Marker> markers = detector_->find(frame, of.id, of.size_mm);
-        const Marker*             best = nullptr;
-        for (const Marker& marker : markers)
-            if (!best && (of.most_error <= 0.0 || marker.error_px <= of.most_error)) best = &marker;
+        const Marker* best = nullptr;
+        for (const Marker& marker : markers) {
+            if (!best && (of.most_error <= 0.0 || marker.error_px <= of.most_error)) {
+                best = &marker;
+            }
+        }
         found.count = static_cast<std::uint32_t>(markers.size());
         if (!best) return;
         found.found = true;
@@ -44,50 +51,76 @@ public:
         found.pose = best->pose;
         found.error_px = best->error_px;
         found.ambiguity = best->ambiguity;
-        for (const auto& corner : best->corners) found.u += corner[0] / 4, found.v += corner[1] / 4;
+        for (const auto& corner : best->corners) {
+            found.u += corner[0] / 4;
+            found.v += corner[1] / 4;
+        }
     }
     Settings settings() const noexcept { return {wanted, size, max_error}; }
-    void     show(const Found& f, bool fresh, hal::Cycle) noexcept {
+    void show(const Found& f, bool fresh, hal::Cycle) noexcept {
         if (!fresh) return;
         count = f.count;
         if (!f.found) return;
         id = f.id;
-        x = f.pose.x_mm, y = f.pose.y_mm, z = f.pose.z_mm;
-        roll = f.pose.roll_deg, pitch = f.pose.pitch_deg, yaw = f.pose.yaw_deg;
-        u = f.u, v = f.v;
+        x = f.pose.x_mm;
+        y = f.pose.y_mm;
+        z = f.pose.z_mm;
+        roll = f.pose.roll_deg;
+        pitch = f.pose.pitch_deg;
+        yaw = f.pose.yaw_deg;
+        u = f.u;
+        v = f.v;
         error = f.error_px;
         ambiguity = f.ambiguity;
     }
 
-    hal::In<std::int32_t> wanted{
-        *this, "target-id", "id of the marker to detect; -1: the lowest id in the frame", {.initial = -1}};
-    hal::In<double>    size{*this, "size", "side length of the marker's black square", {.initial = 50.0, .unit = "mm"}};
-    hal::Param<double> max_error{
-        *this, "max-error", "maximum error of a valid marker; 0: no limit", {.initial = 2.0, .unit = "px"}};
-    hal::Out<std::int32_t>  id{*this, "id", "id of the detected marker", {.initial = -1}};
+    hal::In<std::int32_t> wanted{*this,
+                                 "target-id",
+                                 "id of the marker to detect; -1: the lowest id in the frame",
+                                 {.initial = -1}};
+    hal::In<double> size{
+        *this, "size", "side length of the marker's black square", {.initial = 50.0, .unit = "mm"}};
+    hal::Param<double> max_error{*this,
+                                 "max-error",
+                                 "maximum error of a valid marker; 0: no limit",
+                                 {.initial = 2.0, .unit = "px"}};
+    hal::Out<std::int32_t> id{*this, "id", "id of the detected marker", {.initial = -1}};
     hal::Out<std::uint32_t> count{*this, "count", "number of matching markers in the frame"};
-    hal::Out<double>        x{*this, "x", "position to the right of the camera", {.unit = "mm"}};
-    hal::Out<double>        y{*this, "y", "position below the camera", {.unit = "mm"}};
-    hal::Out<double>        z{*this, "z", "distance in front of the camera", {.unit = "mm"}};
-    hal::Out<double>        roll{*this, "roll", "rotation about the camera's x axis, applied first", {.unit = "deg"}};
-    hal::Out<double>        pitch{*this, "pitch", "rotation about the y axis, applied second", {.unit = "deg"}};
-    hal::Out<double>        yaw{*this, "yaw", "rotation about the z axis, applied third", {.unit = "deg"}};
-    hal::Out<double>        u{*this, "u", "centre of the marker in the frame, from the left", {.unit = "px"}};
-    hal::Out<double>        v{*this, "v", "centre of the marker in the frame, from the top", {.unit = "px"}};
-    hal::Out<double>        error{*this, "error", "reprojection error of the corners, root mean square", {.unit = "px"}};
-    hal::Out<double>        ambiguity{*this, "ambiguity",
-                               "ratio of the errors of this pose and its mirror image over the last frames: 0 unambiguous, 1 ambiguous"};
+    hal::Out<double> x{*this, "x", "position to the right of the camera", {.unit = "mm"}};
+    hal::Out<double> y{*this, "y", "position below the camera", {.unit = "mm"}};
+    hal::Out<double> z{*this, "z", "distance in front of the camera", {.unit = "mm"}};
+    hal::Out<double> roll{
+        *this, "roll", "rotation about the camera's x axis, applied first", {.unit = "deg"}};
+    hal::Out<double> pitch{
+        *this, "pitch", "rotation about the y axis, applied second", {.unit = "deg"}};
+    hal::Out<double> yaw{*this, "yaw", "rotation about the z axis, applied third", {.unit = "deg"}};
+    hal::Out<double> u{
+        *this, "u", "centre of the marker in the frame, from the left", {.unit = "px"}};
+    hal::Out<double> v{
+        *this, "v", "centre of the marker in the frame, from the top", {.unit = "px"}};
+    hal::Out<double> error{
+        *this, "error", "reprojection error of the corners, root mean square", {.unit = "px"}};
+    hal::Out<double> ambiguity{*this, "ambiguity",
+                               "ratio of the errors of this pose and its mirror image over the "
+                               "last frames: 0 unambiguous, 1 ambiguous"};
 
 private:
-    hal::TextArgument dictionary_{*this, "dictionary", "4x4_50", "marker dictionary: 4x4_50, 5x5_100, 6x6_250, apriltag_36h11 ..."};
+    hal::TextArgument dictionary_{
+        *this, "dictionary", "4x4_50",
+        "marker dictionary: 4x4_50, 5x5_100, 6x6_250, apriltag_36h11 ..."};
     hal::TextArgument camera_{
-        *this, "camera", "", "file with the camera's calibration, relative to the netlist; required for the pose", {.per_instance = true}};
+        *this,
+        "camera",
+        "",
+        "file with the camera's calibration, relative to the netlist; required for the pose",
+        {.per_instance = true}};
     std::optional<MarkerDetector> detector_;  // of the helper thread, once started
 };
 
 }  // namespace
 
-HAL_COMPONENT(VisionMarker, "vision_marker", "Detects a square marker and its pose relative to the camera", R"(
+HAL_COMPONENT(VisionMarker, "vision_marker",
+              "Detects a square marker and its pose relative to the camera", R"(
 Detects ArUco markers in the frames of `source=` and computes the pose of one of them: `x` to the right, `y` down, `z` in front of the
 camera in mm; the rotation from the marker (x right, y up, z out of its face) to the camera is R = Rz(yaw) Ry(pitch) Rx(roll) in degrees. An upright marker
 that faces the camera has roll 180.

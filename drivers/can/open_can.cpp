@@ -23,9 +23,12 @@ constexpr link::Driver<Opened, Options, Description> drivers[] = {
     {"sim", simbus::open, simbus::describe},
     {"udp", canudp::open, canudp::describe, nullptr, nullptr, "restart"},
     {"slcan", slcan::open, slcan::describe, nullptr, nullptr, "own errors restart receivequeue"},
-    {"replay", replay::open, replay::describe, nullptr, nullptr, "own restart sendqueue receivequeue"},
-    {"cane", cane::open, cane::describe, cane::is_own_option, cane::own_options, "bitrate datarate own errors restart"},
-    {"scocan", scocan::open, scocan::describe, scocan::is_own_option, scocan::own_options, "bitrate datarate fd own errors stamps restart"},
+    {"replay", replay::open, replay::describe, nullptr, nullptr,
+     "own restart sendqueue receivequeue"},
+    {"cane", cane::open, cane::describe, cane::is_own_option, cane::own_options,
+     "bitrate datarate own errors restart"},
+    {"scocan", scocan::open, scocan::describe, scocan::is_own_option, scocan::own_options,
+     "bitrate datarate fd own errors stamps restart"},
 };
 
 using link::quoted;
@@ -54,18 +57,27 @@ std::string apply(std::string_view key, std::string_view value, bool has_value, 
     const auto to_flag = [&](bool& flag) { return link::to_flag(key, value, has_value, flag); };
     const auto to_rate = [&](std::uint32_t& to) -> std::string {
         const auto r = rate(value);
-        if (!r) return "invalid " + std::string(key) + " " + quoted(value) + "; write bits per second, as in 500000, 500k or 1M";
+        if (!r) {
+            return "invalid " + std::string(key) + " " + quoted(value) +
+                   "; write bits per second, as in 500000, 500k or 1M";
+        }
         to = *r;
         return {};
     };
     const auto to_number = [&](auto& to, std::uint32_t most) -> std::string {
         const auto n = number(value);
-        if (!n || *n > most) return "invalid " + std::string(key) + " " + quoted(value) + "; write a number 0.." + std::to_string(most);
+        if (!n || *n > most) {
+            return "invalid " + std::string(key) + " " + quoted(value) + "; write a number 0.." +
+                   std::to_string(most);
+        }
         to = *n;
         return {};
     };
     if (key == "bitrate") return to_rate(o.bit_rate);
-    if (key == "datarate") return o.fd = true, to_rate(o.data_rate);
+    if (key == "datarate") {
+        o.fd = true;
+        return to_rate(o.data_rate);
+    }
     if (key == "fd") return to_flag(o.fd);
     if (key == "listen") return to_flag(o.listen_only);
     if (key == "own") return to_flag(o.own_frames);
@@ -75,7 +87,8 @@ std::string apply(std::string_view key, std::string_view value, bool has_value, 
     if (key == "sendqueue") return to_number(o.send_capacity, 65536);
     if (key == "receivequeue") return to_number(o.receive_capacity, 65536);
     return std::string(link::no_option) + quoted(key) +
-           "; options are bitrate, datarate, fd, listen, own, errors, stamps, restart, sendqueue, receivequeue";
+           "; options are bitrate, datarate, fd, listen, own, errors, stamps, restart, sendqueue, "
+           "receivequeue";
 }
 
 }  // namespace
@@ -84,9 +97,12 @@ Opened open(std::string_view address, const Options& given) {
     return link::open_address<Opened, Options, Description>(
         address, given, drivers, apply,
         "a CAN bus; write can:can0 for an interface of this machine, sim:NAME for a bus in memory, "
-        "udp:239.74.163.2:43113, slcan:/dev/ttyACM0, cane:enp3s0 for CAN in Ethernet frames, scocan:NODE for the slots of a node, or replay:FILE");
+        "udp:239.74.163.2:43113, slcan:/dev/ttyACM0, cane:enp3s0 for CAN in Ethernet frames, "
+        "scocan:NODE for the slots of a node, or replay:FILE");
 }
 
-Description describe(std::string_view address) { return link::describe_address<Opened, Options, Description>(address, drivers); }
+Description describe(std::string_view address) {
+    return link::describe_address<Opened, Options, Description>(address, drivers);
+}
 
 }  // namespace hal::can

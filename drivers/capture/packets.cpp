@@ -12,7 +12,11 @@ namespace hal::replay {
 
 namespace {
 
-constexpr std::uint32_t section = 0x0a0d0d0a, interface_block = 1, packet_block = 6, byte_order = 0x1a2b3c4d;
+constexpr std::uint32_t section = 0x0a0d0d0a;
+constexpr std::uint32_t interface_block = 1;
+constexpr std::uint32_t packet_block = 6;
+
+constexpr std::uint32_t byte_order = 0x1a2b3c4d;
 constexpr std::size_t largest_file = std::size_t{1} << 30;
 using Take = std::function<void(const Packet&)>;
 
@@ -22,11 +26,15 @@ public:
     bool swapped = false;
     std::uint32_t number(std::size_t at, unsigned width) const {
         std::uint32_t v = 0;
-        for (unsigned i = 0; i < width; ++i)
-            v |= std::uint32_t{static_cast<unsigned char>(at + i < all_.size() ? all_[at + i] : 0)} << 8 * (swapped ? width - 1 - i : i);
+        for (unsigned i = 0; i < width; ++i) {
+            v |= std::uint32_t{static_cast<unsigned char>(at + i < all_.size() ? all_[at + i] : 0)}
+                 << 8 * (swapped ? width - 1 - i : i);
+        }
         return v;
     }
-    std::string_view part(std::size_t at, std::size_t size) const { return at <= all_.size() ? all_.substr(at, size) : std::string_view{}; }
+    std::string_view part(std::size_t at, std::size_t size) const {
+        return at <= all_.size() ? all_.substr(at, size) : std::string_view{};
+    }
 
 private:
     std::string_view all_;
@@ -56,26 +64,32 @@ std::string parse_pcapng(std::string_view all, const Take& take) {
         if (type == interface_block && size >= 20 && interfaces.size() < 1024) {
             Interface i{in.number(at + 8, 2), 1000.0};
             for (std::size_t o = at + 16; o + 4 <= end;) {
-                const auto code = in.number(o, 2), length = in.number(o + 2, 2);
+                const auto code = in.number(o, 2);
+                const auto length = in.number(o + 2, 2);
                 if (code == 0) break;
                 if (code == 9 && length >= 1) {  // time resolution: a negative power of 10, or of 2
                     const auto r = in.number(o + 4, 1);
                     i.tick_ns = 1e9;
-                    for (unsigned k = 0; k < (r & 127U); ++k) i.tick_ns /= (r & 128U) != 0 ? 2.0 : 10.0;
+                    for (unsigned k = 0; k < (r & 127U); ++k) {
+                        i.tick_ns /= (r & 128U) != 0 ? 2.0 : 10.0;
+                    }
                 }
                 o += 4 + (length + 3U) / 4 * 4;
             }
             interfaces.push_back(i);
         } else if (type == packet_block && size >= 32) {
-            const auto number = in.number(at + 8, 4), held = in.number(at + 20, 4);
+            const auto number = in.number(at + 8, 4);
+            const auto held = in.number(at + 20, 4);
             if (number >= interfaces.size() || held > size - 32) return cut_off(at);
             const auto ticks = std::uint64_t{in.number(at + 12, 4)} << 32 | in.number(at + 16, 4);
             const auto tick = interfaces[number].tick_ns;
             const double rough = static_cast<double>(ticks) * tick;
-            const bool whole = tick == 1.0 || tick == 1000.0;  // exact integers, where a double is not
+            // exact integers, where a double is not
+            const bool whole = tick == 1.0 || tick == 1000.0;
             const auto exact = static_cast<std::int64_t>(ticks * (tick == 1.0 ? 1U : 1000U));
             const auto time = rough >= 9e18 ? 0 : whole ? exact : static_cast<std::int64_t>(rough);
-            take({static_cast<std::uint16_t>(interfaces[number].link), time, in.part(at + 28, held), in.number(at + 24, 4)});
+            take({static_cast<std::uint16_t>(interfaces[number].link), time, in.part(at + 28, held),
+                  in.number(at + 24, 4)});
         }
         at += size;
     }
@@ -84,21 +98,26 @@ std::string parse_pcapng(std::string_view all, const Take& take) {
 
 std::string parse_pcap(std::string_view all, const Take& take) {
     Bytes in(all);
-    if (in.number(0, 4) != 0xa1b2c3d4 && in.number(0, 4) != 0xa1b23c4d) in.swapped = true;
+    if (in.number(0, 4) != 0xa1b2c3d4 && in.number(0, 4) != 0xa1b23c4d) {
+        in.swapped = true;
+    }
     const std::int64_t unit = in.number(0, 4) == 0xa1b23c4d ? 1 : 1000;
     const unsigned link = in.number(20, 4) & 0xffffU;
     for (std::size_t at = 24; at < all.size();) {
         const std::size_t held = in.number(at + 8, 4);
         if (all.size() - at < 16 || held > all.size() - at - 16) return cut_off(at);
         const auto time = in.number(at, 4) * 1'000'000'000LL + in.number(at + 4, 4) * unit;
-        take({static_cast<std::uint16_t>(link), time, in.part(at + 16, held), in.number(at + 12, 4)});
+        take({static_cast<std::uint16_t>(link), time, in.part(at + 16, held),
+              in.number(at + 12, 4)});
         at += 16 + held;
     }
     return {};
 }
 
 void add(std::string& s, std::uint32_t v, unsigned width) {
-    for (; width > 0; --width, v >>= 8) s += static_cast<char>(v & 0xff);
+    for (; width > 0; --width, v >>= 8) {
+        s += static_cast<char>(v & 0xff);
+    }
 }
 void pad(std::string& s) { s.resize((s.size() + 3) / 4 * 4); }
 
@@ -107,7 +126,8 @@ void pad(std::string& s) { s.resize((s.size() + 3) / 4 * 4); }
 bool is_capture(std::string_view file) {
     const auto magic = Bytes(file).number(0, 4);
     if (file.size() >= 12 && magic == section) return true;
-    return file.size() >= 24 && (magic == 0xa1b2c3d4 || magic == 0xd4c3b2a1 || magic == 0xa1b23c4d || magic == 0x4d3cb2a1);
+    return file.size() >= 24 && (magic == 0xa1b2c3d4 || magic == 0xd4c3b2a1 ||
+                                 magic == 0xa1b23c4d || magic == 0x4d3cb2a1);
 }
 
 std::string each_packet(std::string_view file, const Take& take) {
@@ -117,7 +137,8 @@ std::string each_packet(std::string_view file, const Take& take) {
 
 std::optional<std::string> read_file(const std::string& name, std::string& problem) {
     struct stat about{};
-    if (::stat(name.c_str(), &about) == 0 && !S_ISREG(about.st_mode)) {  // opening a FIFO would block
+    // opening a FIFO would block
+    if (::stat(name.c_str(), &about) == 0 && !S_ISREG(about.st_mode)) {
         problem = "not a regular file";
         return std::nullopt;
     }
@@ -135,15 +156,28 @@ std::optional<std::string> read_file(const std::string& name, std::string& probl
     return std::nullopt;
 }
 
-PacketWriter::PacketWriter(const std::string& file, std::uint16_t link, std::string_view interface) : file_(file) {
+PacketWriter::PacketWriter(const std::string& file, std::uint16_t link, std::string_view interface)
+    : file_(file) {
     std::string s;
-    add(s, byte_order, 4), add(s, 1, 2), add(s, 0, 2), add(s, 0xffffffff, 4), add(s, 0xffffffff, 4);
+    add(s, byte_order, 4);
+    add(s, 1, 2);
+    add(s, 0, 2);
+    add(s, 0xffffffff, 4);
+    add(s, 0xffffffff, 4);
     put_block(section, s);
     s.clear();
-    add(s, link, 2), add(s, 0, 2), add(s, 0, 4);
+    add(s, link, 2);
+    add(s, 0, 2);
+    add(s, 0, 4);
     interface = interface.substr(0, 255);
-    add(s, 2, 2), add(s, static_cast<std::uint32_t>(interface.size()), 2), s += interface, pad(s);
-    add(s, 9, 2), add(s, 1, 2), s += '\x09', pad(s);  // nanoseconds
+    add(s, 2, 2);
+    add(s, static_cast<std::uint32_t>(interface.size()), 2);
+    s += interface;
+    pad(s);
+    add(s, 9, 2);
+    add(s, 1, 2);
+    s += '\x09';
+    pad(s);  // nanoseconds
     add(s, 0, 4);
     put_block(interface_block, s);
 }
@@ -152,14 +186,20 @@ bool PacketWriter::write(std::int64_t time_ns, std::string_view bytes) {
     const auto time = static_cast<std::uint64_t>(time_ns > 0 ? time_ns : 0);
     const auto size = static_cast<std::uint32_t>(bytes.size());
     std::string s;
-    add(s, 0, 4), add(s, static_cast<std::uint32_t>(time >> 32), 4), add(s, static_cast<std::uint32_t>(time), 4);
-    add(s, size, 4), add(s, size, 4);
-    s += bytes, pad(s);
+    add(s, 0, 4);
+    add(s, static_cast<std::uint32_t>(time >> 32), 4);
+
+    add(s, static_cast<std::uint32_t>(time), 4);
+    add(s, size, 4);
+    add(s, size, 4);
+    s += bytes;
+    pad(s);
     return put_block(packet_block, s);
 }
 bool PacketWriter::put_block(std::uint32_t type, const std::string& body) {
     std::string s;
-    add(s, type, 4), add(s, static_cast<std::uint32_t>(body.size() + 12), 4);
+    add(s, type, 4);
+    add(s, static_cast<std::uint32_t>(body.size() + 12), 4);
     s += body;
     add(s, static_cast<std::uint32_t>(body.size() + 12), 4);
     return file_.put(s);

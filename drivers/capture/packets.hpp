@@ -12,7 +12,10 @@
 
 namespace hal::replay {
 
-inline constexpr std::uint16_t link_ethernet = 1, link_can = 227, link_cooked = 113;  ///< LINKTYPE_* of the tcpdump group's registry
+/// LINKTYPE_* of the tcpdump group's registry
+inline constexpr std::uint16_t link_ethernet = 1;
+inline constexpr std::uint16_t link_can = 227;
+inline constexpr std::uint16_t link_cooked = 113;
 
 /// A packet of a capture.
 struct Packet {
@@ -24,7 +27,8 @@ struct Packet {
 
 /// Returns true when the first bytes are those of a capture. [any]
 bool is_capture(std::string_view file);
-/// Calls `take` for each packet in the order of the file, up to the first damaged or truncated one. Returns the problem, or "".
+/// Calls `take` for each packet in the order of the file, up to the first damaged or truncated one.
+/// Returns the problem, or "".
 std::string each_packet(std::string_view file, const std::function<void(const Packet&)>& take);
 
 /// Reads a whole file of at most 1 GiB. On failure returns nullopt and sets `problem`.

@@ -29,21 +29,26 @@ std::vector<can::DeliveryTime> DisciplineHandle::delivery_times(unsigned slot) c
 
 //   1. user counts itself           2. user reads the discipline        3. user uses it, and counts itself out
 //   4. set() stores the new one     5. set() waits for a count of 0
-// All are sequentially consistent: a user that reads the old one in 2 is counted before 4, so 5 waits for its 3.
+// All are sequentially consistent: a user that reads the old one in 2 is counted before 4, so 5
+// waits for its 3.
 void DisciplineHandle::set(Discipline* discipline, SlotTimes times) {
     {
         const std::lock_guard lock(times_mutex_);
         times_ = std::move(times);
     }
     discipline_.store(discipline);
-    while (users_.load() != 0) std::this_thread::yield();
+    while (users_.load() != 0) {
+        std::this_thread::yield();
+    }
 }
 
 bool offer_discipline(const Port& port, Discipline* discipline, SlotTimes times) {
     auto& all = registry();
     const std::lock_guard lock(all.mutex);
     auto& handle = all.handles[port.description().address];
-    if (!handle) handle = std::make_shared<DisciplineHandle>();
+    if (!handle) {
+        handle = std::make_shared<DisciplineHandle>();
+    }
     if (discipline == nullptr || !handle->holds(nullptr)) return false;
     handle->set(discipline, std::move(times));
     return true;
@@ -52,8 +57,11 @@ bool offer_discipline(const Port& port, Discipline* discipline, SlotTimes times)
 void withdraw_discipline(Discipline* discipline) {
     auto& all = registry();
     const std::lock_guard lock(all.mutex);
-    for (auto& [address, handle] : all.handles)
-        if (handle->holds(discipline)) handle->set(nullptr);
+    for (auto& [address, handle] : all.handles) {
+        if (handle->holds(discipline)) {
+            handle->set(nullptr);
+        }
+    }
 }
 
 std::shared_ptr<DisciplineHandle> discipline_of(const Port& port) {

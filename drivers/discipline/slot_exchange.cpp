@@ -36,14 +36,18 @@ void SlotExchange::remove(SlotUser& user) {
         SlotUser* expected = &user;
         one.compare_exchange_strong(expected, nullptr);
     }
-    while (busy_.load() != 0) std::this_thread::yield();
+    while (busy_.load() != 0) {
+        std::this_thread::yield();
+    }
 }
 
 std::shared_ptr<SlotExchange> offer_slots(const std::string& node, const Description& description) {
     auto& all = registry();
     const std::lock_guard lock(all.mutex);
     auto& exchange = all.nodes[node];
-    if (!exchange) exchange = std::make_shared<SlotExchange>();
+    if (!exchange) {
+        exchange = std::make_shared<SlotExchange>();
+    }
     if (exchange->offered.exchange(true)) return nullptr;
     exchange->description = description;
     return exchange;
@@ -65,8 +69,11 @@ std::vector<std::string> offered_slots() {
     auto& all = registry();
     const std::lock_guard lock(all.mutex);
     std::vector<std::string> names;
-    for (const auto& [name, exchange] : all.nodes)
-        if (exchange->offered.load()) names.push_back(name);
+    for (const auto& [name, exchange] : all.nodes) {
+        if (exchange->offered.load()) {
+            names.push_back(name);
+        }
+    }
     return names;
 }
 

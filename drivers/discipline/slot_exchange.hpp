@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The seam between the node of a CAN bus with time slots (SCoCAN) and the links that send through it, `scocan:NODE`. The component that runs a
-// node offers its name; a link of that name adds itself, and the node moves frames between its queues and the slots:
+// The seam between the node of a CAN bus with time slots (SCoCAN) and the links that send through
+// it, `scocan:NODE`. The component that runs a node offers its name; a link of that name adds
+// itself, and the node moves frames between its queues and the slots:
 //
 //     std::shared_ptr<SlotExchange> x = offer_slots("motor", description);  // [setup] the component scocan
 //     std::shared_ptr<SlotExchange> x = slots_of("motor");                  // [setup] a scocan: link
@@ -26,12 +27,14 @@ struct SlotFrame {
     std::uint32_t slot = any_slot;
 };
 
-/// One link. The thread of the link writes `outgoing` and reads `incoming`, the thread of the node does the opposite.
+/// One link. The thread of the link writes `outgoing` and reads `incoming`, the thread of the node
+/// does the opposite.
 struct SlotUser {
     SlotUser(std::size_t sends, std::size_t receives) : outgoing(sends), incoming(receives) {}
     Queue<SlotFrame> outgoing;
     Queue<Frame> incoming;
-    std::atomic<std::uint64_t> lost{0}, rejected{0};  ///< written by the thread of the node
+    std::atomic<std::uint64_t> lost{0};
+    std::atomic<std::uint64_t> rejected{0};  ///< written by the thread of the node
 };
 
 class SlotExchange {
@@ -46,13 +49,17 @@ public:
     template <class Use>
     void each(Use use) noexcept {
         busy_.fetch_add(1);
-        for (auto& one : users_)
-            if (SlotUser* user = one.load()) use(*user);
+        for (auto& one : users_) {
+            if (SlotUser* user = one.load()) {
+                use(*user);
+            }
+        }
         busy_.fetch_sub(1);
     }
 
     std::atomic<bool> offered{false};  ///< written in setup
-    std::atomic<State> state{State::down};  ///< written by the thread of the node: active while it may send
+    /// written by the thread of the node: active while it may send
+    std::atomic<State> state{State::down};
     std::atomic<std::int64_t> latest{INT64_MIN};  ///< written by the thread of the node: its time
     Description description;  ///< of the link of the node; written by offer_slots()
 

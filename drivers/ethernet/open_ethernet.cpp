@@ -28,9 +28,11 @@ template <class T>
 std::string to_number(std::string_view key, std::string_view value, T& to, long least, long most) {
     long number = 0;
     const auto [end, wrong] = std::from_chars(value.data(), value.data() + value.size(), number);
-    if (wrong != std::errc{} || end != value.data() + value.size() || number < least || number > most)
-        return "invalid " + std::string(key) + " " + quoted(value) + "; write a number " + std::to_string(least) + ".." +
-               std::to_string(most);
+    if (wrong != std::errc{} || end != value.data() + value.size() || number < least ||
+        number > most) {
+        return "invalid " + std::string(key) + " " + quoted(value) + "; write a number " +
+               std::to_string(least) + ".." + std::to_string(most);
+    }
     to = static_cast<T>(number);
     return {};
 }
@@ -41,8 +43,10 @@ std::string to_duration(std::string_view key, std::string_view value, std::int64
     const auto [end, wrong] = std::from_chars(value.data(), value.data() + value.size(), number);
     const std::string_view unit(end, static_cast<std::size_t>(value.data() + value.size() - end));
     number *= unit == "ns" ? 1.0 : unit == "us" ? 1e3 : unit == "ms" ? 1e6 : -1.0;
-    if (wrong != std::errc{} || !(number >= 0.0 && number <= 1e9))
-        return "invalid " + std::string(key) + " " + quoted(value) + "; write a time up to 1 s with its unit, as in 150us";
+    if (wrong != std::errc{} || !(number >= 0.0 && number <= 1e9)) {
+        return "invalid " + std::string(key) + " " + quoted(value) +
+               "; write a time up to 1 s with its unit, as in 150us";
+    }
     to = static_cast<std::int64_t>(number);
     return {};
 }
@@ -50,7 +54,9 @@ std::string to_duration(std::string_view key, std::string_view value, std::int64
 std::string to_policy(std::string_view value, Policy& to) {
     constexpr std::string_view words[] = {"hybrid", "block", "spin"};
     const auto* const found = std::find(std::begin(words), std::end(words), value);
-    if (found == std::end(words)) return "invalid policy " + quoted(value) + "; write hybrid, block or spin";
+    if (found == std::end(words)) {
+        return "invalid policy " + quoted(value) + "; write hybrid, block or spin";
+    }
     to = static_cast<Policy>(found - std::begin(words));
     return {};
 }
@@ -72,23 +78,29 @@ std::string apply(std::string_view key, std::string_view value, bool has_value, 
     if (key == "receivequeue") return to_number(key, value, o.receive_capacity, 1, 16384);
     if (key == "mac") {
         const auto address = parse_address(value);
-        if (!address || ((*address)[0] & 1) != 0 || *address == Address{})
-            return "invalid mac " + quoted(value) + "; write a unicast address, as in 02:00:00:00:00:07";
+        if (!address || ((*address)[0] & 1) != 0 || *address == Address{}) {
+            return "invalid mac " + quoted(value) +
+                   "; write a unicast address, as in 02:00:00:00:00:07";
+        }
         o.address = *address;
         return {};
     }
     return std::string(link::no_option) + quoted(key) +
-           "; options are policy, spin, pacer, priority, cpu, promiscuous, txstamps, speed, mac, forward, noise, sendqueue, receivequeue";
+           "; options are policy, spin, pacer, priority, cpu, promiscuous, txstamps, speed, mac, "
+           "forward, noise, sendqueue, receivequeue";
 }
 
 }  // namespace
 
 Opened open(std::string_view address, const Options& given) {
-    return link::open_address<Opened, Options, Description>(address, given, drivers, apply,
-                                               "an Ethernet segment; write eth:enp3s0 for an interface of this machine, "
-                                               "sim:NAME for a segment in memory, udp:HOST for UDP datagrams or replay:FILE");
+    return link::open_address<Opened, Options, Description>(
+        address, given, drivers, apply,
+        "an Ethernet segment; write eth:enp3s0 for an interface of this machine, "
+        "sim:NAME for a segment in memory, udp:HOST for UDP datagrams or replay:FILE");
 }
 
-Description describe(std::string_view address) { return link::describe_address<Opened, Options, Description>(address, drivers); }
+Description describe(std::string_view address) {
+    return link::describe_address<Opened, Options, Description>(address, drivers);
+}
 
 }  // namespace hal::ethernet

@@ -18,8 +18,11 @@ inline std::string quoted(std::string_view text) { return "'" + std::string(text
 inline constexpr std::string_view no_option = "unknown option ";
 
 /// Parses `key`, `key=0` or `key=1`. Returns the problem, or "".
-inline std::string to_flag(std::string_view key, std::string_view value, bool has_value, bool& flag) {
-    if (has_value && value != "0" && value != "1") return "invalid " + std::string(key) + " " + quoted(value) + "; write 0 or 1";
+inline std::string to_flag(std::string_view key, std::string_view value, bool has_value,
+                           bool& flag) {
+    if (has_value && value != "0" && value != "1") {
+        return "invalid " + std::string(key) + " " + quoted(value) + "; write 0 or 1";
+    }
     flag = !has_value || value == "1";
     return {};
 }
@@ -32,29 +35,36 @@ struct Driver {
     Description (*describe)(const std::string& place);
     bool (*is_own_option)(std::string_view key) = nullptr;
     std::string (*own_options)() = nullptr;  ///< their names, for a message
-    std::string_view without = {};           ///< common options it does not support, separated by blanks
+    /// common options it does not support, separated by blanks
+    std::string_view without = {};
 
     /// Returns true for a common option that the driver does not support.
     bool ignores(std::string_view key) const {
         const auto at = without.find(key);
         if (key.empty() || at == without.npos) return false;
         const auto end = at + key.size();
-        return (at == 0 || without[at - 1] == ' ') && (end == without.size() || without[end] == ' ');
+        return (at == 0 || without[at - 1] == ' ') &&
+               (end == without.size() || without[end] == ' ');
     }
 };
 
-/// Opens an address with the driver that it names. `apply(key, value, has_value, options)` applies an option and returns the problem, or
-/// ""; `help` completes "'x' is not the address of ".
+/// Opens an address with the driver that it names. `apply(key, value, has_value, options)` applies
+/// an option and returns the problem, or ""; `help` completes "'x' is not the address of ".
 template <class Opened, class Options, class Description, class Apply>
-Opened open_address(std::string_view address, Options options, std::span<const Driver<Opened, Options, Description>> drivers, Apply apply,
+Opened open_address(std::string_view address, Options options,
+                    std::span<const Driver<Opened, Options, Description>> drivers, Apply apply,
                     std::string_view help) {
     const auto colon = address.find(':');
-    const auto driver = std::find_if(drivers.begin(), drivers.end(), [&](const auto& d) { return d.name == address.substr(0, colon); });
-    if (colon == address.npos || driver == drivers.end()) return {nullptr, quoted(address) + " is not the address of " + std::string(help)};
+    const auto driver = std::find_if(drivers.begin(), drivers.end(), [&](const auto& d) {
+        return d.name == address.substr(0, colon);
+    });
+    if (colon == address.npos || driver == drivers.end()) {
+        return {nullptr, quoted(address) + " is not the address of " + std::string(help)};
+    }
 
-    const auto  place = address.substr(colon + 1);
-    const auto  question = std::min(place.find('?'), place.size());
-    auto        rest = place.substr(std::min(question + 1, place.size()));
+    const auto place = address.substr(colon + 1);
+    const auto question = std::min(place.find('?'), place.size());
+    auto rest = place.substr(std::min(question + 1, place.size()));
     std::string where(place.substr(0, question));
     const char* separator = "?";
     while (!rest.empty()) {
@@ -68,37 +78,53 @@ Opened open_address(std::string_view address, Options options, std::span<const D
             where.append(std::exchange(separator, "&")).append(item);
             continue;
         }
-        std::string problem = apply(key, has_value ? item.substr(equals + 1) : std::string_view{}, has_value, options);
-        if (problem.starts_with(no_option) && driver->own_options != nullptr)
+        std::string problem = apply(key, has_value ? item.substr(equals + 1) : std::string_view{},
+                                    has_value, options);
+        if (problem.starts_with(no_option) && driver->own_options != nullptr) {
             problem += ", and for " + std::string(driver->name) + ": " + driver->own_options();
-        if (problem.empty() && driver->ignores(key))
-            problem = std::string(driver->name) + " does not support the option " + quoted(key) + "; remove it";
-        if (!problem.empty()) return {nullptr, std::string(address) + ": " + problem};
+        }
+        if (problem.empty() && driver->ignores(key)) {
+            problem = std::string(driver->name) + " does not support the option " + quoted(key) +
+                      "; remove it";
+        }
+        if (!problem.empty()) {
+            return {nullptr, std::string(address) + ": " + problem};
+        }
     }
     try {
         auto opened = driver->open(where, options);
-        if (!opened) opened.problem = std::string(address) + ": " + opened.problem;
+        if (!opened) {
+            opened.problem = std::string(address) + ": " + opened.problem;
+        }
         return opened;
     } catch (const std::exception& e) {
         return {nullptr, std::string(address) + ": " + e.what()};
     }
 }
 
-/// Describes what the driver would open, without opening it. The driver's own options stay behind the place.
+/// Describes what the driver would open, without opening it. The driver's own options stay behind
+/// the place.
 template <class Opened, class Options, class Description>
-Description describe_address(std::string_view address, std::span<const Driver<Opened, Options, Description>> drivers) {
+Description describe_address(std::string_view address,
+                             std::span<const Driver<Opened, Options, Description>> drivers) {
     const auto colon = address.find(':');
-    const auto driver = std::find_if(drivers.begin(), drivers.end(), [&](const auto& d) { return d.name == address.substr(0, colon); });
-    if (colon == address.npos || driver == drivers.end()) return Description{.address = std::string(address), .transport = {}};
-    const auto  place = address.substr(colon + 1);
-    const auto  question = std::min(place.find('?'), place.size());
+    const auto driver = std::find_if(drivers.begin(), drivers.end(), [&](const auto& d) {
+        return d.name == address.substr(0, colon);
+    });
+    if (colon == address.npos || driver == drivers.end()) {
+        return Description{.address = std::string(address), .transport = {}};
+    }
+    const auto place = address.substr(colon + 1);
+    const auto question = std::min(place.find('?'), place.size());
     std::string where(place.substr(0, question));
     const char* separator = "?";
     for (auto rest = place.substr(std::min(question + 1, place.size())); !rest.empty();) {
         const auto item = rest.substr(0, rest.find('&'));
         rest.remove_prefix(std::min(item.size() + 1, rest.size()));
-        if (driver->is_own_option != nullptr && driver->is_own_option(item.substr(0, item.find('='))))
+        if (driver->is_own_option != nullptr &&
+            driver->is_own_option(item.substr(0, item.find('=')))) {
             where.append(std::exchange(separator, "&")).append(item);
+        }
     }
     return driver->describe(where);
 }

@@ -13,7 +13,9 @@ std::uint8_t length_of_code(unsigned code) noexcept { return fd_lengths[code < 1
 
 std::uint8_t code_of_length(std::size_t length) noexcept {
     std::uint8_t code = 0;
-    while (code < 15 && fd_lengths[code] < length) ++code;
+    while (code < 15 && fd_lengths[code] < length) {
+        ++code;
+    }
     return code;
 }
 
@@ -24,9 +26,9 @@ bool Frame::valid() const noexcept {
 }
 
 bool Frame::same(const Frame& other) const noexcept {
-    return id == other.id && length == other.length && extended == other.extended && remote == other.remote && fd == other.fd &&
-           bit_rate_switch == other.bit_rate_switch && error == other.error &&
-           std::memcmp(data.data(), other.data.data(), bytes().size()) == 0;
+    return id == other.id && length == other.length && extended == other.extended &&
+           remote == other.remote && fd == other.fd && bit_rate_switch == other.bit_rate_switch &&
+           error == other.error && std::memcmp(data.data(), other.data.data(), bytes().size()) == 0;
 }
 
 const char* to_string(State state) noexcept {
@@ -41,27 +43,46 @@ const char* to_string(Sent sent) noexcept {
 
 std::string to_string(const Rejected& r) {
     char address[18];
-    std::snprintf(address, sizeof address, "%02x:%02x:%02x:%02x:%02x:%02x", static_cast<unsigned>(r.from >> 40 & 0xff),
-                  static_cast<unsigned>(r.from >> 32 & 0xff), static_cast<unsigned>(r.from >> 24 & 0xff),
-                  static_cast<unsigned>(r.from >> 16 & 0xff), static_cast<unsigned>(r.from >> 8 & 0xff),
-                                        static_cast<unsigned>(r.from & 0xff));
+    std::snprintf(
+        address, sizeof address, "%02x:%02x:%02x:%02x:%02x:%02x",
+        static_cast<unsigned>(r.from >> 40 & 0xff), static_cast<unsigned>(r.from >> 32 & 0xff),
+        static_cast<unsigned>(r.from >> 24 & 0xff), static_cast<unsigned>(r.from >> 16 & 0xff),
+        static_cast<unsigned>(r.from >> 8 & 0xff), static_cast<unsigned>(r.from & 0xff));
     const std::string who = address;
     char command[40];
     std::snprintf(command, sizeof command, "%s (%03Xh)",
-                  r.id == 0x000 ? "NMT command" : r.id == 0x080 ? "SYNC" : r.id == 0x100 ? "TIME" : "set-point", static_cast<unsigned>(r.id));
+                  r.id == 0x000   ? "NMT command"
+                  : r.id == 0x080 ? "SYNC"
+                  : r.id == 0x100 ? "TIME"
+                                  : "set-point",
+                  static_cast<unsigned>(r.id));
     std::string sentence;
     switch (r.why) {
     case Rejected::Why::not_the_master:
-        sentence = std::string("rejected ") + command + " from " + who + ": not the master; to allow it: also=" + who + " in the link";
+        sentence = std::string("rejected ") + command + " from " + who +
+                   ": not the master; to allow it: also=" + who + " in the link";
         break;
-    case Rejected::Why::out_of_slot: sentence = std::string("rejected ") + command + " from " + who + ": not in a slot of that station"; break;
-    case Rejected::Why::unknown_station: sentence = "rejected frame from " + who + ": unknown station"; break;
+    case Rejected::Why::out_of_slot:
+        sentence =
+            std::string("rejected ") + command + " from " + who + ": not in a slot of that station";
+        break;
+    case Rejected::Why::unknown_station:
+        sentence = "rejected frame from " + who + ": unknown station";
+        break;
 
-    case Rejected::Why::unsigned_frame: sentence = "rejected frame from " + who + ": not signed (key=)"; break;
-    case Rejected::Why::wrong_tag: sentence = "rejected frame from " + who + ": signed with another key, or modified"; break;
-    case Rejected::Why::replayed: sentence = "rejected frame from " + who + ": replayed, or its clock was set back"; break;
+    case Rejected::Why::unsigned_frame:
+        sentence = "rejected frame from " + who + ": not signed (key=)";
+        break;
+    case Rejected::Why::wrong_tag:
+        sentence = "rejected frame from " + who + ": signed with another key, or modified";
+        break;
+    case Rejected::Why::replayed:
+        sentence = "rejected frame from " + who + ": replayed, or its clock was set back";
+        break;
     }
-    if (r.count > 1) sentence += "; " + std::to_string(r.count) + " frames since the last report";
+    if (r.count > 1) {
+        sentence += "; " + std::to_string(r.count) + " frames since the last report";
+    }
     return sentence;
 }
 

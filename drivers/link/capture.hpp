@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Captures of CAN frames: candump logs (text) and pcapng (Wireshark), reading and writing. All of it [setup].
+// Captures of CAN frames: candump logs (text) and pcapng (Wireshark), reading and writing. All of
+// it [setup].
 #pragma once
 
 #include <cstdint>
@@ -14,16 +15,19 @@ namespace hal::can {
 
 #pragma GCC visibility push(default)
 
-/// Returns the frame as a line of a log, `(1436509052.249713) can0 181#0102`, without the end of line.
+/// Returns the frame as a line of a log, `(1436509052.249713) can0 181#0102`, without the end of
+/// line.
 std::string log_line(const Frame&, std::string_view channel);
 /// Parses such a line. Returns false for an invalid one. `time_ns` becomes that of the line.
 bool parse_log_line(std::string_view line, Frame&);
-/// Appends the frames of a log: of can-utils or python-can, or candump's terminal format with times. Returns "", or the first line that is invalid and
-/// the reason; then the frames of the other lines are appended all the same.
+/// Appends the frames of a log: of can-utils or python-can, or candump's terminal format with
+/// times. Returns "", or the first line that is invalid and the reason; then the frames of the
+/// other lines are appended all the same.
 std::string parse_log(std::string_view text, std::vector<Frame>& frames);
 
-/// The frames of a capture in order of time: candump log, pcapng or pcap, distinguished by the first bytes. A truncated or damaged part
-/// ends the list, and `problem` has its place; it is empty when all was read.
+/// The frames of a capture in order of time: candump log, pcapng or pcap, distinguished by the
+/// first bytes. A truncated or damaged part ends the list, and `problem` has its place; it is empty
+/// when all was read.
 struct Capture {
     std::vector<Frame> frames;
     std::string problem;
@@ -43,7 +47,8 @@ public:
     virtual bool flush() = 0;
 };
 /// Creates a recorder. On failure returns nullptr and sets `problem`.
-std::unique_ptr<Recorder> record(const std::string& file, std::string_view channel, std::string& problem);
+std::unique_ptr<Recorder> record(const std::string& file, std::string_view channel,
+                                 std::string& problem);
 
 #pragma GCC visibility pop
 

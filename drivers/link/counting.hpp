@@ -15,18 +15,32 @@ inline void trace(link::FrameKind kind, const Frame& f) noexcept {
     link::trace_frame(kind, f.extended ? f.id | 0x80000000U : f.id, f.bytes().size());
 }
 
-/// Counters of one link. The sending thread writes `sent`, `sent_bytes`, `dropped`; the receiving one the rest; both add to the load.
-/// [realtime]
+/// Counters of one link. The sending thread writes `sent`, `sent_bytes`, `dropped`; the receiving
+/// one the rest; both add to the load. [realtime]
 class Counting {
 public:
     using Count = std::atomic<std::uint64_t>;
-    Count sent{0}, sent_bytes{0}, received{0}, received_bytes{0}, lost{0}, dropped{0}, errors{0}, bus_offs{0}, restarts{0}, rejected{0};
-    std::atomic<std::uint8_t> send_errors{0}, receive_errors{0};
+    Count sent{0};
+    Count sent_bytes{0};
+    Count received{0};
+    Count received_bytes{0};
+    Count lost{0};
+    Count dropped{0};
+    Count errors{0};
+
+    Count bus_offs{0};
+    Count restarts{0};
+    Count rejected{0};
+    std::atomic<std::uint8_t> send_errors{0};
+    std::atomic<std::uint8_t> receive_errors{0};
     std::atomic<State> state{State::active};
-    std::atomic<std::uint32_t> bit_rate{0}, data_rate{0};  ///< 0: unknown, and no load
+    std::atomic<std::uint32_t> bit_rate{0};
+    std::atomic<std::uint32_t> data_rate{0};  ///< 0: unknown, and no load
 
     /// Adds to a counter.
-    static void add(Count& to, std::uint64_t value = 1) noexcept { to.fetch_add(value, std::memory_order_relaxed); }
+    static void add(Count& to, std::uint64_t value = 1) noexcept {
+        to.fetch_add(value, std::memory_order_relaxed);
+    }
 
     /// Counts a sent frame. Sending thread.
     void count_sent(const Frame& f) noexcept {
@@ -40,14 +54,18 @@ public:
         trace(link::can_received, f);
         add(received);
         add(received_bytes, f.bytes().size());
-        if (!f.own) occupy(f);
+        if (!f.own) {
+            occupy(f);
+        }
     }
     /// Closes the window of the load when it is over. Receiving thread, once per call.
     void tick(std::int64_t now_ns) noexcept {
         constexpr std::int64_t window_ns = 100'000'000;
         if (now_ns >= window_start_ && now_ns - window_start_ < window_ns) return;
         const auto busy = busy_ns_.exchange(0, std::memory_order_relaxed);
-        const auto share = static_cast<double>(busy) / static_cast<double>(now_ns > window_start_ ? now_ns - window_start_ : window_ns);
+        const auto share =
+            static_cast<double>(busy) /
+            static_cast<double>(now_ns > window_start_ ? now_ns - window_start_ : window_ns);
         load_.store(share < 1.0 ? share : 1.0, std::memory_order_relaxed);
         window_start_ = now_ns;
     }
@@ -56,11 +74,18 @@ public:
         const auto of = [](const auto& counter) { return counter.load(std::memory_order_relaxed); };
         Statistics s;
         s.state = of(state);
-        s.send_errors = of(send_errors), s.receive_errors = of(receive_errors);
-        s.sent = of(sent), s.sent_bytes = of(sent_bytes);
-        s.received = of(received), s.received_bytes = of(received_bytes);
-        s.lost = of(lost), s.dropped = of(dropped), s.errors = of(errors);
-        s.bus_offs = of(bus_offs), s.restarts = of(restarts), s.rejected = of(rejected);
+        s.send_errors = of(send_errors);
+        s.receive_errors = of(receive_errors);
+        s.sent = of(sent);
+        s.sent_bytes = of(sent_bytes);
+        s.received = of(received);
+        s.received_bytes = of(received_bytes);
+        s.lost = of(lost);
+        s.dropped = of(dropped);
+        s.errors = of(errors);
+        s.bus_offs = of(bus_offs);
+        s.restarts = of(restarts);
+        s.rejected = of(rejected);
         s.queued = static_cast<std::uint32_t>(queued);
         s.load = of(load_);
         return s;
@@ -70,7 +95,8 @@ private:
     void occupy(const Frame& f) noexcept {
         const auto rate = bit_rate.load(std::memory_order_relaxed);
         if (rate == 0) return;
-        const auto time = duration_ns(frame_bits(f), rate, data_rate.load(std::memory_order_relaxed));
+        const auto time =
+            duration_ns(frame_bits(f), rate, data_rate.load(std::memory_order_relaxed));
         busy_ns_.fetch_add(static_cast<std::uint64_t>(time), std::memory_order_relaxed);
     }
     std::int64_t window_start_ = 0;

@@ -13,8 +13,11 @@ const char* to_string(Sent sent) noexcept {
 std::string to_string(const Address& address) {
     std::string text;
     for (const auto b : address) {
-        if (!text.empty()) text += ':';
-        text += "0123456789abcdef"[b >> 4], text += "0123456789abcdef"[b & 15];
+        if (!text.empty()) {
+            text += ':';
+        }
+        text += "0123456789abcdef"[b >> 4];
+        text += "0123456789abcdef"[b & 15];
     }
     return text;
 }
@@ -34,6 +37,5 @@ std::optional<Address> parse_address(std::string_view text) noexcept {
     }
     return address;
 }
-
 
 }  // namespace hal::ethernet

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A file that grows by records (lines, blocks of a capture) and always ends with a complete one, even on a full disk. [setup]
+// A file that grows by records (lines, blocks of a capture) and always ends with a complete one,
+// even on a full disk. [setup]
 #pragma once
 
 #include <cerrno>
@@ -19,7 +20,9 @@ class RecordFile {
 public:
     /// Creates or truncates the file; see error().
     explicit RecordFile(const std::string& path)
-        : file_(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666)), error_(file_ < 0 ? errno : 0), owned_(true) {
+        : file_(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666)),
+          error_(file_ < 0 ? errno : 0),
+          owned_(true) {
         look();
     }
     /// Writes to a descriptor owned by the caller.
@@ -28,14 +31,16 @@ public:
     RecordFile(const RecordFile&) = delete;
     RecordFile& operator=(const RecordFile&) = delete;
 
-    /// Queues one record. Returns false, with errno set, when it or an earlier one could not be written.
+    /// Queues one record. Returns false, with errno set, when it or an earlier one could not be
+    /// written.
     bool put(std::string_view record) {
         if (error_ != 0) return fail();
         waiting_ += record;
         ends_.push_back(waiting_.size());
         return waiting_.size() < most_waiting || flush();
     }
-    /// Writes the queued records. Returns false, with errno set, on failure; the file then ends with its last complete record.
+    /// Writes the queued records. Returns false, with errno set, on failure; the file then ends
+    /// with its last complete record.
     bool flush() {
         if (error_ != 0) return fail();
         std::size_t done = 0;
@@ -54,7 +59,10 @@ public:
             whole = end;
             ++records_;
         }
-        if (error_ != 0 && regular_ && ::ftruncate(file_, begin_ + static_cast<off_t>(whole)) != 0) whole = done;
+        if (error_ != 0 && regular_ &&
+            ::ftruncate(file_, begin_ + static_cast<off_t>(whole)) != 0) {
+            whole = done;
+        }
         begin_ += static_cast<off_t>(whole);
         waiting_.clear();
         ends_.clear();
@@ -63,7 +71,9 @@ public:
     /// Flushes and closes. Returns false when anything was lost.
     bool close() {
         flush();
-        if (owned_ && file_ >= 0 && ::close(file_) != 0 && error_ == 0) error_ = errno;
+        if (owned_ && file_ >= 0 && ::close(file_) != 0 && error_ == 0) {
+            error_ = errno;
+        }
         file_ = -1;
         owned_ = false;
         return error_ == 0;
@@ -86,7 +96,8 @@ private:
     }
     int file_;
     int error_ = 0;
-    bool owned_ = false, regular_ = false;
+    bool owned_ = false;
+    bool regular_ = false;
     off_t begin_ = 0;  ///< where waiting_ begins in the file
     std::size_t records_ = 0;
     std::string waiting_;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Fault injection on a bus in memory. Everything is repeatable: the same seed and the same times give the same faults.
+// Fault injection on a bus in memory. Everything is repeatable: the same seed and the same times
+// give the same faults.
 #pragma once
 
 #include <cstdint>
@@ -25,11 +26,13 @@ struct Disturbance {
     Fault fault = Fault::loss;
     std::uint32_t every = 0;      ///< every n-th matching frame; 0: by probability
     double probability = 0.0;     ///< 0..1, drawn per matching frame
-    std::uint32_t id = 0, mask = 0;  ///< identifiers that match; mask 0: all
+    std::uint32_t id = 0;
+    std::uint32_t mask = 0;  ///< identifiers that match; mask 0: all
     std::int32_t node = -1;       ///< only frames sent by this node; -1: all
     std::uint64_t count = UINT64_MAX;  ///< ends after this many hits
     std::int64_t delay_ns = 0;
-    std::int64_t from_ns = INT64_MIN, until_ns = INT64_MAX;  ///< on the bus's clock
+    std::int64_t from_ns = INT64_MIN;
+    std::int64_t until_ns = INT64_MAX;  ///< on the bus's clock
 };
 
 /// The bus behind a `sim:` link. [setup] unless marked; changes take effect with the next frame.
@@ -46,9 +49,11 @@ public:
     /// Returns how many frames disturbance `number` has hit.
     virtual std::uint64_t hits(int number) const = 0;
     virtual void calm() = 0;  ///< Ends all disturbances, babbling and cuts.
-    /// Makes the node send `frame` every `period_ns`, regardless of its identifier's owner; 0 ends it.
+    /// Makes the node send `frame` every `period_ns`, regardless of its identifier's owner; 0 ends
+    /// it.
     virtual void babble(const Frame& frame, std::int64_t period_ns) = 0;
-    /// Cuts or reconnects the wire of a node: while cut it neither receives nor sends, and is not acknowledged.
+    /// Cuts or reconnects the wire of a node: while cut it neither receives nor sends, and is not
+    /// acknowledged.
     virtual void cut(int node, bool is_cut) = 0;
     /// Sets error counters as if the errors had happened, to test the consequences.
     virtual void set_counters(int node, unsigned send_errors, unsigned receive_errors) = 0;

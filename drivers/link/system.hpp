@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Wrappers of the operating system for drivers: an owned descriptor, clocks, waiting for a descriptor.
+// Wrappers of the operating system for drivers: an owned descriptor, clocks, waiting for a
+// descriptor.
 #pragma once
 
 #include <poll.h>
@@ -25,7 +26,9 @@ public:
         return *this;
     }
     ~Descriptor() {
-        if (fd_ >= 0) ::close(fd_);
+        if (fd_ >= 0) {
+            ::close(fd_);
+        }
     }
     int get() const noexcept { return fd_; }
     explicit operator bool() const noexcept { return fd_ >= 0; }
@@ -43,9 +46,12 @@ inline std::int64_t clock_ns(clockid_t clock) noexcept {
 /// Returns the time of CLOCK_MONOTONIC in ns.
 inline std::int64_t monotonic_ns() noexcept { return clock_ns(CLOCK_MONOTONIC); }
 /// Returns the offset to add to a time of CLOCK_REALTIME.
-inline std::int64_t real_to_monotonic_ns() noexcept { return monotonic_ns() - clock_ns(CLOCK_REALTIME); }
+inline std::int64_t real_to_monotonic_ns() noexcept {
+    return monotonic_ns() - clock_ns(CLOCK_REALTIME);
+}
 
-/// Converts a time in ns for calls of the operating system. `long` has 32 bits on 32-bit machines, which the ns of a second fit into.
+/// Converts a time in ns for calls of the operating system. `long` has 32 bits on 32-bit machines,
+/// which the ns of a second fit into.
 constexpr timespec to_timespec(std::int64_t ns) noexcept {
     timespec time{};
     time.tv_sec = static_cast<time_t>(ns / 1'000'000'000);

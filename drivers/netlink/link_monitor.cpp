@@ -11,14 +11,21 @@
 
 namespace hal::link {
 
-LinkMonitor::LinkMonitor(const char* thread_name, int every_ms, std::function<void()> look, int also)
-    : every_ms_(every_ms), also_(also), look_(std::move(look)),
-      events_(::socket(AF_NETLINK, SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, NETLINK_ROUTE)), wake_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
+LinkMonitor::LinkMonitor(const char* thread_name, int every_ms, std::function<void()> look,
+                         int also)
+    : every_ms_(every_ms),
+      also_(also),
+      look_(std::move(look)),
+      events_(::socket(AF_NETLINK, SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, NETLINK_ROUTE)),
+      wake_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
     sockaddr_nl address{};
     address.nl_family = AF_NETLINK;
     address.nl_groups = RTMGRP_LINK;
     const auto* where = reinterpret_cast<const sockaddr*>(&address);
-    if (events_ && ::bind(events_.get(), where, sizeof address) != 0) events_ = {};  // then it checks every `every_ms` only
+    // then it checks every `every_ms` only
+    if (events_ && ::bind(events_.get(), where, sizeof address) != 0) {
+        events_ = {};
+    }
     thread_ = std::thread([this, thread_name] {
         pthread_setname_np(pthread_self(), thread_name);
         run();
@@ -39,11 +46,17 @@ void LinkMonitor::nudge() noexcept {
 void LinkMonitor::run() {
     char discarded[8192];
     while (!ending_) {
-        pollfd sources[] = {{wake_.get(), POLLIN, 0}, {events_.get(), POLLIN, 0}, {also_, POLLIN, 0}};
+        pollfd sources[] = {
+            {wake_.get(), POLLIN, 0}, {events_.get(), POLLIN, 0}, {also_, POLLIN, 0}};
         ::poll(sources, 3, every_ms_);
-        while (::read(wake_.get(), discarded, sizeof discarded) > 0) {}
-        while (::recv(events_.get(), discarded, sizeof discarded, 0) > 0) {}  // the content is irrelevant: a change was reported
-        if (!ending_) look_();
+        while (::read(wake_.get(), discarded, sizeof discarded) > 0) {
+        }
+        // the content is irrelevant: a change was reported
+        while (::recv(events_.get(), discarded, sizeof discarded, 0) > 0) {
+        }
+        if (!ending_) {
+            look_();
+        }
     }
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A thread that checks network interfaces whenever the kernel reports a change, so that no cycle has to.
+// A thread that checks network interfaces whenever the kernel reports a change, so that no cycle
+// has to.
 #pragma once
 
 #include <atomic>
@@ -12,8 +13,9 @@ namespace hal::link {
 
 class LinkMonitor {
 public:
-    /// Starts the thread. It calls `look` after every rtnetlink report about an interface, at least every `every_ms` (also without
-    /// rtnetlink), after nudge(), and when the descriptor `also` is readable. [setup]
+    /// Starts the thread. It calls `look` after every rtnetlink report about an interface, at least
+    /// every `every_ms` (also without rtnetlink), after nudge(), and when the descriptor `also` is
+    /// readable. [setup]
     LinkMonitor(const char* thread_name, int every_ms, std::function<void()> look, int also = -1);
     /// Stops the thread; waits for a call of `look` to end. [setup]
     ~LinkMonitor();

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The one table of HAL types. Everything that depends on a type goes through visit() or through a row of it.
+// The one table of HAL types. Everything that depends on a type goes through visit() or through a
+// row of it.
 #pragma once
 
 #include <array>
@@ -36,7 +37,8 @@ inline constexpr const char* name(hal_type type) { return row(type).name; }
 /// Returns the type of either dialect's name, in any case.
 std::optional<hal_type> type_named(std::string_view name);
 
-/// Calls `action` with a reference to the member of `value` that `type` selects (a hal_port* for port).
+/// Calls `action` with a reference to the member of `value` that `type` selects (a hal_port* for
+/// port).
 template <class Action>
 decltype(auto) visit(hal_type type, const hal_value& value, Action&& action) {
     switch (type) {
@@ -63,11 +65,12 @@ struct Parsed {
 };
 /// What an integer is that begins with 0: octal in a netlist, as in C; decimal in records.
 enum class LeadingZero { octal, decimal };
-/// Parses a value of `type`. On failure `problem` is the reason: "'abc' is not a number", "3000000000 is out of range for
-/// s32 (-2147483648 to 2147483647)".
+/// Parses a value of `type`. On failure `problem` is the reason: "'abc' is not a number",
+/// "3000000000 is out of range for s32 (-2147483648 to 2147483647)".
 Parsed parse_value(hal_type type, std::string_view text, LeadingZero = LeadingZero::octal);
-/// As setp and sets of LinuxCNC 2.9 do: an integer that is out of range keeps its low bits, -1 is 4294967295 as u32. `warning` reports it
-/// unless the text is a pattern of bits, as 0xFFFFFFFF is for s32.
+/// As setp and sets of LinuxCNC 2.9 do: an integer that is out of range keeps its low bits, -1 is
+/// 4294967295 as u32. `warning` reports it unless the text is a pattern of bits, as 0xFFFFFFFF is
+/// for s32.
 Parsed parse_wrapping(hal_type type, std::string_view text);
 
 /// Formats a value as `getp` prints it: decimal, floats `%.7g`, bits TRUE/FALSE.

@@ -36,12 +36,19 @@ public:
         for (std::size_t at = 0; at < text.size();) {
             const std::size_t end = std::min(text.find("\n\n", at), text.size());
             std::string_view paragraph = text.substr(at, end - at);
-            while (paragraph.ends_with('\n')) paragraph.remove_suffix(1);
+            while (paragraph.ends_with('\n')) {
+                paragraph.remove_suffix(1);
+            }
             at = end + 2;
             const std::size_t line = paragraph.find('\n');
             const bool whole = line != paragraph.npos;
-            const bool count = !whole && !paragraph.empty() && paragraph[0] >= '0' && paragraph[0] <= '9';  // "2 errors" of one node
-            if (paragraph.empty() || count || (whole && !printed_.insert(std::string(paragraph)).second)) continue;
+            // "2 errors" of one node
+            const bool count =
+                !whole && !paragraph.empty() && paragraph[0] >= '0' && paragraph[0] <= '9';
+            if (paragraph.empty() || count ||
+                (whole && !printed_.insert(std::string(paragraph)).second)) {
+                continue;
+            }
             to_.err((whole && any_ ? "\n" : "") + std::string(paragraph) + "\n");
             any_ = any_ || whole;
         }
@@ -54,7 +61,8 @@ private:
     bool any_ = false;
 };
 
-Cell::Cell(std::string name, std::vector<NodeLine> nodes, const SessionOptions& session, const ShellOptions& shell)
+Cell::Cell(std::string name, std::vector<NodeLine> nodes, const SessionOptions& session,
+           const ShellOptions& shell)
     : name_(std::move(name)), nodes_(std::move(nodes)), options_(shell) {
     for (const NodeLine& node : nodes_) {
         Machine machine;
@@ -72,8 +80,10 @@ Cell::~Cell() {
 }
 
 std::size_t Cell::find(std::string_view node) const {
-    return static_cast<std::size_t>(std::find_if(nodes_.begin(), nodes_.end(), [&](const NodeLine& n) { return n.name == node; }) -
-                                    nodes_.begin());
+    return static_cast<std::size_t>(
+        std::find_if(nodes_.begin(), nodes_.end(), [&](const NodeLine& n) {
+        return n.name == node;
+    }) - nodes_.begin());
 }
 
 bool Cell::load(const std::vector<std::string>& files, const std::string& ini, Output& output) {
@@ -89,17 +99,23 @@ bool Cell::load(const std::vector<std::string>& files, const std::string& ini, O
                 if (other.name == nodes_[i].name) continue;
                 std::string problem;
                 ProgramPin online{"node." + other.name + ".online", HAL_TYPE_BIT, HAL_DIR_OUT};
-                ProgramPin incompatible{"node." + other.name + ".incompatible", HAL_TYPE_BIT, HAL_DIR_OUT};
+                ProgramPin incompatible{"node." + other.name + ".incompatible", HAL_TYPE_BIT,
+                                        HAL_DIR_OUT};
                 ProgramPin age{"node." + other.name + ".age-ms", HAL_TYPE_FLOAT, HAL_DIR_OUT};
-                machine.pins[other.name + ".online"] = machine.session->programs().add_pin(transaction, watch, online, problem);
-                machine.pins[other.name + ".incompatible"] = machine.session->programs().add_pin(transaction, watch, incompatible, problem);
-                machine.pins[other.name + ".age-ms"] = machine.session->programs().add_pin(transaction, watch, age, problem);
+                machine.pins[other.name + ".online"] =
+                    machine.session->programs().add_pin(transaction, watch, online, problem);
+                machine.pins[other.name + ".incompatible"] =
+                    machine.session->programs().add_pin(transaction, watch, incompatible, problem);
+                machine.pins[other.name + ".age-ms"] =
+                    machine.session->programs().add_pin(transaction, watch, age, problem);
             }
             Diagnostics none;
             transaction.commit(none);
         }
         if (!ini.empty() && machine.shell->read_ini(ini, once) != 0) return false;
-        for (const std::string& file : files) good = machine.shell->run_file(file, once) == 0 && good;
+        for (const std::string& file : files) {
+            good = machine.shell->run_file(file, once) == 0 && good;
+        }
     }
     return good && connect(once);
 }
@@ -108,19 +124,24 @@ Span Cell::place(std::size_t node, Span span) {
     if (!span.known()) return span;
     const Sources::Source& text = machines_[node].session->sources.get(span.source);
     const auto [at, fresh] = known_texts_.try_emplace({text.name, text.first_line}, 0u);
-    if (fresh) at->second = texts_.add(text.name, text.text, text.first_line);
+    if (fresh) {
+        at->second = texts_.add(text.name, text.text, text.first_line);
+    }
     return {at->second, span.begin, span.end};
 }
 
 void Cell::report(Diagnostics& found, Output& output) const {
-    if (!found.all().empty() && options_.level != Level::nothing) output.err(render(found, texts_, options_.color));
+    if (!found.all().empty() && options_.level != Level::nothing) {
+        output.err(render(found, texts_, options_.color));
+    }
 }
 
 bool Cell::connect(Output& output) {
     std::vector<NodePart> parts;
-    for (std::size_t i = 0; i < size(); ++i)
-        parts.push_back({nodes_[i].name, &machines_[i].session->model(), nodes_[i].rate(), nodes_[i].deadline(),
-                         [this, i](Span span) { return place(i, span); }});
+    for (std::size_t i = 0; i < size(); ++i) {
+        parts.push_back({nodes_[i].name, &machines_[i].session->model(), nodes_[i].rate(),
+                         nodes_[i].deadline(), [this, i](Span span) { return place(i, span); }});
+    }
     Diagnostics found;
     topics_ = topics_between(parts, found);
     report(found, output);
@@ -132,8 +153,8 @@ bool Cell::connect(Output& output) {
 bool Cell::start(Output& output) {
     bool good = true;
     std::vector<std::vector<std::vector<std::string>>> links(size());
-    for (const NodeTopic& topic : topics_)
-        for (const NodeField& field : topic.fields)
+    for (const NodeTopic& topic : topics_) {
+        for (const NodeField& field : topic.fields) {
             for (const NodeReader& reader : field.readers) {
                 Machine& machine = machines_[reader.node];
                 const auto lock = machine.session->lock();
@@ -142,19 +163,33 @@ bool Cell::start(Output& output) {
                 ProgramPin pin{"node." + from + "." + field.signal, field.type, HAL_DIR_OUT};
                 pin.initial = reader.safe;
                 Transaction transaction = machine.session->begin();
-                machine.pins[from + "." + field.signal] = machine.session->programs().add_pin(transaction, watch, pin, problem);
+                machine.pins[from + "." + field.signal] =
+                    machine.session->programs().add_pin(transaction, watch, pin, problem);
                 Diagnostics none;
                 transaction.commit(none);
                 links[reader.node].push_back({"net", field.signal, pin.name});
             }
+        }
+    }
     for (std::size_t i = 0; i < size(); ++i) {
-        if (!links[i].empty()) good = machines_[i].shell->execute(links[i], output, "<links of node " + nodes_[i].name + ">") == 0 && good;
+        if (!links[i].empty()) {
+            good = machines_[i].shell->execute(links[i], output,
+                                               "<links of node " + nodes_[i].name + ">") == 0 &&
+                   good;
+        }
         machines_[i].shell->add_latencies(node_latencies(*this, i, true));
         const auto lock = machines_[i].session->lock();
-        if (!machines_[i].session->threads().running() && !machines_[i].session->model().threads.empty()) machines_[i].session->threads().start();
-        for (const auto& thread : machines_[i].session->model().threads) step_ns_ = std::gcd(step_ns_, thread->options.period_ns);
+        if (!machines_[i].session->threads().running() &&
+            !machines_[i].session->model().threads.empty()) {
+            machines_[i].session->threads().start();
+        }
+        for (const auto& thread : machines_[i].session->model().threads) {
+            step_ns_ = std::gcd(step_ns_, thread->options.period_ns);
+        }
     }
-    if (step_ns_ == 0) step_ns_ = 1'000'000;
+    if (step_ns_ == 0) {
+        step_ns_ = 1'000'000;
+    }
     return good;
 }
 
@@ -169,9 +204,14 @@ void Cell::advance(std::int64_t ns) {
         const bool first = now_ns_ == 0;
         now_ns_ += step;
         if (isolated_ != SIZE_MAX) continue;
-        for (const NodeTopic& topic : topics_)
-            if (now_ns_ % topic.rate_ns < step) deliver(topic);
-        if (first) set_online();
+        for (const NodeTopic& topic : topics_) {
+            if (now_ns_ % topic.rate_ns < step) {
+                deliver(topic);
+            }
+        }
+        if (first) {
+            set_online();
+        }
     }
 }
 
@@ -179,8 +219,11 @@ void Cell::advance(std::int64_t ns) {
 void Cell::set_online() {
     for (Machine& machine : machines_) {
         std::vector<std::pair<Pin*, hal_value>> online;
-        for (const auto& [name, pin] : machine.pins)
-            if (name.ends_with(".online") && pin) online.emplace_back(pin, hal_value{.raw = 1});
+        for (const auto& [name, pin] : machine.pins) {
+            if (name.ends_with(".online") && pin) {
+                online.emplace_back(pin, hal_value{.raw = 1});
+            }
+        }
         const auto lock = machine.session->lock();
         machine.session->values().write(online);
     }
@@ -188,7 +231,9 @@ void Cell::set_online() {
 
 void Cell::deliver(const NodeTopic& topic) {
     std::vector<std::string> names;
-    for (const NodeField& field : topic.fields) names.push_back(field.signal);
+    for (const NodeField& field : topic.fields) {
+        names.push_back(field.signal);
+    }
     std::vector<std::optional<Reading>> values;
     {
         Session& from = *machines_[topic.from].session;
@@ -196,10 +241,15 @@ void Cell::deliver(const NodeTopic& topic) {
         values = from.values().read(names);
     }
     std::vector<std::vector<std::pair<Pin*, hal_value>>> rows(size());
-    for (std::size_t i = 0; i < topic.fields.size(); ++i)
-        for (const NodeReader& reader : topic.fields[i].readers)
-            if (Pin* const pin = machines_[reader.node].pins[nodes_[topic.from].name + "." + names[i]]; pin && values[i])
+    for (std::size_t i = 0; i < topic.fields.size(); ++i) {
+        for (const NodeReader& reader : topic.fields[i].readers) {
+            if (Pin* const pin =
+                    machines_[reader.node].pins[nodes_[topic.from].name + "." + names[i]];
+                pin && values[i]) {
                 rows[reader.node].emplace_back(pin, values[i]->value);
+            }
+        }
+    }
     for (std::size_t i = 0; i < size(); ++i) {
         if (rows[i].empty()) continue;
         const auto lock = machines_[i].session->lock();

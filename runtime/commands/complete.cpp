@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: MIT
-// Candidates at the cursor: the row of the command determines the kind of word, the model the names.
+// Candidates at the cursor: the row of the command determines the kind of word, the model the
+// names.
 #include <algorithm>
 #include <filesystem>
 
 #include <fmt/format.h>
 
-#include "commands/table.hpp"
-#include "text/fault_pages.hpp"
 #include "commands/files.hpp"
 #include "commands/listing.hpp"
-#include "machine/programs.hpp"
 #include "commands/shell_state.hpp"
+#include "commands/table.hpp"
+#include "machine/programs.hpp"
+#include "text/fault_pages.hpp"
 
 namespace hal {
 namespace {
@@ -21,13 +22,16 @@ struct Search {
     const Session& session;
     const Programs& programs;
     const ShellOptions& options;
-    std::vector<std::string> words;  ///< before the one being typed, arrows left out, the command first
+    /// before the one being typed, arrows left out, the command first
+    std::vector<std::string> words;
     std::string typed;
     std::vector<Candidate>& found;
 
     const Model& model() const { return session.model(); }
     void add(const std::string& text, std::string hint = "") {
-        if (text.starts_with(typed) && found.size() < most) found.push_back({text, std::move(hint)});
+        if (text.starts_with(typed) && found.size() < most) {
+            found.push_back({text, std::move(hint)});
+        }
     }
     void add_choices(std::string_view choices) {
         for (std::size_t at = 0; at <= choices.size();) {
@@ -45,27 +49,40 @@ std::string hint_of(const Pin& pin) {
 
 template <class Wanted>
 void add_pins(Search& search, Wanted&& wanted) {
-    for (const auto& [key, pin] : search.model().pin)
-        if (wanted(*pin)) search.add(std::string(key), hint_of(*pin));
+    for (const auto& [key, pin] : search.model().pin) {
+        if (wanted(*pin)) {
+            search.add(std::string(key), hint_of(*pin));
+        }
+    }
 }
 
 template <class Wanted>
 void add_signals(Search& search, Wanted&& wanted) {
-    for (const auto& signal : search.model().signals)
-        if (wanted(*signal)) search.add(signal->name, fmt::format("{} {} pins", name(signal->type), signal->pins.size()));
+    for (const auto& signal : search.model().signals) {
+        if (wanted(*signal)) {
+            search.add(signal->name,
+                       fmt::format("{} {} pins", name(signal->type), signal->pins.size()));
+        }
+    }
 }
 
 template <class Wanted>
 void add_functions(Search& search, Wanted&& wanted) {
-    for (const auto& [key, function] : search.model().function)
-        if (wanted(*function)) search.add(std::string(key), function->doc);
+    for (const auto& [key, function] : search.model().function) {
+        if (wanted(*function)) {
+            search.add(std::string(key), function->doc);
+        }
+    }
 }
 
-/// After `net SIGNAL`: free pins that may go onto it beside what is on it, and beside the pins typed so far.
+/// After `net SIGNAL`: free pins that may go onto it beside what is on it, and beside the pins
+/// typed so far.
 void add_free_pins(Search& search) {
-    const Signal* const signal = search.words.size() > 1 ? search.model().find_signal(search.words[1]) : nullptr;
+    const Signal* const signal =
+        search.words.size() > 1 ? search.model().find_signal(search.words[1]) : nullptr;
     std::optional<hal_type> type;
-    bool writer = false, io = false;
+    bool writer = false;
+    bool io = false;
     if (signal) {
         type = signal->type;
         writer = signal->writer != nullptr;
@@ -74,7 +91,9 @@ void add_free_pins(Search& search) {
     for (std::size_t i = 2; i < search.words.size(); ++i) {
         const Pin* const pin = search.model().find_pin(search.words[i]);
         if (!pin) continue;
-        if (!type) type = pin->type;
+        if (!type) {
+            type = pin->type;
+        }
         writer = writer || pin->dir == HAL_DIR_OUT;
         io = io || pin->dir == HAL_DIR_IO;
     }
@@ -82,7 +101,8 @@ void add_free_pins(Search& search) {
         if (pin.signal || pin.dir == HAL_DIR_PARAM || (type && pin.type != *type)) return false;
         if (pin.dir == HAL_DIR_OUT && (writer || io)) return false;
         if (pin.dir == HAL_DIR_IO && writer) return false;
-        return std::find(search.words.begin() + 2, search.words.end(), pin.name) == search.words.end();
+        return std::find(search.words.begin() + 2, search.words.end(), pin.name) ==
+               search.words.end();
     });
 }
 
@@ -91,9 +111,11 @@ void add_files(Search& search) {
     const std::string folder = slash == search.typed.npos ? "" : search.typed.substr(0, slash + 1);
     const std::string where = resolve_path(folder.empty() ? "." : folder, search.options.directory);
     std::error_code problem;
-    for (std::filesystem::directory_iterator entry(where, problem), end; !problem && entry != end; entry.increment(problem)) {
+    for (std::filesystem::directory_iterator entry(where, problem), end; !problem && entry != end;
+         entry.increment(problem)) {
         const bool directory = entry->is_directory(problem);
-        search.add(folder + entry->path().filename().string() + (directory ? "/" : ""), directory ? "folder" : "");
+        search.add(folder + entry->path().filename().string() + (directory ? "/" : ""),
+                   directory ? "folder" : "");
     }
 }
 
@@ -102,31 +124,49 @@ void add_values(Search& search) {
     const std::string& name = search.words[1];
     const Pin* const pin = search.model().find_pin(name);
     const Signal* const signal = search.model().find_signal(name);
-    const bool bit = search.words[0] == "sets" ? signal && signal->type == HAL_TYPE_BIT : pin && pin->type == HAL_TYPE_BIT;
-    if (bit) search.add_choices("TRUE|FALSE");
+    const bool bit = search.words[0] == "sets" ? signal && signal->type == HAL_TYPE_BIT
+                                               : pin && pin->type == HAL_TYPE_BIT;
+    if (bit) {
+        search.add_choices("TRUE|FALSE");
+    }
 }
 
 /// Names that `show KIND`, `list KIND` can be asked for.
 void add_listed(Search& search) {
     const std::string kind = search.words.size() > 1 ? search.words[1] : "";
-    if (kind.starts_with("pin")) add_pins(search, [](const Pin& pin) { return !is_parameter(pin); });
-    else if (kind.starts_with("param")) add_pins(search, [](const Pin& pin) { return is_parameter(pin); });
-    else if (kind.starts_with("sig")) add_signals(search, [](const Signal&) { return true; });
-    else if (kind.starts_with("funct")) add_functions(search, [](const LoadedFunction&) { return true; });
-    else if (kind == "thread" || kind == "timing")
-        for (const auto& thread : search.model().threads) search.add(thread->name);
-    else if (kind == "comp")
-        for (const auto& component : search.model().components) search.add(component->name);
-    else if (kind == "alias")
+    if (kind.starts_with("pin")) {
+        add_pins(search, [](const Pin& pin) { return !is_parameter(pin); });
+    } else if (kind.starts_with("param")) {
+        add_pins(search, [](const Pin& pin) { return is_parameter(pin); });
+    } else if (kind.starts_with("sig")) {
+        add_signals(search, [](const Signal&) { return true; });
+    } else if (kind.starts_with("funct")) {
+        add_functions(search, [](const LoadedFunction&) { return true; });
+    } else if (kind == "thread" || kind == "timing") {
+        for (const auto& thread : search.model().threads) {
+            search.add(thread->name);
+        }
+    } else if (kind == "comp") {
+        for (const auto& component : search.model().components) {
+            search.add(component->name);
+        }
+    } else if (kind == "alias") {
         add_pins(search, [](const Pin& pin) { return !pin.alias.empty(); });
+    }
 }
 
 void add_load_arguments(Search& search) {
-    const auto declared = search.words.size() > 1 ? search.session.host().declared(search.words[1]) : std::nullopt;
-    if (declared)
-        for (const auto& argument : declared->arguments) search.add(argument.name + "=", argument.doc);
+    const auto declared =
+        search.words.size() > 1 ? search.session.host().declared(search.words[1]) : std::nullopt;
+    if (declared) {
+        for (const auto& argument : declared->arguments) {
+            search.add(argument.name + "=", argument.doc);
+        }
+    }
     if (declared && (declared->singleton || declared->whole_names)) return;
-    for (const char* argument : {"names=", "count=", "num_chan=", "personality="}) search.add(argument);
+    for (const char* argument : {"names=", "count=", "num_chan=", "personality="}) {
+        search.add(argument);
+    }
 }
 
 struct Kind {
@@ -139,21 +179,31 @@ constexpr Kind kinds[] = {
     {"COMPONENT",
      [](Search& s) {
     if (s.words[0] == "loadrt") {
-        for (const auto& name : s.session.host().available_components()) s.add(name);
+        for (const auto& name : s.session.host().available_components()) {
+            s.add(name);
+        }
         return;
     }
     const bool programs = s.words[0] != "reload";
-    for (const auto& c : s.model().components)
-        if (programs || c->plugin) s.add(c->name, c->process ? "program" : fmt::format("{} instances", c->instances.size()));
+    for (const auto& c : s.model().components) {
+        if (programs || c->plugin) {
+            s.add(c->name,
+                  c->process ? "program" : fmt::format("{} instances", c->instances.size()));
+        }
+    }
 }},
     {"INSTANCE",
      [](Search& s) {
-    for (const auto& [name, instance] : s.model().instance) s.add(std::string(name), instance->component->name);
+    for (const auto& [name, instance] : s.model().instance) {
+        s.add(std::string(name), instance->component->name);
+    }
 }},
     {"ARGUMENT=VALUE", add_load_arguments},
     {"PROCESS",
      [](Search& s) {
-    for (const auto& name : s.programs.names()) s.add(name);
+    for (const auto& name : s.programs.names()) {
+        s.add(name);
+    }
 }},
     {"PROGRAM", add_files},
     {"FILE", add_files},
@@ -161,80 +211,114 @@ constexpr Kind kinds[] = {
      [](Search& s) {
     const bool placed = s.words[0] == "delf";
     add_functions(s, [&](const LoadedFunction& f) {
-        return (f.thread != nullptr) == placed && std::find(s.words.begin(), s.words.end(), f.name) == s.words.end();
+        return (f.thread != nullptr) == placed &&
+               std::find(s.words.begin(), s.words.end(), f.name) == s.words.end();
     });
 }},
     {"THREAD",
      [](Search& s) {
-    const LoadedFunction* const function = s.words[0] == "delf" && s.words.size() > 1 ? s.model().find_function(s.words[1]) : nullptr;
-    for (const auto& thread : s.model().threads)
-        if (!function || function->thread == thread.get())
+    const LoadedFunction* const function =
+        s.words[0] == "delf" && s.words.size() > 1 ? s.model().find_function(s.words[1]) : nullptr;
+    for (const auto& thread : s.model().threads) {
+        if (!function || function->thread == thread.get()) {
             s.add(thread->name, format_duration(static_cast<double>(thread->options.period_ns)));
+        }
+    }
 }},
     {"SIGNAL",
      [](Search& s) {
     const bool settable = s.words[0] == "sets";
-    add_signals(s, [&](const Signal& signal) { return !settable || (!signal.writer && signal.ios == 0); });
+    add_signals(
+        s, [&](const Signal& signal) { return !settable || (!signal.writer && signal.ios == 0); });
 }},
     {"PIN",
      [](Search& s) {
-        // net and linksp have named the signal already; linkps PIN SIGNAL and linkpp take any free pin
-    if (s.words[0] == "net" || s.words[0] == "linksp") add_free_pins(s);
-    else if (s.words[0] == "unlinkp") add_pins(s, [](const Pin& pin) { return pin.signal != nullptr; });
-    else add_pins(s, [](const Pin& pin) { return !pin.signal && pin.dir != HAL_DIR_PARAM; });
+    // net and linksp have named the signal already; linkps PIN SIGNAL and linkpp take any free
+    // pin
+    if (s.words[0] == "net" || s.words[0] == "linksp") {
+        add_free_pins(s);
+    } else if (s.words[0] == "unlinkp") {
+        add_pins(s, [](const Pin& pin) { return pin.signal != nullptr; });
+    } else {
+        add_pins(s, [](const Pin& pin) { return !pin.signal && pin.dir != HAL_DIR_PARAM; });
+    }
 }},
     {"PIN-OR-PARAMETER",
      [](Search& s) {
-    if (s.words[0] == "setp") return add_pins(s, [](const Pin& pin) { return pin.dir != HAL_DIR_OUT && !pin.read_only() && !pin.signal; });
+    if (s.words[0] == "setp") {
+        return add_pins(s, [](const Pin& pin) {
+            return pin.dir != HAL_DIR_OUT && !pin.read_only() && !pin.signal;
+        });
+    }
     const bool aliasing = s.words[0] == "alias" && s.words.size() > 1;
-    add_pins(s, [&](const Pin& pin) { return !aliasing || (is_parameter(pin) == (s.words[1] == "param") && pin.alias.empty()); });
+    add_pins(s, [&](const Pin& pin) {
+        return !aliasing || (is_parameter(pin) == (s.words[1] == "param") && pin.alias.empty());
+    });
 }},
     {"ALIAS",
      [](Search& s) {
-    for (const auto& [key, pin] : s.model().pin)
-        if (key == pin->alias) s.add(std::string(key), pin->name);
+    for (const auto& [key, pin] : s.model().pin) {
+        if (key == pin->alias) {
+            s.add(std::string(key), pin->name);
+        }
+    }
 }},
     {"VALUE", add_values},
     {"TYPE",
      [](Search& s) {
-    for (const auto& row : types) s.add(row.name);
+    for (const auto& row : types) {
+        s.add(row.name);
+    }
 }},
     {"PATTERN", add_listed},
     {"COMMAND",
      [](Search& s) {
-    for (const auto& row : command_table()) s.add(row.name, row.summary);
+    for (const auto& row : command_table()) {
+        s.add(row.name, row.summary);
+    }
 }},
     {"CODE",
      [](Search& s) {
-    for (const CodePage& row : all_code_pages()) s.add(row.name);
+    for (const CodePage& row : all_code_pages()) {
+        s.add(row.name);
+    }
 }},
 };
 
 void add_word(Search& search, std::string_view word) {
     bool choices = false;
-    for (std::size_t at = 0; at <= word.size();) {  // "COMPONENT|all", "[comp|pin|…]", or one word alone
+    for (std::size_t at = 0;
+         at <= word.size();) {  // "COMPONENT|all", "[comp|pin|…]", or one word alone
         const auto bar = std::min(word.find('|', at), word.size());
         const std::string_view one = word.substr(at, bar - at);
-        const auto kind = std::find_if(std::begin(kinds), std::end(kinds), [&](const Kind& k) { return k.word == one; });
-        const bool literal = one.find_first_of("ABCDEFGHIJKLMNOPQRSTUVWXYZ") == one.npos || one.starts_with('-');
+        const auto kind = std::find_if(std::begin(kinds), std::end(kinds),
+                                       [&](const Kind& k) { return k.word == one; });
+        const bool literal =
+            one.find_first_of("ABCDEFGHIJKLMNOPQRSTUVWXYZ") == one.npos || one.starts_with('-');
         choices = choices || bar < word.size();
-        if (kind != std::end(kinds)) kind->add(search);
-        else if (const auto equals = one.find('='); equals != one.npos) return search.add(std::string(one.substr(0, equals + 1)));
-        else if (literal) search.add(std::string(one));
+        if (kind != std::end(kinds)) {
+            kind->add(search);
+        } else if (const auto equals = one.find('='); equals != one.npos) {
+            return search.add(std::string(one.substr(0, equals + 1)));
+        } else if (literal) {
+            search.add(std::string(one));
+        }
         at = bar + 1;
     }
 }
 
-/// Follows the usage through the words typed so far and offers every word that may come next: optional ones can be left
-/// out, repeated ones stay, an option's own argument comes only after the option.
+/// Follows the usage through the words typed so far and offers every word that may come next:
+/// optional ones can be left out, repeated ones stay, an option's own argument comes only after the
+/// option.
 void add_arguments(Search& search, const std::vector<UsageWord>& words) {
     std::vector<bool> here(words.size() + 1), next;
     const auto reach = [&](std::vector<bool>& states, std::size_t i) {
         while (true) {
             states[i] = true;
             if (i == words.size() || !words[i].optional || words[i].of_option) return;
-            do ++i;
-            while (i < words.size() && words[i].of_option);
+            do {
+                ++i;
+            } while (i < words.size() && words[i].of_option);
         }
     };
     reach(here, 0);
@@ -243,15 +327,26 @@ void add_arguments(Search& search, const std::vector<UsageWord>& words) {
         const bool option = search.words[given].starts_with('-');
         for (std::size_t i = 0; i < words.size(); ++i) {
             const bool wants_option = words[i].text.starts_with('-');
-            if (!here[i] || (wants_option ? words[i].text != search.words[given] : option && !words[i].of_option)) continue;
-            if (words[i].repeats) reach(next, i);
-            if (i + 1 < words.size() && words[i + 1].of_option) next[i + 1] = true;
-            else reach(next, i + 1);
+            if (!here[i] || (wants_option ? words[i].text != search.words[given]
+                                          : option && !words[i].of_option)) {
+                continue;
+            }
+            if (words[i].repeats) {
+                reach(next, i);
+            }
+            if (i + 1 < words.size() && words[i + 1].of_option) {
+                next[i + 1] = true;
+            } else {
+                reach(next, i + 1);
+            }
         }
         here.swap(next);
     }
-    for (std::size_t i = 0; i < words.size(); ++i)
-        if (here[i]) add_word(search, words[i].text);
+    for (std::size_t i = 0; i < words.size(); ++i) {
+        if (here[i]) {
+            add_word(search, words[i].text);
+        }
+    }
 }
 
 }  // namespace
@@ -263,24 +358,38 @@ Completion Shell::complete(std::string_view line, std::size_t cursor) const {
     completion.begin = last == line.npos ? 0 : last + 1;
 
     const auto lock = state_->session.lock();
-    Search search{state_->session, state_->session.programs(), options, {}, std::string(line.substr(completion.begin)), completion.candidates};
+    Search search{state_->session,
+                  state_->session.programs(),
+                  options,
+                  {},
+                  std::string(line.substr(completion.begin)),
+                  completion.candidates};
     for (std::size_t at = 0; at < completion.begin;) {
         const auto end = std::min(line.find_first_of(" \t", at), completion.begin);
-        if (end > at && !is_arrow(line.substr(at, end - at))) search.words.emplace_back(line.substr(at, end - at));
+        if (end > at && !is_arrow(line.substr(at, end - at))) {
+            search.words.emplace_back(line.substr(at, end - at));
+        }
         at = end + 1;
     }
     if (search.words.empty()) {
         for (const auto& row : command_table()) {
             search.add(row.name, row.summary);
-            if (*row.also) search.add(row.also, row.summary);
+            if (*row.also) {
+                search.add(row.also, row.summary);
+            }
         }
     } else if (const CommandRow* const row = find_command(search.words[0])) {
-        for (const auto& form : usage_forms(row->arguments)) add_arguments(search, form);
+        for (const auto& form : usage_forms(row->arguments)) {
+            add_arguments(search, form);
+        }
     }
     auto& found = completion.candidates;
-    std::sort(found.begin(), found.end(), [](const Candidate& a, const Candidate& b) { return a.text < b.text; });
-    found.erase(std::unique(found.begin(), found.end(), [](const Candidate& a, const Candidate& b) { return a.text == b.text; }),
-                found.end());
+    std::sort(found.begin(), found.end(),
+              [](const Candidate& a, const Candidate& b) { return a.text < b.text; });
+    found.erase(
+        std::unique(found.begin(), found.end(),
+                    [](const Candidate& a, const Candidate& b) { return a.text == b.text; }),
+        found.end());
     return completion;
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What completion answers: shared by the shell, which computes it, and the client, which asks for it over the socket.
+// What completion answers: shared by the shell, which computes it, and the client, which asks for
+// it over the socket.
 #pragma once
 
 #include <cstddef>

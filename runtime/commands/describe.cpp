@@ -5,16 +5,16 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "machine/session.hpp"
 #include "machine/programs.hpp"
+#include "machine/session.hpp"
 
 namespace hal {
 namespace {
 
 using Object = nlohmann::ordered_json;
 
-/// Appends an array of the objects that `row` returns, and writes each before the next is built: a hundred thousand at once would take
-/// several times the memory of their text.
+/// Appends an array of the objects that `row` returns, and writes each before the next is built: a
+/// hundred thousand at once would take several times the memory of their text.
 template <class Range, class Row>
 void array(std::string& to, const Session& session, const Range& range, Row&& row) {
     to += '[';
@@ -22,7 +22,9 @@ void array(std::string& to, const Session& session, const Range& range, Row&& ro
     std::size_t i = 0;
     for (const auto& each : range) {
         if (session.ending()) break;
-        if (!std::exchange(first, false)) to += ',';
+        if (!std::exchange(first, false)) {
+            to += ',';
+        }
         to += json_text(row(each, i++));
     }
     to += ']';
@@ -31,38 +33,60 @@ void array(std::string& to, const Session& session, const Range& range, Row&& ro
 template <class Range>
 Object names(const Range& range) {
     Object all = Object::array();
-    for (const auto& each : range) all.push_back(each->name);
+    for (const auto& each : range) {
+        all.push_back(each->name);
+    }
     return all;
 }
 
 template <class T>
 void keep_type(std::vector<const T*>& objects, std::optional<hal_type> type) {
-    if (type) std::erase_if(objects, [&](const T* object) { return object->type != *type; });
+    if (type) {
+        std::erase_if(objects, [&](const T* object) { return object->type != *type; });
+    }
 }
 
-void describe_pins(std::string& to, Session& session, bool parameters, const Patterns& patterns, std::optional<hal_type> type) {
+void describe_pins(std::string& to, Session& session, bool parameters, const Patterns& patterns,
+                   std::optional<hal_type> type) {
     auto pins = pins_by_name(session.model(), parameters, patterns);
     keep_type(pins, type);
     const auto values = session.values().read_pins(pins);
     array(to, session, pins, [&](const Pin* pin, std::size_t i) {
         Object object;
         object["name"] = pin->name;
-        if (!pin->alias.empty()) object["alias"] = pin->alias;
+        if (!pin->alias.empty()) {
+            object["alias"] = pin->alias;
+        }
         object["type"] = name(pin->type);
         object["dir"] = direction_text(*pin);
         object["value"] = to_json(pin->type, values[i]);
-        if (pin->signal) object["signal"] = pin->signal->name;
-        if (const LoadedComponent* const component = owner(*pin)) object["component"] = component->name;
-        if (pin->instance) object["instance"] = pin->instance->name;
-        if (pin->instance && pin->instance->loaded.known()) object["file"] = session.sources.get(pin->instance->loaded.source).name;
-        if (const Thread* const thread = thread_of(*pin)) object["thread"] = thread->name;
-        if (*pin->doc) object["doc"] = pin->doc;
-        if (*pin->unit) object["unit"] = pin->unit;
+        if (pin->signal) {
+            object["signal"] = pin->signal->name;
+        }
+        if (const LoadedComponent* const component = owner(*pin)) {
+            object["component"] = component->name;
+        }
+        if (pin->instance) {
+            object["instance"] = pin->instance->name;
+        }
+        if (pin->instance && pin->instance->loaded.known()) {
+            object["file"] = session.sources.get(pin->instance->loaded.source).name;
+        }
+        if (const Thread* const thread = thread_of(*pin)) {
+            object["thread"] = thread->name;
+        }
+        if (*pin->doc) {
+            object["doc"] = pin->doc;
+        }
+        if (*pin->unit) {
+            object["unit"] = pin->unit;
+        }
         return object;
     });
 }
 
-void describe_signals(std::string& to, Session& session, const Patterns& patterns, std::optional<hal_type> type) {
+void describe_signals(std::string& to, Session& session, const Patterns& patterns,
+                      std::optional<hal_type> type) {
     auto signals = signals_by_name(session.model(), patterns);
     keep_type(signals, type);
     const auto values = session.values().read_signals(signals);
@@ -71,14 +95,17 @@ void describe_signals(std::string& to, Session& session, const Patterns& pattern
         object["name"] = signal->name;
         object["type"] = name(signal->type);
         object["value"] = to_json(signal->type, values[i]);
-        if (signal->writer) object["writer"] = signal->writer->name;
+        if (signal->writer) {
+            object["writer"] = signal->writer->name;
+        }
         object["pins"] = names(signal->pins);
         return object;
     });
 }
 
 void describe_components(std::string& to, Session& session, const Patterns& patterns) {
-    array(to, session, components_newest_first(session.model(), patterns), [&](const LoadedComponent* component, std::size_t) {
+    array(to, session, components_newest_first(session.model(), patterns),
+          [&](const LoadedComponent* component, std::size_t) {
         Object object;
         object["name"] = component->name;
         if (component->process) {
@@ -100,22 +127,30 @@ void describe_components(std::string& to, Session& session, const Patterns& patt
 }
 
 void describe_functions(std::string& to, Session& session, const Patterns& patterns) {
-    array(to, session, functions_by_name(session.model(), patterns), [&](const LoadedFunction* function, std::size_t) {
+    array(to, session, functions_by_name(session.model(), patterns),
+          [&](const LoadedFunction* function, std::size_t) {
         Object object;
         object["name"] = function->name;
         object["component"] = function->component->name;
-        if (function->thread) object["thread"] = function->thread->name;
-        if (*function->doc) object["doc"] = function->doc;
+        if (function->thread) {
+            object["thread"] = function->thread->name;
+        }
+        if (*function->doc) {
+            object["doc"] = function->doc;
+        }
         const auto samples = function->times->samples.load(std::memory_order_relaxed);
         const auto total = function->times->total_ns.load(std::memory_order_relaxed);
-        if (samples > 0) object["mean_ns"] = static_cast<double>(total) / static_cast<double>(samples);
+        if (samples > 0) {
+            object["mean_ns"] = static_cast<double>(total) / static_cast<double>(samples);
+        }
         return object;
     });
 }
 
 void describe_threads(std::string& to, Session& session, const Patterns& patterns) {
     const auto clock = session.reports().clock();
-    array(to, session, threads_slowest_first(session.model(), patterns), [&](const Thread* thread, std::size_t) {
+    array(to, session, threads_slowest_first(session.model(), patterns),
+          [&](const Thread* thread, std::size_t) {
         const ThreadReport report = session.reports().thread(*thread);
         Object object;
         object["name"] = thread->name;
@@ -131,7 +166,9 @@ void describe_threads(std::string& to, Session& session, const Patterns& pattern
         if (report.hung) {
             object["hung"] = true;
             object["silent_ns"] = report.silent_ns;
-            if (!report.function.empty()) object["function"] = report.function;
+            if (!report.function.empty()) {
+                object["function"] = report.function;
+            }
         }
         object["wakeup_p50_ns"] = report.wakeup_p50_ns;
         object["wakeup_p99_ns"] = report.wakeup_p99_ns;
@@ -152,9 +189,13 @@ void describe_threads(std::string& to, Session& session, const Patterns& pattern
 
 void describe_aliases(std::string& to, Session& session, const Patterns& patterns) {
     std::vector<const Pin*> aliased;
-    for (const bool parameters : {false, true})
-        for (const Pin* const pin : pins_by_name(session.model(), parameters, patterns))
-            if (!pin->alias.empty()) aliased.push_back(pin);
+    for (const bool parameters : {false, true}) {
+        for (const Pin* const pin : pins_by_name(session.model(), parameters, patterns)) {
+            if (!pin->alias.empty()) {
+                aliased.push_back(pin);
+            }
+        }
+    }
     array(to, session, aliased, [&](const Pin* pin, std::size_t) {
         Object object;
         object["name"] = pin->name;
@@ -167,18 +208,30 @@ void describe_aliases(std::string& to, Session& session, const Patterns& pattern
 
 std::optional<Listed> listed_kind(std::string_view word) {
     static constexpr std::pair<std::string_view, Listed> words[] = {
-        {"comp", Listed::components}, {"component", Listed::components}, {"pin", Listed::pins}, {"sig", Listed::signals},
-        {"signal", Listed::signals}, {"param", Listed::parameters}, {"parameter", Listed::parameters}, {"funct", Listed::functions},
-        {"function", Listed::functions}, {"thread", Listed::threads}, {"alias", Listed::aliases}, {"all", Listed::all}};
-    for (const auto& [name, kind] : words)
+        {"comp", Listed::components},
+        {"component", Listed::components},
+        {"pin", Listed::pins},
+        {"sig", Listed::signals},
+        {"signal", Listed::signals},
+        {"param", Listed::parameters},
+        {"parameter", Listed::parameters},
+        {"funct", Listed::functions},
+        {"function", Listed::functions},
+        {"thread", Listed::threads},
+        {"alias", Listed::aliases},
+        {"all", Listed::all}};
+    for (const auto& [name, kind] : words) {
         if (name == word) return kind;
+    }
     return std::nullopt;
 }
 
 std::vector<std::string> names_of(const Model& model, Listed kind, const Patterns& patterns) {
     std::vector<std::string> names;
     const auto add = [&](const auto& objects, auto&& name) {
-        for (const auto* const object : objects) names.push_back(name(*object));
+        for (const auto* const object : objects) {
+            names.push_back(name(*object));
+        }
     };
     const auto own = [](const auto& object) { return object.name; };
     switch (kind) {
@@ -189,13 +242,17 @@ std::vector<std::string> names_of(const Model& model, Listed kind, const Pattern
     case Listed::functions: add(functions_by_name(model, patterns), own); break;
     case Listed::threads: add(threads_slowest_first(model, patterns), own); break;
     case Listed::aliases:
-        for (const bool parameters : {false, true})
-            for (const Pin* const pin : pins_by_name(model, parameters, patterns))
-                if (!pin->alias.empty()) names.push_back(pin->alias);
+        for (const bool parameters : {false, true}) {
+            for (const Pin* const pin : pins_by_name(model, parameters, patterns)) {
+                if (!pin->alias.empty()) {
+                    names.push_back(pin->alias);
+                }
+            }
+        }
         break;
     case Listed::all:
-        for (const Listed each :
-             {Listed::components, Listed::pins, Listed::signals, Listed::parameters, Listed::functions, Listed::threads}) {
+        for (const Listed each : {Listed::components, Listed::pins, Listed::signals,
+                                  Listed::parameters, Listed::functions, Listed::threads}) {
             auto more = names_of(model, each, patterns);
             std::move(more.begin(), more.end(), std::back_inserter(names));
         }
@@ -217,8 +274,9 @@ void describe(std::string& to, Session& session, Listed kind, const Patterns& pa
     case Listed::all: break;
     }
     static constexpr std::pair<std::string_view, Listed> parts[] = {
-        {"components", Listed::components}, {"pins", Listed::pins}, {"signals", Listed::signals},
-        {"parameters", Listed::parameters}, {"functions", Listed::functions}, {"threads", Listed::threads}};
+        {"components", Listed::components}, {"pins", Listed::pins},
+        {"signals", Listed::signals},       {"parameters", Listed::parameters},
+        {"functions", Listed::functions},   {"threads", Listed::threads}};
     std::string_view before = "{";
     for (const auto& [name, part] : parts) {
         json_quote(to += before, name);

@@ -17,7 +17,8 @@ constexpr std::size_t most_bytes = std::size_t{1} << 30;  // places in a text ar
 
 }  // namespace
 
-bool read_text_file(const std::string& path, std::string& text, std::string& problem, bool descriptors) {
+bool read_text_file(const std::string& path, std::string& text, std::string& problem,
+                    bool descriptors) {
     if (read_regular_file(path, most_bytes, text, descriptors)) return true;
     problem = std::move(text);
     text.clear();
@@ -30,34 +31,53 @@ std::vector<std::string> netlist_places(const std::string& name, const std::stri
         const char* const value = std::getenv(variable);
         for (std::string_view left = value ? value : ""; !left.empty();) {
             const std::string_view one = left.substr(0, left.find(':'));
-            if (!one.empty()) library.push_back(resolve_path(std::string(one), directory));
+            if (!one.empty()) {
+                library.push_back(resolve_path(std::string(one), directory));
+            }
             left.remove_prefix(std::min(left.size(), one.size() + 1));
         }
     };
     const bool only_library = name.starts_with("LIB:");
-    if (!only_library) add_list("HALLIB_PATH");
+    if (!only_library) {
+        add_list("HALLIB_PATH");
+    }
     add_list("HALLIB_DIR");
     library.emplace_back("/usr/share/linuxcnc/hallib");
     std::vector<std::string> places;
-    if (!only_library) places.push_back(resolve_path(name, directory));
+    if (!only_library) {
+        places.push_back(resolve_path(name, directory));
+    }
     const std::string file = only_library ? name.substr(4) : name;
-    if (only_library || !(name.starts_with('/') || name.starts_with('~')))
+    if (only_library || !(name.starts_with('/') || name.starts_with('~'))) {
         for (const std::string& folder : library) {
             std::string place = folder + "/" + file;
-            if (std::find(places.begin(), places.end(), place) == places.end()) places.push_back(std::move(place));
+            if (std::find(places.begin(), places.end(), place) == places.end()) {
+                places.push_back(std::move(place));
+            }
         }
+    }
     return places;
 }
 
-bool read_netlist(const std::string& name, const std::string& directory, std::string& path, std::string& text, std::string& problem) {
+bool read_netlist(const std::string& name, const std::string& directory, std::string& path,
+                  std::string& text, std::string& problem) {
     const auto places = netlist_places(name, directory);
     for (const std::string& place : places) {
         std::string why;
-        if (read_text_file(place, text, why)) return path = place, true;
-        if (&place == places.data() || (why != std::strerror(ENOENT) && problem == std::strerror(ENOENT))) problem = why;
+        if (read_text_file(place, text, why)) {
+            path = place;
+            return true;
+        }
+        if (&place == places.data() ||
+            (why != std::strerror(ENOENT) && problem == std::strerror(ENOENT))) {
+            problem = why;
+        }
     }
-    if (name.starts_with("LIB:") && problem == std::strerror(ENOENT))
-        problem = std::string(std::getenv("HALLIB_DIR") ? "it is not in HALLIB_DIR" : "HALLIB_DIR is not set") + " and not in /usr/share/linuxcnc/hallib";
+    if (name.starts_with("LIB:") && problem == std::strerror(ENOENT)) {
+        problem = std::string(std::getenv("HALLIB_DIR") ? "it is not in HALLIB_DIR"
+                                                        : "HALLIB_DIR is not set") +
+                  " and not in /usr/share/linuxcnc/hallib";
+    }
     return false;
 }
 

@@ -13,8 +13,11 @@ bool is_linuxcnc_configuration(const Ini& ini) {
 
 std::string ini_version_problem(const Ini& ini) {
     const auto version = ini.get("EMC", "VERSION");
-    if (version == "1.1") return {};
-    return "[EMC]VERSION is " + version.value_or("missing") + ", not 1.1: the file is from an older LinuxCNC";
+    if (version == "1.1") {
+        return {};
+    }
+    return "[EMC]VERSION is " + version.value_or("missing") +
+           ", not 1.1: the file is from an older LinuxCNC";
 }
 
 }  // namespace hal

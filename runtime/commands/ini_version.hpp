@@ -8,7 +8,8 @@
 
 namespace hal {
 
-/// True for the configuration of a whole LinuxCNC machine: its INI file names parts that only LinuxCNC's launcher starts.
+/// True for the configuration of a whole LinuxCNC machine: its INI file names parts that only
+/// LinuxCNC's launcher starts.
 bool is_linuxcnc_configuration(const Ini& ini);
 /// Returns why LinuxCNC 2.9 and later do not start the configuration before it is converted, or "".
 std::string ini_version_problem(const Ini& ini);

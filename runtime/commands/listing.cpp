@@ -21,56 +21,80 @@ bool Patterns::match(const std::string& name) const {
 const std::string& shown_name(const Pin& pin) { return pin.alias.empty() ? pin.name : pin.alias; }
 
 bool is_parameter(const Pin& pin) {
-    return pin.dir == HAL_DIR_PARAM || (!pin.instance && !pin.signal && pin.name.ends_with(".tmax-increased"));
+    return pin.dir == HAL_DIR_PARAM ||
+           (!pin.instance && !pin.signal && pin.name.ends_with(".tmax-increased"));
 }
 
 const char* direction_text(const Pin& pin) {
-    return pin.read_only() || (is_parameter(pin) && pin.dir != HAL_DIR_PARAM) ? "RO" : name(pin.dir);
+    return pin.read_only() || (is_parameter(pin) && pin.dir != HAL_DIR_PARAM) ? "RO"
+                                                                              : name(pin.dir);
 }
 
-std::vector<const Pin*> pins_by_name(const Model& model, bool parameters, const Patterns& patterns) {
+std::vector<const Pin*> pins_by_name(const Model& model, bool parameters,
+                                     const Patterns& patterns) {
     std::vector<const Pin*> chosen;
-    for (const auto& [name, pin] : model.pin)
-        if (name == pin->name && is_parameter(*pin) == parameters && patterns.match(shown_name(*pin))) chosen.push_back(pin);
-    std::sort(chosen.begin(), chosen.end(), [](const Pin* a, const Pin* b) { return shown_name(*a) < shown_name(*b); });
+    for (const auto& [name, pin] : model.pin) {
+        if (name == pin->name && is_parameter(*pin) == parameters &&
+            patterns.match(shown_name(*pin))) {
+            chosen.push_back(pin);
+        }
+    }
+    std::sort(chosen.begin(), chosen.end(),
+              [](const Pin* a, const Pin* b) { return shown_name(*a) < shown_name(*b); });
     return chosen;
 }
 
 std::vector<const Signal*> signals_by_name(const Model& model, const Patterns& patterns) {
     std::vector<const Signal*> chosen;
-    for (const auto& signal : model.signals)
-        if (patterns.match(signal->name)) chosen.push_back(signal.get());
-    std::sort(chosen.begin(), chosen.end(), [](const Signal* a, const Signal* b) { return a->name < b->name; });
+    for (const auto& signal : model.signals) {
+        if (patterns.match(signal->name)) {
+            chosen.push_back(signal.get());
+        }
+    }
+    std::sort(chosen.begin(), chosen.end(),
+              [](const Signal* a, const Signal* b) { return a->name < b->name; });
     return chosen;
 }
 
 std::vector<const LoadedFunction*> functions_by_name(const Model& model, const Patterns& patterns) {
     auto all = model.sorted_functions();
-    std::erase_if(all, [&](const LoadedFunction* function) { return !patterns.match(function->name); });
+    std::erase_if(all,
+                  [&](const LoadedFunction* function) { return !patterns.match(function->name); });
     return all;
 }
 
-std::vector<const LoadedComponent*> components_newest_first(const Model& model, const Patterns& patterns) {
+std::vector<const LoadedComponent*> components_newest_first(const Model& model,
+                                                            const Patterns& patterns) {
     std::vector<const LoadedComponent*> chosen;
-    for (const auto& component : model.components)
-        if (patterns.match(component->name)) chosen.push_back(component.get());
-    std::sort(chosen.begin(), chosen.end(), [](const LoadedComponent* a, const LoadedComponent* b) { return a->id > b->id; });
+    for (const auto& component : model.components) {
+        if (patterns.match(component->name)) {
+            chosen.push_back(component.get());
+        }
+    }
+    std::sort(chosen.begin(), chosen.end(),
+              [](const LoadedComponent* a, const LoadedComponent* b) { return a->id > b->id; });
     return chosen;
 }
 
 std::vector<const Thread*> threads_slowest_first(const Model& model, const Patterns& patterns) {
     std::vector<const Thread*> chosen;
-    for (auto thread = model.threads.rbegin(); thread != model.threads.rend(); ++thread)
-        if (patterns.match((*thread)->name)) chosen.push_back(thread->get());
+    for (auto thread = model.threads.rbegin(); thread != model.threads.rend(); ++thread) {
+        if (patterns.match((*thread)->name)) {
+            chosen.push_back(thread->get());
+        }
+    }
     return chosen;
 }
 
 std::string clock_text(const Session& session) {
     const auto clock = session.reports().clock();
-    if (!clock) return {};
+    if (!clock) {
+        return {};
+    }
     const auto shift = static_cast<double>(clock->shift_ns);
-    return fmt::format("Clock disciplined by {}: {} {} than the local clock, drift {:+.1f} ppm\n", clock->leader,
-                       format_duration(std::abs(shift)), shift < 0 ? "earlier" : "later", clock->rate * 1e6);
+    return fmt::format("Clock disciplined by {}: {} {} than the local clock, drift {:+.1f} ppm\n",
+                       clock->leader, format_duration(std::abs(shift)),
+                       shift < 0 ? "earlier" : "later", clock->rate * 1e6);
 }
 
 const LoadedComponent* owner(const Pin& pin) {
@@ -79,13 +103,21 @@ const LoadedComponent* owner(const Pin& pin) {
     return pin.of_thread ? pin.of_thread->component : nullptr;
 }
 
-const char* arrow_of_pin(const Pin& pin) { return pin.dir == HAL_DIR_OUT ? "==>" : pin.dir == HAL_DIR_IO ? "<=>" : "<=="; }
+const char* arrow_of_pin(const Pin& pin) {
+    return pin.dir == HAL_DIR_OUT ? "==>" : pin.dir == HAL_DIR_IO ? "<=>" : "<==";
+}
 
-const char* arrow_of_signal(const Pin& pin) { return pin.dir == HAL_DIR_OUT ? "<==" : pin.dir == HAL_DIR_IO ? "<=>" : "==>"; }
+const char* arrow_of_signal(const Pin& pin) {
+    return pin.dir == HAL_DIR_OUT ? "<==" : pin.dir == HAL_DIR_IO ? "<=>" : "==>";
+}
 
 std::string table_value(hal_type type, const hal_value& value) {
-    if (type == HAL_TYPE_U32) return fmt::format("0x{:08X}", value.u32);
-    if (type == HAL_TYPE_U64) return fmt::format("0x{:016X}", value.u64);
+    if (type == HAL_TYPE_U32) {
+        return fmt::format("0x{:08X}", value.u32);
+    }
+    if (type == HAL_TYPE_U64) {
+        return fmt::format("0x{:016X}", value.u64);
+    }
     return format_value(type, value);
 }
 

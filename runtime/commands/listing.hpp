@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What show, list, save, completion and the protocol share: the selection of objects and the text of their values.
+// What show, list, save, completion and the protocol share: the selection of objects and the text
+// of their values.
 #pragma once
 
 #include <string>
@@ -12,7 +13,8 @@ namespace hal {
 
 class Session;
 
-/// LinuxCNC's patterns: one matches a name it is a prefix of, or as a shell glob. No pattern matches all.
+/// LinuxCNC's patterns: one matches a name it is a prefix of, or as a shell glob. No pattern
+/// matches all.
 class Patterns {
 public:
     Patterns() = default;
@@ -26,8 +28,8 @@ private:
 
 /// The name show and list print: the alias when there is one.
 const std::string& shown_name(const Pin& pin);
-/// LinuxCNC knows three kinds of what is a pin here: pins; parameters that can be set; parameters only the machine writes
-/// (`.tmax-increased`), which its tables list with the parameters.
+/// LinuxCNC knows three kinds of what is a pin here: pins; parameters that can be set; parameters
+/// only the machine writes (`.tmax-increased`), which its tables list with the parameters.
 bool is_parameter(const Pin& pin);
 /// "IN", "OUT", "I/O" or, of a parameter, "RO", "RW".
 const char* direction_text(const Pin& pin);
@@ -37,11 +39,13 @@ std::vector<const Pin*> pins_by_name(const Model& model, bool parameters, const 
 std::vector<const Signal*> signals_by_name(const Model& model, const Patterns& patterns);
 std::vector<const LoadedFunction*> functions_by_name(const Model& model, const Patterns& patterns);
 /// Newest first, as LinuxCNC lists them.
-std::vector<const LoadedComponent*> components_newest_first(const Model& model, const Patterns& patterns);
+std::vector<const LoadedComponent*> components_newest_first(const Model& model,
+                                                            const Patterns& patterns);
 /// Slowest first, as LinuxCNC lists them.
 std::vector<const Thread*> threads_slowest_first(const Model& model, const Patterns& patterns);
 
-/// A line with the external clock reference of the threads and its drift; empty while they use the local clock.
+/// A line with the external clock reference of the threads and its drift; empty while they use the
+/// local clock.
 std::string clock_text(const Session& session);
 
 /// Whose pin it is: the component of its instance or function, of a thread's own pins the one that

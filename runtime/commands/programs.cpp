@@ -18,39 +18,59 @@ namespace {
 using namespace std::chrono_literals;
 
 struct Plan {
-    bool wait_ready = false, wait_end = false, ignore_status = false;
+    bool wait_ready = false;
+    bool wait_end = false;
+    bool ignore_status = false;
     bool any_name = true;  ///< no -Wn: whatever the program calls its component
     RestartPolicy restart;
     std::string name;  ///< as component
-    std::size_t name_at = 0, program = 0;
+    std::size_t name_at = 0;
+    std::size_t program = 0;
     std::int64_t timeout_ns = 0;  ///< of waiting; 0: none
 };
 
 /// The time behind `-t` at argument i, or 0 after reporting.
 std::int64_t timeout_option(Context& context, std::size_t i) {
-    if (i < context.count())
-        if (const auto time = parse_duration_ns(context.argument(i)); time && *time >= 1'000'000 && *time <= 86'400'000'000'000)
+    if (i < context.count()) {
+        if (const auto time = parse_duration_ns(context.argument(i));
+            time && *time >= 1'000'000 && *time <= 86'400'000'000'000) {
             return *time;
-    context.diagnostics.error("unknown-option", context.span(i), "-t requires a duration of 1ms..24h, such as -t 10s");
+        }
+    }
+    context.diagnostics.error("unknown-option", context.span(i),
+                              "-t requires a duration of 1ms..24h, such as -t 10s");
     return 0;
 }
 
 /// True for an option about restarts, which it has then taken or reported.
 bool restart_option(Context& context, Plan& plan, std::size_t i, const std::string& option) {
     const auto equals = option.find('=');
-    const std::string key = option.substr(0, equals), value = equals == option.npos ? "" : option.substr(equals + 1);
+    const std::string key = option.substr(0, equals);
+
+    const std::string value = equals == option.npos ? "" : option.substr(equals + 1);
     if (key == "--restart") {
         static constexpr std::pair<const char*, Restart> words[] = {
             {"no", Restart::no}, {"on-failure", Restart::on_failure}, {"always", Restart::always}};
-        const auto word = std::find_if(std::begin(words), std::end(words), [&](const auto& w) { return value == w.first; });
-        if (word != std::end(words)) plan.restart.when = word->second;
-        else context.diagnostics.error("unknown-option", context.span(i), "--restart must be no, on-failure or always", "", context.usage());
+        const auto word = std::find_if(std::begin(words), std::end(words),
+                                       [&](const auto& w) { return value == w.first; });
+        if (word != std::end(words)) {
+            plan.restart.when = word->second;
+        } else {
+            context.diagnostics.error("unknown-option", context.span(i),
+                                      "--restart must be no, on-failure or always", "",
+                                      context.usage());
+        }
         return true;
     }
     if (key != "--restart-delay") return false;
-    if (const auto delay = parse_duration_ns(value); delay && *delay >= 10'000'000 && *delay <= 3'600'000'000'000)
+    if (const auto delay = parse_duration_ns(value);
+        delay && *delay >= 10'000'000 && *delay <= 3'600'000'000'000) {
         plan.restart.delay_ns = *delay;
-    else context.diagnostics.error("unknown-option", context.span(i), "--restart-delay must be a duration of 10ms..1h", "", context.usage());
+    } else {
+        context.diagnostics.error("unknown-option", context.span(i),
+                                  "--restart-delay must be a duration of 10ms..1h", "",
+                                  context.usage());
+    }
     return true;
 }
 
@@ -59,11 +79,15 @@ bool read_options(Context& context, Plan& plan) {
     std::size_t i = 0;
     for (; i < context.count() && context.argument(i).starts_with('-'); ++i) {
         const std::string& option = context.argument(i);
-        if (option == "-W") plan.wait_ready = true;
-        else if (option == "-w") plan.wait_end = true;
-        else if (option == "-i") plan.ignore_status = true;
-        else if (option == "-iw" || option == "-wi") plan.wait_end = plan.ignore_status = true;
-        else if (restart_option(context, plan, i, option)) {
+        if (option == "-W") {
+            plan.wait_ready = true;
+        } else if (option == "-w") {
+            plan.wait_end = true;
+        } else if (option == "-i") {
+            plan.ignore_status = true;
+        } else if (option == "-iw" || option == "-wi") {
+            plan.wait_end = plan.ignore_status = true;
+        } else if (restart_option(context, plan, i, option)) {
             if (context.diagnostics.failed()) return false;
         } else if (option == "-Wn" && i + 1 < context.count()) {
             plan.wait_ready = true;
@@ -75,53 +99,73 @@ bool read_options(Context& context, Plan& plan) {
             if (plan.timeout_ns == 0) return false;
         } else {
             context.diagnostics.error("unknown-option", context.span(i),
-                                      "loadusr has no option '" + option + "'" + (option == "-Wn" ? " without a name" : ""), "", context.usage());
+                                      "loadusr has no option '" + option + "'" +
+                                          (option == "-Wn" ? " without a name" : ""),
+                                      "", context.usage());
             return false;
         }
     }
     plan.program = i;
     if (plan.timeout_ns != 0 && !plan.wait_ready && !plan.wait_end) {
-        context.diagnostics.error("unknown-option", context.span(0), "-t requires -W, -Wn or -w, whose wait it limits", "", context.usage());
+        context.diagnostics.error("unknown-option", context.span(0),
+                                  "-t requires -W, -Wn or -w, whose wait it limits", "",
+                                  context.usage());
         return false;
     }
     if (plan.wait_end && plan.restart.when != Restart::no) {
-        context.diagnostics.error("unknown-option", context.span(0), "-w and --restart exclude each other: -w waits for the program to end, --restart starts it again", "", context.usage());
+        context.diagnostics.error("unknown-option", context.span(0),
+                                  "-w and --restart exclude each other: -w waits for the program "
+                                  "to end, --restart starts it again",
+                                  "", context.usage());
         return false;
     }
     if (i == context.count()) {
-        context.diagnostics.error("wrong-arguments", context.command.name.span, "'loadusr' requires the name of a program",
-                                  "missing program", context.usage());
+        context.diagnostics.error("wrong-arguments", context.command.name.span,
+                                  "'loadusr' requires the name of a program", "missing program",
+                                  context.usage());
         return false;
     }
     if (plan.name.empty()) {
         const std::string& program = context.argument(i);
         plan.name = program.substr(program.rfind('/') + 1);
         plan.name_at = i;
-        if (plan.name.ends_with(".py")) plan.name.resize(plan.name.size() - 3);
+        if (plan.name.ends_with(".py")) {
+            plan.name.resize(plan.name.size() - 3);
+        }
     }
     return true;
 }
 
-/// Two pipes through which a child's stdout and stderr reach an Output that is not this process's own.
+/// Two pipes through which a child's stdout and stderr reach an Output that is not this process's
+/// own.
 class Pipes {
 public:
     Pipes() {
-        for (auto& pipe : pipes_)
-            if (pipe2(pipe.data(), O_CLOEXEC) == 0) fcntl(pipe[0], F_SETFL, O_NONBLOCK);
+        for (auto& pipe : pipes_) {
+            if (pipe2(pipe.data(), O_CLOEXEC) == 0) {
+                fcntl(pipe[0], F_SETFL, O_NONBLOCK);
+            }
+        }
     }
     ~Pipes() {
         close_writers();
-        for (auto& pipe : pipes_) close_one(pipe[0]);
+        for (auto& pipe : pipes_) {
+            close_one(pipe[0]);
+        }
     }
     Pipes(const Pipes&) = delete;
     int out() const { return pipes_[0][1]; }
     int err() const { return pipes_[1][1]; }
     void close_writers() {
-        for (auto& pipe : pipes_) close_one(pipe[1]);
+        for (auto& pipe : pipes_) {
+            close_one(pipe[1]);
+        }
     }
-    /// Passes on what has arrived; waits at most `timeout_ms` for it. False when both ends are closed.
+    /// Passes on what has arrived; waits at most `timeout_ms` for it. False when both ends are
+    /// closed.
     bool pass_on(Output& output, int timeout_ms) {
-        std::array<pollfd, 2> ready{pollfd{pipes_[0][0], POLLIN, 0}, pollfd{pipes_[1][0], POLLIN, 0}};
+        std::array<pollfd, 2> ready{pollfd{pipes_[0][0], POLLIN, 0},
+                                    pollfd{pipes_[1][0], POLLIN, 0}};
         poll(ready.data(), ready.size(), timeout_ms);
         for (std::size_t i = 0; i < 2; ++i) {
             if (pipes_[i][0] < 0) continue;
@@ -129,13 +173,21 @@ public:
             ssize_t got;
             while ((got = read(pipes_[i][0], text.data(), text.size())) > 0) {
                 const std::string_view part(text.data(), static_cast<std::size_t>(got));
-                if (total_ > most) continue;  // read and discarded, so that the program does not block
+                // read and discarded, so that the program does not block
+                if (total_ > most) continue;
                 total_ += part.size();
-                if (i == 0) output.out(part);
-                else output.err(part);
-                if (total_ > most) output.err("\n(output truncated after 1 MiB)\n");
+                if (i == 0) {
+                    output.out(part);
+                } else {
+                    output.err(part);
+                }
+                if (total_ > most) {
+                    output.err("\n(output truncated after 1 MiB)\n");
+                }
             }
-            if (got == 0) close_one(pipes_[i][0]);
+            if (got == 0) {
+                close_one(pipes_[i][0]);
+            }
         }
         return pipes_[0][0] >= 0 || pipes_[1][0] >= 0;
     }
@@ -143,7 +195,9 @@ public:
 private:
     static constexpr std::size_t most = std::size_t{1} << 20;
     static void close_one(int& file) {
-        if (file >= 0) close(file);
+        if (file >= 0) {
+            close(file);
+        }
         file = -1;
     }
     std::array<std::array<int, 2>, 2> pipes_{{{-1, -1}, {-1, -1}}};
@@ -161,7 +215,10 @@ public:
         report_ = report_ < 10s ? 10s : report_ < 60s ? 60s : report_ + 60s;
         return true;
     }
-    std::string text() const { return std::to_string(std::chrono::duration_cast<std::chrono::seconds>(waited()).count()) + " s"; }
+    std::string text() const {
+        return std::to_string(std::chrono::duration_cast<std::chrono::seconds>(waited()).count()) +
+               " s";
+    }
 
 private:
     std::chrono::nanoseconds waited() const { return std::chrono::steady_clock::now() - begin_; }
@@ -171,39 +228,57 @@ private:
 
 void report_wait(Context& context, Timeout& timeout, const auto& what) {
     if (!timeout.report_due() || context.options().level == Level::nothing) return;
-    const std::string text = context.command.name.text + ": " + what() + " (" + timeout.text() + ")\n";
+    const std::string text =
+        context.command.name.text + ": " + what() + " (" + timeout.text() + ")\n";
     context.lock.unlock();
     context.output.notice(text);
     context.lock.lock();
 }
 
 void timed_out(Context& context, std::int64_t limit_ns, const std::string& what, std::string help) {
-    context.diagnostics.error("program-timeout", context.command.span, what + " within " + format_duration(static_cast<double>(limit_ns)),
+    context.diagnostics.error("program-timeout", context.command.span,
+                              what + " within " + format_duration(static_cast<double>(limit_ns)),
                               "", std::move(help));
 }
 
-/// Waits until the name that the program is to have is free or a dead program's. False after reporting.
+/// Waits until the name that the program is to have is free or a dead program's. False after
+/// reporting.
 bool wait_for_name(Context& context, const Plan& plan, Timeout& timeout) {
     while (true) {
         const auto* const entry = context.programs.find(plan.name);
-        const bool dead = entry && entry->dead(), runs = entry && entry->child && !entry->ended;
-        const bool comes_back = dead && (entry->restart_ns != 0 || (runs && entry->restart.when != Restart::no));
+        const bool dead = entry && entry->dead();
+        const bool runs = entry && entry->child && !entry->ended;
+        const bool comes_back =
+            dead && (entry->restart_ns != 0 || (runs && entry->restart.when != Restart::no));
         if (dead && !comes_back && !runs) return true;
-        if (!entry && !context.session.model().find_component(plan.name) && !context.session.model().find_instance(plan.name)) return true;
+        if (!entry && !context.session.model().find_component(plan.name) &&
+            !context.session.model().find_instance(plan.name)) {
+            return true;
+        }
         if (!entry || !(entry->stopping || (dead && !comes_back))) {
-            const std::string who = !entry ? "a component in the machine" : "process " + std::to_string(entry->pid) + ", " + entry->state();
-            context.diagnostics.error("name-taken", context.span(plan.name_at), "the name '" + plan.name + "' is in use (" + who + ")",
-                                      "in use", entry ? "end the program first: unload " + plan.name : "give the program another name");
+            const std::string who =
+                !entry ? "a component in the machine"
+                       : "process " + std::to_string(entry->pid) + ", " + entry->state();
+            context.diagnostics.error("name-taken", context.span(plan.name_at),
+                                      "the name '" + plan.name + "' is in use (" + who + ")",
+                                      "in use",
+                                      entry ? "end the program first: unload " + plan.name
+                                            : "give the program another name");
             return false;
         }
         if (timeout.over()) {
-            timed_out(context, plan.timeout_ns, "the previous '" + plan.name + "' (process " + std::to_string(entry->pid) + ") did not end",
-                      "nothing was started; kill -9 " + std::to_string(entry->pid) + " ends it by force");
+            timed_out(
+                context, plan.timeout_ns,
+                "the previous '" + plan.name + "' (process " + std::to_string(entry->pid) +
+                    ") did not end",
+                "nothing was started; kill -9 " + std::to_string(entry->pid) + " ends it by force");
             return false;
         }
         report_wait(context, timeout, [&] {
-            return "waiting for the previous '" + plan.name + "' to end: process " + std::to_string(entry->pid) +
-                   (entry->stopping ? " received SIGTERM but is still running" : " lost its connection but is still running");
+            return "waiting for the previous '" + plan.name + "' to end: process " +
+                   std::to_string(entry->pid) +
+                   (entry->stopping ? " received SIGTERM but is still running"
+                                    : " lost its connection but is still running");
         });
         if (context.interrupted()) return false;
         context.programs.wait(context.lock, 100ms);
@@ -216,19 +291,25 @@ constexpr const char* initializing = "has registered it and is initializing";
 std::string progress(Context& context, const Plan& plan, pid_t pid) {
     const auto* const entry = context.programs.find(plan.name);
     if (entry && entry->owner != 0 && !entry->dead()) return initializing;
-    if (const std::string why = context.programs.refusal_of(pid); !why.empty()) return "could not register: " + why;
+    if (const std::string why = context.programs.refusal_of(pid); !why.empty()) {
+        return "could not register: " + why;
+    }
     const auto names = context.programs.registered_by(pid);
     if (names.empty()) return "has not registered a component";
-    return "has registered " + (names.size() == 1 ? "'" + names[0] + "'" : listed(names)) + " instead";
+    return "has registered " + (names.size() == 1 ? "'" + names[0] + "'" : listed(names)) +
+           " instead";
 }
 
 /// `fresh`: no dead program had the name before.
-void wait_until_ready(Context& context, const Plan& plan, pid_t pid, std::uint64_t number, bool fresh, Timeout& timeout) {
+void wait_until_ready(Context& context, const Plan& plan, pid_t pid, std::uint64_t number,
+                      bool fresh, Timeout& timeout) {
     const std::string& program = context.argument(plan.program);
     std::string last = "has not registered a component";
     while (true) {
         const auto* const child = context.programs.find(pid);
-        if (child || !context.programs.refusal_of(pid).empty()) last = progress(context, plan, pid);
+        if (child || !context.programs.refusal_of(pid).empty()) {
+            last = progress(context, plan, pid);
+        }
         auto* const entry = context.programs.find_number(number);
         if (entry && entry->ready) return;
         const auto* const named = plan.any_name ? nullptr : context.programs.find(plan.name);
@@ -236,32 +317,43 @@ void wait_until_ready(Context& context, const Plan& plan, pid_t pid, std::uint64
         if (!child && !(entry && entry->dead() && (entry->restart_ns != 0 || !entry->ended))) {
             const bool registered = last == initializing || (fresh && entry && entry->dead());
             context.diagnostics.error(
-                "program-ended", context.span(plan.program), "'" + program + "' ended before a component '" + plan.name + "' was ready", "",
-                registered                                 ? "it registered the component and ended while it was initializing"
-                : last == "has not registered a component" ? "a program registers over the control socket; omit -W if it does not"
-                                                           : "it " + last);
-            if (fresh && entry && entry->dead()) context.programs.give_up(*entry);
+                "program-ended", context.span(plan.program),
+                "'" + program + "' ended before a component '" + plan.name + "' was ready", "",
+                registered ? "it registered the component and ended while it was initializing"
+                : last == "has not registered a component"
+                    ? "a program registers over the control socket; omit -W if it does not"
+                    : "it " + last);
+            if (fresh && entry && entry->dead()) {
+                context.programs.give_up(*entry);
+            }
             return;
         }
         if (timeout.over()) {
-            if (entry) context.programs.give_up(*entry);
-            return timed_out(context, plan.timeout_ns, "component '" + plan.name + "' was not ready",
+            if (entry) {
+                context.programs.give_up(*entry);
+            }
+            return timed_out(context, plan.timeout_ns,
+                             "component '" + plan.name + "' was not ready",
                              "'" + program + "' " + last + "; it was terminated");
         }
         report_wait(context, timeout, [&] {
-            return "waiting for component '" + plan.name + "': '" + program + "' (process " + std::to_string(pid) + ") " + last;
+            return "waiting for component '" + plan.name + "': '" + program + "' (process " +
+                   std::to_string(pid) + ") " + last;
         });
         if (context.interrupted()) return;
         context.programs.wait(context.lock, 100ms);
     }
 }
 
-void wait_until_ended(Context& context, const Plan& plan, pid_t pid, Pipes* pipes, const Timeout& timeout) {
+void wait_until_ended(Context& context, const Plan& plan, pid_t pid, Pipes* pipes,
+                      const Timeout& timeout) {
     while (true) {
         const auto* const entry = context.programs.find(pid);
         if (entry->ended) break;
         if (timeout.over()) {
-            timed_out(context, plan.timeout_ns, "'" + context.argument(plan.program) + "' did not end", "the program was terminated");
+            timed_out(context, plan.timeout_ns,
+                      "'" + context.argument(plan.program) + "' did not end",
+                      "the program was terminated");
             context.programs.give_up(*context.programs.find(pid));
             return context.programs.abandon(pid);
         }
@@ -279,11 +371,15 @@ void wait_until_ended(Context& context, const Plan& plan, pid_t pid, Pipes* pipe
     }
     const int status = context.programs.find(pid)->status;
     context.programs.collect(pid);
-    if (pipes) pipes->pass_on(context.output, 0);
+    if (pipes) {
+        pipes->pass_on(context.output, 0);
+    }
     if (status == 0 || plan.ignore_status) return;
-    const std::string how =
-        status > 128 ? "was terminated by signal " + std::to_string(status - 128) : "failed with exit status " + std::to_string(status);
-    context.diagnostics.error("program-failed", context.span(plan.program), "'" + context.argument(plan.program) + "' " + how, "",
+    const std::string how = status > 128
+                                ? "was terminated by signal " + std::to_string(status - 128)
+                                : "failed with exit status " + std::to_string(status);
+    context.diagnostics.error("program-failed", context.span(plan.program),
+                              "'" + context.argument(plan.program) + "' " + how, "",
                               "-i before the name of the program ignores the status");
 }
 
@@ -295,8 +391,12 @@ void command_loadusr(Context& context) {
 
     ProcessStart start;
     start.directory = context.options().directory;
-    for (std::size_t i = plan.program; i < context.count(); ++i) start.arguments.push_back(context.argument(i));
-    if (start.arguments[0].starts_with('~')) start.arguments[0] = context.path(start.arguments[0]);
+    for (std::size_t i = plan.program; i < context.count(); ++i) {
+        start.arguments.push_back(context.argument(i));
+    }
+    if (start.arguments[0].starts_with('~')) {
+        start.arguments[0] = context.path(start.arguments[0]);
+    }
     std::optional<Pipes> pipes;
     if (plan.wait_end && context.output.is_process()) {
         start.keep_stdin = isatty(0);
@@ -312,15 +412,24 @@ void command_loadusr(Context& context) {
     std::string problem;
     const pid_t pid = context.programs.start(start, plan.wait_end, problem);
     if (pid == 0) {
-        context.diagnostics.error("no-program", context.span(plan.program), "'" + start.arguments[0] + "' cannot be started: " + problem);
+        context.diagnostics.error("no-program", context.span(plan.program),
+                                  "'" + start.arguments[0] + "' cannot be started: " + problem);
         return;
     }
-    if (pipes) pipes->close_writers();
-    if (plan.wait_end) return wait_until_ended(context, plan, pid, pipes ? &*pipes : nullptr, timeout);
-    // A program that registers its own name later is listed under the name of its process until then.
-    const std::uint64_t number = context.programs.add(pid, plan.name, context.command, !plan.any_name);
+    if (pipes) {
+        pipes->close_writers();
+    }
+    if (plan.wait_end) {
+        return wait_until_ended(context, plan, pid, pipes ? &*pipes : nullptr, timeout);
+    }
+    // A program that registers its own name later is listed under the name of its process until
+    // then.
+    const std::uint64_t number =
+        context.programs.add(pid, plan.name, context.command, !plan.any_name);
     context.programs.keep_alive(pid, start, plan.restart);
-    if (plan.wait_ready) wait_until_ready(context, plan, pid, number, fresh, timeout);
+    if (plan.wait_ready) {
+        wait_until_ready(context, plan, pid, number, fresh, timeout);
+    }
 }
 
 void command_waitusr(Context& context) {
@@ -328,16 +437,20 @@ void command_waitusr(Context& context) {
     const std::int64_t limit_ns = limited ? timeout_option(context, 1) : 0;
     if (context.diagnostics.failed()) return;
     if (context.count() != (limited ? 3U : 1U)) {
-        context.diagnostics.error("wrong-arguments", context.command.span, "'waitusr' requires one program", "", context.usage());
+        context.diagnostics.error("wrong-arguments", context.command.span,
+                                  "'waitusr' requires one program", "", context.usage());
         return;
     }
     const std::size_t at = limited ? 2 : 0;
     const std::string& name = context.argument(at);
     if (!context.programs.find(name)) {
         const bool component = context.session.model().find_component(name) != nullptr;
-        if (component)
-            context.diagnostics.error("not-a-program", context.span(at), "'" + name + "' is a component in this process, not a program", "",
-                                      "waitusr waits for programs started by loadusr");
+        if (component) {
+            context.diagnostics.error(
+                "not-a-program", context.span(at),
+                "'" + name + "' is a component in this process, not a program", "",
+                "waitusr waits for programs started by loadusr");
+        }
         return;  // it has already ended
     }
     const Timeout timeout(limit_ns);
@@ -345,13 +458,18 @@ void command_waitusr(Context& context) {
     const std::uint64_t number = context.programs.find(name)->number;
     const auto living = [&]() -> const Programs::Entry* {
         const auto* const entry = context.programs.find_number(number);
-        const bool lives = entry && entry->name == name && (!entry->dead() || entry->restart_ns != 0 || (entry->child && !entry->ended));
+        const bool lives =
+            entry && entry->name == name &&
+            (!entry->dead() || entry->restart_ns != 0 || (entry->child && !entry->ended));
         return lives ? entry : nullptr;
     };
     while (const auto* const entry = living()) {
-        if (timeout.over())
+        if (timeout.over()) {
             return timed_out(context, limit_ns,
-                             "'" + name + "' (process " + std::to_string(entry->pid) + ", " + entry->state() + ") did not end", "");
+                             "'" + name + "' (process " + std::to_string(entry->pid) + ", " +
+                                 entry->state() + ") did not end",
+                             "");
+        }
         if (context.interrupted()) return;
         context.programs.wait(context.lock, 100ms);
     }
@@ -361,8 +479,10 @@ namespace {
 
 void no_program(Context& context, const std::string& name) {
     const auto names = context.programs.names();
-    context.diagnostics.error("not-a-program", context.span(0), "unknown program '" + name + "'", did_you_mean(name, names),
-                              names.empty() ? "no program is running" : "programs: " + listed(names));
+    context.diagnostics.error(
+        "not-a-program", context.span(0), "unknown program '" + name + "'",
+        did_you_mean(name, names),
+        names.empty() ? "no program is running" : "programs: " + listed(names));
 }
 
 }  // namespace
@@ -371,10 +491,15 @@ void command_unloadusr(Context& context) {
     const std::string& name = context.argument(0);
     const auto unload = [&](Programs::Entry& entry) {
         const std::string why = context.programs.unload(*context.transaction, entry);
-        if (!why.empty()) context.diagnostics.error("not-permitted", context.span(0), why, "", "end it as that user, or as root");
+        if (!why.empty()) {
+            context.diagnostics.error("not-permitted", context.span(0), why, "",
+                                      "end it as that user, or as root");
+        }
     };
     if (name == "all") {
-        for (const auto& each : context.programs.names()) unload(*context.programs.find(each));
+        for (const auto& each : context.programs.names()) {
+            unload(*context.programs.find(each));
+        }
     } else if (auto* const entry = context.programs.find(name)) {
         unload(*entry);
     } else {
@@ -385,7 +510,10 @@ void command_unloadusr(Context& context) {
 bool unload_processes(Context& context) {
     if (context.count() != 1) return false;
     const std::string& name = context.argument(0);
-    if (name != "all" && !(context.programs.find(name) && context.session.model().find_component(name))) return false;
+    if (name != "all" &&
+        !(context.programs.find(name) && context.session.model().find_component(name))) {
+        return false;
+    }
     command_unloadusr(context);
     return name != "all";
 }

@@ -5,11 +5,11 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "commands/table.hpp"
-#include "commands/json_text.hpp"
 #include "commands/describe.hpp"
+#include "commands/json_text.hpp"
 #include "commands/listing.hpp"
 #include "commands/script.hpp"
+#include "commands/table.hpp"
 
 namespace hal {
 namespace {
@@ -21,26 +21,43 @@ void lock_status(std::string& text, unsigned lock) {
         {4, "  HAL_LOCK_PARAMS  - setting params is locked\n"},
         {8, "  HAL_LOCK_RUN     - running/stopping HAL is locked\n"}};
     text += fmt::format("HAL locking status:\n  current lock value {} ({:02x})\n", lock, lock);
-    if (lock == 0) text += "  HAL_LOCK_NONE - nothing is locked\n";
-    for (const auto& [bit, line] : bits)
-        if (lock & bit) text += line;
+    if (lock == 0) {
+        text += "  HAL_LOCK_NONE - nothing is locked\n";
+    }
+    for (const auto& [bit, line] : bits) {
+        if (lock & bit) {
+            text += line;
+        }
+    }
 }
 
 struct Counts {
-    std::size_t components = 0, instances = 0, pins = 0, parameters = 0, aliases = 0, signals = 0, functions = 0, threads = 0;
+    std::size_t components = 0;
+    std::size_t instances = 0;
+    std::size_t pins = 0;
+    std::size_t parameters = 0;
+    std::size_t aliases = 0;
+    std::size_t signals = 0;
+
+    std::size_t functions = 0;
+    std::size_t threads = 0;
 };
 
 Counts count(const Model& model) {
     Counts counts{model.components.size(), model.instance.size(), 0, 0, 0, model.signals.size(),
                   model.function.size(),   model.threads.size()};
     for (const auto& [name, pin] : model.pin) {
-        if (name != pin->name) ++counts.aliases;
-        else ++(is_parameter(*pin) ? counts.parameters : counts.pins);
+        if (name != pin->name) {
+            ++counts.aliases;
+        } else {
+            ++(is_parameter(*pin) ? counts.parameters : counts.pins);
+        }
     }
     return counts;
 }
 
-/// In place of LinuxCNC's memory table: there is no fixed memory here that could run out, nor anything recycled.
+/// In place of LinuxCNC's memory table: there is no fixed memory here that could run out, nor
+/// anything recycled.
 void memory_status(std::string& text, const Model& model) {
     const Counts counts = count(model);
     text += "HAL memory status\n";
@@ -59,25 +76,37 @@ void memory_status(std::string& text, const Model& model) {
 
 std::string status_json(const Session& session) {
     const Counts c = count(session.model());
-    return json_text({{"instance", session.options().name}, {"running", session.threads().running()}, {"lock", session.locked.load()},
-                      {"faults", session.reports().fault_count()}, {"components", c.components}, {"instances", c.instances}, {"pins", c.pins},
-                      {"parameters", c.parameters}, {"aliases", c.aliases}, {"signals", c.signals}, {"functions", c.functions},
+    return json_text({{"instance", session.options().name},
+                      {"running", session.threads().running()},
+                      {"lock", session.locked.load()},
+                      {"faults", session.reports().fault_count()},
+                      {"components", c.components},
+                      {"instances", c.instances},
+                      {"pins", c.pins},
+                      {"parameters", c.parameters},
+                      {"aliases", c.aliases},
+                      {"signals", c.signals},
+                      {"functions", c.functions},
                       {"threads", c.threads}}) +
            "\n";
 }
 
 /// Three figures of a distribution in one column each.
 std::string figures(double p50, double p99, double max) {
-    return fmt::format("{:>9} {:>9} {:>9}", format_duration(p50), format_duration(p99), format_duration(max));
+    return fmt::format("{:>9} {:>9} {:>9}", format_duration(p50), format_duration(p99),
+                       format_duration(max));
 }
 
 /// What is not ordinary about a thread.
 std::string state_of(const ThreadReport& r) {
     std::string text = r.supervised ? "" : ", not supervised";
-    if (r.hung)
-        text += fmt::format(", hangs{} for {}", r.function.empty() ? "" : " in '" + r.function + "'",
-                            format_duration(static_cast<double>(r.silent_ns)));
-    else if (r.faulted) text += ", stopped by a fault";
+    if (r.hung) {
+        text +=
+            fmt::format(", hangs{} for {}", r.function.empty() ? "" : " in '" + r.function + "'",
+                        format_duration(static_cast<double>(r.silent_ns)));
+    } else if (r.faulted) {
+        text += ", stopped by a fault";
+    }
     return text;
 }
 
@@ -87,20 +116,27 @@ void command_status(Context& context) {
     const std::string_view what = context.argument_or(0, "all");
     if (what == "instance") return context.output.out(context.session.reports().status_text());
     if (what != "all" && what != "lock" && what != "mem") {
-        context.diagnostics.error("unknown-word", context.span(0), "unknown status '" + std::string(what) + "'", "",
+        context.diagnostics.error("unknown-word", context.span(0),
+                                  "unknown status '" + std::string(what) + "'", "",
                                   "the choices are: lock, mem, instance, all");
         return;
     }
     if (context.options().json) return context.output.out(status_json(context.session));
     std::string text;
-    if (what != "mem") lock_status(text, context.script.locks());
-    if (what != "lock") memory_status(text, context.session.model());
+    if (what != "mem") {
+        lock_status(text, context.script.locks());
+    }
+    if (what != "lock") {
+        memory_status(text, context.session.model());
+    }
     context.output.out(text);
 }
 
 void show_timing(Context& context) {
     std::vector<std::string> words;
-    for (std::size_t i = 1; i < context.count(); ++i) words.push_back(context.argument(i));
+    for (std::size_t i = 1; i < context.count(); ++i) {
+        words.push_back(context.argument(i));
+    }
     const Patterns patterns(std::move(words));
     std::string text;
     if (context.options().json) {
@@ -108,12 +144,16 @@ void show_timing(Context& context) {
         return context.output.out(text + "\n");
     }
     const auto threads = threads_slowest_first(context.session.model(), patterns);
-    text += "Threads:                                                 wake-up lateness              execution time\n"
-            "Name                     Period     Cycles   Missed       p50       p99       max       p50       p99       max  Scheduling\n";
+    text +=
+        "Threads:                                                 wake-up lateness              "
+        "execution time\n"
+        "Name                     Period     Cycles   Missed       p50       p99       max       "
+        "p50       p99       max  Scheduling\n";
     for (const Thread* const thread : threads) {
         const ThreadReport r = context.session.reports().thread(*thread);
-        text += fmt::format("{:<20} {:>10} {:>10} {:>8} {} {}  {}{}{}\n", r.name, format_duration(static_cast<double>(r.period_ns)),
-                            r.cycles, r.missed, figures(r.wakeup_p50_ns, r.wakeup_p99_ns, r.wakeup_max_ns),
+        text += fmt::format("{:<20} {:>10} {:>10} {:>8} {} {}  {}{}{}\n", r.name,
+                            format_duration(static_cast<double>(r.period_ns)), r.cycles, r.missed,
+                            figures(r.wakeup_p50_ns, r.wakeup_p99_ns, r.wakeup_max_ns),
                             figures(r.busy_p50_ns, r.busy_p99_ns, r.busy_max_ns), r.policy,
                             r.cpu >= 0 ? fmt::format(", CPU {}", r.cpu) : "", state_of(r));
     }
@@ -121,32 +161,39 @@ void show_timing(Context& context) {
     text += "\nFunctions:                                    Mean       Max   Samples  Thread\n";
     std::vector<const Pin*> maxima;
     std::vector<const LoadedFunction*> functions;
-    for (const Thread* const thread : threads)
+    for (const Thread* const thread : threads) {
         for (const LoadedFunction* const function : thread->functions) {
             const Pin* const tmax = context.session.model().find_pin(function->name + ".tmax");
             if (!tmax) continue;
             functions.push_back(function);
             maxima.push_back(tmax);
         }
+    }
     const auto values = context.session.values().read_pins(maxima);
     for (std::size_t i = 0; i < functions.size(); ++i) {
         const LoadedFunction& function = *functions[i];
         const auto samples = function.times->samples.load(std::memory_order_relaxed);
         const auto total = function.times->total_ns.load(std::memory_order_relaxed);
-        const double mean = samples == 0 ? 0 : static_cast<double>(total) / static_cast<double>(samples);
-        text += fmt::format("{:<40} {:>9} {:>9} {:>9}  {}\n", function.name, format_duration(mean), format_duration(values[i].s32), samples,
-                            function.thread->name);
+        const double mean =
+            samples == 0 ? 0 : static_cast<double>(total) / static_cast<double>(samples);
+        text += fmt::format("{:<40} {:>9} {:>9} {:>9}  {}\n", function.name, format_duration(mean),
+                            format_duration(values[i].s32), samples, function.thread->name);
     }
     context.output.out(text + "\n");
 }
 
 void show_latency(Context& context) {
     std::vector<std::string> words;
-    for (std::size_t i = 1; i < context.count(); ++i) words.push_back(context.argument(i));
+    for (std::size_t i = 1; i < context.count(); ++i) {
+        words.push_back(context.argument(i));
+    }
     const Patterns patterns(std::move(words));
     std::string text;
-    for (const auto& line : context.shell.latencies())
-        if (patterns.match(line)) text += line + "\n";
+    for (const auto& line : context.shell.latencies()) {
+        if (patterns.match(line)) {
+            text += line + "\n";
+        }
+    }
     context.output.out(text);
 }
 
@@ -156,10 +203,17 @@ namespace {
 std::string acknowledgement_text(const Reports& reports) {
     const std::uint64_t count = reports.fault_count();
     const std::uint64_t lasting = std::min(count, reports.lasting_count());
-    if (lasting == 0) return fmt::format("{} not acknowledged; `fault clear` acknowledges them\n", count);
+    if (lasting == 0) {
+        return fmt::format("{} not acknowledged; `fault clear` acknowledges them\n", count);
+    }
     const char* const verb = lasting == 1 ? "lasts" : "last";
-    if (lasting == count) return fmt::format("{} not acknowledged; {} {}: type `fault clear` once the cause is over\n", count, lasting, verb);
-    return fmt::format("{} not acknowledged; {} {}, `fault clear` acknowledges the others\n", count, lasting, verb);
+    if (lasting == count) {
+        return fmt::format(
+            "{} not acknowledged; {} {}: type `fault clear` once the cause is over\n", count,
+            lasting, verb);
+    }
+    return fmt::format("{} not acknowledged; {} {}, `fault clear` acknowledges the others\n", count,
+                       lasting, verb);
 }
 
 }  // namespace
@@ -169,16 +223,29 @@ void show_faults(Context& context) {
     std::string text;
     if (context.options().json) {
         auto rows = nlohmann::ordered_json::array();
-        for (const auto& record : records)
-            rows.push_back({{"number", record.number}, {"age_ns", record.age_ns}, {"cycle", record.cycle}, {"count", record.count},
-                            {"span_ns", record.span_ns}, {"thread", record.thread}, {"code", record.code}, {"lasts", record.lasts}, {"sentence", record.sentence}});
+        for (const auto& record : records) {
+            rows.push_back({{"number", record.number},
+                            {"age_ns", record.age_ns},
+                            {"cycle", record.cycle},
+                            {"count", record.count},
+                            {"span_ns", record.span_ns},
+                            {"thread", record.thread},
+                            {"code", record.code},
+                            {"lasts", record.lasts},
+                            {"sentence", record.sentence}});
+        }
         return context.output.out(json_text(rows) + "\n");
     }
-    for (const auto& record : records)
-        text += fmt::format("{:>4}  {} ago{}  {}\n", record.number, format_duration(static_cast<double>(record.age_ns)),
+    for (const auto& record : records) {
+        text += fmt::format("{:>4}  {} ago{}  {}\n", record.number,
+                            format_duration(static_cast<double>(record.age_ns)),
                             record.lasts ? " (lasts)" : "", record.line());
-    if (records.empty()) text = "no faults\n";
-    else text += acknowledgement_text(context.session.reports());
+    }
+    if (records.empty()) {
+        text = "no faults\n";
+    } else {
+        text += acknowledgement_text(context.session.reports());
+    }
     context.output.out(text);
 }
 
@@ -189,22 +256,31 @@ void report_lasting(const std::vector<FaultRecord>& lasting, Span span, Diagnost
     constexpr std::size_t max_named = 8;
     if (lasting.empty()) return;
     const bool one = lasting.size() == 1;
-    std::string text = fmt::format("{} and {} not acknowledged:", one ? "1 fault lasts" : fmt::format("{} faults last", lasting.size()),
-                                   one ? "is" : "are");
-    for (std::size_t i = 0; i < std::min(lasting.size(), max_named); ++i) text += (i == 0 ? " " : "; ") + lasting[i].subject();
-    if (lasting.size() > max_named) text += fmt::format("; {} more", lasting.size() - max_named);
-    diagnostics.warning("lasting-fault", span, text, "", "see: show fault; once the cause is over, type: fault clear");
+    std::string text = fmt::format(
+        "{} and {} not acknowledged:",
+        one ? "1 fault lasts" : fmt::format("{} faults last", lasting.size()), one ? "is" : "are");
+    for (std::size_t i = 0; i < std::min(lasting.size(), max_named); ++i) {
+        text += (i == 0 ? " " : "; ") + lasting[i].subject();
+    }
+    if (lasting.size() > max_named) {
+        text += fmt::format("; {} more", lasting.size() - max_named);
+    }
+    diagnostics.warning("lasting-fault", span, text, "",
+                        "see: show fault; once the cause is over, type: fault clear");
 }
 
 }  // namespace
 
 void command_fault(Context& context) {
     Session& session = context.session;
-    if (context.argument(0) == "clear")
-        return context.transaction->when_committed([&session, &diagnostics = context.diagnostics, span = context.command.span] {
+    if (context.argument(0) == "clear") {
+        return context.transaction->when_committed(
+            [&session, &diagnostics = context.diagnostics, span = context.command.span] {
             report_lasting(session.reports().clear_faults(), span, diagnostics);
         });
-    context.diagnostics.error("unknown-word", context.span(0), "'" + context.argument(0) + "' is not an action on faults", "",
+    }
+    context.diagnostics.error("unknown-word", context.span(0),
+                              "'" + context.argument(0) + "' is not an action on faults", "",
                               "type `fault clear`; `show fault` lists the faults");
 }
 

@@ -15,7 +15,8 @@ constexpr auto look_again = std::chrono::milliseconds(1);
 std::optional<std::uint64_t> whole_number(std::string_view text) {
     std::uint64_t number = 0;
     const auto [end, status] = std::from_chars(text.data(), text.data() + text.size(), number);
-    return status == std::errc{} && end == text.data() + text.size() ? std::optional(number) : std::nullopt;
+    return status == std::errc{} && end == text.data() + text.size() ? std::optional(number)
+                                                                     : std::nullopt;
 }
 
 /// Waits, without holding the lock of the session, until `done` (called with it) returns true.
@@ -28,7 +29,8 @@ void wait_for(Context& context, Done&& done) {
     }
 }
 
-/// On the virtual clock in steps, so that other clients can access the machine and a long simulation can be ended.
+/// On the virtual clock in steps, so that other clients can access the machine and a long
+/// simulation can be ended.
 void advance_ns(Context& context, std::int64_t ns) {
     Session& session = context.session;
     if (session.options().virtual_clock) {
@@ -47,8 +49,8 @@ void advance_ns(Context& context, std::int64_t ns) {
 void advance_cycles(Context& context, std::uint64_t cycles) {
     Session& session = context.session;
     if (session.model().threads.empty()) {
-        context.diagnostics.error("no-thread", context.span(0), "cannot advance: no thread exists", "",
-                                  "create one with `newthread servo-thread 1000000`");
+        context.diagnostics.error("no-thread", context.span(0), "cannot advance: no thread exists",
+                                  "", "create one with `newthread servo-thread 1000000`");
         return;
     }
     if (session.options().virtual_clock) {
@@ -61,12 +63,14 @@ void advance_cycles(Context& context, std::uint64_t cycles) {
         return;
     }
     const std::string fastest = session.model().threads.front()->name;
-    const std::uint64_t end = session.reports().thread(*session.model().threads.front()).cycles + cycles;
+    const std::uint64_t end =
+        session.reports().thread(*session.model().threads.front()).cycles + cycles;
     wait_for(context, [&] {
         const Thread* const thread = session.model().find_thread(fastest);
         if (!thread) return true;
         const ThreadReport report = session.reports().thread(*thread);
-        return report.cycles >= end || (report.hung && session.threads().report_hung(context.diagnostics));
+        return report.cycles >= end ||
+               (report.hung && session.threads().report_hung(context.diagnostics));
     });
 }
 
@@ -96,31 +100,43 @@ void command_advance(Context& context) {
     const std::string& amount = context.argument(0);
     if (context.count() == 2) {
         const auto cycles = whole_number(amount);
-        if (cycles && context.argument(1).starts_with("cycle")) return advance_cycles(context, *cycles);
+        if (cycles && context.argument(1).starts_with("cycle")) {
+            return advance_cycles(context, *cycles);
+        }
     } else if (!whole_number(amount)) {
         if (const auto ns = parse_duration_ns(amount)) return advance_ns(context, *ns);
     }
-    context.diagnostics.error("bad-duration", context.span(0), "'" + amount + "' has no valid unit", "",
-                              "write `advance 10 cycles`, or a time with its unit: `advance 250ms`");
+    context.diagnostics.error(
+        "bad-duration", context.span(0), "'" + amount + "' has no valid unit", "",
+        "write `advance 10 cycles`, or a time with its unit: `advance 250ms`");
 }
 
 void command_lock(Context& context) {
     const std::string_view level = context.argument_or(0, "all");
-    if (level == "none") *context.locks = static_cast<unsigned>(Lock::none);
-    else if (level == "tune") *context.locks = static_cast<unsigned>(Lock::tune);
-    else if (level == "all") *context.locks = static_cast<unsigned>(Lock::all);
-    else
-        context.diagnostics.error("unknown-word", context.span(0), "unknown lock '" + std::string(level) + "'", "",
+    if (level == "none") {
+        *context.locks = static_cast<unsigned>(Lock::none);
+    } else if (level == "tune") {
+        *context.locks = static_cast<unsigned>(Lock::tune);
+    } else if (level == "all") {
+        *context.locks = static_cast<unsigned>(Lock::all);
+    } else {
+        context.diagnostics.error("unknown-word", context.span(0),
+                                  "unknown lock '" + std::string(level) + "'", "",
                                   "the locks are: none, tune, all");
+    }
 }
 
 void command_unlock(Context& context) {
     const std::string_view level = context.argument_or(0, "all");
-    if (level == "all") *context.locks = static_cast<unsigned>(Lock::none);
-    else if (level == "tune") *context.locks &= ~static_cast<unsigned>(Lock::tune);
-    else
-        context.diagnostics.error("unknown-word", context.span(0), "unknown lock '" + std::string(level) + "'", "",
+    if (level == "all") {
+        *context.locks = static_cast<unsigned>(Lock::none);
+    } else if (level == "tune") {
+        *context.locks &= ~static_cast<unsigned>(Lock::tune);
+    } else {
+        context.diagnostics.error("unknown-word", context.span(0),
+                                  "unknown lock '" + std::string(level) + "'", "",
                                   "the choices are: all, tune");
+    }
 }
 
 }  // namespace hal

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: MIT
-// save: the state as commands that make it again. LinuxCNC's sections and formats; linear in what there is.
+// save: the state as commands that make it again. LinuxCNC's sections and formats; linear in what
+// there is.
 #include <algorithm>
 
 #include <fmt/format.h>
 
-#include "hal/replace_file.hpp"
-#include "commands/table.hpp"
 #include "commands/listing.hpp"
+#include "commands/table.hpp"
 #include "commands/text_writer.hpp"
+#include "hal/replace_file.hpp"
 #include "model/modules.hpp"
 
 namespace hal {
@@ -25,8 +26,10 @@ std::vector<std::string> deleted_threads(const Model& model) {
             const auto end = std::min(arguments.find(' ', at), arguments.size());
             const std::string word = arguments.substr(at, end - at);
             const auto equals = word.find('=');
-            if (word.starts_with("name") && equals != word.npos && !model.find_thread(word.substr(equals + 1)))
+            if (word.starts_with("name") && equals != word.npos &&
+                !model.find_thread(word.substr(equals + 1))) {
                 gone.push_back(word.substr(equals + 1));
+            }
             at = end + 1;
         }
     }
@@ -36,15 +39,33 @@ std::vector<std::string> deleted_threads(const Model& model) {
 void new_thread(Text& text, const Thread& thread) {
     const ThreadOptions& o = thread.options;
     text.add("newthread {} {}", thread.name, o.period_ns);
-    if (o.cpu >= 0) text.add(" cpu={}", o.cpu);
-    if (o.policy == Policy::deadline) text.add(" policy=deadline");
-    if (o.policy == Policy::other) text.add(" policy=other");
-    if (o.priority != 0) text.add(" priority={}", o.priority);
-    if (o.spin_ns >= 0) text.add(" spin={}ns", o.spin_ns);
-    if (o.budget_ns > 0) text.add(" budget={}ns", o.budget_ns);
-    if (o.supervise_ns == 0) text.add(" supervise=off");
-    if (o.supervise_ns > 0) text.add(" supervise={}ns", o.supervise_ns);
-    if (o.profile_every) text.add(" profile=every");
+    if (o.cpu >= 0) {
+        text.add(" cpu={}", o.cpu);
+    }
+    if (o.policy == Policy::deadline) {
+        text.add(" policy=deadline");
+    }
+    if (o.policy == Policy::other) {
+        text.add(" policy=other");
+    }
+    if (o.priority != 0) {
+        text.add(" priority={}", o.priority);
+    }
+    if (o.spin_ns >= 0) {
+        text.add(" spin={}ns", o.spin_ns);
+    }
+    if (o.budget_ns > 0) {
+        text.add(" budget={}ns", o.budget_ns);
+    }
+    if (o.supervise_ns == 0) {
+        text.add(" supervise=off");
+    }
+    if (o.supervise_ns > 0) {
+        text.add(" supervise={}ns", o.supervise_ns);
+    }
+    if (o.profile_every) {
+        text.add(" profile=every");
+    }
     text.add("\n");
 }
 
@@ -54,44 +75,67 @@ void save_comp(Context& context, Text& text) {
     std::vector<const LoadedComponent*> oldest_first = components_newest_first(model, {});
     std::reverse(oldest_first.begin(), oldest_first.end());
     const std::vector<std::string> ours = context.session.host().available_components();
-    const auto contains = [](const std::vector<std::string>& sorted, const std::string& name) { return std::binary_search(sorted.begin(), sorted.end(), name); };
+    const auto contains = [](const std::vector<std::string>& sorted, const std::string& name) {
+        return std::binary_search(sorted.begin(), sorted.end(), name);
+    };
     for (const LoadedComponent* const component : oldest_first) {
         if (component->process != 0) continue;
-        for (const std::string& arguments : component->arguments)
-            text.add("loadrt {}{}{}{}\n", is_module(*component) && contains(ours, component->name) ? "--linuxcnc " : "", component->name, arguments.empty() ? "" : " ", arguments);
+        for (const std::string& arguments : component->arguments) {
+            text.add("loadrt {}{}{}{}\n",
+                     is_module(*component) && contains(ours, component->name) ? "--linuxcnc " : "",
+                     component->name, arguments.empty() ? "" : " ", arguments);
+        }
     }
-    for (const std::string& name : deleted_threads(model)) text.add("delthread {}\n", name);
-    for (const auto& thread : model.threads)  // fastest first, so that periods fit
-        if (!thread->component && !made_by_module(*thread, model)) new_thread(text, *thread);
+    for (const std::string& name : deleted_threads(model)) {
+        text.add("delthread {}\n", name);
+    }
+    for (const auto& thread : model.threads) {  // fastest first, so that periods fit
+        if (!thread->component && !made_by_module(*thread, model)) {
+            new_thread(text, *thread);
+        }
+    }
 }
 
 void save_alias(Context& context, Text& text) {
     for (const bool parameters : {false, true}) {
         text.add("# {} aliases\n", parameters ? "param" : "pin");
-        for (const Pin* const pin : pins_by_name(context.session.model(), parameters, {}))
-            if (!pin->alias.empty()) text.add("alias {} {} {}\n", parameters ? "param" : "pin", pin->name, pin->alias);
+        for (const Pin* const pin : pins_by_name(context.session.model(), parameters, {})) {
+            if (!pin->alias.empty()) {
+                text.add("alias {} {} {}\n", parameters ? "param" : "pin", pin->name, pin->alias);
+            }
+        }
     }
 }
 
-void new_signal(Text& text, const Signal& signal) { text.add("newsig {} {:<5}\n", signal.name, name(signal.type)); }
+void new_signal(Text& text, const Signal& signal) {
+    text.add("newsig {} {:<5}\n", signal.name, name(signal.type));
+}
 
 void save_sig(Context& context, Text& text) {
     text.add("# signals\n");
-    for (const Signal* const signal : signals_by_name(context.session.model(), {})) new_signal(text, *signal);
+    for (const Signal* const signal : signals_by_name(context.session.model(), {})) {
+        new_signal(text, *signal);
+    }
 }
 
 void save_sigu(Context& context, Text& text) {
     text.add("# signals\n");
     for (const Signal* const signal : signals_by_name(context.session.model(), {})) {
         if (context.session.ending()) return;
-        if (signal->pins.empty()) new_signal(text, *signal);
+        if (signal->pins.empty()) {
+            new_signal(text, *signal);
+        }
     }
 }
 
 void save_links(Context& context, Text& text, bool arrows) {
     text.add("# links\n");
-    for (const Pin* const pin : pins_by_name(context.session.model(), false, {}))
-        if (pin->signal) text.add("linkps {} {} {}\n", shown_name(*pin), arrows ? arrow_of_pin(*pin) : "", pin->signal->name);
+    for (const Pin* const pin : pins_by_name(context.session.model(), false, {})) {
+        if (pin->signal) {
+            text.add("linkps {} {} {}\n", shown_name(*pin), arrows ? arrow_of_pin(*pin) : "",
+                     pin->signal->name);
+        }
+    }
 }
 
 void save_link(Context& context, Text& text) { save_links(context, text, false); }
@@ -99,7 +143,8 @@ void save_linka(Context& context, Text& text) { save_links(context, text, true);
 
 std::vector<const Pin*> by_name(const Signal& signal) {
     std::vector<const Pin*> pins(signal.pins.begin(), signal.pins.end());
-    std::sort(pins.begin(), pins.end(), [](const Pin* a, const Pin* b) { return shown_name(*a) < shown_name(*b); });
+    std::sort(pins.begin(), pins.end(),
+              [](const Pin* a, const Pin* b) { return shown_name(*a) < shown_name(*b); });
     return pins;
 }
 
@@ -107,8 +152,10 @@ void save_nets(Context& context, Text& text, bool arrows) {
     text.add("# nets\n");
     for (const Signal* const signal : signals_by_name(context.session.model(), {})) {
         new_signal(text, *signal);
-        for (const Pin* const pin : by_name(*signal))
-            text.add("linksp {} {} {}\n", signal->name, arrows ? arrow_of_signal(*pin) : "", shown_name(*pin));
+        for (const Pin* const pin : by_name(*signal)) {
+            text.add("linksp {} {} {}\n", signal->name, arrows ? arrow_of_signal(*pin) : "",
+                     shown_name(*pin));
+        }
     }
 }
 
@@ -121,12 +168,15 @@ void save_netl(Context& context, Text& text) {
         if (context.session.ending()) return;
         if (signal->pins.empty()) continue;
         text.add("net {}", signal->name);
-        for (const Pin* const pin : by_name(*signal)) text.add(" {}", shown_name(*pin));
+        for (const Pin* const pin : by_name(*signal)) {
+            text.add(" {}", shown_name(*pin));
+        }
         text.add("\n");
     }
 }
 
-/// One line per signal: the writer, =>, the readers; or I/O pins with <=> between, then => and the readers.
+/// One line per signal: the writer, =>, the readers; or I/O pins with <=> between, then => and the
+/// readers.
 void save_netla(Context& context, Text& text) {
     text.add("# nets\n");
     for (const Signal* const signal : signals_by_name(context.session.model(), {})) {
@@ -134,7 +184,8 @@ void save_netla(Context& context, Text& text) {
         if (signal->pins.empty()) continue;
         text.add("net {}", signal->name);
         const auto pins = by_name(*signal);
-        bool sources = false, readers = false;
+        bool sources = false;
+        bool readers = false;
         for (const Pin* const pin : pins) {
             if (pin->dir == HAL_DIR_IN) continue;
             text.add("{} {}", pin->dir == HAL_DIR_IO && sources ? " <=>" : "", shown_name(*pin));
@@ -151,14 +202,19 @@ void save_netla(Context& context, Text& text) {
 
 void save_values(Context& context, Text& text, const std::vector<const Pin*>& pins) {
     const auto values = context.session.values().read_pins(pins);
-    for (std::size_t i = 0; i < pins.size(); ++i)
-        if (pins[i]->type != HAL_TYPE_PORT) text.add("setp {} {:>20}\n", shown_name(*pins[i]), saved_value(pins[i]->type, values[i]));
+    for (std::size_t i = 0; i < pins.size(); ++i) {
+        if (pins[i]->type != HAL_TYPE_PORT) {
+            text.add("setp {} {:>20}\n", shown_name(*pins[i]),
+                     saved_value(pins[i]->type, values[i]));
+        }
+    }
 }
 
 void save_param(Context& context, Text& text) {
     text.add("# parameter values\n");
     auto parameters = pins_by_name(context.session.model(), true, {});
-    std::erase_if(parameters, [](const Pin* pin) { return pin->dir != HAL_DIR_PARAM || pin->read_only(); });
+    std::erase_if(parameters,
+                  [](const Pin* pin) { return pin->dir != HAL_DIR_PARAM || pin->read_only(); });
     save_values(context, text, parameters);
 }
 
@@ -173,21 +229,27 @@ void save_unconnected(Context& context, Text& text) {
 void save_signal_values(Context& context, Text& text) {
     text.add("# signal values\n");
     auto signals = signals_by_name(context.session.model(), {});
-    std::erase_if(signals,
-                  [](const Signal* signal) { return signal->type == HAL_TYPE_PORT ? !signal->port : signal->writer || signal->ios > 0; });
+    std::erase_if(signals, [](const Signal* signal) {
+        return signal->type == HAL_TYPE_PORT ? !signal->port : signal->writer || signal->ios > 0;
+    });
     const auto values = context.session.values().read_signals(signals);
     for (std::size_t i = 0; i < signals.size(); ++i) {
         const Signal& signal = *signals[i];
         text.add("sets {} {:>20}\n", signal.name,
-                 signal.type == HAL_TYPE_PORT ? std::to_string(signal.port->capacity) : saved_value(signal.type, values[i]));
+                 signal.type == HAL_TYPE_PORT ? std::to_string(signal.port->capacity)
+                                              : saved_value(signal.type, values[i]));
     }
 }
 
 void save_thread(Context& context, Text& text) {
     text.add("# realtime thread/function links\n");
     for (const Thread* const thread : threads_slowest_first(context.session.model(), {})) {
-        for (const LoadedFunction* const function : thread->init) text.add("initf {} {}\n", function->name, thread->name);
-        for (const LoadedFunction* const function : thread->functions) text.add("addf {} {}\n", function->name, thread->name);
+        for (const LoadedFunction* const function : thread->init) {
+            text.add("initf {} {}\n", function->name, thread->name);
+        }
+        for (const LoadedFunction* const function : thread->functions) {
+            text.add("addf {} {}\n", function->name, thread->name);
+        }
     }
 }
 
@@ -224,7 +286,8 @@ void command_save(Context& context) {
     for (const Section& section : sections) {
         const bool chosen = wanted == "all"    ? section.in_all
                             : wanted == "allu" ? section.in_allu
-                                               : wanted == section.name || (!section.also.empty() && wanted == section.also);
+                                               : wanted == section.name || (!section.also.empty() &&
+                                                                            wanted == section.also);
         if (!chosen) continue;
         section.save(context, text);
         if (context.session.ending()) return;
@@ -232,14 +295,20 @@ void command_save(Context& context) {
     }
     if (!known) {
         std::vector<std::string> names{"all", "allu"};
-        for (const Section& section : sections) names.emplace_back(section.name);
-        context.diagnostics.error("unknown-word", context.span(0), "unknown kind '" + std::string(wanted) + "'",
-                                  did_you_mean(wanted, names), "the choices are: " + listed(names, names.size()));
+        for (const Section& section : sections) {
+            names.emplace_back(section.name);
+        }
+        context.diagnostics.error(
+            "unknown-word", context.span(0), "unknown kind '" + std::string(wanted) + "'",
+            did_you_mean(wanted, names), "the choices are: " + listed(names, names.size()));
         return;
     }
     if (context.count() < 2) return context.output.out(text.text);
-    if (const std::string problem = replace_file(context.path(context.argument(1)), text.text); !problem.empty())
-        context.diagnostics.error("cannot-write", context.span(1), "'" + context.argument(1) + "' cannot be written: " + problem);
+    if (const std::string problem = replace_file(context.path(context.argument(1)), text.text);
+        !problem.empty()) {
+        context.diagnostics.error("cannot-write", context.span(1),
+                                  "'" + context.argument(1) + "' cannot be written: " + problem);
+    }
 }
 
 }  // namespace hal

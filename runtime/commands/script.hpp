@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: MIT
-// Runs one text: which of its commands form a transaction, when it takes effect, what is printed about it.
-// Internal to the shell; used for one execute(), run_text() or run_file(), and not after that.
+// Runs one text: which of its commands form a transaction, when it takes effect, what is printed
+// about it. Internal to the shell; used for one execute(), run_text() or run_file(), and not after
+// that.
 //
-// Consecutive edits are one transaction. It ends before a command that acts on the machine and at the end of the text;
-// with -k after every line. Commands that only look do not end it: they see the machine with the edits made so far
-// (docs/decisions/0019). All its problems are printed together, and the last line states which lines took effect. A `source`d
-// file belongs to the text at its place. From the first edit to the end of its transaction the session's lock is held.
+// Consecutive edits are one transaction. It ends before a command that acts on the machine and at
+// the end of the text; with -k after every line. Commands that only look do not end it: they see
+// the machine with the edits made so far (docs/decisions/0019). All its problems are printed
+// together, and the last line states which lines took effect. A `source`d file belongs to the text
+// at its place. From the first edit to the end of its transaction the session's lock is held.
 #pragma once
 
 #include <memory>
@@ -15,22 +17,25 @@
 #include <string_view>
 #include <vector>
 
-#include "commands/table.hpp"
 #include "commands/shell_state.hpp"
+#include "commands/table.hpp"
 
 namespace hal {
 
 class Script {
 public:
-    /// The locks as the commands carried out so far leave them: `lock` and `unlock` take effect with their transaction.
+    /// The locks as the commands carried out so far leave them: `lock` and `unlock` take effect
+    /// with their transaction.
     unsigned locks() const { return locks_.value_or(session_.locked); }
     Script(Shell& shell, Shell::State& state, Output& output);
     ~Script();
     Script(const Script&) = delete;
 
-    /// Runs a text that is in the session's sources, then ends the last transaction. Returns 0, or 1 when anything failed.
+    /// Runs a text that is in the session's sources, then ends the last transaction. Returns 0, or
+    /// 1 when anything failed.
     int run(std::uint32_t source);
-    /// Runs commands whose text is in the session's sources, then ends the last transaction. Returns like run(source).
+    /// Runs commands whose text is in the session's sources, then ends the last transaction.
+    /// Returns like run(source).
     int run(const std::vector<Command>& commands);
     /// Several texts with the loads of all of them merged and done first (`[HAL]TWOPASS`).
     int run_two_pass(const std::vector<std::uint32_t>& texts, Pass pass = Pass::both);
@@ -41,7 +46,8 @@ public:
     /// True when Shell::cancel was called; reports it once.
     bool interrupted(Context& context);
     bool quit_seen() const { return ended_; }
-    /// Adds a text to the session's sources for as long as this object lives, and longer when something made by it points into it.
+    /// Adds a text to the session's sources for as long as this object lives, and longer when
+    /// something made by it points into it.
     std::uint32_t add_text(std::string name, std::string text, std::uint32_t first_line = 1);
 
 private:
@@ -74,10 +80,12 @@ private:
     /// Ends the transaction: commits, prints. Sets failed_ and, without -k, stopped_.
     void finish();
     void look_up_names(Diagnostics& found);
-    /// True after Session::interrupt(); then the transaction is rolled back, and `command` and those after it are not executed.
+    /// True after Session::interrupt(); then the transaction is rolled back, and `command` and
+    /// those after it are not executed.
     bool ended(const Command& command);
     void report(Diagnostics& found, std::size_t edits, bool took_effect);
-    /// The diagnostic with the places in the INI file of the values that the words at its main place have.
+    /// The diagnostic with the places in the INI file of the values that the words at its main
+    /// place have.
     Diagnostic with_values(Diagnostic diagnostic) const;
     /// After a failure: "nothing was changed", or which lines took effect and which did not.
     std::string outcome(bool edited) const;
@@ -91,29 +99,36 @@ private:
     Output& output_;
     SessionLock lock_;
     std::optional<Transaction> transaction_;
-    Diagnostics pending_;           ///< of the open transaction
-    std::size_t edits_ = 0;         ///< in it
-    std::optional<unsigned> locks_; ///< Session::locked when it has taken effect, if it has `lock` or `unlock`
-    std::set<std::shared_ptr<const NameIndex>> names_;  ///< that messages have offered: kept for those to come
-    std::vector<Span> lines_;       ///< in it
-    std::vector<Span> effective_;   ///< lines that took effect
-    std::vector<Span> idle_;        ///< lines that had none: of transactions that failed, or were forgotten by `abort`
+    Diagnostics pending_;  ///< of the open transaction
+    std::size_t edits_ = 0;  ///< in it
+    /// Session::locked when it has taken effect, if it has `lock` or `unlock`
+    std::optional<unsigned> locks_;
+    /// that messages have offered: kept for those to come
+    std::set<std::shared_ptr<const NameIndex>> names_;
+    std::vector<Span> lines_;  ///< in it
+    std::vector<Span> effective_;  ///< lines that took effect
+    /// lines that had none: of transactions that failed, or were forgotten by `abort`
+    std::vector<Span> idle_;
     struct Row {
         const std::vector<Command>* commands;
         std::size_t next, end;
     };
-    std::vector<Row> rows_;         ///< being run, the outermost first
-    bool half_done_ = false;        ///< a command that acts failed: what it did stays
-    std::size_t collected_before_;  ///< of the shell's collected commands, those that came before this text
-    bool checked_begin_ = false;    ///< `hal check` is between begin and commit
-    std::size_t errors_ = 0;        ///< printed so far, for the summary with -k
-    bool failed_ = false, stopped_ = false, ended_ = false, text_is_kept_ = false;
+    std::vector<Row> rows_;  ///< being run, the outermost first
+    bool half_done_ = false;  ///< a command that acts failed: what it did stays
+    /// of the shell's collected commands, those that came before this text
+    std::size_t collected_before_;
+    bool checked_begin_ = false;  ///< `hal check` is between begin and commit
+    std::size_t errors_ = 0;  ///< printed so far, for the summary with -k
+    bool failed_ = false;
+    bool stopped_ = false;
+    bool ended_ = false;
+    bool text_is_kept_ = false;
     struct Open {
-        std::string path;           ///< canonical
-        Span at;                    ///< of the `source` command, in the file before
+        std::string path;  ///< canonical
+        Span at;  ///< of the `source` command, in the file before
     };
     std::vector<std::uint32_t> texts_;  ///< of add_text()
-    std::vector<Open> files_;       ///< being read, the outermost first
+    std::vector<Open> files_;  ///< being read, the outermost first
 };
 
 }  // namespace hal

@@ -12,11 +12,15 @@ void Script::note_program(const Command& command) {
     for (std::size_t i = 0; i < command.args.size(); ++i) {
         const std::string& word = command.args[i].text;
         const bool named = word == "-Wn" && i + 1 < command.args.size();
-        if (named) names.push_back(command.args[++i].text);
+        if (named) {
+            names.push_back(command.args[++i].text);
+        }
         if (named || word.starts_with('-')) continue;
         // Many programs take the name of their component as an argument: pyvcp -c panel panel.xml
         names.push_back(std::filesystem::path(word).stem().string());
-        if (program.empty()) program = word;
+        if (program.empty()) {
+            program = word;
+        }
     }
     session_.absences().note_program(program, names);
 }

@@ -11,13 +11,13 @@
 #include <utility>
 #include <vector>
 
-#include "machine/module_library.hpp"
-#include "machine/session.hpp"
-#include "commands/table.hpp"
 #include "commands/files.hpp"
 #include "commands/ini_version.hpp"
 #include "commands/script.hpp"
 #include "commands/shell_state.hpp"
+#include "commands/table.hpp"
+#include "machine/module_library.hpp"
+#include "machine/session.hpp"
 
 namespace hal {
 namespace {
@@ -45,8 +45,11 @@ private:
 void ProcessOutput::out(std::string_view text) {
     const bool lost_before = std::ferror(stdout) != 0;
     if (write_all(stdout, stderr, text)) return;
-    if (errno == EPIPE) std::clearerr(stdout);  // its reader has left, as `head` does
-    else if (!lost_before) err(std::string("hal: cannot write to standard output: ") + std::strerror(errno) + "\n");
+    if (errno == EPIPE) {
+        std::clearerr(stdout);  // its reader has left, as `head` does
+    } else if (!lost_before) {
+        err(std::string("hal: cannot write to standard output: ") + std::strerror(errno) + "\n");
+    }
 }
 void ProcessOutput::err(std::string_view text) { write_all(stderr, stdout, text); }
 
@@ -54,12 +57,15 @@ Shell::Shell(Session& session, ShellOptions o)
     : options(std::move(o)), state_(new State{.session = session}) {}
 
 Shell::Shell(Shell& sibling, ShellOptions o)
-    : options(std::move(o)), state_(new State{.session = sibling.session(), .latencies = sibling.state_->latencies}) {}
+    : options(std::move(o)),
+      state_(new State{.session = sibling.session(), .latencies = sibling.state_->latencies}) {}
 
 Shell::~Shell() {
     if (state_->collected.empty()) return;
     const auto lock = state_->session.lock();
-    for (const Command& one : state_->collected) state_->session.sources.release(one.span.source);
+    for (const Command& one : state_->collected) {
+        state_->session.sources.release(one.span.source);
+    }
 }
 
 Session& Shell::session() const { return state_->session; }
@@ -70,7 +76,9 @@ void Shell::collect(const std::vector<Command>& commands) {
 bool Shell::quit() const { return state_->quit; }
 void Shell::cancel(bool on) { state_->cancelled.store(on, std::memory_order_relaxed); }
 
-void Shell::look_up(std::function<std::optional<std::string>(const std::string&)> variable) { state_->variable = std::move(variable); }
+void Shell::look_up(std::function<std::optional<std::string>(const std::string&)> variable) {
+    state_->variable = std::move(variable);
+}
 
 void Shell::add_latencies(std::vector<std::string> lines) {
     const auto lock = state_->session.lock();
@@ -90,26 +98,36 @@ int Shell::execute(const std::vector<std::string>& words, Output& output, std::s
     return words.empty() ? 0 : execute(std::vector<std::vector<std::string>>{words}, output, name);
 }
 
-int Shell::execute(const std::vector<std::vector<std::string>>& all, Output& output, std::string_view name) {
+int Shell::execute(const std::vector<std::vector<std::string>>& all, Output& output,
+                   std::string_view name) {
     Script script(*this, *state_, output);
     std::vector<Command> commands;
     std::string text;
-    for (const auto& words : all) commands.push_back(command_of(words, 0, text));
+    for (const auto& words : all) {
+        commands.push_back(command_of(words, 0, text));
+    }
     const std::uint32_t source = script.add_text(std::string(name), std::move(text));
     for (Command& command : commands) {
         command.span.source = command.name.span.source = source;
-        for (Token& word : command.args) word.span.source = source;
+        for (Token& word : command.args) {
+            word.span.source = source;
+        }
     }
     const int status = script.run(commands);
-    if (script.quit_seen()) state_->quit = true;
+    if (script.quit_seen()) {
+        state_->quit = true;
+    }
     return status;
 }
 
-int Shell::execute(std::string_view line, Output& output, std::string_view name, std::uint32_t number) {
+int Shell::execute(std::string_view line, Output& output, std::string_view name,
+                   std::uint32_t number) {
     Script script(*this, *state_, output);
     const std::uint32_t source = script.add_text(std::string(name), std::string(line), number);
     const int status = script.run(source);
-    if (script.quit_seen()) state_->quit = true;
+    if (script.quit_seen()) {
+        state_->quit = true;
+    }
     return status;
 }
 
@@ -120,11 +138,14 @@ int Shell::run_text(std::string name, std::string text, Output& output) {
 
 namespace {
 
-int cannot_read(Shell& shell, Output& output, const std::string& path, const std::string& problem, Code code, std::string help) {
+int cannot_read(Shell& shell, Output& output, const std::string& path, const std::string& problem,
+                Code code, std::string help) {
     Diagnostics diagnostics;
     diagnostics.error(code, {}, "'" + path + "' cannot be read: " + problem, "", std::move(help));
     const auto lock = shell.session().lock();
-    if (shell.options.level != Level::nothing) output.err(render(diagnostics, shell.session().sources, shell.options.color));
+    if (shell.options.level != Level::nothing) {
+        output.err(render(diagnostics, shell.session().sources, shell.options.color));
+    }
     return 1;
 }
 
@@ -132,16 +153,22 @@ int cannot_read(Shell& shell, Output& output, const std::string& path, const std
 
 namespace {
 
-/// The programs that LinuxCNC starts by itself, before the files of [HAL] and between HALFILE and POSTGUI_HALFILE.
+/// The programs that LinuxCNC starts by itself, before the files of [HAL] and between HALFILE and
+/// POSTGUI_HALFILE.
 void note_programs(Session& session, const Ini& ini) {
-    const auto started = [&](const char* section, const char* key, const char* otherwise, std::vector<std::string> names) {
+    const auto started = [&](const char* section, const char* key, const char* otherwise,
+                             std::vector<std::string> names) {
         const std::string program = ini.get(section, key).value_or(otherwise);
-        if (!program.empty()) session.absences().note_program(program.substr(0, program.find(' ')), names);
+        if (!program.empty()) {
+            session.absences().note_program(program.substr(0, program.find(' ')), names);
+        }
     };
     started("EMCIO", "EMCIO", "", {"iocontrol"});
     started("HAL", "HALUI", "", {"halui"});
     const std::string display = ini.get("DISPLAY", "DISPLAY").value_or("");
-    started("DISPLAY", "DISPLAY", "", {"axisui", "pyvcp", "gladevcp", "qtvcp", "gmoccapy", display.substr(0, display.find(' '))});
+    started(
+        "DISPLAY", "DISPLAY", "",
+        {"axisui", "pyvcp", "gladevcp", "qtvcp", "gmoccapy", display.substr(0, display.find(' '))});
 }
 
 /// `hal check`: whether `hal linuxcnc` would run the configuration. Returns 1 after reporting that it would not.
@@ -150,11 +177,16 @@ int check_version(Shell& shell, const std::string& path, Output& output) {
     std::string problem = is_linuxcnc_configuration(ini) ? ini_version_problem(ini) : "";
     if (problem.empty()) return 0;
     const Ini::Entry* const version = ini.find("EMC", "VERSION");
-    if (!version) problem = path + ": " + problem;
+    if (!version) {
+        problem = path + ": " + problem;
+    }
     Diagnostics diagnostics;
-    diagnostics.error("ini-version", version ? version->at : Span{}, problem, "", "type: update_ini " + path);
+    diagnostics.error("ini-version", version ? version->at : Span{}, problem, "",
+                      "type: update_ini " + path);
     const auto lock = shell.session().lock();
-    if (shell.options.level != Level::nothing) output.err(render(diagnostics, shell.session().sources, shell.options.color));
+    if (shell.options.level != Level::nothing) {
+        output.err(render(diagnostics, shell.session().sources, shell.options.color));
+    }
     return 1;
 }
 
@@ -162,12 +194,17 @@ int check_version(Shell& shell, const std::string& path, Output& output) {
 
 int Shell::run_file(const std::string& path, Output& output) {
     if (path.ends_with(".ini")) return run_ini(path, output);
-    if (path.ends_with(".tcl"))
-        return cannot_read(*this, output, path, "it is a Tcl script", "unsupported-file",
-                           "`hal run` executes it, and `haltcl` on a running machine; here only .hal and .ini files are supported, with loops as ranges: pid.[0..5].command");
+    if (path.ends_with(".tcl")) {
+        return cannot_read(
+            *this, output, path, "it is a Tcl script", "unsupported-file",
+            "`hal run` executes it, and `haltcl` on a running machine; here only .hal and .ini "
+            "files are supported, with loops as ranges: pid.[0..5].command");
+    }
     std::string text, problem;
     if (!read_text_file(resolve_path(path, options.directory), text, problem, true)) {
-        if (options.check) state_->session.absences().note_missing_text(path);
+        if (options.check) {
+            state_->session.absences().note_missing_text(path);
+        }
         return cannot_read(*this, output, path, problem, "unreadable-file", "");
     }
     return run_text(path, std::move(text), output);
@@ -176,9 +213,11 @@ int Shell::run_file(const std::string& path, Output& output) {
 int Shell::read_ini(const std::string& path, Output& output) {
     Diagnostics diagnostics;
     const auto lock = state_->session.lock();
-    Ini ini = Ini::read(state_->session.sources, resolve_path(path, options.directory), diagnostics);
-    if (!diagnostics.all().empty() && options.level != Level::nothing)
+    Ini ini =
+        Ini::read(state_->session.sources, resolve_path(path, options.directory), diagnostics);
+    if (!diagnostics.all().empty() && options.level != Level::nothing) {
         output.err(render(diagnostics, state_->session.sources, options.color));
+    }
     if (diagnostics.failed()) return 1;
     state_->session.ini = std::move(ini);
     return 0;
@@ -203,8 +242,10 @@ std::vector<std::string> words_of(const std::string& line) {
 
 void Shell::run_scripts_with(ScriptRunner runner) { state_->run_script = std::move(runner); }
 
-/// Reads the files that a key of [HAL] names, relative to the folder of the INI file. Returns 1 after reporting those that cannot be read.
-int Shell::take_files(const std::string& path, const char* key, std::vector<HalFile>& files, Output& output) {
+/// Reads the files that a key of [HAL] names, relative to the folder of the INI file. Returns 1
+/// after reporting those that cannot be read.
+int Shell::take_files(const std::string& path, const char* key, std::vector<HalFile>& files,
+                      Output& output) {
     int status = 0;
     std::string at;  // of a file named by a relative path
     for (const std::string& entry : state_->session.ini.all("HAL", key)) {
@@ -212,17 +253,26 @@ int Shell::take_files(const std::string& path, const char* key, std::vector<HalF
         const std::string file = words.empty() ? "" : words[0];
         std::string text, problem = "it is a Tcl script";
         const bool script = file.ends_with(".tcl");
-        if ((!script || state_->run_script) && read_netlist(file, options.directory, at, text, problem)) {
+        if ((!script || state_->run_script) &&
+            read_netlist(file, options.directory, at, text, problem)) {
             // Messages name it as the INI file was named.
             const std::string beside = resolve_path(file, options.directory);
-            if (script) files.push_back({at, "", true, {words.begin() + 1, words.end()}});
-            else files.push_back({at == beside ? resolve_path(file, folder_of(path)) : at, std::move(text)});
+            if (script) {
+                files.push_back({at, "", true, {words.begin() + 1, words.end()}});
+            } else {
+                files.push_back(
+                    {at == beside ? resolve_path(file, folder_of(path)) : at, std::move(text)});
+            }
             continue;
         }
-        if (options.check) state_->session.absences().note_missing_text(file);
+        if (options.check) {
+            state_->session.absences().note_missing_text(file);
+        }
         status = script && !state_->run_script
                      ? cannot_read(*this, output, file, problem, "unsupported-file",
-                                   "`hal run " + path + "` executes it; or rewrite it as a .hal file, where loops become ranges: pid.[0..5].command")
+                                   "`hal run " + path +
+                                       "` executes it; or rewrite it as a .hal file, where loops "
+                                       "become ranges: pid.[0..5].command")
                      : cannot_read(*this, output, file, problem, "unreadable-file",
                                    "named by [HAL]" + std::string(key) + " in " + path +
                                        "; HALLIB_PATH and HALLIB_DIR are further search paths");
@@ -231,7 +281,8 @@ int Shell::take_files(const std::string& path, const char* key, std::vector<HalF
 }
 
 int Shell::run_halfiles(const std::string& path, Output& output) {
-    const Borrowed in_folder(options.directory, folder_of(absolute_path(resolve_path(path, options.directory))));
+    const Borrowed in_folder(options.directory,
+                             folder_of(absolute_path(resolve_path(path, options.directory))));
     std::vector<HalFile> files;
     const int status = take_files(path, "HALFILE", files, output);
     if (status != 0 && !options.keep_going) return status;
@@ -239,21 +290,28 @@ int Shell::run_halfiles(const std::string& path, Output& output) {
     return status | run_taken(files, quit, output);
 }
 
-/// Runs netlists that were read, with [HAL]TWOPASS. Sets `quit` when a `quit` in them ends the loading.
+/// Runs netlists that were read, with [HAL]TWOPASS. Sets `quit` when a `quit` in them ends the
+/// loading.
 int Shell::run_taken(std::vector<HalFile>& files, bool& quit, Output& output) {
     int status = 0;
-    const auto over = [&] { return quit || (status != 0 && !options.keep_going && !options.check); };
+    const auto over = [&] {
+        return quit || (status != 0 && !options.keep_going && !options.check);
+    };
     const bool two_pass = !state_->session.ini.get("HAL", "TWOPASS").value_or("").empty();
     if (!two_pass) {
         for (HalFile& file : files) {
-            status |= file.script ? state_->run_script(file.name, file.arguments, Pass::both, output) : run_text(file.name, std::move(file.text), output);
+            status |= file.script
+                          ? state_->run_script(file.name, file.arguments, Pass::both, output)
+                          : run_text(file.name, std::move(file.text), output);
             if (over()) break;
         }
         return status;
     }
-    const bool scripts = std::any_of(files.begin(), files.end(), [](const HalFile& file) { return file.script; });
+    const bool scripts =
+        std::any_of(files.begin(), files.end(), [](const HalFile& file) { return file.script; });
     std::vector<Command> module_loads;
-    for (const Pass pass : scripts || prefers_modules() ? std::vector{Pass::loads, Pass::rest} : std::vector{Pass::both}) {
+    for (const Pass pass : scripts || prefers_modules() ? std::vector{Pass::loads, Pass::rest}
+                                                        : std::vector{Pass::both}) {
         state_->module_loads = pass == Pass::loads ? &module_loads : nullptr;
         for (auto file = files.begin(); file != files.end() && !over();) {
             if (file->script) {
@@ -263,15 +321,21 @@ int Shell::run_taken(std::vector<HalFile>& files, bool& quit, Output& output) {
             }
             Script script(*this, *state_, output);
             std::vector<std::uint32_t> sources;
-            for (; file != files.end() && !file->script; ++file) sources.push_back(script.add_text(file->name, file->text));
+            for (; file != files.end() && !file->script; ++file) {
+                sources.push_back(script.add_text(file->name, file->text));
+            }
             status |= script.run_two_pass(sources, pass);
             quit = quit || script.quit_seen();
         }
         state_->module_loads = nullptr;
-        if (pass == Pass::loads && !over()) status |= Script(*this, *state_, output).run(module_loads);
+        if (pass == Pass::loads && !over()) {
+            status |= Script(*this, *state_, output).run(module_loads);
+        }
     }
     const auto lock = state_->session.lock();
-    for (const std::uint32_t text : std::exchange(state_->module_load_texts, {})) state_->session.sources.release(text);
+    for (const std::uint32_t text : std::exchange(state_->module_load_texts, {})) {
+        state_->session.sources.release(text);
+    }
     return status;
 }
 
@@ -279,46 +343,67 @@ int Shell::run_ini(const std::string& path, Output& output) {
     if (read_ini(path, output) != 0) return 1;
     const Ini& ini = state_->session.ini;
     // As LinuxCNC does, everything named in the file is relative to its folder.
-    const Borrowed in_folder(options.directory, folder_of(absolute_path(resolve_path(path, options.directory))));
-    if (options.check) note_programs(state_->session, ini);
+    const Borrowed in_folder(options.directory,
+                             folder_of(absolute_path(resolve_path(path, options.directory))));
+    if (options.check) {
+        note_programs(state_->session, ini);
+    }
     std::vector<HalFile> files, after_display;
     int status = options.check ? check_version(*this, path, output) : 0;
     status |= take_files(path, "HALFILE", files, output);
-    if (options.check) status |= take_files(path, "POSTGUI_HALFILE", after_display, output);  // for `hal check` only: no user interface runs here
+    // for `hal check` only: no user interface runs here
+    if (options.check) {
+        status |= take_files(path, "POSTGUI_HALFILE", after_display, output);
+    }
     if (status != 0 && !options.keep_going) return status;
     std::string commands;
-    for (const std::string& command : ini.all("HAL", "HALCMD")) commands += command + "\n";
+    for (const std::string& command : ini.all("HAL", "HALCMD")) {
+        commands += command + "\n";
+    }
     bool quit = false;
     status |= run_taken(files, quit, output);
     if (quit || (status != 0 && !options.keep_going && !options.check)) return status;
-    if (!commands.empty()) status |= run_text(path + " [HAL]HALCMD", std::move(commands), output);
-    for (HalFile& file : after_display) status |= run_text(file.name, std::move(file.text), output);
+    if (!commands.empty()) {
+        status |= run_text(path + " [HAL]HALCMD", std::move(commands), output);
+    }
+    for (HalFile& file : after_display) {
+        status |= run_text(file.name, std::move(file.text), output);
+    }
     return status;
 }
 
 namespace {
 
 bool has_functions(const Model& model) {
-    return std::any_of(model.components.begin(), model.components.end(), [](const auto& component) { return !component->functions.empty(); });
+    return std::any_of(model.components.begin(), model.components.end(),
+                       [](const auto& component) { return !component->functions.empty(); });
 }
 
 bool runs_functions(const Model& model) {
-    return std::any_of(model.threads.begin(), model.threads.end(), [](const auto& thread) { return !thread->functions.empty(); });
+    return std::any_of(model.threads.begin(), model.threads.end(),
+                       [](const auto& thread) { return !thread->functions.empty(); });
 }
 
 /// Why no function has run although time has passed; nothing when one has, or when there is none.
 void check_that_something_ran(const Session& session, Diagnostics& diagnostics) {
     const Model& model = session.model();
     const Span at = session.threads().first_advance();
-    if (!has_functions(model) || session.threads().functions_ran() || session.threads().now_ns() == 0) return;
-    if (model.threads.empty())
-        diagnostics.warning("nothing-ran", at, "no thread exists, so no function ran", "",
-                            "create one with `newthread servo-thread 1000000`, then `addf FUNCTION servo-thread`");
-    else if (!runs_functions(model))
+    if (!has_functions(model) || session.threads().functions_ran() ||
+        session.threads().now_ns() == 0) {
+        return;
+    }
+    if (model.threads.empty()) {
+        diagnostics.warning(
+            "nothing-ran", at, "no thread exists, so no function ran", "",
+            "create one with `newthread servo-thread 1000000`, then `addf FUNCTION servo-thread`");
+    } else if (!runs_functions(model)) {
         diagnostics.warning("nothing-ran", at, "no function is in a thread, so none ran", "",
-                            "addf FUNCTION " + model.threads.front()->name + "; to see the functions: show function");
-    else if (!session.threads().was_started())
-        diagnostics.warning("nothing-ran", at, "the threads were never started, so no function ran", "", "write `start` before this line");
+                            "addf FUNCTION " + model.threads.front()->name +
+                                "; to see the functions: show function");
+    } else if (!session.threads().was_started()) {
+        diagnostics.warning("nothing-ran", at, "the threads were never started, so no function ran",
+                            "", "write `start` before this line");
+    }
 }
 
 }  // namespace
@@ -327,21 +412,26 @@ void Shell::warn_when_nothing_ran(Output& output) {
     Diagnostics diagnostics;
     const auto lock = state_->session.lock();
     check_that_something_ran(state_->session, diagnostics);
-    if (!diagnostics.all().empty() && options.level != Level::nothing)
+    if (!diagnostics.all().empty() && options.level != Level::nothing) {
         output.err(render(diagnostics, state_->session.sources, options.color));
+    }
 }
 
 bool Shell::may_wait(std::string_view text) {
     static const auto waiting = [] {
         std::vector<std::string_view> names;
-        for (const auto& row : command_table())
-            if (row.flags & command_waits) names.push_back(row.name);
+        for (const auto& row : command_table()) {
+            if (row.flags & command_waits) {
+                names.push_back(row.name);
+            }
+        }
         return names;
     }();
-    // A match anywhere is enough, and the values of $NAME and [SECTION]KEY are unknown here: running a harmless text in a
-    // thread of its own costs little.
+    // A match anywhere is enough, and the values of $NAME and [SECTION]KEY are unknown here:
+    // running a harmless text in a thread of its own costs little.
     if (text.find_first_of("$[") != text.npos) return true;
-    return std::any_of(waiting.begin(), waiting.end(), [&](std::string_view name) { return text.find(name) != text.npos; });
+    return std::any_of(waiting.begin(), waiting.end(),
+                       [&](std::string_view name) { return text.find(name) != text.npos; });
 }
 
 }  // namespace hal

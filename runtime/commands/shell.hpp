@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
-// The command language on a session: a line, a file, completion. The command table is in commands.hpp.
-// One Shell per user of the session (the program itself, each connection of the server); they share the machine and the
-// processes started by loadusr, but neither options nor an open `begin`. All members take the session's lock themselves, and
-// only while they work: a command that waits (loadusr -w, waitusr, advance on a real clock) lets others go on.
-// [setup], one thread at a time per Shell, but for cancel().
+// The command language on a session: a line, a file, completion. The command table is in
+// commands.hpp. One Shell per user of the session (the program itself, each connection of the
+// server); they share the machine and the processes started by loadusr, but neither options nor an
+// open `begin`. All members take the session's lock themselves, and only while they work: a command
+// that waits (loadusr -w, waitusr, advance on a real clock) lets others go on. [setup], one thread
+// at a time per Shell, but for cancel().
 #pragma once
 
 #include <functional>
@@ -28,9 +29,11 @@ public:
     virtual ~Output() = default;
     virtual void out(std::string_view text) = 0;
     virtual void err(std::string_view text) = 0;
-    /// What a command that waits reports meanwhile; on stderr unless there is a faster way to the user.
+    /// What a command that waits reports meanwhile; on stderr unless there is a faster way to the
+    /// user.
     virtual void notice(std::string_view text) { err(text); }
-    /// True: this is the process's own stdout and stderr, and programs run by `loadusr -w` may write there directly.
+    /// True: this is the process's own stdout and stderr, and programs run by `loadusr -w` may
+    /// write there directly.
     virtual bool is_process() const { return false; }
 };
 
@@ -54,24 +57,31 @@ public:
 enum class Level { nothing, errors, results, debug };
 
 struct ShellOptions {
-    bool keep_going = false;  ///< -k: each line is a transaction of its own, an error does not stop the file
-    bool echo = false;        ///< -e: each line to stderr as `(LINE)<echo>: TEXT`
-    bool script = false;      ///< -s: no titles, owner names, one line per thread and signal
-    bool json = false;        ///< show, list, getp, gets, ptype, stype and status answer in JSON
-    bool color = false;       ///< of diagnostics
-    bool notes = false;       ///< print notes (stale reads …) as well as errors and warnings
-    bool check = false;       ///< `hal check`: a file is one transaction, commands that act are only looked at
-    bool linuxcnc = false;    ///< with check: reports also what LinuxCNC would not load
+    /// -k: each line is a transaction of its own, an error does not stop the file
+    bool keep_going = false;
+    bool echo = false;  ///< -e: each line to stderr as `(LINE)<echo>: TEXT`
+    bool script = false;  ///< -s: no titles, owner names, one line per thread and signal
+    bool json = false;  ///< show, list, getp, gets, ptype, stype and status answer in JSON
+    bool color = false;  ///< of diagnostics
+    bool notes = false;  ///< print notes (stale reads …) as well as errors and warnings
+    /// `hal check`: a file is one transaction, commands that act are only looked at
+    bool check = false;
+    bool linuxcnc = false;  ///< with check: reports also what LinuxCNC would not load
     Level level = Level::errors;
-    std::string node = {};    ///< of a netlist with `node` lines: whose part is loaded; `$NODE` in it
-    std::string directory = {};  ///< what relative paths of source, save, loadusr are relative to; empty: the process's own
+    /// of a netlist with `node` lines: whose part is loaded; `$NODE` in it
+    std::string node = {};
+    /// what relative paths of source, save, loadusr are relative to; empty: the process's own
+    std::string directory = {};
 };
 
-/// Which commands of a netlist run: LinuxCNC's TWOPASS does the loads of all files before anything else.
+/// Which commands of a netlist run: LinuxCNC's TWOPASS does the loads of all files before anything
+/// else.
 enum class Pass { both, loads, rest };
 
-/// Runs a netlist that is a script of another language: the file, its arguments, which of its commands. Returns the exit status.
-using ScriptRunner = std::function<int(const std::string& path, const std::vector<std::string>& arguments, Pass, Output&)>;
+/// Runs a netlist that is a script of another language: the file, its arguments, which of its
+/// commands. Returns the exit status.
+using ScriptRunner = std::function<int(const std::string& path,
+                                       const std::vector<std::string>& arguments, Pass, Output&)>;
 
 class Shell {
 public:
@@ -85,17 +95,22 @@ public:
     ShellOptions options;
     Session& session() const;
 
-    /// Runs one line. Returns LinuxCNC's exit status: 0 all good, 1 something failed. `name` is what messages call the
-    /// source: "<shell>" or "<commandline>"; `number` is the line's in it.
-    int execute(std::string_view line, Output& output, std::string_view name = "<shell>", std::uint32_t number = 1);
-    /// Runs one command whose words are given as they are: no quotes, no comments, nothing to substitute.
-    int execute(const std::vector<std::string>& words, Output& output, std::string_view name = "<commandline>");
+    /// Runs one line. Returns LinuxCNC's exit status: 0 all good, 1 something failed. `name` is
+    /// what messages call the source: "<shell>" or "<commandline>"; `number` is the line's in it.
+    int execute(std::string_view line, Output& output, std::string_view name = "<shell>",
+                std::uint32_t number = 1);
+    /// Runs one command whose words are given as they are: no quotes, no comments, nothing to
+    /// substitute.
+    int execute(const std::vector<std::string>& words, Output& output,
+                std::string_view name = "<commandline>");
     /// Runs several commands of words like a text: consecutive edits are one transaction.
-    int execute(const std::vector<std::vector<std::string>>& commands, Output& output, std::string_view name);
-    /// Runs a text as a file: consecutive edits are one transaction, ended by commands that act and by the end.
+    int execute(const std::vector<std::vector<std::string>>& commands, Output& output,
+                std::string_view name);
+    /// Runs a text as a file: consecutive edits are one transaction, ended by commands that act and
+    /// by the end.
     int run_text(std::string name, std::string text, Output& output);
-    /// Runs a .hal file, or an .ini file with its [HAL] section: HALFILE=, HALCMD=, TWOPASS=. An .ini file also becomes
-    /// what [SECTION]KEY is looked up in.
+    /// Runs a .hal file, or an .ini file with its [HAL] section: HALFILE=, HALCMD=, TWOPASS=. An
+    /// .ini file also becomes what [SECTION]KEY is looked up in.
     int run_file(const std::string& path, Output& output);
     /// After a simulation: prints a warning when time has passed and no function has run.
     void warn_when_nothing_ran(Output& output);
@@ -106,7 +121,8 @@ public:
     /// Sets what runs the Tcl files among them; without it they are errors.
     void run_scripts_with(ScriptRunner runner);
 
-    /// True between `begin` and `commit` or `abort`; the edits are kept in this shell and invisible to others.
+    /// True between `begin` and `commit` or `abort`; the edits are kept in this shell and invisible
+    /// to others.
     bool collecting() const;
     /// Adds commands that set NAME VALUE to those collected since `begin`.
     void collect(const std::vector<Command>& commands);
@@ -114,10 +130,12 @@ public:
     bool quit() const;
     /// Interrupts a command that waits, and all later ones until cancel(false). [any]
     void cancel(bool on = true);
-    /// True when executing the line may wait for something outside (loadusr -w …), so that a server needs a thread for it.
+    /// True when executing the line may wait for something outside (loadusr -w …), so that a server
+    /// needs a thread for it.
     static bool may_wait(std::string_view text);
 
-    /// What could stand at `cursor` (a byte offset) of the line: only what the command would take there.
+    /// What could stand at `cursor` (a byte offset) of the line: only what the command would take
+    /// there.
     Completion complete(std::string_view line, std::size_t cursor) const;
 
     /// The manual of all commands in Markdown, made from the command table.
@@ -125,20 +143,25 @@ public:
     /// The page of a diagnostic code for `hal explain CODE`; empty when there is no such code.
     static std::string explain(std::string_view code);
 
-    /// What $NAME means in commands; empty: the environment of this process. A client of the socket brings its own.
+    /// What $NAME means in commands; empty: the environment of this process. A client of the socket
+    /// brings its own.
     void look_up(std::function<std::optional<std::string>(const std::string&)> variable);
-    /// What [SECTION]KEY means in commands; without a value, the INI file of the session. A client of the socket brings its own.
+    /// What [SECTION]KEY means in commands; without a value, the INI file of the session. A client
+    /// of the socket brings its own.
     void look_in(std::optional<Ini> ini);
 
-    /// Sets the lines that latencies() of this shell and its siblings adds: about signals between the machines of a cell.
+    /// Sets the lines that latencies() of this shell and its siblings adds: about signals between
+    /// the machines of a cell.
     void add_latencies(std::vector<std::string> lines);
-    /// Returns what `show latency` prints: one line per signal, sorted. The session's lock must be held.
+    /// Returns what `show latency` prints: one line per signal, sorted. The session's lock must be
+    /// held.
     std::vector<std::string> latencies() const;
     struct State;
 
 private:
     int run_ini(const std::string& path, Output& output);
-    int take_files(const std::string& path, const char* key, std::vector<HalFile>& files, Output& output);
+    int take_files(const std::string& path, const char* key, std::vector<HalFile>& files,
+                   Output& output);
     int run_taken(std::vector<HalFile>& files, bool& quit, Output& output);
     std::unique_ptr<State> state_;
 };

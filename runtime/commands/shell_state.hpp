@@ -9,9 +9,9 @@
 #include <optional>
 #include <vector>
 
-#include "netlist/netlist.hpp"
 #include "commands/linuxcnc_check.hpp"
 #include "commands/shell.hpp"
+#include "netlist/netlist.hpp"
 
 namespace hal {
 
@@ -21,16 +21,21 @@ struct Shell::State {
     std::vector<Command> collected = {};
     bool quit = false;
     std::atomic<bool> cancelled{false};    ///< set by any thread, read by a command that waits
-    /// What $NAME means to this shell; empty: the environment of the process. A client of the socket brings its own.
+    /// What $NAME means to this shell; empty: the environment of the process. A client of the
+    /// socket brings its own.
     std::function<std::optional<std::string>(const std::string&)> variable = {};
-    /// Lines of `show latency` about signals between machines, shared by all shells of the session and read with its lock held.
-    std::shared_ptr<std::vector<std::string>> latencies = std::make_shared<std::vector<std::string>>();
+    /// Lines of `show latency` about signals between machines, shared by all shells of the session
+    /// and read with its lock held.
+    std::shared_ptr<std::vector<std::string>> latencies =
+        std::make_shared<std::vector<std::string>>();
     ScriptRunner run_script = {};
-    LinuxcncCheck linuxcnc_check = {};     ///< `hal check --linuxcnc`
-    /// With TWOPASS, while the loads are gathered: one `loadrt` for each LinuxCNC module, which is loaded once; else nullptr.
+    LinuxcncCheck linuxcnc_check = {};  ///< `hal check --linuxcnc`
+    /// With TWOPASS, while the loads are gathered: one `loadrt` for each LinuxCNC module, which is
+    /// loaded once; else nullptr.
     std::vector<Command>* module_loads = nullptr;
     std::vector<std::uint32_t> module_load_texts = {};  ///< of the session's sources, held for them
-    std::optional<Ini> ini = {};           ///< what [SECTION]KEY means to this shell, when it is not the session's INI file
+    /// what [SECTION]KEY means to this shell, when it is not the session's INI file
+    std::optional<Ini> ini = {};
 };
 
 }  // namespace hal

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The command table: a row per command. Arity, help, completion, the manual and the rules of transactions come from it.
-// Internal to the shell.
+// The command table: a row per command. Arity, help, completion, the manual and the rules of
+// transactions come from it. Internal to the shell.
 #pragma once
 
 #include <cstddef>
@@ -9,11 +9,11 @@
 #include <string_view>
 #include <vector>
 
-#include "text/diagnostic.hpp"
+#include "commands/shell.hpp"
+#include "machine/session.hpp"
 #include "netlist/netlist.hpp"
 #include "netlist/usage.hpp"
-#include "machine/session.hpp"
-#include "commands/shell.hpp"
+#include "text/diagnostic.hpp"
 
 namespace hal {
 
@@ -21,7 +21,8 @@ struct Programs;
 class Script;
 struct CommandRow;
 
-/// One command that is being executed by its function. The lock of the session is held; a command that waits releases it meanwhile.
+/// One command that is being executed by its function. The lock of the session is held; a command
+/// that waits releases it meanwhile.
 struct Context {
     Script& script;
     Shell& shell;
@@ -32,13 +33,17 @@ struct Context {
     const Command& command;
     Diagnostics& diagnostics;            ///< an error in here is the command's failure
     SessionLock& lock;
-    Transaction* transaction = nullptr;  ///< of a deferred command: the transaction that queues its action
-    unsigned* locks = nullptr;           ///< of a deferred command: Session::locked after the commit
+    /// of a deferred command: the transaction that queues its action
+    Transaction* transaction = nullptr;
+    /// of a deferred command: Session::locked after the commit
+    unsigned* locks = nullptr;
 
     const ShellOptions& options() const { return shell.options; }
     std::size_t count() const { return command.args.size(); }
     const std::string& argument(std::size_t i) const { return command.args[i].text; }
-    std::string_view argument_or(std::size_t i, std::string_view fallback) const { return i < count() ? argument(i) : fallback; }
+    std::string_view argument_or(std::size_t i, std::string_view fallback) const {
+        return i < count() ? argument(i) : fallback;
+    }
     Span span(std::size_t i) const { return i < count() ? command.args[i].span : command.span; }
     std::string usage() const;
     /// A path of the command line, relative to the shell's directory, `~` expanded.
@@ -63,11 +68,14 @@ enum CommandFlags : unsigned {
     command_waits = 2,        ///< may wait for something outside
     command_transaction = 4,  ///< begin, commit, abort
     command_checked = 8,      ///< executed under `hal check`, too
-    command_query = 16,       ///< only reads the machine, including the edits made so far: does not end a transaction
-    command_deferred = 32,    ///< part of a transaction: executed after its commit, and not at all after a rollback
+    /// only reads the machine, including the edits made so far: does not end a transaction
+    command_query = 16,
+    /// part of a transaction: executed after its commit, and not at all after a rollback
+    command_deferred = 32,
     command_collected = 64,   ///< start, stop: acts at once, but after `begin` it is deferred
     command_arrows = 128,     ///< an edit with arrows among its arguments
-    command_traceless = 256,  ///< an edit that leaves nothing in the model that points into its text
+    /// an edit that leaves nothing in the model that points into its text
+    command_traceless = 256,
     command_each = 512,       ///< takes one name; a range of them is a command for each
     command_path = 1024,      ///< its arguments may be paths: quotes around them are removed
     command_programs = 2048,  ///< an edit that also ends programs
@@ -99,8 +107,10 @@ std::vector<std::string> command_names();
 /// Applies an edit by its row. Reports unknown-command when there is none.
 void apply_edit(Transaction& transaction, const Command& command, Diagnostics& diagnostics);
 
-/// Checks the locks. False after reporting the lock and how to release it. Values of pins and signals are never locked, as in LinuxCNC.
-bool check_lock(const CommandRow& row, const Command& command, unsigned lock, const Model& model, Diagnostics& diagnostics);
+/// Checks the locks. False after reporting the lock and how to release it. Values of pins and
+/// signals are never locked, as in LinuxCNC.
+bool check_lock(const CommandRow& row, const Command& command, unsigned lock, const Model& model,
+                Diagnostics& diagnostics);
 
 /// Makes a command that sets `NAME VALUE` a sets when NAME is a signal, else a setp.
 void resolve_set(const Model& model, Command& command);
@@ -132,7 +142,8 @@ void command_unlock(Context&);
 void command_loadusr(Context&);
 void command_waitusr(Context&);
 void command_unloadusr(Context&);
-/// The part of `unload NAME|all` that ends programs, a deferred command. True: nothing remains to be done.
+/// The part of `unload NAME|all` that ends programs, a deferred command. True: nothing remains to
+/// be done.
 bool unload_processes(Context&);
 // help.cpp
 void command_source(Context&);

@@ -3,22 +3,26 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "commands/table.hpp"
 #include "commands/json_text.hpp"
 #include "commands/listing.hpp"
+#include "commands/table.hpp"
 #include "model/names.hpp"
 
 namespace hal {
 namespace {
 
-UnknownName unknown(const std::string& name, NameGroup group) { return {.name = name, .group = static_cast<std::uint32_t>(group)}; }
+UnknownName unknown(const std::string& name, NameGroup group) {
+    return {.name = name, .group = static_cast<std::uint32_t>(group)};
+}
 
 const Pin* pin_named(Context& context) {
     const auto& name = context.argument(0);
     if (const Pin* const pin = context.session.model().find_pin(name)) return pin;
     const bool signal = context.session.model().find_signal(name) != nullptr;
     const char* const other = context.command.name.text == "getp" ? "gets" : "stype";
-    context.diagnostics.error("no-such-pin", context.span(0), "unknown pin or parameter '" + name + "'", unknown(name, NameGroup::pins),
+    context.diagnostics.error("no-such-pin", context.span(0),
+                              "unknown pin or parameter '" + name + "'",
+                              unknown(name, NameGroup::pins),
                               signal ? "it is a signal: " + std::string(other) + " " + name : "");
     return nullptr;
 }
@@ -28,14 +32,18 @@ const Signal* signal_named(Context& context) {
     if (const Signal* const signal = context.session.model().find_signal(name)) return signal;
     const bool pin = context.session.model().find_pin(name) != nullptr;
     const char* const other = context.command.name.text == "gets" ? "getp" : "ptype";
-    context.diagnostics.error("no-such-signal", context.span(0), "unknown signal '" + name + "'", unknown(name, NameGroup::signals),
+    context.diagnostics.error("no-such-signal", context.span(0), "unknown signal '" + name + "'",
+                              unknown(name, NameGroup::signals),
                               pin ? "it is a pin: " + std::string(other) + " " + name : "");
     return nullptr;
 }
 
 void print_value(Context& context, hal_type type, const hal_value& value) {
     if (!context.options().json) return context.output.out(format_value(type, value) + "\n");
-    context.output.out(json_text({{"name", context.argument(0)}, {"type", name(type)}, {"value", to_json(type, value)}}) + "\n");
+    context.output.out(json_text({{"name", context.argument(0)},
+                                  {"type", name(type)},
+                                  {"value", to_json(type, value)}}) +
+                       "\n");
 }
 
 void print_type(Context& context, hal_type type) {
@@ -46,19 +54,27 @@ void print_type(Context& context, hal_type type) {
 }  // namespace
 
 void command_getp(Context& context) {
-    if (const Pin* const pin = pin_named(context)) print_value(context, pin->type, context.session.values().read_pins({pin})[0]);
+    if (const Pin* const pin = pin_named(context)) {
+        print_value(context, pin->type, context.session.values().read_pins({pin})[0]);
+    }
 }
 
 void command_gets(Context& context) {
-    if (const Signal* const signal = signal_named(context)) print_value(context, signal->type, context.session.values().read_signals({signal})[0]);
+    if (const Signal* const signal = signal_named(context)) {
+        print_value(context, signal->type, context.session.values().read_signals({signal})[0]);
+    }
 }
 
 void command_ptype(Context& context) {
-    if (const Pin* const pin = pin_named(context)) print_type(context, pin->type);
+    if (const Pin* const pin = pin_named(context)) {
+        print_type(context, pin->type);
+    }
 }
 
 void command_stype(Context& context) {
-    if (const Signal* const signal = signal_named(context)) print_type(context, signal->type);
+    if (const Signal* const signal = signal_named(context)) {
+        print_type(context, signal->type);
+    }
 }
 
 }  // namespace hal

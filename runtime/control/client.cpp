@@ -56,13 +56,20 @@ struct Client::State {
         Json message = Json::parse(line.begin(), line.end(), nullptr, false);
         if (!message.is_object()) return lose();
         if (const auto event = message.find("event"); event != message.end()) {
-            if (*event == "closed") reason = message.value("reason", "");
+            if (*event == "closed") {
+                reason = message.value("reason", "");
+            }
             if (*event != "notice") {
-                if (const auto bytes = message.find("bytes"); bytes != message.end() && bytes->is_number_unsigned()) payload_left = bytes->get<std::size_t>();
+                if (const auto bytes = message.find("bytes");
+                    bytes != message.end() && bytes->is_number_unsigned()) {
+                    payload_left = bytes->get<std::size_t>();
+                }
                 if (payload_left > most_payload) return lose();
                 return events.push_back({std::move(message)});
             }
-            if (notice) notice(message.value("text", ""));
+            if (notice) {
+                notice(message.value("text", ""));
+            }
             return;
         }
         const auto id = message.find("id");
@@ -91,7 +98,8 @@ struct Client::State {
         const std::size_t searched = in.size();
         in.append(part.data(), static_cast<std::size_t>(got));
         std::size_t from = take_payload() ? taken : searched;
-        for (std::size_t end; payload_left == 0 && (end = in.find('\n', from)) != std::string::npos; from = taken) {
+        for (std::size_t end; payload_left == 0 && (end = in.find('\n', from)) != std::string::npos;
+             from = taken) {
             const std::size_t begin = taken;
             taken = end + 1;
             take(std::string_view(in).substr(begin, end - begin));
@@ -110,31 +118,45 @@ struct Client::State {
     }
     void drain_cancel() const {
         std::array<char, 4096> news;
-        while (cancel >= 0 && read(cancel, news.data(), news.size()) > 0) {}
+        while (cancel >= 0 && read(cancel, news.data(), news.size()) > 0) {
+        }
     }
 
     /// Waits until something can be read (or written, when asked). False after the time-out.
     bool wait_for(short what, int timeout_ms) {
         pollfd ready[] = {{fd, what, 0}, {cancel, POLLIN, 0}};
         const int count = poll(ready, 2, timeout_ms);
-        if (count < 0 && errno != EINTR) lose();
-        if (count > 0 && ready[0].revents & (POLLIN | POLLHUP | POLLERR)) read_lines();
-        if (count > 0 && (ready[1].revents & POLLIN)) on_cancel();
+        if (count < 0 && errno != EINTR) {
+            lose();
+        }
+        if (count > 0 && ready[0].revents & (POLLIN | POLLHUP | POLLERR)) {
+            read_lines();
+        }
+        if (count > 0 && (ready[1].revents & POLLIN)) {
+            on_cancel();
+        }
         return count != 0;
     }
 
-    /// Reads while it writes: a long sequence of requests must not block because replies fill the other direction.
+    /// Reads while it writes: a long sequence of requests must not block because replies fill the
+    /// other direction.
     void write_all(std::string_view text) {
         while (!text.empty() && fd >= 0) {
             const ssize_t gone = ::send(fd, text.data(), text.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
-            if (gone > 0) text.remove_prefix(static_cast<std::size_t>(gone));
-            else if (gone < 0 && errno == EAGAIN) wait_for(POLLIN | POLLOUT, -1);
-            else if (gone < 0 && errno != EINTR) lose();
+            if (gone > 0) {
+                text.remove_prefix(static_cast<std::size_t>(gone));
+            } else if (gone < 0 && errno == EAGAIN) {
+                wait_for(POLLIN | POLLOUT, -1);
+            } else if (gone < 0 && errno != EINTR) {
+                lose();
+            }
         }
     }
 
     Json lost() const {
-        return {{"ok", false}, {"error", "the connection to instance '" + instance + "' is lost" + (reason.empty() ? "" : ": " + reason)}};
+        return {{"ok", false},
+                {"error", "the connection to instance '" + instance + "' is lost" +
+                              (reason.empty() ? "" : ": " + reason)}};
     }
 };
 
@@ -154,14 +176,16 @@ std::unique_ptr<Client> Client::connect(std::string_view instance, std::string& 
     }
     path.copy(address.sun_path, sizeof address.sun_path - 1);
     s.fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    if (s.fd < 0 || ::connect(s.fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
+    if (s.fd < 0 ||
+        ::connect(s.fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
         const int error = errno;
         if (error == EACCES || error == EPERM) {
             problem = "instance '" + s.instance + "' belongs to another user";
         } else {
             const auto running = running_instances();
             problem = "no instance '" + s.instance + "' is running; " +
-                      (running.empty() ? "start one with `hal run FILE.hal`" : "running: " + listed(running) + " (choose with --name)");
+                      (running.empty() ? "start one with `hal run FILE.hal`"
+                                       : "running: " + listed(running) + " (choose with --name)");
         }
         return nullptr;
     }
@@ -172,16 +196,21 @@ std::unique_ptr<Client> Client::connect(std::string_view instance, std::string& 
         pollfd ready{s.fd, POLLIN, 0};
         if (poll(&ready, 1, 5000) == 0) break;
         const ssize_t got = recv(s.fd, part.data(), part.size(), 0);
-        if (got > 0) s.in.append(part.data(), static_cast<std::size_t>(got));
-        else if (got == 0 || errno != EINTR) s.lose();
+        if (got > 0) {
+            s.in.append(part.data(), static_cast<std::size_t>(got));
+        } else if (got == 0 || errno != EINTR) {
+            s.lose();
+        }
     }
     if (const auto end = s.in.find('\n'); end != std::string::npos) {
-        hello = Json::parse(s.in.begin(), s.in.begin() + static_cast<std::ptrdiff_t>(end), nullptr, false);
+        hello = Json::parse(s.in.begin(), s.in.begin() + static_cast<std::ptrdiff_t>(end), nullptr,
+                            false);
         s.in.erase(0, end + 1);
     }
     if (!hello.is_object() || hello.value("halcyon", 0) != 1) {
-        problem = hello.is_object() ? "instance '" + s.instance + "' uses another version of the protocol"
-                                    : "instance '" + s.instance + "' does not answer";
+        problem = hello.is_object()
+                      ? "instance '" + s.instance + "' uses another version of the protocol"
+                      : "instance '" + s.instance + "' does not answer";
         return nullptr;
     }
     s.version = hello.value("version", "");
@@ -194,11 +223,15 @@ const std::string& Client::version() const { return state_->version; }
 std::int64_t Client::pid() const { return state_->pid; }
 bool Client::connected() const { return state_->fd >= 0; }
 bool Client::look() {
-    if (state_->fd >= 0) state_->wait_for(POLLIN, 0);
+    if (state_->fd >= 0) {
+        state_->wait_for(POLLIN, 0);
+    }
     return connected();
 }
 const std::string& Client::closed_because() const { return state_->reason; }
-void Client::on_notice(std::function<void(std::string_view)> take) { state_->notice = std::move(take); }
+void Client::on_notice(std::function<void(std::string_view)> take) {
+    state_->notice = std::move(take);
+}
 int Client::fd() const { return state_->fd; }
 void Client::cancel_on(int descriptor) { state_->cancel = descriptor; }
 
@@ -237,7 +270,9 @@ bool Client::next_event(Json& event, std::string& payload, int timeout_ms) {
     const auto end = std::chrono::steady_clock::now() + std::chrono::milliseconds(timeout_ms);
     while (s.events.empty() || (s.events.size() == 1 && s.payload_left > 0)) {
         if (s.fd < 0) return false;
-        const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(end - std::chrono::steady_clock::now()).count();
+        const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(
+                              end - std::chrono::steady_clock::now())
+                              .count();
         if (timeout_ms >= 0 && left < 0) return false;
         s.wait_for(POLLIN, timeout_ms < 0 ? -1 : static_cast<int>(left));
     }
@@ -268,13 +303,20 @@ Json environment_for(std::string_view text) {
     Json variables = Json::object();
     for (std::size_t at = 0; (at = text.find('$', at)) != text.npos;) {
         ++at;
-        if (at < text.size() && text[at] == '(') ++at;
+        if (at < text.size() && text[at] == '(') {
+            ++at;
+        }
         const auto name_character = [](char c) {
-            return (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || c == '_' || c == '.' || c == '-';
+            return (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') ||
+                   c == '_' || c == '.' || c == '-';
         };
         std::string name;
-        while (at < text.size() && name_character(text[at])) name += text[at++];
-        if (const char* const value = std::getenv(name.c_str())) variables[name] = value;
+        while (at < text.size() && name_character(text[at])) {
+            name += text[at++];
+        }
+        if (const char* const value = std::getenv(name.c_str())) {
+            variables[name] = value;
+        }
     }
     return variables;
 }
@@ -282,14 +324,19 @@ Json environment_for(std::string_view text) {
 }  // namespace
 
 bool Client::set_options(const Options& o) {
-    Json options{{"keep_going", o.keep_going}, {"echo", o.echo},   {"script", o.script}, {"json", o.json},
-                 {"color", o.color},           {"notes", o.notes}, {"level", o.level},   {"directory", o.directory}};
-    if (!o.ini.empty()) options["ini"] = o.ini;
+    Json options{{"keep_going", o.keep_going}, {"echo", o.echo},
+                 {"script", o.script},         {"json", o.json},
+                 {"color", o.color},           {"notes", o.notes},
+                 {"level", o.level},           {"directory", o.directory}};
+    if (!o.ini.empty()) {
+        options["ini"] = o.ini;
+    }
     return request({{"options", std::move(options)}}).value("ok", false);
 }
 
 Client::Answer Client::run(std::string_view line, std::string_view name, std::uint32_t number) {
-    return answer_of(request({{"run", line}, {"name", name}, {"line", number}, {"env", environment_for(line)}}));
+    return answer_of(
+        request({{"run", line}, {"name", name}, {"line", number}, {"env", environment_for(line)}}));
 }
 
 Client::Answer Client::run(const std::vector<std::string>& words, std::string_view name) {
@@ -306,8 +353,9 @@ Completion Client::complete(std::string_view line, std::size_t cursor) {
     const Json reply = request({{"complete", line}, {"cursor", cursor}});
     Completion completion;
     completion.begin = reply.value("begin", std::size_t{0});
-    for (const Json& candidate : reply.value("candidates", Json::array()))
+    for (const Json& candidate : reply.value("candidates", Json::array())) {
         completion.candidates.push_back({candidate.value("text", ""), candidate.value("hint", "")});
+    }
     return completion;
 }
 

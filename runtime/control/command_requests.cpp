@@ -32,8 +32,12 @@ void append_answer(int status, const Shell& shell, const Reply& output, std::str
     reply += ",\"status\":" + std::to_string(status) + ",\"out\":";
     json_quote(reply, output.out_text);
     json_quote(reply += ",\"err\":", output.err_text);
-    if (shell.quit()) reply += ",\"quit\":true";
-    if (shell.collecting()) reply += ",\"collecting\":true";
+    if (shell.quit()) {
+        reply += ",\"quit\":true";
+    }
+    if (shell.collecting()) {
+        reply += ",\"collecting\":true";
+    }
 }
 
 }  // namespace
@@ -41,36 +45,53 @@ void append_answer(int status, const Shell& shell, const Reply& output, std::str
 void Connection::State::run(const Json& body, std::string& reply) {
     if (!body["run"].is_array()) return execute(body, text_of(body["run"], "run"), false, reply);
     const auto words = names_in(body["run"], "run");
-    if (words.empty()) throw RequestError{"run requires a command: a line, or its words"};
+    if (words.empty()) {
+        throw RequestError{"run requires a command: a line, or its words"};
+    }
     const Json& name = member(body, "name");
     Reply output(event);
-    const int status = shell.execute(words, output, name.is_null() ? "<commandline>" : text_of(name, "name"));
+    const int status =
+        shell.execute(words, output, name.is_null() ? "<commandline>" : text_of(name, "name"));
     append_answer(status, shell, output, reply);
 }
 
-void Connection::State::script(const Json& body, std::string& reply) { execute(body, text_of(body["script"], "script"), true, reply); }
+void Connection::State::script(const Json& body, std::string& reply) {
+    execute(body, text_of(body["script"], "script"), true, reply);
+}
 
-void Connection::State::execute(const Json& body, const std::string& text, bool script, std::string& reply) {
+void Connection::State::execute(const Json& body, const std::string& text, bool script,
+                                std::string& reply) {
     const Json& name = member(body, "name");
     const Json& env = member(body, "env");
-    if (!name.is_null()) text_of(name, "name");
+    if (!name.is_null()) {
+        text_of(name, "name");
+    }
     std::uint32_t number = 1;
     if (const Json& line = member(body, "line"); !line.is_null()) {
-        if (!line.is_number_unsigned() || line.get<std::uint64_t>() - 1 > 4'000'000'000) throw RequestError{"line must be a number, 1 or more"};
+        if (!line.is_number_unsigned() || line.get<std::uint64_t>() - 1 > 4'000'000'000) {
+            throw RequestError{"line must be a number, 1 or more"};
+        }
         number = line.get<std::uint32_t>();
     }
     if (!env.is_null()) {
-        if (!env.is_object()) throw RequestError{"env must be an object of names and strings"};
+        if (!env.is_object()) {
+            throw RequestError{"env must be an object of names and strings"};
+        }
         environment.clear();
-        for (const auto& [key, value] : env.items()) environment[key] = text_of(value, "a value in env");
+        for (const auto& [key, value] : env.items()) {
+            environment[key] = text_of(value, "a value in env");
+        }
         shell.look_up([this](const std::string& key) -> std::optional<std::string> {
             const auto at = environment.find(key);
             return at == environment.end() ? std::nullopt : std::optional(at->second);
         });
     }
     Reply output(event);
-    const std::string source = name.is_string() ? name.get<std::string>() : script ? "<stdin>" : "<shell>";
-    const int status = script ? shell.run_text(source, text, output) : shell.execute(text, output, source, number);
+    const std::string source = name.is_string() ? name.get<std::string>()
+                               : script         ? "<stdin>"
+                                                : "<shell>";
+    const int status =
+        script ? shell.run_text(source, text, output) : shell.execute(text, output, source, number);
     shell.look_up({});
     append_answer(status, shell, output, reply);
 }
@@ -80,12 +101,21 @@ namespace {
 /// The entries of a client's INI file: [SECTION, KEY, VALUE] each.
 Ini ini_of(const Json& entries) {
     Ini ini;
-    if (!entries.is_array()) throw RequestError{"ini must be a list of [SECTION, KEY, VALUE] or [SECTION, KEY, VALUE, PLACE]"};
+    if (!entries.is_array()) {
+        throw RequestError{
+            "ini must be a list of [SECTION, KEY, VALUE] or [SECTION, KEY, VALUE, PLACE]"};
+    }
     for (const Json& entry : entries) {
-        if (!entry.is_array() || entry.size() < 3 || entry.size() > 4)
-            throw RequestError{"an entry of ini must be [SECTION, KEY, VALUE] or [SECTION, KEY, VALUE, PLACE]"};
+        if (!entry.is_array() || entry.size() < 3 || entry.size() > 4) {
+            throw RequestError{
+                "an entry of ini must be [SECTION, KEY, VALUE] or [SECTION, KEY, VALUE, PLACE]"};
+        }
         std::string place = entry.size() == 4 ? text_of(entry[3], "a place") : std::string();
-        ini.add({text_of(entry[0], "a section"), text_of(entry[1], "a key"), text_of(entry[2], "a value"), {}, std::move(place)});
+        ini.add({text_of(entry[0], "a section"),
+                 text_of(entry[1], "a key"),
+                 text_of(entry[2], "a value"),
+                 {},
+                 std::move(place)});
     }
     return ini;
 }
@@ -94,21 +124,30 @@ Ini ini_of(const Json& entries) {
 
 void Connection::State::options(const Json& body, std::string&) {
     static constexpr std::pair<const char*, bool ShellOptions::*> flags[] = {
-        {"keep_going", &ShellOptions::keep_going}, {"echo", &ShellOptions::echo}, {"script", &ShellOptions::script},
-        {"json", &ShellOptions::json}, {"color", &ShellOptions::color}, {"notes", &ShellOptions::notes}};
+        {"keep_going", &ShellOptions::keep_going}, {"echo", &ShellOptions::echo},
+        {"script", &ShellOptions::script},         {"json", &ShellOptions::json},
+        {"color", &ShellOptions::color},           {"notes", &ShellOptions::notes}};
     static constexpr const char* levels[] = {"nothing", "errors", "results", "debug"};
     const Json& given = body["options"];
-    if (!given.is_object()) throw RequestError{"options must be an object"};
+    if (!given.is_object()) {
+        throw RequestError{"options must be an object"};
+    }
     ShellOptions wanted = shell.options;
     std::optional<Ini> ini;
     for (const auto& [key, value] : given.items()) {
-        const auto flag = std::find_if(std::begin(flags), std::end(flags), [&, k = key](const auto& f) { return k == f.first; });
+        const auto flag = std::find_if(std::begin(flags), std::end(flags),
+                                       [&, k = key](const auto& f) { return k == f.first; });
         if (flag != std::end(flags)) {
-            if (!value.is_boolean()) throw RequestError{key + " must be true or false"};
+            if (!value.is_boolean()) {
+                throw RequestError{key + " must be true or false"};
+            }
             wanted.*flag->second = value.get<bool>();
         } else if (key == "level") {
-            const auto level = std::find(std::begin(levels), std::end(levels), text_of(value, "level"));
-            if (level == std::end(levels)) throw RequestError{"level must be nothing, errors, results or debug"};
+            const auto level =
+                std::find(std::begin(levels), std::end(levels), text_of(value, "level"));
+            if (level == std::end(levels)) {
+                throw RequestError{"level must be nothing, errors, results or debug"};
+            }
             wanted.level = static_cast<Level>(level - std::begin(levels));
         } else if (key == "directory") {
             wanted.directory = text_of(value, "directory");
@@ -119,21 +158,28 @@ void Connection::State::options(const Json& body, std::string&) {
         }
     }
     shell.options = std::move(wanted);
-    if (ini) shell.look_in(std::move(ini));
+    if (ini) {
+        shell.look_in(std::move(ini));
+    }
 }
 
 void Connection::State::complete(const Json& body, std::string& reply) {
     const std::string& line = text_of(body["complete"], "complete");
     const Json& cursor = member(body, "cursor");
-    const auto at =
-        cursor.is_null() ? line.size() : static_cast<std::size_t>(whole(cursor, "cursor", 0, std::numeric_limits<std::int32_t>::max()));
+    const auto at = cursor.is_null()
+                        ? line.size()
+                        : static_cast<std::size_t>(
+                              whole(cursor, "cursor", 0, std::numeric_limits<std::int32_t>::max()));
     const Completion completion = shell.complete(line, at);
     auto candidates = nlohmann::ordered_json::array();
     for (const Candidate& candidate : completion.candidates) {
         auto& row = candidates.emplace_back(nlohmann::ordered_json{{"text", candidate.text}});
-        if (!candidate.hint.empty()) row["hint"] = candidate.hint;
+        if (!candidate.hint.empty()) {
+            row["hint"] = candidate.hint;
+        }
     }
-    reply += ",\"begin\":" + std::to_string(completion.begin) + ",\"candidates\":" + json_text(candidates);
+    reply += ",\"begin\":" + std::to_string(completion.begin) +
+             ",\"candidates\":" + json_text(candidates);
 }
 
 }  // namespace hal

@@ -23,8 +23,11 @@ bool too_deep(std::string_view line) {
     for (std::size_t i = 0; i < line.size(); ++i) {
         const char c = line[i];
         if (quoted) {
-            if (c == '\\') ++i;
-            else if (c == '"') quoted = false;
+            if (c == '\\') {
+                ++i;
+            } else if (c == '"') {
+                quoted = false;
+            }
         } else if (c == '"') {
             quoted = true;
         } else if (c == '[' || c == '{') {
@@ -36,7 +39,9 @@ bool too_deep(std::string_view line) {
     return false;
 }
 
-std::string dumped(const Json& value) { return value.dump(-1, ' ', false, Json::error_handler_t::replace); }
+std::string dumped(const Json& value) {
+    return value.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
 
 struct Verb {
     const char* name;
@@ -70,31 +75,41 @@ constexpr Verb verbs[] = {
 
 /// True when `word` is one of those in `words`, each followed by a blank.
 bool listed_in(std::string_view words, std::string_view word) {
-    for (std::size_t at = 0, blank; (blank = words.find(' ', at)) != words.npos; at = blank + 1)
+    for (std::size_t at = 0, blank; (blank = words.find(' ', at)) != words.npos; at = blank + 1) {
         if (words.substr(at, blank - at) == word) return true;
+    }
     return false;
 }
 
-/// The one verb of a request; rejects unknown members, so that a misspelt one is not silently ignored.
+/// The one verb of a request; rejects unknown members, so that a misspelt one is not silently
+/// ignored.
 const Verb& verb_of(const Json& body) {
     const Verb* found = nullptr;
     for (auto entry = body.begin(); entry != body.end(); ++entry) {
-        const auto verb = std::find_if(std::begin(verbs), std::end(verbs), [&](const Verb& v) { return entry.key() == v.name; });
+        const auto verb = std::find_if(std::begin(verbs), std::end(verbs),
+                                       [&](const Verb& v) { return entry.key() == v.name; });
         if (verb == std::end(verbs)) continue;
-        if (found && listed_in(found->members, verb->name)) continue;  // read is a member of exchange, too
-        if (found && !listed_in(verb->members, found->name))
-            throw RequestError{std::string("a request has one verb, not both ") + found->name + " and " + verb->name};
+        // read is a member of exchange, too
+        if (found && listed_in(found->members, verb->name)) continue;
+        if (found && !listed_in(verb->members, found->name)) {
+            throw RequestError{std::string("a request has one verb, not both ") + found->name +
+                               " and " + verb->name};
+        }
         found = verb;
     }
     if (!found) {
         std::vector<std::string> names;
-        for (const Verb& verb : verbs) names.emplace_back(verb.name);
+        for (const Verb& verb : verbs) {
+            names.emplace_back(verb.name);
+        }
         throw RequestError{"missing verb; a request has one of: " + listed(names, names.size())};
     }
     for (auto entry = body.begin(); entry != body.end(); ++entry) {
         const std::string& key = entry.key();
-        if (key != "id" && key != found->name && !listed_in(found->members, key))
-            throw RequestError{"'" + key.substr(0, 60) + "' is not a valid member of a request to " + found->name};
+        if (key != "id" && key != found->name && !listed_in(found->members, key)) {
+            throw RequestError{"'" + key.substr(0, 60) +
+                               "' is not a valid member of a request to " + found->name};
+        }
     }
     return *found;
 }
@@ -108,10 +123,15 @@ Connection::~Connection() {
     state_->session.programs().withdraw(state_->owner);
 }
 
-void Connection::on_event(std::function<void(std::string)> take) { state_->event = std::move(take); }
+void Connection::on_event(std::function<void(std::string)> take) {
+    state_->event = std::move(take);
+}
 
 bool Connection::idle() const {
-    if (state_->engaged || !state_->subscriptions.empty() || !state_->probes.empty() || state_->traces.on()) return false;
+    if (state_->engaged || !state_->subscriptions.empty() || !state_->probes.empty() ||
+        state_->traces.on()) {
+        return false;
+    }
     if (!state_->has_component) return true;
     const auto lock = state_->session.try_lock();
     if (!lock || state_->session.programs().answers(state_->owner)) return false;
@@ -120,7 +140,11 @@ bool Connection::idle() const {
 }
 
 std::string Connection::hello() const {
-    return json_text({{"halcyon", 1}, {"name", state_->session.options().name}, {"version", paths::version}, {"pid", getpid()}}) + "\n";
+    return json_text({{"halcyon", 1},
+                      {"name", state_->session.options().name},
+                      {"version", paths::version},
+                      {"pid", getpid()}}) +
+           "\n";
 }
 
 Connection::Handled Connection::handle(std::string_view line, std::string& replies, bool may_wait) {
@@ -140,24 +164,34 @@ Connection::Handled Connection::handle(std::string_view line, std::string& repli
     const Json body = Json::parse(line.begin(), line.end(), nullptr, false);
     if (!body.is_object()) {
         ++state.rubbish;
-        return refuse(body.is_discarded() ? "invalid JSON; a request is one JSON object on one line" : "a request is a JSON object");
+        return refuse(body.is_discarded() ? "invalid JSON; a request is one JSON object on one line"
+                                          : "a request is a JSON object");
     }
     if (const Json& given = member(body, "id");
-        given.is_number() || (given.is_string() && given.get_ref<const std::string&>().size() <= 200))
+        given.is_number() ||
+        (given.is_string() && given.get_ref<const std::string&>().size() <= 200)) {
         id = dumped(given);
+    }
     const std::size_t before = replies.size();
     try {
         const Verb& verb = verb_of(body);
-        // A program's values go on until the connection is closed, which is what it takes for the end of the machine.
-        constexpr decltype(verb.handle) until_closed[] = {&State::end, &State::exchange, &State::exit, &State::port, &State::stream};
-        const bool answered = std::find(std::begin(until_closed), std::end(until_closed), verb.handle) != std::end(until_closed);
+        // A program's values go on until the connection is closed, which is what it takes for the
+        // end of the machine.
+        constexpr decltype(verb.handle) until_closed[] = {
+            &State::end, &State::exchange, &State::exit, &State::port, &State::stream};
+        const bool answered = std::find(std::begin(until_closed), std::end(until_closed),
+                                        verb.handle) != std::end(until_closed);
         if (state.session.ending() && !answered) return refuse("the machine ends");
         const bool script = verb.handle == &State::script;
         if (!may_wait && (verb.handle == &State::run || script)) {
             const Json& text = body[script ? "script" : "run"];
-            if (text.is_string() && Shell::may_wait(text.get_ref<const std::string&>())) return Handled::wants_thread;
-            if (text.is_array() && !text.empty() && text[0].is_string() && Shell::may_wait(text[0].get_ref<const std::string&>()))
+            if (text.is_string() && Shell::may_wait(text.get_ref<const std::string&>())) {
                 return Handled::wants_thread;
+            }
+            if (text.is_array() && !text.empty() && text[0].is_string() &&
+                Shell::may_wait(text[0].get_ref<const std::string&>())) {
+                return Handled::wants_thread;
+            }
         }
         ++state.requests;
         replies += "{\"id\":" + id + ",\"ok\":true";
@@ -182,7 +216,8 @@ bool is_stop(const Json& command) {
     if (command.is_array()) return command.size() == 1 && command[0] == "stop";
     if (!command.is_string()) return false;
     const std::string& text = command.get_ref<const std::string&>();
-    const auto first = text.find_first_not_of(" \t"), last = text.find_last_not_of(" \t");
+    const auto first = text.find_first_not_of(" \t");
+    const auto last = text.find_last_not_of(" \t");
     return first != text.npos && std::string_view(text).substr(first, last - first + 1) == "stop";
 }
 
@@ -191,15 +226,20 @@ bool is_stop(const Json& command) {
 Connection::Urgent Connection::execute_urgent(std::string_view line, std::string& reply) {
     State& state = *state_;
     const bool stops = line.find("stop") != line.npos;
-    if (line.size() > longest_urgent || (!stops && line.find("\"options\"") == line.npos) || too_deep(line)) return Urgent::no;
+    if (line.size() > longest_urgent || (!stops && line.find("\"options\"") == line.npos) ||
+        too_deep(line)) {
+        return Urgent::no;
+    }
     const Json body = Json::parse(line.begin(), line.end(), nullptr, false);
     if (!body.is_object()) return Urgent::no;
     try {
         const auto handle = verb_of(body).handle;
-        if (handle == &State::options || handle == &State::end)
+        if (handle == &State::options || handle == &State::end) {
             return this->handle(line, reply) == Handled::stop ? Urgent::stop : Urgent::done;
+        }
         const bool locked = (state.session.locked & static_cast<unsigned>(Lock::run)) != 0;
-        const bool plain = !locked && !state.shell.collecting() && !state.shell.options.echo && !state.session.options().virtual_clock;
+        const bool plain = !locked && !state.shell.collecting() && !state.shell.options.echo &&
+                           !state.session.options().virtual_clock;
         if (handle != &State::run || !plain || !is_stop(body["run"])) return Urgent::no;
     } catch (const RequestError&) {
         return Urgent::no;  // handle() reports it
@@ -218,8 +258,10 @@ Connection::Urgent Connection::halted(std::string_view line, std::string& reply)
     state.session.journal().note("command", "stop");
     ++state.requests;
     const Json id = Json::parse(line.begin(), line.end(), nullptr, false).value("id", Json());
-    const bool echoed = id.is_number() || (id.is_string() && id.get_ref<const std::string&>().size() <= 200);
-    reply += "{\"id\":" + (echoed ? dumped(id) : "null") + ",\"ok\":true,\"status\":0,\"out\":\"\",\"err\":\"\"}\n";
+    const bool echoed =
+        id.is_number() || (id.is_string() && id.get_ref<const std::string&>().size() <= 200);
+    reply += "{\"id\":" + (echoed ? dumped(id) : "null") +
+             ",\"ok\":true,\"status\":0,\"out\":\"\",\"err\":\"\"}\n";
     return Urgent::done;
 }
 
@@ -234,7 +276,8 @@ bool Connection::cancels(std::string_view line) {
 void Connection::cancel(bool on) { state_->shell.cancel(on); }
 
 std::int64_t Connection::next_due_ns() const {
-    return std::min({state_->subscriptions.next_due_ns(), state_->probes.next_due_ns(), state_->traces.next_due_ns()});
+    return std::min({state_->subscriptions.next_due_ns(), state_->probes.next_due_ns(),
+                     state_->traces.next_due_ns()});
 }
 
 void Connection::publish(std::int64_t now_ns, bool congested, std::string& events) {

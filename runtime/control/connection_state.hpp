@@ -11,9 +11,9 @@
 #include <nlohmann/json.hpp>
 
 #include "commands/shell.hpp"
+#include "control/connection.hpp"
 #include "control/probe_feeds.hpp"
 #include "control/program_requests.hpp"
-#include "control/connection.hpp"
 #include "control/request.hpp"
 #include "control/subscriptions.hpp"
 #include "control/trace_feed.hpp"
@@ -30,20 +30,26 @@ struct Connection::State {
     Shell shell;
     Session& session;
     pid_t peer;
-    const std::uint64_t owner = session.programs().new_owner();  ///< of the components that this client answers for
+    /// of the components that this client answers for
+    const std::uint64_t owner = session.programs().new_owner();
     Subscriptions subscriptions;
     ProbeFeeds probes{session};
     TraceFeed traces{session};
-    std::atomic<std::uint64_t> requests{0}, rubbish{0};
-    std::atomic<bool> has_component{false};  ///< the client has declared one since idle() last found none
-    std::atomic<bool> engaged{false};  ///< a request is being executed, or `begin` is open since the last one
+    std::atomic<std::uint64_t> requests{0};
+    std::atomic<std::uint64_t> rubbish{0};
+    /// the client has declared one since idle() last found none
+    std::atomic<bool> has_component{false};
+    /// a request is being executed, or `begin` is open since the last one
+    std::atomic<bool> engaged{false};
     // What follows, and the shell's members beside cancel(), belong to the thread in handle().
-    std::map<std::string, std::string> environment;  ///< what $NAME is in the request being executed
+    /// what $NAME is in the request being executed
+    std::map<std::string, std::string> environment;
     bool stop = false;
     std::uint64_t halt_ticket = 0;
     std::function<void(std::string)> event;
 
-    // Each appends the members of its reply after "ok":true, beginning with a comma, or throws RequestError before anything.
+    // Each appends the members of its reply after "ok":true, beginning with a comma, or throws
+    // RequestError before anything.
     void run(const Json& body, std::string& reply);
     void script(const Json& body, std::string& reply);
     void options(const Json& body, std::string& reply);
@@ -63,25 +69,38 @@ struct Connection::State {
         has_component = true;
         declare_component({shell, session, peer, owner}, body, reply);
     }
-    void exchange(const Json& body, std::string& reply) { exchange_values({shell, session, peer, owner}, body, reply); }
+    void exchange(const Json& body, std::string& reply) {
+        exchange_values({shell, session, peer, owner}, body, reply);
+    }
     void exit(const Json& body, std::string&) {
         no_begin("exit");
         leave_component({shell, session, peer, owner}, body);
     }
-    void port(const Json& body, std::string& reply) { use_port({shell, session, peer, owner}, body, reply); }
-    void stream(const Json& body, std::string& reply) { use_stream({shell, session, peer, owner}, body, reply); }
+    void port(const Json& body, std::string& reply) {
+        use_port({shell, session, peer, owner}, body, reply);
+    }
+    void stream(const Json& body, std::string& reply) {
+        use_stream({shell, session, peer, owner}, body, reply);
+    }
     void end(const Json& body, std::string&) {
-        if (body["stop"] != true) throw RequestError{"stop must be true"};
+        if (body["stop"] != true) {
+            throw RequestError{"stop must be true"};
+        }
         stop = true;
     }
     void cancelled(const Json& body, std::string&) {
-        if (body["cancel"] != true) throw RequestError{"cancel must be true"};
+        if (body["cancel"] != true) {
+            throw RequestError{"cancel must be true"};
+        }
     }
 
     /// A verb that changes the model at once is not for a connection that collects edits.
     void no_begin(const char* verb) const {
-        if (shell.collecting())
-            throw RequestError{std::string("'") + verb + "' cannot be part of a transaction; this connection has an open 'begin': commit or abort it first"};
+        if (shell.collecting()) {
+            throw RequestError{std::string("'") + verb +
+                               "' cannot be part of a transaction; this connection has an open "
+                               "'begin': commit or abort it first"};
+        }
     }
     void execute(const Json& body, const std::string& text, bool script, std::string& reply);
 

@@ -20,19 +20,24 @@ namespace {
 
 std::string system_reason() { return std::strerror(errno); }
 
-/// Makes the folder if needed. It must be ours and closed to others: the socket in it gives full control of the machine.
+/// Makes the folder if needed. It must be ours and closed to others: the socket in it gives full
+/// control of the machine.
 bool private_folder(const std::string& folder, Diagnostics& diagnostics) {
     struct stat about{};
     if (mkdir(folder.c_str(), 0700) != 0 && errno != EEXIST) {
-        diagnostics.error("no-socket", {}, "the folder of the control sockets '" + folder + "' cannot be created: " + system_reason(), "",
-                          "set XDG_RUNTIME_DIR to a folder of your own");
+        diagnostics.error("no-socket", {},
+                          "the folder of the control sockets '" + folder +
+                              "' cannot be created: " + system_reason(),
+                          "", "set XDG_RUNTIME_DIR to a folder of your own");
         return false;
     }
     if (lstat(folder.c_str(), &about) == 0 && S_ISDIR(about.st_mode) && about.st_uid == geteuid()) {
         if ((about.st_mode & 0077) == 0 || chmod(folder.c_str(), 0700) == 0) return true;
     }
-    diagnostics.error("no-socket", {}, "the folder of the control sockets '" + folder + "' belongs to another user or is accessible to others", "",
-                      "remove it, or set XDG_RUNTIME_DIR to a folder of your own");
+    diagnostics.error("no-socket", {},
+                      "the folder of the control sockets '" + folder +
+                          "' belongs to another user or is accessible to others",
+                      "", "remove it, or set XDG_RUNTIME_DIR to a folder of your own");
     return false;
 }
 
@@ -47,17 +52,21 @@ std::string content_of(int file) {
 
 bool Endpoint::open(std::string_view name, Diagnostics& diagnostics) {
     if (!good_instance_name(name)) {
-        diagnostics.error("no-socket", {}, "'" + std::string(name) + "' is not a valid instance name", "",
+        diagnostics.error("no-socket", {},
+                          "'" + std::string(name) + "' is not a valid instance name", "",
                           "use up to 64 letters, digits, -, _ and ., without a leading dot");
         return false;
     }
     path_ = socket_path(name);
     if (path_.size() >= sizeof(sockaddr_un::sun_path)) {
-        diagnostics.error("no-socket", {}, "the path of the control socket is too long: " + path_, "",
-                          "set XDG_RUNTIME_DIR to a shorter path");
+        diagnostics.error("no-socket", {}, "the path of the control socket is too long: " + path_,
+                          "", "set XDG_RUNTIME_DIR to a shorter path");
         return false;
     }
-    if (private_folder(socket_folder(), diagnostics) && take_lock(name, diagnostics) && listen_at(diagnostics)) return true;
+    if (private_folder(socket_folder(), diagnostics) && take_lock(name, diagnostics) &&
+        listen_at(diagnostics)) {
+        return true;
+    }
     close_all();
     return false;
 }
@@ -67,21 +76,30 @@ bool Endpoint::take_lock(std::string_view name, Diagnostics& diagnostics) {
     while (true) {
         lock_ = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600);
         if (lock_ < 0) {
-            diagnostics.error("no-socket", {}, "'" + file + "' cannot be opened: " + system_reason());
+            diagnostics.error("no-socket", {},
+                              "'" + file + "' cannot be opened: " + system_reason());
             return false;
         }
         if (flock(lock_, LOCK_EX | LOCK_NB) != 0) {
             const std::string pid = content_of(lock_);
-            diagnostics.error("instance-running", {},
-                              "an instance named '" + std::string(name) + "' is already running" + (pid.empty() ? "" : " (process " + pid + ")"),
-                              "", "choose another name with --name" + (pid.empty() ? "" : ", or end the running instance: kill " + pid));
+            diagnostics.error(
+                "instance-running", {},
+                "an instance named '" + std::string(name) + "' is already running" +
+                    (pid.empty() ? "" : " (process " + pid + ")"),
+                "",
+                "choose another name with --name" +
+                    (pid.empty() ? "" : ", or end the running instance: kill " + pid));
             close(lock_);
             lock_ = -1;
             return false;
         }
-        // An instance that ended between our open and our lock has removed the file: then we hold the lock of a deleted file.
+        // An instance that ended between our open and our lock has removed the file: then we hold
+        // the lock of a deleted file.
         struct stat locked{}, there{};
-        if (fstat(lock_, &locked) == 0 && stat(file.c_str(), &there) == 0 && locked.st_ino == there.st_ino) break;
+        if (fstat(lock_, &locked) == 0 && stat(file.c_str(), &there) == 0 &&
+            locked.st_ino == there.st_ino) {
+            break;
+        }
         close(lock_);
     }
     lock_file_ = file;
@@ -99,11 +117,15 @@ bool Endpoint::listen_at(Diagnostics& diagnostics) {
     address.sun_family = AF_UNIX;
     path_.copy(address.sun_path, sizeof address.sun_path - 1);
     unlink(path_.c_str());  // we hold the lock: what is there was left over by a dead process
-    // The mode a socket has when it is bound becomes the file's: there is no moment at which it is open to others.
-    if (socket_ >= 0 && fchmod(socket_, 0600) == 0 && bind(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0 &&
-        listen(socket_, 64) == 0)
+    // The mode a socket has when it is bound becomes the file's: there is no moment at which it is
+    // open to others.
+    if (socket_ >= 0 && fchmod(socket_, 0600) == 0 &&
+        bind(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0 &&
+        listen(socket_, 64) == 0) {
         return true;
-    diagnostics.error("no-socket", {}, "the control socket '" + path_ + "' cannot be opened: " + system_reason());
+    }
+    diagnostics.error("no-socket", {},
+                      "the control socket '" + path_ + "' cannot be opened: " + system_reason());
     return false;
 }
 
@@ -116,7 +138,9 @@ void Endpoint::stop_listening() {
 void Endpoint::close_all() {
     stop_listening();
     if (lock_ >= 0) {
-        if (!lock_file_.empty()) unlink(lock_file_.c_str());
+        if (!lock_file_.empty()) {
+            unlink(lock_file_.c_str());
+        }
         close(lock_);
     }
     lock_ = -1;

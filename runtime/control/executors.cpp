@@ -5,7 +5,9 @@ namespace hal {
 
 void Executors::start() {
     constexpr std::size_t count = 2;
-    for (std::size_t i = 0; i < count; ++i) threads_.emplace_back([this] { work(); });
+    for (std::size_t i = 0; i < count; ++i) {
+        threads_.emplace_back([this] { work(); });
+    }
 }
 
 void Executors::give(ServedClient& client) {
@@ -22,7 +24,9 @@ void Executors::end() {
         ending_ = true;
     }
     wake_.notify_all();
-    for (std::thread& thread : threads_) thread.join();
+    for (std::thread& thread : threads_) {
+        thread.join();
+    }
     threads_.clear();
 }
 
@@ -46,22 +50,30 @@ void Executors::carry_out(ServedClient& client) {
     Turn& turn = client.turn;
     if (turn.closes) return client.connection.reset();
     Connection& connection = *client.connection;
-    const std::uint64_t requests = connection.requests(), rubbish = connection.rubbish();
+    const std::uint64_t requests = connection.requests();
+    const std::uint64_t rubbish = connection.rubbish();
     std::size_t taken = 0;
-    while (taken < turn.lines.size() && turn.replies.size() <= turn.capacity && turn.waiting.empty() && !turn.stop) {
+    while (taken < turn.lines.size() && turn.replies.size() <= turn.capacity &&
+           turn.waiting.empty() && !turn.stop) {
         const std::size_t end = turn.lines.find('\n', taken);
         std::string_view line = std::string_view(turn.lines).substr(taken, end - taken);
-        if (line.ends_with('\r')) line.remove_suffix(1);
+        if (line.ends_with('\r')) {
+            line.remove_suffix(1);
+        }
         taken = end + 1;
         if (line.empty()) continue;
         const auto handled = connection.handle(line, turn.replies);
         turn.stop = handled == Connection::Handled::stop;
-        if (handled == Connection::Handled::wants_thread) turn.waiting = line;
+        if (handled == Connection::Handled::wants_thread) {
+            turn.waiting = line;
+        }
     }
     turn.lines.erase(0, taken);
     turn.requests = connection.requests() - requests;
     turn.rubbish = connection.rubbish() - rubbish;
-    if (const std::int64_t now = monotonic_ns(); connection.next_due_ns() <= now) connection.publish(now, turn.congested, turn.replies);
+    if (const std::int64_t now = monotonic_ns(); connection.next_due_ns() <= now) {
+        connection.publish(now, turn.congested, turn.replies);
+    }
 }
 
 }  // namespace hal

@@ -23,27 +23,39 @@
 
 namespace hal {
 
-constexpr std::size_t slow_reader = std::size_t{64} << 10; // bytes waiting for a client that skip its subscriptions
+// bytes waiting for a client that skip its subscriptions
+constexpr std::size_t slow_reader = std::size_t{64} << 10;
 
-/// What a client has an executor do: its next requests, then its subscriptions. Filled by the server's thread, carried out by an executor.
+/// What a client has an executor do: its next requests, then its subscriptions. Filled by the
+/// server's thread, carried out by an executor.
 struct Turn {
     std::string lines;             ///< complete requests; afterwards those that remain
-    std::string waiting;           ///< a request that needs a thread of its own; it was not executed
+    /// a request that needs a thread of its own; it was not executed
+    std::string waiting;
     std::string replies;
-    std::size_t capacity = 0;      ///< of replies: when they are longer the remaining requests are left for later
+    /// of replies: when they are longer the remaining requests are left for later
+    std::size_t capacity = 0;
     bool congested = false;        ///< subscriptions are skipped
     bool stop = false;             ///< a request asked the instance to end
-    bool closes = false;           ///< the client is gone: the connection is closed, which may take long
-    std::uint64_t requests = 0, rubbish = 0;
+    /// the client is gone: the connection is closed, which may take long
+    bool closes = false;
+    std::uint64_t requests = 0;
+    std::uint64_t rubbish = 0;
 };
 
-/// One connected client. Used by the server's thread only, but for `result`, `finished` and `events` while a worker runs, and `turn` and
+/// One connected client. Used by the server's thread only, but for `result`, `finished` and
+/// `events` while a worker runs, and `turn` and
 /// `connection` while the client has a turn.
 struct ServedClient {
-    ServedClient(int f, Shell& shell, pid_t peer) : fd(f), connection(std::make_unique<Connection>(shell, peer)) {}
+    ServedClient(int f, Shell& shell, pid_t peer)
+        : fd(f), connection(std::make_unique<Connection>(shell, peer)) {}
     ~ServedClient() {
-        if (worker.joinable()) worker.join();
-        if (fd >= 0) close(fd);
+        if (worker.joinable()) {
+            worker.join();
+        }
+        if (fd >= 0) {
+            close(fd);
+        }
     }
     ServedClient(const ServedClient&) = delete;
 
@@ -54,13 +66,17 @@ struct ServedClient {
     std::size_t searched = 0;      ///< up to here there is no end of line behind `taken`
     std::size_t sent = 0;          ///< bytes of `out` that have gone
     bool discarding = false;       ///< in the rest of a request that was too long
-    bool gone = false;             ///< to be removed as soon as no worker runs and its connection is closed
+    /// to be removed as soon as no worker runs and its connection is closed
+    bool gone = false;
     bool has_turn = false;         ///< the turn is queued or being carried out
-    bool placed = false;           ///< it counts among the places; others have urgent requests executed only
+    /// it counts among the places; others have urgent requests executed only
+    bool placed = false;
     bool not_urgent = false;       ///< the next request has been looked at
     std::int64_t stalled_since = 0; ///< since when a full queue has not moved; 0: it moves
-    std::int64_t halting_since = 0; ///< since when its next request, a `stop`, waits for the threads; 0: it does not
-    std::thread worker;            ///< runs a command that waits; until it has finished no other request is executed
+    /// since when its next request, a `stop`, waits for the threads; 0: it does not
+    std::int64_t halting_since = 0;
+    /// runs a command that waits; until it has finished no other request is executed
+    std::thread worker;
     std::string result;            ///< of the worker
     std::atomic<bool> finished{false};
     Turn turn;
@@ -71,7 +87,8 @@ struct ServedClient {
     std::mutex events_mutex;
     std::string events;            ///< that the worker has for the client meanwhile
 
-    /// The place of the next end of line, or npos. Every byte is looked at once, however slowly a long line comes.
+    /// The place of the next end of line, or npos. Every byte is looked at once, however slowly a
+    /// long line comes.
     std::size_t line_end() {
         const auto end = in.find('\n', std::max(taken, searched));
         searched = end == std::string::npos ? in.size() : end;
@@ -89,14 +106,16 @@ struct ServedClient {
         if (taken < in.size()) return;
         in.clear();
         taken = searched = 0;
-        if (in.capacity() > slow_reader) in.shrink_to_fit();
+        if (in.capacity() > slow_reader) {
+            in.shrink_to_fit();
+        }
     }
     bool busy() const { return worker.joinable(); }
     std::size_t waiting() const { return out.size() - sent; }
 };
 
-/// Carries out the turns of clients, in the order in which they were given. A turn may wait for the session's lock for long: the server's thread
-/// never does.
+/// Carries out the turns of clients, in the order in which they were given. A turn may wait for the
+/// session's lock for long: the server's thread never does.
 class Executors {
 public:
     explicit Executors(std::function<void()> told) : told_(std::move(told)) {}
@@ -113,8 +132,8 @@ private:
     std::function<void()> told_;
     std::mutex mutex_;
     std::condition_variable wake_;
-    std::deque<ServedClient*> queue_;   // guarded by mutex_
-    bool ending_ = false;         // guarded by mutex_
+    std::deque<ServedClient*> queue_;  // guarded by mutex_
+    bool ending_ = false;  // guarded by mutex_
     std::vector<std::thread> threads_;
 };
 

@@ -19,31 +19,44 @@ namespace hal {
 class ProbeBatch {
 public:
     struct Part {
-        std::size_t group = 0, rows = 0, columns = 0;  ///< columns: of the group
-        std::uint64_t lost = 0;                        ///< rows that did not fit into the ring since the part before
-        std::size_t offset = 0;                        ///< in the bytes
+        std::size_t group = 0;
+        std::size_t rows = 0;
+        std::size_t columns = 0;  ///< columns: of the group
+        /// rows that did not fit into the ring since the part before
+        std::uint64_t lost = 0;
+        std::size_t offset = 0;  ///< in the bytes
     };
     std::uint64_t layout = 0;
-    std::int64_t until_ns = 0;  ///< all rows of earlier cycles are in this batch or in an earlier one
+    /// all rows of earlier cycles are in this batch or in an earlier one
+    std::int64_t until_ns = 0;
     std::vector<Part> parts;
 
     std::uint64_t cycle(const Part& part, std::size_t row) const { return word(part, row, 0); }
     /// Returns when the row's cycle was due, on the machine's clock.
-    std::int64_t time_ns(const Part& part, std::size_t row) const { return static_cast<std::int64_t>(word(part, row, 1)); }
+    std::int64_t time_ns(const Part& part, std::size_t row) const {
+        return static_cast<std::int64_t>(word(part, row, 1));
+    }
     /// Returns the value of a column of the group: bits of a double, or an integer, sign-extended.
-    std::uint64_t raw(const Part& part, std::size_t row, std::size_t column) const { return word(part, row, column + 2); }
+    std::uint64_t raw(const Part& part, std::size_t row, std::size_t column) const {
+        return word(part, row, column + 2);
+    }
     /// Returns it as a double, whatever its type.
     double real(const Part& part, std::size_t row, std::size_t column, hal_type type) const;
 
-    /// Calls f(part, row) for all rows, the oldest first. Rows of equal time come in the order of their groups.
+    /// Calls f(part, row) for all rows, the oldest first. Rows of equal time come in the order of
+    /// their groups.
     template <class F>
     void in_time_order(F f) const {
         std::vector<std::size_t> next(parts.size());
         for (;;) {
             std::size_t first = parts.size();
-            for (std::size_t i = 0; i < parts.size(); ++i)
-                if (next[i] < parts[i].rows && (first == parts.size() || time_ns(parts[i], next[i]) < time_ns(parts[first], next[first])))
+            for (std::size_t i = 0; i < parts.size(); ++i) {
+                if (next[i] < parts[i].rows &&
+                    (first == parts.size() ||
+                     time_ns(parts[i], next[i]) < time_ns(parts[first], next[first]))) {
                     first = i;
+                }
+            }
             if (first == parts.size()) return;
             f(parts[first], next[first]++);
         }
@@ -62,13 +75,16 @@ private:
 class ProbeClient {
 public:
     struct Options {
-        std::uint32_t every = 1;               ///< cycles of each thread from one row to the next
-        int batch_ms = 20, buffer_ms = 2000;
-        bool journal = false;                  ///< entries of the machine's journal as well
+        std::uint32_t every = 1;  ///< cycles of each thread from one row to the next
+        int batch_ms = 20;
+        int buffer_ms = 2000;
+        bool journal = false;  ///< entries of the machine's journal as well
     };
-    /// Attaches to pins, parameters and signals. Returns nullptr and sets `problem`. Takes all events of `client`, which must outlive it.
-    static std::unique_ptr<ProbeClient> attach(Client& client, const std::vector<std::string>& names, const Options& options,
-                                               std::string& problem);
+    /// Attaches to pins, parameters and signals. Returns nullptr and sets `problem`. Takes all
+    /// events of `client`, which must outlive it.
+    static std::unique_ptr<ProbeClient> attach(Client& client,
+                                               const std::vector<std::string>& names,
+                                               const Options& options, std::string& problem);
     ~ProbeClient();  ///< detaches
     ProbeClient(const ProbeClient&) = delete;
 
@@ -101,7 +117,8 @@ private:
     bool read_batch(const nlohmann::json& event, std::string&& payload, ProbeBatch& batch);
 
     Client& client_;
-    std::uint64_t number_ = 0, lost_ = 0;
+    std::uint64_t number_ = 0;
+    std::uint64_t lost_ = 0;
     std::vector<ProbeColumn> columns_;
     ProbeLayout layout_;
     std::int64_t unix_offset_ns_ = 0;

@@ -28,7 +28,9 @@ void list(std::string& to, const Items& items, Append append) {
     to += '[';
     bool first = true;
     for (const auto& item : items) {
-        if (!first) to += ',';
+        if (!first) {
+            to += ',';
+        }
         first = false;
         append(item);
     }
@@ -50,11 +52,16 @@ void append_groups(std::string& to, const ProbeLayout& layout) {
 ProbeFeeds::~ProbeFeeds() {
     const std::scoped_lock own(mutex_);
     const auto lock = session_.lock();
-    for (const Feed& feed : all_) session_.probes().detach(feed.probe);
-    if (journal_) session_.journal().end();
+    for (const Feed& feed : all_) {
+        session_.probes().detach(feed.probe);
+    }
+    if (journal_) {
+        session_.journal().end();
+    }
 }
 
-std::string ProbeFeeds::add(const ProbeRequest& request, std::int64_t batch_ns, std::string& reply) {
+std::string ProbeFeeds::add(const ProbeRequest& request, std::int64_t batch_ns,
+                            std::string& reply) {
     const std::scoped_lock own(mutex_);
     if (all_.size() >= most) return "a client has at most " + number(most) + " probes";
     const auto lock = session_.lock();
@@ -65,8 +72,8 @@ std::string ProbeFeeds::add(const ProbeRequest& request, std::int64_t batch_ns, 
     all_.push_back({next_++, probe, batch_ns, now + batch_ns, now});
     const ProbeLayout& layout = Probes::layout(*probe);
     reply += ",\"probe\":" + number(all_.back().id) + ",\"layout\":" + number(layout.number) +
-             ",\"time_ns\":" + std::to_string(session_.threads().now_ns()) + ",\"unix_ns\":" + std::to_string(unix_now_ns()) +
-             ",\"columns\":";
+             ",\"time_ns\":" + std::to_string(session_.threads().now_ns()) +
+             ",\"unix_ns\":" + std::to_string(unix_now_ns()) + ",\"columns\":";
     list(reply, Probes::columns(*probe), [&](const ProbeColumn& column) {
         json_quote(reply += "{\"name\":", column.name);
         reply += std::string(",\"type\":\"") + name(column.type) + "\",\"unit\":";
@@ -79,7 +86,8 @@ std::string ProbeFeeds::add(const ProbeRequest& request, std::int64_t batch_ns, 
 
 std::optional<std::uint64_t> ProbeFeeds::remove(std::uint64_t id) {
     const std::scoped_lock own(mutex_);
-    const auto at = std::find_if(all_.begin(), all_.end(), [&](const Feed& feed) { return feed.id == id; });
+    const auto at =
+        std::find_if(all_.begin(), all_.end(), [&](const Feed& feed) { return feed.id == id; });
     if (at == all_.end()) return std::nullopt;
     const auto lock = session_.lock();
     session_.probes().detach(at->probe);
@@ -92,8 +100,12 @@ void ProbeFeeds::journal(bool on) {
     const std::scoped_lock own(mutex_);
     if (on == journal_.has_value()) return;
     const auto lock = session_.lock();
-    if (on) journal_ = session_.journal().begin();
-    else session_.journal().end(), journal_.reset();
+    if (on) {
+        journal_ = session_.journal().begin();
+    } else {
+        session_.journal().end();
+        journal_.reset();
+    }
     journal_due_ns_ = monotonic_ns();
 }
 
@@ -105,7 +117,9 @@ bool ProbeFeeds::empty() const {
 std::int64_t ProbeFeeds::next_due_ns() const {
     const std::scoped_lock own(mutex_);
     std::int64_t due = journal_ ? journal_due_ns_ : std::numeric_limits<std::int64_t>::max();
-    for (const Feed& feed : all_) due = std::min(due, feed.due_ns);
+    for (const Feed& feed : all_) {
+        due = std::min(due, feed.due_ns);
+    }
     return due;
 }
 
@@ -114,14 +128,18 @@ void ProbeFeeds::publish(std::int64_t now_ns, bool congested, std::string& event
     for (Feed& feed : all_) {
         if (feed.due_ns > now_ns) continue;
         feed.due_ns += ((now_ns - feed.due_ns) / feed.every_ns + 1) * feed.every_ns;
-        if (!congested) publish(feed, now_ns, events);
+        if (!congested) {
+            publish(feed, now_ns, events);
+        }
     }
     if (!journal_ || journal_due_ns_ > now_ns) return;
     journal_due_ns_ = now_ns + journal_every_ns;
     if (congested) return;
     const auto lock = session_.lock();
     for (const JournalEntry& entry : session_.journal().after(*journal_)) {
-        json_quote(events += "{\"event\":\"journal\",\"time_ns\":" + std::to_string(entry.time_ns) + ",\"kind\":", entry.kind);
+        json_quote(events += "{\"event\":\"journal\",\"time_ns\":" + std::to_string(entry.time_ns) +
+                             ",\"kind\":",
+                   entry.kind);
         json_quote(events += ",\"text\":", entry.text);
         events += "}\n";
     }
@@ -133,11 +151,15 @@ void ProbeFeeds::publish(Feed& feed, std::int64_t now_ns, std::string& events) {
         const auto lock = session_.lock();
         results = session_.probes().take(*feed.probe);
     }
-    if (!results.empty() && results.back().bytes.size() >= Probes::most_at_once) feed.due_ns = now_ns;  // more is waiting
+    // more is waiting
+    if (!results.empty() && results.back().bytes.size() >= Probes::most_at_once) {
+        feed.due_ns = now_ns;
+    }
     const std::string probe = "\"probe\":" + number(feed.id);
     for (const ProbeRows& rows : results) {
         if (rows.layout) {
-            events += "{\"event\":\"layout\"," + probe + ",\"layout\":" + number(rows.layout->number);
+            events +=
+                "{\"event\":\"layout\"," + probe + ",\"layout\":" + number(rows.layout->number);
             append_groups(events, *rows.layout);
             events += "}\n";
         }
@@ -146,7 +168,8 @@ void ProbeFeeds::publish(Feed& feed, std::int64_t now_ns, std::string& events) {
         events += "{\"event\":\"samples\"," + probe + ",\"layout\":" + number(rows.layout_number) +
                   ",\"until_ns\":" + std::to_string(rows.until_ns) + ",\"parts\":";
         list(events, rows.parts, [&](const ProbeRows::Part& part) {
-            events += "{\"group\":" + number(part.group) + ",\"rows\":" + number(part.rows) + ",\"lost\":" + number(part.lost) + "}";
+            events += "{\"group\":" + number(part.group) + ",\"rows\":" + number(part.rows) +
+                      ",\"lost\":" + number(part.lost) + "}";
         });
         events += ",\"bytes\":" + number(rows.bytes.size()) + "}\n" + rows.bytes;
     }

@@ -13,8 +13,9 @@
 
 namespace hal {
 
-/// Nothing of it is reached but through its members, and each of them takes its mutex, then the session's lock where it needs it: they may be
-/// called from any thread. Who holds the session's lock must not call anything here. [any]
+/// Nothing of it is reached but through its members, and each of them takes its mutex, then the
+/// session's lock where it needs it: they may be called from any thread. Who holds the session's
+/// lock must not call anything here. [any]
 class ProbeFeeds {
 public:
     static constexpr std::size_t most = 64;  ///< of one client
@@ -25,7 +26,8 @@ public:
 
     /// Attaches a probe and appends the members of the reply; or returns the reason why not.
     std::string add(const ProbeRequest& request, std::int64_t batch_ns, std::string& reply);
-    /// Detaches it and returns how many rows were lost; nothing when there is no probe of this number.
+    /// Detaches it and returns how many rows were lost; nothing when there is no probe of this
+    /// number.
     std::optional<std::uint64_t> remove(std::uint64_t id);
     /// Begins or ends sending the journal.
     void journal(bool on);

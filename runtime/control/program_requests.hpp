@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The verbs by which a program is a component: component, exchange, exit, port, stream. docs/protocol.md. Internal to the shell.
+// The verbs by which a program is a component: component, exchange, exit, port, stream.
+// docs/protocol.md. Internal to the shell.
 #pragma once
 
 #include <cstdint>

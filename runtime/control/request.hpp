@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What the verbs of the control protocol share: reading a request and rejecting it. Internal to the shell.
+// What the verbs of the control protocol share: reading a request and rejecting it. Internal to the
+// shell.
 #pragma once
 
 #include <cstdint>
@@ -23,22 +24,33 @@ inline const nlohmann::json& member(const nlohmann::json& body, const char* key)
 }
 
 inline const std::string& text_of(const nlohmann::json& value, const char* what) {
-    if (!value.is_string()) throw RequestError{std::string(what) + " must be a string"};
+    if (!value.is_string()) {
+        throw RequestError{std::string(what) + " must be a string"};
+    }
     return value.get_ref<const std::string&>();
 }
 
 inline std::vector<std::string> names_in(const nlohmann::json& value, const char* what) {
     constexpr std::size_t most = 100'000;
-    if (!value.is_array()) throw RequestError{std::string(what) + " must be an array of names"};
-    if (value.size() > most) throw RequestError{std::string(what) + " has more than " + std::to_string(most) + " names"};
+    if (!value.is_array()) {
+        throw RequestError{std::string(what) + " must be an array of names"};
+    }
+    if (value.size() > most) {
+        throw RequestError{std::string(what) + " has more than " + std::to_string(most) + " names"};
+    }
     std::vector<std::string> names;
-    for (const nlohmann::json& name : value) names.push_back(text_of(name, "a name"));
+    for (const nlohmann::json& name : value) {
+        names.push_back(text_of(name, "a name"));
+    }
     return names;
 }
 
-inline std::int64_t whole(const nlohmann::json& value, const char* what, std::int64_t least, std::int64_t most) {
-    if (!value.is_number_integer() || value < least || value > most)
-        throw RequestError{std::string(what) + " must be a whole number from " + std::to_string(least) + " to " + std::to_string(most)};
+inline std::int64_t whole(const nlohmann::json& value, const char* what, std::int64_t least,
+                          std::int64_t most) {
+    if (!value.is_number_integer() || value < least || value > most) {
+        throw RequestError{std::string(what) + " must be a whole number from " +
+                           std::to_string(least) + " to " + std::to_string(most)};
+    }
     return value.get<std::int64_t>();
 }
 

@@ -18,20 +18,30 @@ namespace hal {
 namespace {
 
 constexpr std::size_t read_at_once = 65536;
-constexpr std::int64_t halt_poll_ns = 500'000;             // between two looks whether the threads have stopped
-constexpr std::int64_t halt_timeout_ns = 1'000'000'000;    // before the ordinary `stop` reports which thread does not
-constexpr int lines_at_once = 1000;                        // of one client before the others have a turn
+// between two looks whether the threads have stopped
+constexpr std::int64_t halt_poll_ns = 500'000;
+// before the ordinary `stop` reports which thread does not
+constexpr std::int64_t halt_timeout_ns = 1'000'000'000;
+// of one client before the others have a turn
+constexpr int lines_at_once = 1000;
 
 }  // namespace
 
-Server::Server(Shell& shell, ServerOptions options) : state_(new State(shell, std::move(options))) {}
+Server::Server(Shell& shell, ServerOptions options)
+    : state_(new State(shell, std::move(options))) {}
 
 Server::~Server() {
     State& s = *state_;
     s.ending = true;
-    if (s.wake >= 0) eventfd_write(s.wake, 1);
-    if (s.thread.joinable()) s.thread.join();
-    if (s.wake >= 0) close(s.wake);
+    if (s.wake >= 0) {
+        eventfd_write(s.wake, 1);
+    }
+    if (s.thread.joinable()) {
+        s.thread.join();
+    }
+    if (s.wake >= 0) {
+        close(s.wake);
+    }
 }
 
 bool Server::start(Diagnostics& diagnostics) {
@@ -60,11 +70,13 @@ void Server::State::serve() {
     std::vector<pollfd> ready;
     while (!ending) {
         ready.clear();
-        ready.push_back({endpoint.fd(), static_cast<short>(monotonic_ns() >= accepts_from ? POLLIN : 0), 0});
+        ready.push_back(
+            {endpoint.fd(), static_cast<short>(monotonic_ns() >= accepts_from ? POLLIN : 0), 0});
         ready.push_back({wake, POLLIN, 0});
         for (const auto& client : clients) {
             const int reads = listens_to(*client) ? POLLIN | POLLRDHUP : POLLRDHUP;
-            ready.push_back({client->gone ? -1 : client->fd, static_cast<short>(reads | (client->waiting() > 0 ? POLLOUT : 0)), 0});
+            ready.push_back({client->gone ? -1 : client->fd,
+                             static_cast<short>(reads | (client->waiting() > 0 ? POLLOUT : 0)), 0});
         }
         const int timeout = sleep_ms();
         poll(ready.data(), ready.size(), timeout);
@@ -72,8 +84,12 @@ void Server::State::serve() {
         eventfd_read(wake, &ignored);
 
         const std::size_t before = clients.size();
-        if (ready[0].revents & POLLIN) accept_clients();
-        for (std::size_t i = 0; i < before; ++i) serve_client(*clients[i], ready[i + 2].revents);
+        if (ready[0].revents & POLLIN) {
+            accept_clients();
+        }
+        for (std::size_t i = 0; i < before; ++i) {
+            serve_client(*clients[i], ready[i + 2].revents);
+        }
         remove_gone();
         reclaim();
         place_clients();
@@ -87,12 +103,19 @@ void Server::State::serve_client(ServedClient& client, short events) {
     collect_turn(client);
     collect_worker(client);
     if (client.gone) return;
-    if (events & POLLIN) receive(client);
-    else if (events & (POLLHUP | POLLERR | POLLRDHUP)) leave(client);
+    if (events & POLLIN) {
+        receive(client);
+    } else if (events & (POLLHUP | POLLERR | POLLRDHUP)) {
+        leave(client);
+    }
     if (client.gone) return;
-    if (client.busy()) look_for_cancel(client);
+    if (client.busy()) {
+        look_for_cancel(client);
+    }
     execute(client);
-    if (!client.gone) send_out(client);
+    if (!client.gone) {
+        send_out(client);
+    }
 }
 
 void Server::State::remove_gone() {
@@ -103,55 +126,83 @@ void Server::State::remove_gone() {
         client->turn_over = false;
         pool.give(*client);
     }
-    std::erase_if(clients, [](const auto& client) { return client->gone && !client->busy() && !client->has_turn && !client->connection; });
+    std::erase_if(clients, [](const auto& client) {
+        return client->gone && !client->busy() && !client->has_turn && !client->connection;
+    });
 }
 
 void Server::State::end_all() {
     for (const auto& client : clients) {
         const bool is_being_closed = client->turn.closes;  // an executor has the connection
-        if (!is_being_closed && client->connection) client->connection->cancel();
+        if (!is_being_closed && client->connection) {
+            client->connection->cancel();
+        }
     }
     pool.end();
     for (const auto& client : clients) {
-        if (client->has_turn) client->out += client->turn.replies;
+        if (client->has_turn) {
+            client->out += client->turn.replies;
+        }
         if (client->busy()) {
             client->worker.join();
             client->out += client->result;
         }
-        if (!client->gone) send_out(*client);
+        if (!client->gone) {
+            send_out(*client);
+        }
     }
     endpoint.stop_listening();
     clients.clear();
-    if (spare >= 0) close(std::exchange(spare, -1));
+    if (spare >= 0) {
+        close(std::exchange(spare, -1));
+    }
     connected = 0;
 }
 
-/// When the next subscription of the client is due; never while it has a turn, at whose end they are sent.
+/// When the next subscription of the client is due; never while it has a turn, at whose end they
+/// are sent.
 std::int64_t Server::State::next_due_ns(ServedClient& client) {
-    return client.gone || client.has_turn ? std::numeric_limits<std::int64_t>::max() : client.connection->next_due_ns();
+    return client.gone || client.has_turn ? std::numeric_limits<std::int64_t>::max()
+                                          : client.connection->next_due_ns();
 }
 
 /// True when the client's next request can be executed now.
 bool Server::State::has_work(ServedClient& client) {
-    if (client.gone || client.busy() || client.has_turn || client.halting_since != 0 || client.waiting() > options.queue) return false;
+    if (client.gone || client.busy() || client.has_turn || client.halting_since != 0 ||
+        client.waiting() > options.queue) {
+        return false;
+    }
     return client.line_end() != std::string::npos && (client.placed || !client.not_urgent);
 }
 
-/// Time until the next subscription or client timeout is due; 0 while complete requests are pending.
+/// Time until the next subscription or client timeout is due; 0 while complete requests are
+/// pending.
 int Server::State::sleep_ms() {
     const std::int64_t now = monotonic_ns();
-    std::int64_t until = accepts_from > now ? accepts_from : std::numeric_limits<std::int64_t>::max();
+    std::int64_t until =
+        accepts_from > now ? accepts_from : std::numeric_limits<std::int64_t>::max();
     for (const auto& client : clients) {
         if (client->gone) continue;
         if (has_work(*client)) return 0;
         until = std::min(until, next_due_ns(*client));
-        if (client->halting_since != 0) until = std::min(until, now + halt_poll_ns);
-        if (!client->placed) until = std::min(until, client->came_ns + give_up_ns);
-        if (client->stalled_since != 0) until = std::min(until, client->stalled_since + std::int64_t{options.stall_ms} * 1'000'000);
+        if (client->halting_since != 0) {
+            until = std::min(until, now + halt_poll_ns);
+        }
+        if (!client->placed) {
+            until = std::min(until, client->came_ns + give_up_ns);
+        }
+        if (client->stalled_since != 0) {
+            until =
+                std::min(until, client->stalled_since + std::int64_t{options.stall_ms} * 1'000'000);
+        }
     }
-    if (files_short || count(true) > options.max_clients) until = std::min(until, now + std::int64_t{options.idle_ms} * 250'000);
+    if (files_short || count(true) > options.max_clients) {
+        until = std::min(until, now + std::int64_t{options.idle_ms} * 250'000);
+    }
     if (until == std::numeric_limits<std::int64_t>::max()) return -1;
-    return until <= now ? 0 : static_cast<int>(std::min<std::int64_t>((until - now + 999'999) / 1'000'000, 60'000));
+    return until <= now ? 0
+                        : static_cast<int>(
+                              std::min<std::int64_t>((until - now + 999'999) / 1'000'000, 60'000));
 }
 
 void Server::State::receive(ServedClient& client) {
@@ -173,8 +224,8 @@ void Server::State::receive(ServedClient& client) {
     client.in += text;
     if (client.in.size() > options.max_request && client.line_end() == std::string::npos) {
         ++rubbish;
-        client.out +=
-            "{\"id\":null,\"ok\":false,\"error\":\"the request is longer than " + std::to_string(options.max_request) + " bytes\"}\n";
+        client.out += "{\"id\":null,\"ok\":false,\"error\":\"the request is longer than " +
+                      std::to_string(options.max_request) + " bytes\"}\n";
         client.in.clear();
         client.in.shrink_to_fit();
         client.searched = 0;
@@ -182,7 +233,8 @@ void Server::State::receive(ServedClient& client) {
     }
 }
 
-/// A client that has gone: what it sent last is not executed, what its command waits for is not waited for.
+/// A client that has gone: what it sent last is not executed, what its command waits for is not
+/// waited for.
 void Server::State::leave(ServedClient& client) {
     client.gone = true;
     client.connection->cancel();
@@ -194,10 +246,13 @@ void Server::State::execute(ServedClient& client) {
     }
     if (client.gone || client.has_turn) return;
     if (client.halting_since != 0 && !execute_urgent(client)) return;
-    if ((client.placed && has_work(client)) || next_due_ns(client) <= monotonic_ns()) give_turn(client);
+    if ((client.placed && has_work(client)) || next_due_ns(client) <= monotonic_ns()) {
+        give_turn(client);
+    }
 }
 
-/// Executes the client's next request if it must not wait. False when it is not such a request, or not done yet.
+/// Executes the client's next request if it must not wait. False when it is not such a request, or
+/// not done yet.
 bool Server::State::execute_urgent(ServedClient& client) {
     const std::size_t end = client.line_end();
     const std::string_view line = client.line(end);
@@ -208,9 +263,12 @@ bool Server::State::execute_urgent(ServedClient& client) {
     if (client.not_urgent) return false;
     const std::uint64_t before = client.connection->requests();
     const std::int64_t now = monotonic_ns();
-    auto done = client.halting_since != 0 ? client.connection->halted(line, client.out) : client.connection->execute_urgent(line, client.out);
+    auto done = client.halting_since != 0 ? client.connection->halted(line, client.out)
+                                          : client.connection->execute_urgent(line, client.out);
     if (done == Connection::Urgent::halting) {
-        if (client.halting_since == 0) client.halting_since = now;
+        if (client.halting_since == 0) {
+            client.halting_since = now;
+        }
         if (now - client.halting_since < halt_timeout_ns) return false;
         done = Connection::Urgent::lost;
     }
@@ -255,7 +313,9 @@ void Server::State::collect_turn(ServedClient& client) {
     client.has_turn = false;
     Turn& turn = client.turn;
     if (turn.closes) return;
-    if (turn.requests + turn.rubbish > 0) client.active_ns = monotonic_ns();
+    if (turn.requests + turn.rubbish > 0) {
+        client.active_ns = monotonic_ns();
+    }
     requests += turn.requests;
     rubbish += turn.rubbish;
     if (!client.busy()) {
@@ -270,12 +330,16 @@ void Server::State::collect_turn(ServedClient& client) {
         turn.lines = {};
     }
     if (turn.stop && options.stop) {
-        if (!client.gone) send_out(client);
+        if (!client.gone) {
+            send_out(client);
+        }
         options.stop();
     }
     if (turn.waiting.empty()) return;
     start_worker(client, std::exchange(turn.waiting, {}));
-    if (client.gone) client.connection->cancel();  // what it waits for is not waited for
+    if (client.gone) {
+        client.connection->cancel();  // what it waits for is not waited for
+    }
 }
 
 void Server::State::start_worker(ServedClient& client, std::string request) {
@@ -293,7 +357,10 @@ void Server::State::start_worker(ServedClient& client, std::string request) {
 void Server::State::look_for_cancel(ServedClient& client) {
     for (std::size_t at = client.taken; at < client.in.size();) {
         const auto end = client.in.find('\n', at);
-        if (end == std::string::npos || client.connection->cancels(std::string_view(client.in).substr(at, end - at))) return;
+        if (end == std::string::npos ||
+            client.connection->cancels(std::string_view(client.in).substr(at, end - at))) {
+            return;
+        }
         at = end + 1;
     }
 }
@@ -306,7 +373,9 @@ void Server::State::collect_worker(ServedClient& client) {
     if (!client.busy() || !client.finished.load(std::memory_order_acquire)) return;
     client.worker.join();
     client.active_ns = monotonic_ns();
-    if (!client.gone) client.connection->cancel(false);
+    if (!client.gone) {
+        client.connection->cancel(false);
+    }
     client.out += std::exchange(client.events, {});
     client.out += std::exchange(client.result, {});
 }
@@ -314,7 +383,8 @@ void Server::State::collect_worker(ServedClient& client) {
 void Server::State::send_out(ServedClient& client) {
     const std::size_t before = client.sent;
     while (client.waiting() > 0) {
-        const ssize_t gone = send(client.fd, client.out.data() + client.sent, client.waiting(), MSG_NOSIGNAL | MSG_DONTWAIT);
+        const ssize_t gone = send(client.fd, client.out.data() + client.sent, client.waiting(),
+                                  MSG_NOSIGNAL | MSG_DONTWAIT);
         if (gone < 0 && errno == EINTR) continue;
         if (gone < 0 && errno != EAGAIN && errno != EWOULDBLOCK) return leave(client);
         if (gone <= 0) break;
@@ -323,7 +393,9 @@ void Server::State::send_out(ServedClient& client) {
     const bool moved = client.sent != before;
     if (client.waiting() == 0) {
         client.out.clear();
-        if (client.out.capacity() > options.queue) client.out.shrink_to_fit();
+        if (client.out.capacity() > options.queue) {
+            client.out.shrink_to_fit();
+        }
         client.sent = 0;
     } else if (client.sent > options.queue) {
         client.out.erase(0, client.sent);
@@ -334,11 +406,13 @@ void Server::State::send_out(ServedClient& client) {
         return;
     }
     const std::int64_t now = monotonic_ns();
-    if (client.stalled_since == 0) client.stalled_since = now;
+    if (client.stalled_since == 0) {
+        client.stalled_since = now;
+    }
     if (now - client.stalled_since < std::int64_t{options.stall_ms} * 1'000'000) return;
     ++dropped;
-    log("disconnected a client: " + std::to_string(client.waiting()) + " bytes of replies pending, nothing read for " +
-        std::to_string(options.stall_ms) + " ms");
+    log("disconnected a client: " + std::to_string(client.waiting()) +
+        " bytes of replies pending, nothing read for " + std::to_string(options.stall_ms) + " ms");
     leave(client);
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The control socket of an instance: one thread that serves any number of clients, docs/protocol.md.
+// The control socket of an instance: one thread that serves any number of clients,
+// docs/protocol.md.
 #pragma once
 
 #include <cstddef>
@@ -16,30 +17,43 @@ namespace hal {
 class Shell;
 
 struct ServerOptions {
-    std::function<void()> stop;                      ///< a client asked the instance to end; called in the server's thread
-    std::function<void(std::string_view)> log;       ///< one sentence when a client is dropped; may be empty
+    /// a client asked the instance to end; called in the server's thread
+    std::function<void()> stop;
+    /// one sentence when a client is dropped; may be empty
+    std::function<void(std::string_view)> log;
     std::size_t max_request = std::size_t{16} << 20; ///< bytes of one request
-    std::size_t queue = std::size_t{1} << 20;        ///< replies waiting for a client before it is no longer listened to
-    int stall_ms = 10000;                            ///< a client with a full queue that reads nothing for this time is disconnected
+    /// replies waiting for a client before it is no longer listened to
+    std::size_t queue = std::size_t{1} << 20;
+    /// a client with a full queue that reads nothing for this time is disconnected
+    int stall_ms = 10000;
     std::size_t max_clients = 256;
-    std::size_t reserved = 8;                        ///< connections beyond these, for short commands: an operator always gets in
-    int idle_ms = 1000;                              ///< after this time without a request, a client on which nothing depends counts as idle
+    /// connections beyond these, for short commands: an operator always gets in
+    std::size_t reserved = 8;
+    /// after this time without a request, a client on which nothing depends counts as idle
+    int idle_ms = 1000;
 };
 
 struct ServerCounts {
     std::uint64_t clients = 0;   ///< connected now
-    std::uint64_t accepted = 0, dropped = 0, reclaimed = 0, refused = 0, requests = 0, rubbish = 0;
+    std::uint64_t accepted = 0;
+    std::uint64_t dropped = 0;
+    std::uint64_t reclaimed = 0;
+    std::uint64_t refused = 0;
+    std::uint64_t requests = 0;
+    std::uint64_t rubbish = 0;
 };
 
 class Server {
 public:
-    /// Serves the shell's session; each client gets a shell of its own. The shell must outlive the server.
+    /// Serves the shell's session; each client gets a shell of its own. The shell must outlive the
+    /// server.
     explicit Server(Shell& shell, ServerOptions options = {});
     ~Server();  ///< ends all connections and waits for the thread; removes the socket
     Server(const Server&) = delete;
 
-    /// Makes the socket (named by the session's instance name) and starts the thread. False: `diagnostics` has the reason, for
-    /// instance that an instance of this name runs already. A socket left over by a dead process is replaced.
+    /// Makes the socket (named by the session's instance name) and starts the thread. False:
+    /// `diagnostics` has the reason, for instance that an instance of this name runs already. A
+    /// socket left over by a dead process is replaced.
     bool start(Diagnostics& diagnostics);
     const std::string& path() const;
     ServerCounts counts() const;  ///< [any]

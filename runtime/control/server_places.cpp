@@ -10,27 +10,38 @@
 namespace hal {
 namespace {
 
-constexpr std::int64_t no_files_ns = 5'000'000;            // before accept is tried again after the system had no file left
-constexpr std::int64_t urgent_ns = 20'000'000;             // how long a client without a place has at least for an urgent request
+// before accept is tried again after the system had no file left
+constexpr std::int64_t no_files_ns = 5'000'000;
+// how long a client without a place has at least for an urgent request
+constexpr std::int64_t urgent_ns = 20'000'000;
 constexpr std::size_t max_waiting = 64;                    // clients without a place
 
 }  // namespace
 
 /// Opens the descriptor in reserve again, once no client uses it.
 void Server::State::keep_spare() {
-    if (spare < 0) spare = eventfd(0, EFD_CLOEXEC);
-    if (spare >= 0) files_short = false;
+    if (spare < 0) {
+        spare = eventfd(0, EFD_CLOEXEC);
+    }
+    if (spare >= 0) {
+        files_short = false;
+    }
 }
 
-/// Accepts a connection; with the descriptor in reserve when the process has no other. Returns -1 when there is none, or no way to accept it.
+/// Accepts a connection; with the descriptor in reserve when the process has no other. Returns -1
+/// when there is none, or no way to accept it.
 int Server::State::accept_one() {
     int fd = accept4(endpoint.fd(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
     if (fd >= 0) return fd;
     if (errno != EMFILE && errno != ENFILE && errno != ENOBUFS && errno != ENOMEM) return -1;
     files_short = true;
-    if (!close_one_idle(urgent_ns) && spare >= 0) close(std::exchange(spare, -1));
+    if (!close_one_idle(urgent_ns) && spare >= 0) {
+        close(std::exchange(spare, -1));
+    }
     fd = accept4(endpoint.fd(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
-    if (fd < 0) accepts_from = monotonic_ns() + no_files_ns;
+    if (fd < 0) {
+        accepts_from = monotonic_ns() + no_files_ns;
+    }
     return fd;
 }
 
@@ -39,23 +50,32 @@ bool Server::State::close_one_idle(std::int64_t idle_ns) {
     const std::int64_t now = monotonic_ns();
     ServedClient* longest = nullptr;
     for (const auto& client : clients) {
-        const bool occupied = client->gone || client->has_turn || client->busy() || client->halting_since != 0 || now - client->active_ns < idle_ns;
+        const bool occupied = client->gone || client->has_turn || client->busy() ||
+                              client->halting_since != 0 || now - client->active_ns < idle_ns;
         if (occupied || (longest && longest->active_ns <= client->active_ns)) continue;
-        if (!client->placed || client->connection->idle()) longest = client.get();
+        if (!client->placed || client->connection->idle()) {
+            longest = client.get();
+        }
     }
     if (!longest) return false;
     close_idle(*longest);
     return true;
 }
 
-/// Closes the client without a place that has been connected longest, if it had the time for an urgent request. False when there is none.
+/// Closes the client without a place that has been connected longest, if it had the time for an
+/// urgent request. False when there is none.
 bool Server::State::make_way() {
     ServedClient* oldest = nullptr;
-    for (const auto& client : clients)
-        if (!client->gone && !client->placed && client->halting_since == 0 && (!oldest || client->came_ns < oldest->came_ns)) oldest = client.get();
+    for (const auto& client : clients) {
+        if (!client->gone && !client->placed && client->halting_since == 0 &&
+            (!oldest || client->came_ns < oldest->came_ns)) {
+            oldest = client.get();
+        }
+    }
     if (!oldest || monotonic_ns() - oldest->came_ns < urgent_ns) return false;
     ++reclaimed;
-    close_client(*oldest, files_short ? "the machine has no file descriptor left" : "too many clients are connected");
+    close_client(*oldest, files_short ? "the machine has no file descriptor left"
+                                      : "too many clients are connected");
     return true;
 }
 
@@ -74,7 +94,8 @@ void Server::State::accept_clients() {
 void Server::State::add_client(int fd) {
     ucred peer{};
     socklen_t size = sizeof peer;
-    if (getsockopt(fd, SOL_SOCKET, SO_PEERCRED, &peer, &size) != 0 || (peer.uid != geteuid() && peer.uid != 0)) {
+    if (getsockopt(fd, SOL_SOCKET, SO_PEERCRED, &peer, &size) != 0 ||
+        (peer.uid != geteuid() && peer.uid != 0)) {
         ++refused;
         log("rejected a client of user " + std::to_string(peer.uid));
         close(fd);
@@ -94,7 +115,8 @@ void Server::State::add_client(int fd) {
     send_out(client);
 }
 
-/// Gives free places to those who wait for one, in the order in which they came, and closes the connection of those who have waited too long.
+/// Gives free places to those who wait for one, in the order in which they came, and closes the
+/// connection of those who have waited too long.
 void Server::State::place_clients() {
     const std::int64_t now = monotonic_ns();
     for (const auto& client : clients) {
@@ -104,30 +126,43 @@ void Server::State::place_clients() {
             client->reserved = count(true) > options.max_clients;
         } else if (now - client->came_ns >= give_up_ns) {
             ++refused;
-            close_client(*client, spare < 0 ? "the machine has no file descriptor left" : "too many clients are connected, and none of them is idle");
+            close_client(*client, spare < 0
+                                      ? "the machine has no file descriptor left"
+                                      : "too many clients are connected, and none of them is idle");
         }
     }
 }
 
-/// While more clients are connected than there are places, those go that have been idle longest, and one in a reserved place that
-/// keeps it from the next. When the process has no descriptor left, an idle client goes, too.
+/// While more clients are connected than there are places, those go that have been idle longest,
+/// and one in a reserved place that keeps it from the next. When the process has no descriptor
+/// left, an idle client goes, too.
 void Server::State::reclaim() {
     std::size_t living = count(true);
-    const std::int64_t now = monotonic_ns(), idle_ns = std::int64_t{options.idle_ms} * 1'000'000;
-    if (files_short && spare < 0) close_one_idle(idle_ns);
+    const std::int64_t now = monotonic_ns();
+    const std::int64_t idle_ns = std::int64_t{options.idle_ms} * 1'000'000;
+    if (files_short && spare < 0) {
+        close_one_idle(idle_ns);
+    }
     if (living <= options.max_clients) {
-        for (const auto& client : clients) client->reserved = false;
+        for (const auto& client : clients) {
+            client->reserved = false;
+        }
         return;
     }
     for (; living > options.max_clients; --living) {
         ServedClient* longest = nullptr;
         for (const auto& client : clients) {
-            if (client->gone || !client->placed || client->has_turn || now - client->active_ns < idle_ns) continue;
+            if (client->gone || !client->placed || client->has_turn ||
+                now - client->active_ns < idle_ns) {
+                continue;
+            }
             if (longest && longest->active_ns <= client->active_ns) continue;
             const bool in_the_way = client->reserved && living == places();
-            const bool goes =
-                client->busy() ? in_the_way && now - client->active_ns >= 10 * idle_ns : in_the_way || client->connection->idle();
-            if (goes) longest = client.get();
+            const bool goes = client->busy() ? in_the_way && now - client->active_ns >= 10 * idle_ns
+                                             : in_the_way || client->connection->idle();
+            if (goes) {
+                longest = client.get();
+            }
         }
         if (!longest) return;
         close_idle(*longest);
@@ -136,9 +171,12 @@ void Server::State::reclaim() {
 
 void Server::State::close_idle(ServedClient& client) {
     ++reclaimed;
-    const std::string idle = std::to_string((monotonic_ns() - client.active_ns) / 1'000'000'000) + " s";
-    const std::string why = count(true) > options.max_clients ? "more than " + std::to_string(options.max_clients) + " clients are connected"
-                                                              : "the machine has no file descriptor left";
+    const std::string idle =
+        std::to_string((monotonic_ns() - client.active_ns) / 1'000'000'000) + " s";
+    const std::string why =
+        count(true) > options.max_clients
+            ? "more than " + std::to_string(options.max_clients) + " clients are connected"
+            : "the machine has no file descriptor left";
     close_client(client, why + ", and this one sent no request for " + idle);
     log("disconnected a client without a request for " + idle + ": " + why);
 }

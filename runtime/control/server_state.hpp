@@ -19,26 +19,37 @@
 
 namespace hal {
 
-constexpr std::int64_t give_up_ns = 5'000'000'000;         // a client without a place waits for one at most
+// a client without a place waits for one at most
+constexpr std::int64_t give_up_ns = 5'000'000'000;
 
-// Two kinds of threads: the server's own accepts, reads and writes, and executes what must not wait (`stop`, `options`); executors do all the rest.
-// The server's thread takes no lock of the session, so whatever clients do, the next `stop` is seen at once. For that a client gets in when
-// all places are taken, and with the descriptor that is kept in reserve when the process has no other.
+// Two kinds of threads: the server's own accepts, reads and writes, and executes what must not wait
+// (`stop`, `options`); executors do all the rest. The server's thread takes no lock of the session,
+// so whatever clients do, the next `stop` is seen at once. For that a client gets in when all
+// places are taken, and with the descriptor that is kept in reserve when the process has no other.
 struct Server::State {
     State(Shell& s, ServerOptions o) : shell(s), options(std::move(o)) {}
 
     Shell& shell;
     ServerOptions options;
     Endpoint endpoint;
-    int wake = -1;                     ///< eventfd: a worker or an executor has finished, or the server is to end
-    int spare = -1;                    ///< a descriptor in reserve
+    /// eventfd: a worker or an executor has finished, or the server is to end
+    int wake = -1;
+    int spare = -1;  ///< a descriptor in reserve
     std::atomic<bool> ending{false};
     std::thread thread;
-    std::int64_t accepts_from = 0;     ///< on the steady clock
-    bool files_short = false;          ///< accept has failed because the process has no descriptor left
+    std::int64_t accepts_from = 0;  ///< on the steady clock
+    /// accept has failed because the process has no descriptor left
+    bool files_short = false;
     std::vector<std::unique_ptr<ServedClient>> clients;
     Executors pool{[this] { eventfd_write(wake, 1); }};
-    std::atomic<std::uint64_t> connected{0}, accepted{0}, dropped{0}, reclaimed{0}, refused{0}, requests{0}, rubbish{0};
+    std::atomic<std::uint64_t> connected{0};
+    std::atomic<std::uint64_t> accepted{0};
+    std::atomic<std::uint64_t> dropped{0};
+    std::atomic<std::uint64_t> reclaimed{0};
+    std::atomic<std::uint64_t> refused{0};
+
+    std::atomic<std::uint64_t> requests{0};
+    std::atomic<std::uint64_t> rubbish{0};
 
     void serve();
     void serve_client(ServedClient& client, short events);
@@ -69,14 +80,18 @@ struct Server::State {
     void remove_gone();
     std::size_t places() const { return options.max_clients + options.reserved; }
     std::size_t count(bool placed) const {
-        return static_cast<std::size_t>(
-            std::count_if(clients.begin(), clients.end(), [&](const auto& client) { return !client->gone && client->placed == placed; }));
+        return static_cast<std::size_t>(std::count_if(
+            clients.begin(), clients.end(),
+            [&](const auto& client) { return !client->gone && client->placed == placed; }));
     }
     bool listens_to(const ServedClient& client) const {
-        return client.waiting() <= options.queue && client.in.size() - client.taken <= options.max_request;
+        return client.waiting() <= options.queue &&
+               client.in.size() - client.taken <= options.max_request;
     }
     void log(const std::string& sentence) const {
-        if (options.log) options.log(sentence);
+        if (options.log) {
+            options.log(sentence);
+        }
     }
 };
 

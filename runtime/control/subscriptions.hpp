@@ -12,14 +12,16 @@
 
 namespace hal {
 
-/// Nothing of it is reached but through its members, and each of them takes its mutex: they may be called from any thread, also while
-/// another thread executes a request of the same client. publish() takes the session's lock after it; who holds that lock must
-/// not call anything here. [any]
+/// Nothing of it is reached but through its members, and each of them takes its mutex: they may be
+/// called from any thread, also while another thread executes a request of the same client.
+/// publish() takes the session's lock after it; who holds that lock must not call anything here.
+/// [any]
 class Subscriptions {
 public:
     static constexpr std::size_t most = 64;  ///< of one client
 
-    /// Adds a subscription to the values of `names` and returns its number; 0 when there are `most`.
+    /// Adds a subscription to the values of `names` and returns its number; 0 when there are
+    /// `most`.
     std::uint64_t add(std::vector<std::string> names, std::int64_t every_ns, bool changes_only);
     /// Returns false when there is no subscription of this number.
     bool remove(std::uint64_t id);

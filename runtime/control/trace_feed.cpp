@@ -31,12 +31,18 @@ std::string TraceFeed::set(bool on, std::string& reply) {
     const std::scoped_lock own(mutex_);
     if (on == on_) return on ? "this connection traces the instance already" : "";
     const auto lock = session_.lock();
-    if (on)
+    if (on) {
         if (std::string problem = session_.traces().begin(); !problem.empty()) return problem;
-    if (!on) session_.traces().end();
+    }
+    if (!on) {
+        session_.traces().end();
+    }
     on_ = on;
     due_ns_ = monotonic_ns();
-    if (on) reply += ",\"time_ns\":" + std::to_string(due_ns_) + ",\"unix_ns\":" + std::to_string(realtime_ns());
+    if (on) {
+        reply += ",\"time_ns\":" + std::to_string(due_ns_) +
+                 ",\"unix_ns\":" + std::to_string(realtime_ns());
+    }
     return "";
 }
 
@@ -64,10 +70,14 @@ void TraceFeed::publish(std::int64_t now_ns, bool congested, std::string& events
     events += "{\"event\":\"trace\",\"parts\":[";
     std::size_t bytes = 0;
     for (const TraceBatch::Part& part : batch.parts) {
-        if (&part != batch.parts.data()) events += ',';
+        if (&part != batch.parts.data()) {
+            events += ',';
+        }
         json_quote(events += "{\"thread\":", part.thread.name);
-        events += ",\"period_ns\":" + std::to_string(part.thread.period_ns) + ",\"tid\":" + std::to_string(part.thread.tid) +
-                  ",\"cpu\":" + std::to_string(part.thread.cpu) + ",\"count\":" + std::to_string(part.events.size()) +
+        events += ",\"period_ns\":" + std::to_string(part.thread.period_ns) +
+                  ",\"tid\":" + std::to_string(part.thread.tid) +
+                  ",\"cpu\":" + std::to_string(part.thread.cpu) +
+                  ",\"count\":" + std::to_string(part.events.size()) +
                   ",\"lost\":" + std::to_string(part.lost) + "}";
         bytes += part.events.size() * sizeof(TraceEvent);
     }
@@ -79,14 +89,20 @@ void TraceFeed::publish(std::int64_t now_ns, bool congested, std::string& events
         first = false;
     }
     events += "},\"bytes\":" + std::to_string(bytes) + "}\n";
-    for (const TraceBatch::Part& part : batch.parts)
-        events.append(reinterpret_cast<const char*>(part.events.data()), part.events.size() * sizeof(TraceEvent));
+    for (const TraceBatch::Part& part : batch.parts) {
+        events.append(reinterpret_cast<const char*>(part.events.data()),
+                      part.events.size() * sizeof(TraceEvent));
+    }
 }
 
 void Connection::State::trace(const Json& body, std::string& reply) {
     const Json& on = body["trace"];
-    if (!on.is_boolean()) throw RequestError{"trace must be true or false"};
-    if (std::string problem = traces.set(on.get<bool>(), reply); !problem.empty()) throw RequestError{std::move(problem)};
+    if (!on.is_boolean()) {
+        throw RequestError{"trace must be true or false"};
+    }
+    if (std::string problem = traces.set(on.get<bool>(), reply); !problem.empty()) {
+        throw RequestError{std::move(problem)};
+    }
 }
 
 }  // namespace hal

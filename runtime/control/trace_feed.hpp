@@ -10,14 +10,16 @@
 
 namespace hal {
 
-/// Each member takes its mutex, then the session's lock where it needs it. Who holds the session's lock must not call anything here. [any]
+/// Each member takes its mutex, then the session's lock where it needs it. Who holds the session's
+/// lock must not call anything here. [any]
 class TraceFeed {
 public:
     explicit TraceFeed(Session& session) : session_(session) {}
     ~TraceFeed();  ///< ends the trace
     TraceFeed(const TraceFeed&) = delete;
 
-    /// Begins or ends the trace. On success appends the members of the reply and returns an empty string, otherwise returns the reason.
+    /// Begins or ends the trace. On success appends the members of the reply and returns an empty
+    /// string, otherwise returns the reason.
     std::string set(bool on, std::string& reply);
     bool on() const;
     /// Returns when the next batch is due, on the steady clock; INT64_MAX without a trace.

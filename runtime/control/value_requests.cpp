@@ -20,7 +20,9 @@ void Connection::State::read(const Json& body, std::string& reply) {
     append_values(reply += ",\"values\":", readings);
     reply += ",\"types\":[";
     for (const auto& reading : readings) {
-        if (reply.back() != '[') reply += ',';
+        if (reply.back() != '[') {
+            reply += ',';
+        }
         reply += reading ? std::string("\"") + name(reading->type) + '"' : "null";
     }
     reply += "]";
@@ -28,11 +30,16 @@ void Connection::State::read(const Json& body, std::string& reply) {
 
 void Connection::State::set(const Json& body, std::string& reply) {
     const Json& values = body["set"];
-    if (!values.is_object()) throw RequestError{"set must be an object of names and values"};
+    if (!values.is_object()) {
+        throw RequestError{"set must be an object of names and values"};
+    }
     std::vector<Command> commands;
     for (const auto& [key, value] : values.items()) {
         const std::string word = value_word(value);
-        if (word.empty()) throw RequestError{"the value of '" + key.substr(0, 60) + "' must be a number, true, false or a string"};
+        if (word.empty()) {
+            throw RequestError{"the value of '" + key.substr(0, 60) +
+                               "' must be a number, true, false or a string"};
+        }
         commands.push_back({{"setp", {}}, {{key, {}}, {word, {}}}, {}});
     }
     if (shell.collecting()) {  // part of what `commit` makes take effect
@@ -47,10 +54,13 @@ void Connection::State::set(const Json& body, std::string& reply) {
         resolve_set(session.model(), command);
         const CommandRow& row = *find_command(command.name.text);
         if (!check_lock(row, command, session.locked, session.model(), diagnostics)) break;
-        session.journal().add("edit", command.name.text + " " + command.args[0].text + " " + command.args[1].text);
+        session.journal().add(
+            "edit", command.name.text + " " + command.args[0].text + " " + command.args[1].text);
         transaction.apply(row.form(), command, diagnostics);
     }
-    if (!transaction.commit(diagnostics)) throw RequestError{render(diagnostics, session.sources) + "nothing was changed"};
+    if (!transaction.commit(diagnostics)) {
+        throw RequestError{render(diagnostics, session.sources) + "nothing was changed"};
+    }
     reply += ",\"count\":" + std::to_string(commands.size());
 }
 
@@ -59,22 +69,34 @@ void Connection::State::subscribe(const Json& body, std::string& reply) {
     const Json& every = member(body, "every_ms");
     const std::int64_t every_ms = every.is_null() ? 100 : whole(every, "every_ms", 1, 3'600'000);
     const Json& changes = member(body, "changes");
-    if (!changes.is_null() && !changes.is_boolean()) throw RequestError{"changes must be true or false"};
-    const std::uint64_t number = subscriptions.add(std::move(names), every_ms * 1'000'000, changes.is_boolean() && changes.get<bool>());
-    if (number == 0) throw RequestError{"a client has at most " + std::to_string(Subscriptions::most) + " subscriptions"};
+    if (!changes.is_null() && !changes.is_boolean()) {
+        throw RequestError{"changes must be true or false"};
+    }
+    const std::uint64_t number = subscriptions.add(std::move(names), every_ms * 1'000'000,
+                                                   changes.is_boolean() && changes.get<bool>());
+    if (number == 0) {
+        throw RequestError{"a client has at most " + std::to_string(Subscriptions::most) +
+                           " subscriptions"};
+    }
     reply += ",\"subscription\":" + std::to_string(number);
 }
 
 void Connection::State::unsubscribe(const Json& body, std::string&) {
-    const auto id = static_cast<std::uint64_t>(whole(body["unsubscribe"], "unsubscribe", 1, std::numeric_limits<std::int64_t>::max()));
-    if (!subscriptions.remove(id)) throw RequestError{"unknown subscription " + std::to_string(id)};
+    const auto id = static_cast<std::uint64_t>(
+        whole(body["unsubscribe"], "unsubscribe", 1, std::numeric_limits<std::int64_t>::max()));
+    if (!subscriptions.remove(id)) {
+        throw RequestError{"unknown subscription " + std::to_string(id)};
+    }
 }
 
 namespace {
 
 Listed kind_of(const Json& value, const char* verb) {
     const auto kind = listed_kind(text_of(value, verb));
-    if (!kind) throw RequestError{std::string(verb) + " must be one of comp, pin, sig, param, funct, thread, alias, all"};
+    if (!kind) {
+        throw RequestError{std::string(verb) +
+                           " must be one of comp, pin, sig, param, funct, thread, alias, all"};
+    }
     return *kind;
 }
 
@@ -91,7 +113,9 @@ void Connection::State::list(const Json& body, std::string& reply) {
     const auto lock = session.lock();
     reply += ",\"names\":[";
     for (const auto& name : names_of(session.model(), kind, patterns)) {
-        if (reply.back() != '[') reply += ',';
+        if (reply.back() != '[') {
+            reply += ',';
+        }
         json_quote(reply, name);
     }
     reply += ']';
@@ -103,11 +127,15 @@ void Connection::State::describe_kind(const Json& body, std::string& reply) {
     std::optional<hal_type> type;
     if (const Json& wanted = member(body, "type"); !wanted.is_null()) {
         type = type_named(text_of(wanted, "type"));
-        if (!type) throw RequestError{"type must be bit, float, s32, u32, s64, u64 or port"};
+        if (!type) {
+            throw RequestError{"type must be bit, float, s32, u32, s64, u64 or port"};
+        }
     }
     const Json& histograms = member(body, "histograms");
-    if (!histograms.is_null() && !(histograms.is_boolean() && kind == Listed::threads))
-        throw RequestError{"histograms must be true or false, and is a member of a request to describe threads"};
+    if (!histograms.is_null() && !(histograms.is_boolean() && kind == Listed::threads)) {
+        throw RequestError{
+            "histograms must be true or false, and is a member of a request to describe threads"};
+    }
     const auto lock = session.lock();
     describe(reply += ",\"objects\":", session, kind, patterns, type);
     if (!histograms.is_boolean() || !histograms.get<bool>()) return;

@@ -14,7 +14,8 @@ Background::Shared& Background::of(const hal_background* host) {
 Background::Background(bool virtual_clock) {
     shared_.host.size = sizeof shared_.host;
     shared_.host.is_virtual = virtual_clock;
-    shared_.host.attach = [](const hal_background* b, void (*work)(void*, std::int64_t), void* self) {
+    shared_.host.attach = [](const hal_background* b, void (*work)(void*, std::int64_t),
+                             void* self) {
         if (b->is_virtual == 0) return false;
         try {
             of(b).works.push_back({work, self});
@@ -29,7 +30,9 @@ Background::Background(bool virtual_clock) {
 }
 
 void Background::run(std::int64_t now_ns) {
-    for (const Work& w : shared_.works) w.work(w.self, now_ns);
+    for (const Work& w : shared_.works) {
+        w.work(w.self, now_ns);
+    }
 }
 
 }  // namespace hal

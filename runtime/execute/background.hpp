@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Extension "hal.background/1": runs non-real-time work of components between two instants of the virtual clock (decision 17).
+// Extension "hal.background/1": runs non-real-time work of components between two instants of the
+// virtual clock (decision 17).
 #pragma once
 
 #include <cstdint>
@@ -14,7 +15,8 @@ public:
     explicit Background(bool virtual_clock);
     Background(const Background&) = delete;
 
-    /// Calls the attached functions in the order in which they were attached, outside of all cycles. [setup]
+    /// Calls the attached functions in the order in which they were attached, outside of all
+    /// cycles. [setup]
     void run(std::int64_t now_ns);
     const hal_background& shared() const { return shared_.host; }  ///< given out to components
 

@@ -18,15 +18,23 @@ namespace {
 constexpr std::uintptr_t cache_line = 64;
 
 void fetch_times(const plan::FunctionTimes& times) noexcept {
-    for (std::uintptr_t at = 0; at < sizeof times; at += cache_line) __builtin_prefetch(reinterpret_cast<const char*>(&times) + at, 1);
+    for (std::uintptr_t at = 0; at < sizeof times; at += cache_line) {
+        __builtin_prefetch(reinterpret_cast<const char*>(&times) + at, 1);
+    }
 }
 
 thread_local Core* current_core = nullptr;
 
 // the shell may look at any moment
-void store(hal_pin& pin, std::int32_t value) noexcept { __atomic_store_n(&pin.slot->s32, value, __ATOMIC_RELAXED); }
-void store(hal_pin& pin, std::uint32_t value) noexcept { __atomic_store_n(&pin.slot->u32, value, __ATOMIC_RELAXED); }
-void store(hal_pin& pin, bool value) noexcept { __atomic_store_n(&pin.slot->bit, value, __ATOMIC_RELAXED); }
+void store(hal_pin& pin, std::int32_t value) noexcept {
+    __atomic_store_n(&pin.slot->s32, value, __ATOMIC_RELAXED);
+}
+void store(hal_pin& pin, std::uint32_t value) noexcept {
+    __atomic_store_n(&pin.slot->u32, value, __ATOMIC_RELAXED);
+}
+void store(hal_pin& pin, bool value) noexcept {
+    __atomic_store_n(&pin.slot->bit, value, __ATOMIC_RELAXED);
+}
 
 struct Current {  // outlives no core: on the virtual clock the session's own thread runs them all
     explicit Current(Core* core) noexcept { current_core = core; }
@@ -34,25 +42,37 @@ struct Current {  // outlives no core: on the virtual clock the session's own th
 };
 
 struct Guard {
-    Guard() noexcept { if (__rtsan_realtime_enter) __rtsan_realtime_enter(); }
-    ~Guard() { if (__rtsan_realtime_exit) __rtsan_realtime_exit(); }
+    Guard() noexcept {
+        if (__rtsan_realtime_enter) {
+            __rtsan_realtime_enter();
+        }
+    }
+    ~Guard() {
+        if (__rtsan_realtime_exit) {
+            __rtsan_realtime_exit();
+        }
+    }
 };
 }  // namespace
 
 Core* Core::current() noexcept { return current_core; }
 
-Core::Core(std::uint32_t id, std::int64_t period_ns, ThreadPins pins, FaultBoard& board, Timeline& timeline,
-           const std::atomic<bool>& running, bool measure, CycleMark* mark)
-    : id_(id), period_ns_(period_ns), pins_(pins), board_(board), timeline_(timeline), running_(running), measure_(measure),
+Core::Core(std::uint32_t id, std::int64_t period_ns, ThreadPins pins, FaultBoard& board,
+           Timeline& timeline, const std::atomic<bool>& running, bool measure, CycleMark* mark)
+    : id_(id),
+      period_ns_(period_ns),
+      pins_(pins),
+      board_(board),
+      timeline_(timeline),
+      running_(running),
+      measure_(measure),
       mark_(mark ? mark : &own_mark_) {
     info_.size = sizeof info_;
     info_.period_ns = period_ns;
     info_.period_s = static_cast<double>(period_ns) * 1e-9;
 }
 
-Core::~Core() {
-    board_.end_all(this, this + 1);
-}
+Core::~Core() { board_.end_all(this, this + 1); }
 
 void Core::clear_stop() noexcept {
     stopped_.store(false, std::memory_order_release);
@@ -60,8 +80,11 @@ void Core::clear_stop() noexcept {
 }
 
 void Core::not_finite(const hal_pin& pin, bool lasts) noexcept {
-    if (lasts) board_.begin(&info_, &pin);
-    else board_.end(&info_, &pin);
+    if (lasts) {
+        board_.begin(&info_, &pin);
+    } else {
+        board_.end(&info_, &pin);
+    }
 }
 
 Core::Condition Core::condition(const FaultEvent& event) const noexcept {
@@ -87,22 +110,34 @@ void Core::cycle(std::int64_t grid_ns, std::int64_t due_ns, std::int64_t woke_ns
         due_.store(due_ns, std::memory_order_release);
         busy_since_.store(woke_ns, std::memory_order_release);
         wakeup.add(woke_ns - due_ns);
-        if (max_gap_ns.load(std::memory_order_relaxed) > 0) note_usage();
+        if (max_gap_ns.load(std::memory_order_relaxed) > 0) {
+            note_usage();
+        }
     }
     take_over();
     if (plan_) {
         import();
-        if (live()) run();
-        if (measure_) store(*pins_.wakeup, static_cast<std::int32_t>(woke_ns - due_ns));
+        if (live()) {
+            run();
+        }
+        if (measure_) {
+            store(*pins_.wakeup, static_cast<std::int32_t>(woke_ns - due_ns));
+        }
         end_ns = account(woke_ns);
-        limiter_.flush(measure_ ? woke_ns : due_ns, [this](const FaultEvent& e) noexcept { faults_.push(e); });
+        limiter_.flush(measure_ ? woke_ns : due_ns,
+                       [this](const FaultEvent& e) noexcept { faults_.push(e); });
         output();
-        if (probes_) sample_probes();
+        if (probes_) {
+            sample_probes();
+        }
         answer();
-        if (tracing_) [[unlikely]]
-            tracing_->put(TraceEvent::cycle, woke_ns, monotonic_ns(), info_.number, static_cast<std::uint64_t>(std::max<std::int64_t>(woke_ns - due_ns, 0)));
+        if (tracing_) [[unlikely]] {
+            tracing_->put(TraceEvent::cycle, woke_ns, monotonic_ns(), info_.number,
+                          static_cast<std::uint64_t>(std::max<std::int64_t>(woke_ns - due_ns, 0)));
+        }
     } else {
-        halt_seen_.store(halt_asked_.load(std::memory_order_acquire), std::memory_order_release);  // it has no outputs yet
+        // it has no outputs yet
+        halt_seen_.store(halt_asked_.load(std::memory_order_acquire), std::memory_order_release);
     }
     ++info_.number;
     finished_.store(end_ns, std::memory_order_release);
@@ -113,27 +148,35 @@ void Core::cycle(std::int64_t grid_ns, std::int64_t due_ns, std::int64_t woke_ns
 void Core::service() noexcept {
     const Current current(this);
     take_over();
-    const std::uint64_t asked = halt_asked_.load(std::memory_order_acquire);  // before running_ is read: who asks has stopped it before
-    if (int free = nobody; !live() && !safe_ && turn_.compare_exchange_strong(free, thread, std::memory_order_acq_rel)) {
+    // before running_ is read: who asks has stopped it before
+    const std::uint64_t asked = halt_asked_.load(std::memory_order_acquire);
+    if (int free = nobody; !live() && !safe_ &&
+                           turn_.compare_exchange_strong(free, thread, std::memory_order_acq_rel)) {
         make_safe();
         turn_.store(nobody, std::memory_order_release);
     }
     halt_seen_.store(asked, std::memory_order_release);
-    if (plan_) answer();
+    if (plan_) {
+        answer();
+    }
 }
 
 void Core::output() noexcept {
     int free = nobody;
     if (!turn_.compare_exchange_strong(free, thread, std::memory_order_acq_rel)) return;
-    const std::uint64_t asked = halt_asked_.load(std::memory_order_acquire);  // before running_ is read: who asks has stopped it before
-    if (!live() && !safe_) make_safe();
+    // before running_ is read: who asks has stopped it before
+    const std::uint64_t asked = halt_asked_.load(std::memory_order_acquire);
+    if (!live() && !safe_) {
+        make_safe();
+    }
     publish(*plan_);
     turn_.store(nobody, std::memory_order_release);
     halt_seen_.store(asked, std::memory_order_release);
 }
 
-// After a millisecond of other work neither the instances nor the code are in a near cache, and waiting for memory is
-// half of the cycle's time. A thread that spins towards its deadline has the time to fetch them before.
+// After a millisecond of other work neither the instances nor the code are in a near cache, and
+// waiting for memory is half of the cycle's time. A thread that spins towards its deadline has the
+// time to fetch them before.
 void Core::warm(std::int64_t until_ns) const noexcept {
     if (!plan_) return;
     unsigned fetched = 0;
@@ -146,11 +189,16 @@ void Core::warm(std::int64_t until_ns) const noexcept {
         return true;
     };
     if (!fetch(this, sizeof *this)) return;
-    for (const hal_pin* pin : {pins_.time, pins_.tmax, pins_.tmax_increased, pins_.beat, pins_.missed, pins_.wakeup})
+    for (const hal_pin* pin :
+         {pins_.time, pins_.tmax, pins_.tmax_increased, pins_.beat, pins_.missed, pins_.wakeup}) {
         fetch(pin, sizeof *pin);
-    if (sampled_ < plan_->functions.size()) fetch(plan_->functions[sampled_].times, sizeof(plan::FunctionTimes));
-    for (const plan::Memory& memory : plan_->working_set)
+    }
+    if (sampled_ < plan_->functions.size()) {
+        fetch(plan_->functions[sampled_].times, sizeof(plan::FunctionTimes));
+    }
+    for (const plan::Memory& memory : plan_->working_set) {
         if (!fetch(memory.begin, memory.bytes)) return;
+    }
 }
 
 void Core::skip(std::uint64_t periods) noexcept {
@@ -160,13 +208,15 @@ void Core::skip(std::uint64_t periods) noexcept {
     }
     info_.number += periods;
     // first the deadline, then the number: missed_by() never counts a period twice
-    due_.store(due_.load(std::memory_order_relaxed) + static_cast<std::int64_t>(periods) * period_ns_, std::memory_order_release);
+    due_.store(
+        due_.load(std::memory_order_relaxed) + static_cast<std::int64_t>(periods) * period_ns_,
+        std::memory_order_release);
     missed.store(missed.load(std::memory_order_relaxed) + periods, std::memory_order_release);
     store(*pins_.missed, static_cast<std::uint32_t>(missed.load(std::memory_order_relaxed)));
 }
 
-// The inbox first: a write that was queued before a plan was offered goes to the places of the plan before it, and
-// those places are gone once the new plan has been taken.
+// The inbox first: a write that was queued before a plan was offered goes to the places of the plan
+// before it, and those places are gone once the new plan has been taken.
 void Core::take_over() noexcept {
     plan::Plan* const offered = inbox_.exchange(nullptr, std::memory_order_acq_rel);
     drain_writes();
@@ -174,7 +224,9 @@ void Core::take_over() noexcept {
         TraceRing* const tracing = trace_.load(std::memory_order_acquire);
         const std::int64_t begin_ns = tracing ? monotonic_ns() : 0;
         take(offered);
-        if (tracing) tracing->put(TraceEvent::plan, begin_ns, monotonic_ns(), info_.number, 0);
+        if (tracing) {
+            tracing->put(TraceEvent::plan, begin_ns, monotonic_ns(), info_.number, 0);
+        }
     }
     if (!probe_inbox_.load(std::memory_order_relaxed)) return;
     if (plan::ProbeSet* const probes = probe_inbox_.exchange(nullptr, std::memory_order_acq_rel)) {
@@ -184,19 +236,29 @@ void Core::take_over() noexcept {
 }
 
 void Core::sample_probes() noexcept {
-    for (const plan::Probe& probe : probes_->probes) probe.ring->sample(info_.number, info_.start_ns, probe.from.data());
+    for (const plan::Probe& probe : probes_->probes) {
+        probe.ring->sample(info_.number, info_.start_ns, probe.from.data());
+    }
 }
 
 void Core::take(plan::Plan* plan) noexcept {
-    limiter_.clear([this](const FaultEvent& e) noexcept { faults_.push(e); });  // the reasons may be those of a plugin that is unloaded next
-    // All old places are read before any new one is written or rebound: a value may move within one image.
+    // the reasons may be those of a plugin that is unloaded next
+    limiter_.clear([this](const FaultEvent& e) noexcept { faults_.push(e); });
+    // All old places are read before any new one is written or rebound: a value may move within one
+    // image.
     for (std::size_t i = 0; i < plan->carries.size(); ++i) {
         const plan::Carry& carry = plan->carries[i];
         plan->scratch[i] = carry.from ? carry.from->raw : carry.value.raw;
     }
-    for (const plan::Rebind& rebind : plan->rebinds) rebind.pin->slot = rebind.slot;
-    for (const plan::Pointer& pointer : plan->pointers) *pointer.to = pointer.slot;
-    for (std::size_t i = 0; i < plan->carries.size(); ++i) plan->carries[i].to->raw = plan->scratch[i];
+    for (const plan::Rebind& rebind : plan->rebinds) {
+        rebind.pin->slot = rebind.slot;
+    }
+    for (const plan::Pointer& pointer : plan->pointers) {
+        *pointer.to = pointer.slot;
+    }
+    for (std::size_t i = 0; i < plan->carries.size(); ++i) {
+        plan->carries[i].to->raw = plan->scratch[i];
+    }
     board_.end_all(&info_, &info_ + 1);  // the checks of the new plan begin anew
     plan_ = plan;
     probes_ = plan->probes.get();
@@ -218,10 +280,14 @@ void Core::import() noexcept {
         if (!(channel.middle.load(std::memory_order_acquire) & plan::Channel::fresh)) continue;
         channel.front = channel.middle.exchange(channel.front, std::memory_order_acq_rel) & 3;
         const hal_value* values = channel.buffers[channel.front].get();
-        for (std::size_t i = 0; i < from.to.size(); ++i) __atomic_store_n(&from.to[i]->raw, values[i].raw, __ATOMIC_RELAXED);
+        for (std::size_t i = 0; i < from.to.size(); ++i) {
+            __atomic_store_n(&from.to[i]->raw, values[i].raw, __ATOMIC_RELAXED);
+        }
     }
-    for (const plan::CellImport& from : plan_->cell_imports)
-        __atomic_store_n(&from.to->raw, __atomic_load_n(&from.cell->raw, __ATOMIC_RELAXED), __ATOMIC_RELAXED);
+    for (const plan::CellImport& from : plan_->cell_imports) {
+        __atomic_store_n(&from.to->raw, __atomic_load_n(&from.cell->raw, __ATOMIC_RELAXED),
+                         __ATOMIC_RELAXED);
+    }
 }
 
 void Core::publish(plan::Plan& plan) noexcept {
@@ -229,8 +295,12 @@ void Core::publish(plan::Plan& plan) noexcept {
         plan::Channel& channel = *to.channel;
         hal_value* values = channel.buffers[channel.back].get();
         // the supervisor publishes too, while a function that hung may continue and write its pins
-        for (std::size_t i = 0; i < to.from.size(); ++i) values[i].raw = __atomic_load_n(&to.from[i]->raw, __ATOMIC_RELAXED);
-        channel.back = channel.middle.exchange(channel.back | plan::Channel::fresh, std::memory_order_acq_rel) & 3;
+        for (std::size_t i = 0; i < to.from.size(); ++i) {
+            values[i].raw = __atomic_load_n(&to.from[i]->raw, __ATOMIC_RELAXED);
+        }
+        channel.back = channel.middle.exchange(channel.back | plan::Channel::fresh,
+                                               std::memory_order_acq_rel) &
+                       3;
     }
 }
 
@@ -238,7 +308,9 @@ void Core::answer() noexcept {
     Observation* const wish = observation_.exchange(nullptr, std::memory_order_acq_rel);
     if (!wish) return;
     drain_writes();  // who reads after having written sees what was written
-    for (std::size_t i = 0; i < wish->count; ++i) wish->to[i].raw = __atomic_load_n(&wish->from[i]->raw, __ATOMIC_RELAXED);
+    for (std::size_t i = 0; i < wish->count; ++i) {
+        wish->to[i].raw = __atomic_load_n(&wish->from[i]->raw, __ATOMIC_RELAXED);
+    }
     wish->cycle = info_.number;
     wish->done.store(true, std::memory_order_release);
 }
@@ -258,7 +330,9 @@ void Core::run() noexcept {
             if (!measure_) {
                 run_rows(row, steps, steps + functions.back().end);
             } else if (profile_every.load(std::memory_order_relaxed) || tracing_) {
-                for (const plan::Function& function : functions) run_timed(function, steps);
+                for (const plan::Function& function : functions) {
+                    run_timed(function, steps);
+                }
             } else {
                 const plan::Function& function = functions[sampled_];
                 sampled_ = sampled_ + 1 == functions.size() ? 0 : sampled_ + 1;
@@ -273,80 +347,121 @@ void Core::run() noexcept {
         // An exception left a noexcept function; the terminate handler jumped back here.
         mark_->in_function.store(false, std::memory_order_relaxed);
         board_.begin(this, &stopped_);
-        raise({HAL_FAULT_EXCEPTION, current_function(), info_.number, info_.start_ns, 0.0, nullptr, nullptr});
+        raise({HAL_FAULT_EXCEPTION, current_function(), info_.number, info_.start_ns, 0.0, nullptr,
+               nullptr});
         stopped_.store(true, std::memory_order_release);  // output() makes the outputs safe
     }
 }
 
 /// `row` is one that begins at or before `first`; left at one that begins at or before `last`.
-void Core::run_rows(const plan::Row*& row, const plan::Step* first, const plan::Step* last) noexcept {
+void Core::run_rows(const plan::Row*& row, const plan::Step* first,
+                    const plan::Step* last) noexcept {
     for (const plan::Step* const steps = plan_->steps.data(); first != last;) {
-        while (steps + row->end <= first) ++row;
+        while (steps + row->end <= first) {
+            ++row;
+        }
         const plan::Step* const end = std::min(last, steps + row->end);
-        if (stopped_.load(std::memory_order_relaxed)) [[unlikely]] return;  // declared hung meanwhile
-        if (row->run) row->run(first, end, &info_, &mark_->current);
-        else run_steps(first, end);
+        // declared hung meanwhile
+        if (stopped_.load(std::memory_order_relaxed)) [[unlikely]]
+            return;
+        if (row->run) {
+            row->run(first, end, &info_, &mark_->current);
+        } else {
+            run_steps(first, end);
+        }
         first = end;
     }
 }
 
 void Core::run_steps(const plan::Step* first, const plan::Step* last) noexcept {
-    // Small functions cost little more than their call: eight per turn save the jumps, a fifth of the cycle of 1000 gates. A function
-    // that returns after its thread was declared hung is the last that runs.
+    // Small functions cost little more than their call: eight per turn save the jumps, a fifth of
+    // the cycle of 1000 gates. A function that returns after its thread was declared hung is the
+    // last that runs.
     const auto call = [this, current = &mark_->current](const plan::Step* step) noexcept {
         *current = step;
         step->step(step->self, &info_);
         return stopped_.load(std::memory_order_relaxed);
     };
-    // A processor predicts the target of a call by its place in the code: in each cycle a step is called at the same of the eight, wherever the
-    // range begins, so the first ones up to a multiple of eight are called one by one.
-    const auto place = [](const plan::Step* step) noexcept { return reinterpret_cast<std::uintptr_t>(step) / sizeof(plan::Step) % 8; };
-    for (; first != last && place(first) != 0; ++first)
-        if (call(first)) [[unlikely]] return;
-    for (; last - first >= 8; first += 8)
-        if (call(first) || call(first + 1) || call(first + 2) || call(first + 3) || call(first + 4) || call(first + 5) || call(first + 6) ||
-            call(first + 7)) [[unlikely]]
+    // A processor predicts the target of a call by its place in the code: in each cycle a step is
+    // called at the same of the eight, wherever the range begins, so the first ones up to a
+    // multiple of eight are called one by one.
+    const auto place = [](const plan::Step* step) noexcept {
+        return reinterpret_cast<std::uintptr_t>(step) / sizeof(plan::Step) % 8;
+    };
+    for (; first != last && place(first) != 0; ++first) {
+        if (call(first)) [[unlikely]]
             return;
-    for (; first != last; ++first)
-        if (call(first)) [[unlikely]] return;
+    }
+    for (; last - first >= 8; first += 8) {
+        if (call(first) || call(first + 1) || call(first + 2) || call(first + 3) ||
+            call(first + 4) || call(first + 5) || call(first + 6) || call(first + 7)) [[unlikely]] {
+            return;
+        }
+    }
+    for (; first != last; ++first) {
+        if (call(first)) [[unlikely]]
+            return;
+    }
 }
 
 void Core::run_timed(const plan::Function& function, const plan::Step* steps) noexcept {
     const std::int64_t begin = monotonic_ns();
     run_steps(steps + function.begin, steps + function.end);
     const std::int64_t end = monotonic_ns();
-    if (tracing_) tracing_->put(TraceEvent::function, begin, end, info_.number, function.id);
+    if (tracing_) {
+        tracing_->put(TraceEvent::function, begin, end, info_.number, function.id);
+    }
     const auto took = static_cast<std::int32_t>(std::min<std::int64_t>(end - begin, INT32_MAX));
     plan::FunctionTimes& times = *function.times;
     store(times.time, took);
     const bool more = took > times.tmax.slot->s32;
-    if (more) store(times.tmax, took);
+    if (more) {
+        store(times.tmax, took);
+    }
     store(times.tmax_increased, more);
-    times.samples.store(times.samples.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
-    times.total_ns.store(times.total_ns.load(std::memory_order_relaxed) + static_cast<std::uint64_t>(took), std::memory_order_relaxed);
+    times.samples.store(times.samples.load(std::memory_order_relaxed) + 1,
+                        std::memory_order_relaxed);
+    times.total_ns.store(
+        times.total_ns.load(std::memory_order_relaxed) + static_cast<std::uint64_t>(took),
+        std::memory_order_relaxed);
 }
 
 // Returns the time at the end of the cycle's work.
 std::int64_t Core::account(std::int64_t woke_ns) noexcept {
     store(*pins_.beat, pins_.beat->slot->u32 + 1);
     if (!measure_) return woke_ns;
-    const std::int64_t now_ns = monotonic_ns(), busy_ns = now_ns - woke_ns;
+    const std::int64_t now_ns = monotonic_ns();
+    const std::int64_t busy_ns = now_ns - woke_ns;
     busy.add(busy_ns);
     const auto took = static_cast<std::int32_t>(busy_ns < INT32_MAX ? busy_ns : INT32_MAX);
     store(*pins_.time, took);
     const bool more = took > pins_.tmax->slot->s32;
-    if (more) store(*pins_.tmax, took);
+    if (more) {
+        store(*pins_.tmax, took);
+    }
     store(*pins_.tmax_increased, more);
-    const std::int64_t budget = budget_ns.load(std::memory_order_relaxed), limit = supervise_ns.load(std::memory_order_relaxed);
+    const std::int64_t budget = budget_ns.load(std::memory_order_relaxed);
+
+    const std::int64_t limit = supervise_ns.load(std::memory_order_relaxed);
     const bool too_long = busy_ns >= longest_overrun * period_ns_;
     const bool in_budget = (budget == 0 || busy_ns <= budget) && !too_long;
-    if (!in_budget) overruns.store(overruns.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+    if (!in_budget) {
+        overruns.store(overruns.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+    }
     const auto event = [&](hal_fault_code code) -> FaultEvent {
-        return {code, slow_function(woke_ns), info_.number, info_.start_ns, static_cast<double>(busy_ns), nullptr, nullptr};
+        return {code,           slow_function(woke_ns),       info_.number,
+                info_.start_ns, static_cast<double>(busy_ns), nullptr,
+                nullptr};
     };
-    const bool gap = limit != 0 && busy_ns > limit && max_gap_ns.load(std::memory_order_relaxed) > 0 && was_preempted() && tolerate_gap(busy_ns);
-    if (!gap && limit != 0 && now_ns - std::max(woke_ns, excused_.load(std::memory_order_acquire)) > limit) {
-        if (declare_hung()) raise(event(HAL_FAULT_SILENT_THREAD));  // otherwise the supervisor has reported it
+    const bool gap = limit != 0 && busy_ns > limit &&
+                     max_gap_ns.load(std::memory_order_relaxed) > 0 && was_preempted() &&
+                     tolerate_gap(busy_ns);
+    if (!gap && limit != 0 &&
+        now_ns - std::max(woke_ns, excused_.load(std::memory_order_acquire)) > limit) {
+        // otherwise the supervisor has reported it
+        if (declare_hung()) {
+            raise(event(HAL_FAULT_SILENT_THREAD));
+        }
     } else if (!gap && !in_budget && in_budget_ && !hung()) {
         board_.begin(this, &in_budget_);
         raise(event(HAL_FAULT_BUDGET));
@@ -360,13 +475,20 @@ std::int64_t Core::account(std::int64_t woke_ns) noexcept {
 void Core::make_safe() noexcept {
     safe_ = true;
     if (!plan_) return;
-    for (const plan::Safe& safe : plan_->safe) __atomic_store_n(&safe.pin->slot->raw, safe.value.raw, __ATOMIC_RELAXED);
-    for (const plan::Step& step : plan_->emergency) step.step(step.self, &info_);
+    for (const plan::Safe& safe : plan_->safe) {
+        __atomic_store_n(&safe.pin->slot->raw, safe.value.raw, __ATOMIC_RELAXED);
+    }
+    for (const plan::Step& step : plan_->emergency) {
+        step.step(step.self, &info_);
+    }
 }
 
 void Core::make_safe_at_end() noexcept {
     const Current current(this);
-    for (int free = nobody; !turn_.compare_exchange_weak(free, thread, std::memory_order_acq_rel); free = nobody) sched_yield();
+    for (int free = nobody; !turn_.compare_exchange_weak(free, thread, std::memory_order_acq_rel);
+         free = nobody) {
+        sched_yield();
+    }
     make_safe();
     turn_.store(nobody, std::memory_order_release);
 }
@@ -374,7 +496,8 @@ void Core::make_safe_at_end() noexcept {
 void Core::raise(FaultEvent event) noexcept {
     event.time_ns = measure_ ? monotonic_ns() : info_.start_ns;
     board_.count(event, id_);
-    limiter_.raise(event, [this](const FaultEvent& e) noexcept { faults_.push(e); });  // when full the newest is lost but counted
+    // when full the newest is lost but counted
+    limiter_.raise(event, [this](const FaultEvent& e) noexcept { faults_.push(e); });
 }
 
 void Core::trace_frame(TraceEvent::Kind kind, std::uint32_t id, std::size_t bytes) noexcept {
@@ -384,7 +507,9 @@ void Core::trace_frame(TraceEvent::Kind kind, std::uint32_t id, std::size_t byte
 }
 
 void Core::step_clock(std::int64_t ns) noexcept {
-    if (in_function()) timeline_.step(grid_ns_, ns);
+    if (in_function()) {
+        timeline_.step(grid_ns_, ns);
+    }
 }
 
 void check_finite(void* self, const hal_cycle* cycle) {
@@ -395,7 +520,8 @@ void check_finite(void* self, const hal_cycle* cycle) {
         check.bad = true;
         auto& core = *static_cast<Core*>(check.sink);
         core.not_finite(*check.pin, true);
-        core.raise({HAL_FAULT_NOT_FINITE, check.pin_id, cycle->number, cycle->start_ns, value, nullptr, check.pin});
+        core.raise({HAL_FAULT_NOT_FINITE, check.pin_id, cycle->number, cycle->start_ns, value,
+                    nullptr, check.pin});
     } else if (check.bad) [[unlikely]] {
         check.bad = false;
         static_cast<Core*>(check.sink)->not_finite(*check.pin, false);
@@ -405,5 +531,7 @@ void check_finite(void* self, const hal_cycle* cycle) {
 }  // namespace hal
 
 void hal_trace_frame(unsigned kind, std::uint32_t id, std::size_t bytes) noexcept {
-    if (hal::Core* const core = hal::Core::current()) core->trace_frame(static_cast<hal::TraceEvent::Kind>(kind), id, bytes);
+    if (hal::Core* const core = hal::Core::current()) {
+        core->trace_frame(static_cast<hal::TraceEvent::Kind>(kind), id, bytes);
+    }
 }

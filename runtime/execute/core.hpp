@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
-// The work of one real-time thread without the operating-system thread: the cycle, the inbox, the statistics. The same code runs under
-// the real and the virtual clock. This file and core.cpp define a cycle.
+// The work of one real-time thread without the operating-system thread: the cycle, the inbox, the
+// statistics. The same code runs under the real and the virtual clock. This file and core.cpp
+// define a cycle.
 #pragma once
 
-#include <csetjmp>
 #include <atomic>
+#include <csetjmp>
 #include <cstdint>
 
 #include "execute/cycle_mark.hpp"
@@ -25,7 +26,8 @@ struct Write {
     hal_value value;
 };
 
-/// A request for values of this thread, all from one finished cycle. The session fills it in, the thread answers it.
+/// A request for values of this thread, all from one finished cycle. The session fills it in, the
+/// thread answers it.
 struct Observation {
     const hal_value* const* from = nullptr;
     hal_value* to = nullptr;
@@ -41,105 +43,134 @@ struct ThreadPins {
 
 class Core {
 public:
-    Core(std::uint32_t id, std::int64_t period_ns, ThreadPins pins, FaultBoard& board, Timeline& timeline,
-         const std::atomic<bool>& running, bool measure, CycleMark* mark = nullptr);
+    Core(std::uint32_t id, std::int64_t period_ns, ThreadPins pins, FaultBoard& board,
+         Timeline& timeline, const std::atomic<bool>& running, bool measure,
+         CycleMark* mark = nullptr);
     ~Core();
     Core(const Core&) = delete;
 
     // --- by the thread --------------------------------------------------------------------------------------------
-    /// Runs the cycle at position `grid_ns`, which was due at `due_ns`. The thread woke at `woke_ns`, just now; the execution time counts
-    /// from then. [realtime]
+    /// Runs the cycle at position `grid_ns`, which was due at `due_ns`. The thread woke at
+    /// `woke_ns`, just now; the execution time counts from then. [realtime]
     void cycle(std::int64_t grid_ns, std::int64_t due_ns, std::int64_t woke_ns) noexcept;
-    /// Takes a new plan and queued writes and answers an observation, between two cycles. [realtime]
+    /// Takes a new plan and queued writes and answers an observation, between two cycles.
+    /// [realtime]
     void service() noexcept;
     /// Prefetches the memory of the next cycle into the caches until `until_ns` at most. [realtime]
     void warm(std::int64_t until_ns) const noexcept;
     /// Counts periods in which no cycle ran. [realtime]
     void skip(std::uint64_t periods) noexcept;
-    /// Begins supervision: the thread must finish its first cycle, which is due at `due_ns`, and all others. [realtime]
+    /// Begins supervision: the thread must finish its first cycle, which is due at `due_ns`, and
+    /// all others. [realtime]
     void begin(std::int64_t now_ns, std::int64_t due_ns) noexcept;
-    /// Checks the start of the cycle that was due at `due_ns`: a delay above the supervision limit is a fault that stops the
-    /// thread. [realtime]
+    /// Checks the start of the cycle that was due at `due_ns`: a delay above the supervision limit
+    /// is a fault that stops the thread. [realtime]
     void woke_late(std::int64_t due_ns, std::int64_t now_ns) noexcept;
-    /// Writes all declared safe values and calls the emergency functions. [realtime] and in a crash handler
+    /// Writes all declared safe values and calls the emergency functions. [realtime] and in a crash
+    /// handler
     void make_safe() noexcept;
     /// Does the same at the end of the thread; waits while the supervisor does it. Not in a cycle
     void make_safe_at_end() noexcept;
     void raise(FaultEvent event) noexcept;
     /// Records a frame that the running function sends or receives. [realtime]
     void trace_frame(TraceEvent::Kind kind, std::uint32_t id, std::size_t bytes) noexcept;
-    /// Shifts the grid for all positions after that of this cycle; does nothing outside a function. [realtime]
+    /// Shifts the grid for all positions after that of this cycle; does nothing outside a function.
+    /// [realtime]
     void step_clock(std::int64_t ns) noexcept;
 
     // --- by the supervisor, in a thread of its own (supervisor.hpp) ----------------------------------------------------
-    /// A thread that was created now and has not begun yet must finish its first cycle one period later. [setup]
+    /// A thread that was created now and has not begun yet must finish its first cycle one period
+    /// later. [setup]
     void expect(std::int64_t now_ns) noexcept;
     /// Returns when the newest cycle ended, CLOCK_MONOTONIC. [any]
     std::int64_t finished_ns() const noexcept { return finished_.load(std::memory_order_acquire); }
-    /// Returns the time from which the running or next cycle counts as unfinished; in the future while it is not due yet. [any]
+    /// Returns the time from which the running or next cycle counts as unfinished; in the future
+    /// while it is not due yet. [any]
     std::int64_t overdue_since_ns() const noexcept;
-    /// Restarts the time without a finished cycle, because another thread used the CPU until now. Not called by the thread itself
+    /// Restarts the time without a finished cycle, because another thread used the CPU until now.
+    /// Not called by the thread itself
     void excuse(std::int64_t now_ns) noexcept { excused_.store(now_ns, std::memory_order_release); }
     /// Returns true while the thread is declared hung and no cycle has ended since. [any]
-    bool hung() const noexcept { return hung_at_.load(std::memory_order_acquire) == cycles.load(std::memory_order_acquire) + 1; }
-    /// Stops the thread's functions because the running or due cycle does not end. Returns false if they were stopped already. [any]
+    bool hung() const noexcept {
+        return hung_at_.load(std::memory_order_acquire) ==
+               cycles.load(std::memory_order_acquire) + 1;
+    }
+    /// Stops the thread's functions because the running or due cycle does not end. Returns false if
+    /// they were stopped already. [any]
     bool declare_hung() noexcept;
     /// Records the current function, so that an overrun report can name it.
     void sample() noexcept;
-    /// Acts for a thread that hangs: writes the safe values, with `emergency` calls the emergency functions, counts the missed periods, and
-    /// publishes the result to other threads.
+    /// Acts for a thread that hangs: writes the safe values, with `emergency` calls the emergency
+    /// functions, counts the missed periods, and publishes the result to other threads.
     void stand_in(std::int64_t now_ns, bool emergency) noexcept;
     /// Returns the function that the cycle is running; 0: none.
     std::uint32_t hung_function() const noexcept;
-    /// Returns the missed periods by the clock: those that the thread has counted, and those that have passed since. [any]
+    /// Returns the missed periods by the clock: those that the thread has counted, and those that
+    /// have passed since. [any]
     std::uint64_t missed_by(std::int64_t now_ns) const noexcept;
 
     // --- by the session ---------------------------------------------------------------------------------------------
     /// Puts a plan in the inbox; the thread answers by storing its epoch in taken().
     void offer(plan::Plan* plan) { inbox_.store(plan, std::memory_order_release); }
     /// Withdraws an unanswered plan. Returns false if the thread has taken it already.
-    bool withdraw(plan::Plan* plan) { return inbox_.compare_exchange_strong(plan, nullptr, std::memory_order_acq_rel); }
+    bool withdraw(plan::Plan* plan) {
+        return inbox_.compare_exchange_strong(plan, nullptr, std::memory_order_acq_rel);
+    }
     std::uint64_t taken() const { return taken_.load(std::memory_order_acquire); }
     /// The same for probes, which change while the plan stays. A later plan brings its own.
     void offer(plan::ProbeSet* probes) { probe_inbox_.store(probes, std::memory_order_release); }
-    bool withdraw(plan::ProbeSet* probes) { return probe_inbox_.compare_exchange_strong(probes, nullptr, std::memory_order_acq_rel); }
+    bool withdraw(plan::ProbeSet* probes) {
+        return probe_inbox_.compare_exchange_strong(probes, nullptr, std::memory_order_acq_rel);
+    }
     std::uint64_t probes_taken() const { return probes_taken_.load(std::memory_order_acquire); }
-    /// Queues a batch of writes, all of which take effect in the same cycle. Returns false and queues none if the queue is full.
+    /// Queues a batch of writes, all of which take effect in the same cycle. Returns false and
+    /// queues none if the queue is full.
     bool write(const Write* row, std::size_t count) {
         if (!writes_.push(row, count)) return false;
         pushed_ += count;
         return true;
     }
-    static constexpr std::size_t most_writes = 4096;              ///< largest batch
+    static constexpr std::size_t most_writes = 4096;  ///< largest batch
     /// Returns the remaining capacity in writes; the thread only increases it.
     std::size_t room() const { return writes_.capacity() - writes_.size(); }
-    /// Returns when the running cycle began (CLOCK_MONOTONIC); 0 between cycles and under the virtual clock.
+    /// Returns when the running cycle began (CLOCK_MONOTONIC); 0 between cycles and under the
+    /// virtual clock.
     std::int64_t busy_since_ns() const { return busy_since_.load(std::memory_order_acquire); }
     /// Returns true when all queued writes have been applied.
     bool settled() const { return applied_.load(std::memory_order_acquire) == pushed_; }
-    void observe(Observation* observation) { observation_.store(observation, std::memory_order_release); }
-    bool withdraw(Observation* observation) {
-        return observation_.compare_exchange_strong(observation, nullptr, std::memory_order_acq_rel);
+    void observe(Observation* observation) {
+        observation_.store(observation, std::memory_order_release);
     }
-    /// Begins to record events in the ring, or ends it with nullptr. The ring must outlive the thread: a cycle that runs may still write to it.
+    bool withdraw(Observation* observation) {
+        return observation_.compare_exchange_strong(observation, nullptr,
+                                                    std::memory_order_acq_rel);
+    }
+    /// Begins to record events in the ring, or ends it with nullptr. The ring must outlive the
+    /// thread: a cycle that runs may still write to it.
     void trace(TraceRing* ring) { trace_.store(ring, std::memory_order_release); }
     bool traced() const { return trace_.load(std::memory_order_relaxed) != nullptr; }
     bool next_fault(FaultEvent& event) { return faults_.pop(event); }
     /// Returns true after the first pass of the thread, in which initf functions run.
     bool passed() const { return passed_.load(std::memory_order_acquire); }
     void clear_stop() noexcept;
-    /// A condition that a fault reports begins or is over (FaultBoard::begin). `pin`: of an output that is not finite. [realtime]
+    /// A condition that a fault reports begins or is over (FaultBoard::begin). `pin`: of an output
+    /// that is not finite. [realtime]
     void not_finite(const hal_pin& pin, bool lasts) noexcept;
-    /// What owns the lasting condition of a fault of this thread, and its key; two nullptrs: the fault is an event. [any]
+    /// What owns the lasting condition of a fault of this thread, and its key; two nullptrs: the
+    /// fault is an event. [any]
     struct Condition {
         const void *owner, *key;
     };
     Condition condition(const FaultEvent& event) const noexcept;
-    /// Asks the thread to confirm that it has seen a stop: `ticket` is larger than those before. The thread confirms it when its outputs
-    /// have their safe values. [any], one caller at a time
-    void ask_halted(std::uint64_t ticket) noexcept { halt_asked_.store(ticket, std::memory_order_release); }
+    /// Asks the thread to confirm that it has seen a stop: `ticket` is larger than those before.
+    /// The thread confirms it when its outputs have their safe values. [any], one caller at a time
+    void ask_halted(std::uint64_t ticket) noexcept {
+        halt_asked_.store(ticket, std::memory_order_release);
+    }
     /// Returns true when the thread has confirmed this ticket or a later one. [any]
-    bool confirmed_halt(std::uint64_t ticket) const noexcept { return halt_seen_.load(std::memory_order_acquire) >= ticket; }
+    bool confirmed_halt(std::uint64_t ticket) const noexcept {
+        return halt_seen_.load(std::memory_order_acquire) >= ticket;
+    }
 
     /// Returns the mark that the thread was given; nullptr: it has one of its own.
     const CycleMark* mark() const { return mark_ == &own_mark_ ? nullptr : mark_; }
@@ -148,25 +179,34 @@ public:
     std::atomic<std::int64_t> budget_ns{0};
     /// Longest time without a finished cycle; 0: not supervised. Set before the thread begins.
     std::atomic<std::int64_t> supervise_ns{0};
-    /// Longest time without CPU above the supervision limit that is counted as a gap and does not stop the thread; 0: none.
+    /// Longest time without CPU above the supervision limit that is counted as a gap and does not
+    /// stop the thread; 0: none.
     std::atomic<std::int64_t> max_gap_ns{0};
-    std::atomic<std::uint64_t> gaps{0};                           ///< number of such gaps; written by the thread
-    std::atomic<std::int64_t> newest_gap_ns{0};                   ///< length of the newest; written by the thread before `gaps`
+    /// number of such gaps; written by the thread
+    std::atomic<std::uint64_t> gaps{0};
+    /// length of the newest; written by the thread before `gaps`
+    std::atomic<std::int64_t> newest_gap_ns{0};
     /// A cycle that takes this many periods is a fault, whatever the budget.
     static constexpr std::int64_t longest_overrun = 10;
-    std::atomic<std::uint64_t> hangs{0};                          ///< number of times the thread was declared hung
+    /// number of times the thread was declared hung
+    std::atomic<std::uint64_t> hangs{0};
     std::atomic<bool> profile_every{false};
-    Histogram wakeup, busy;                                       ///< written by the thread
-    std::atomic<std::uint64_t> cycles{0}, missed{0}, overruns{0}; ///< written by the thread
+    Histogram wakeup, busy;  ///< written by the thread
+    std::atomic<std::uint64_t> cycles{0};
+    std::atomic<std::uint64_t> missed{0};
+    std::atomic<std::uint64_t> overruns{0};  ///< written by the thread
     bool stopped_by_fault() const { return stopped_.load(std::memory_order_acquire); }
 
-    /// Returns the core whose functions run on the calling thread, or nullptr; for crash and terminate handlers.
+    /// Returns the core whose functions run on the calling thread, or nullptr; for crash and
+    /// terminate handlers.
     static Core* current() noexcept;
     std::uint32_t current_function() const noexcept;
-    std::uint32_t interrupted_function() const noexcept;          ///< the same, seen from another thread
+    /// the same, seen from another thread
+    std::uint32_t interrupted_function() const noexcept;
     std::uint64_t cycle_number() const noexcept { return info_.number; }
     bool in_function() const noexcept { return mark_->in_function.load(std::memory_order_relaxed); }
-    std::jmp_buf recover;                                         ///< where the cycle continues after an exception left a function
+    /// where the cycle continues after an exception left a function
+    std::jmp_buf recover;
 
 private:
     void take_over() noexcept;
@@ -177,7 +217,10 @@ private:
     void output() noexcept;
     void answer() noexcept;
     void sample_probes() noexcept;
-    bool live() const noexcept { return running_.load(std::memory_order_acquire) && !stopped_.load(std::memory_order_relaxed); }
+    bool live() const noexcept {
+        return running_.load(std::memory_order_acquire) &&
+               !stopped_.load(std::memory_order_relaxed);
+    }
     const plan::Step* where() const noexcept;
     std::uint32_t slow_function(std::int64_t woke_ns) const noexcept;
     void run() noexcept;
@@ -196,50 +239,63 @@ private:
     Timeline& timeline_;
     const std::atomic<bool>& running_;
     std::atomic<TraceRing*> trace_{nullptr};  // written by the session; nullptr: not traced
-    const bool measure_;                  // false under the virtual clock: times are 0, so runs are identical
-    std::atomic<plan::Plan*> inbox_{nullptr};         // written by the session, emptied by the thread
-    std::atomic<std::uint64_t> taken_{0};             // written by the thread
-    std::atomic<plan::ProbeSet*> probe_inbox_{nullptr};  // written by the session, emptied by the thread
-    std::atomic<std::uint64_t> probes_taken_{0};      // written by the thread
-    std::atomic<Observation*> observation_{nullptr};  // written by the session, emptied by the thread
-    std::atomic<bool> stopped_{false};                // set by the thread and the supervisor, cleared by the session
-    std::atomic<bool> passed_{false};                 // set by the thread
-    std::atomic<std::uint64_t> halt_asked_{0};        // written by who stops the machine
-    std::atomic<std::uint64_t> halt_seen_{0};         // written by the thread
-    std::atomic<std::int64_t> busy_since_{0};         // written by the thread
-    std::atomic<std::int64_t> due_{0}, finished_{0};  // of the newest cycle: when it was due and when it ended; written by the thread
-    std::atomic<std::int64_t> excused_{0};            // written by the supervisor
-    std::int64_t cpu_before_ns_ = 0, waits_before_ = 0;  // the thread's own, while gaps are tolerated: at the start of its cycle
-    std::atomic<std::uint64_t> hung_at_{0};           // cycles + 1 when it was declared hung; written by thread and supervisor
-    // Whose turn it is to make outputs safe and to publish: the thread in each cycle, the supervisor in place of a hung thread.
+    // false under the virtual clock: times are 0, so runs are identical
+    const bool measure_;
+    // written by the session, emptied by the thread
+    std::atomic<plan::Plan*> inbox_{nullptr};
+    std::atomic<std::uint64_t> taken_{0};  // written by the thread
+    // written by the session, emptied by the thread
+    std::atomic<plan::ProbeSet*> probe_inbox_{nullptr};
+    std::atomic<std::uint64_t> probes_taken_{0};  // written by the thread
+    // written by the session, emptied by the thread
+    std::atomic<Observation*> observation_{nullptr};
+    // set by the thread and the supervisor, cleared by the session
+    std::atomic<bool> stopped_{false};
+    std::atomic<bool> passed_{false};  // set by the thread
+    std::atomic<std::uint64_t> halt_asked_{0};  // written by who stops the machine
+    std::atomic<std::uint64_t> halt_seen_{0};  // written by the thread
+    std::atomic<std::int64_t> busy_since_{0};  // written by the thread
+    // of the newest cycle: when it was due and when it ended; written by the thread
+    std::atomic<std::int64_t> due_{0};
+    std::atomic<std::int64_t> finished_{0};
+    std::atomic<std::int64_t> excused_{0};  // written by the supervisor
+    // the thread's own, while gaps are tolerated: at the start of its cycle
+    std::int64_t cpu_before_ns_ = 0;
+    std::int64_t waits_before_ = 0;
+    // cycles + 1 when it was declared hung; written by thread and supervisor
+    std::atomic<std::uint64_t> hung_at_{0};
+    // Whose turn it is to make outputs safe and to publish: the thread in each cycle, the
+    // supervisor in place of a hung thread.
     //   1. thread: nobody -> thread      2. make safe if stopped, publish      3. thread -> nobody     (release)
     //   4. supervisor: stopped := true, nobody -> supervisor (acquire)         5. make safe, publish   6. supervisor -> nobody
-    // When the supervisor is between 4 and 6 the thread does neither and tries again in its next cycle; between 1 and 3 the supervisor
-    // writes safe values without publishing, and the thread, which then is alive, finds itself stopped in its next cycle.
+    // When the supervisor is between 4 and 6 the thread does neither and tries again in its next
+    // cycle; between 1 and 3 the supervisor writes safe values without publishing, and the thread,
+    // which then is alive, finds itself stopped in its next cycle.
     enum Turn : int { nobody, thread, supervisor };
     std::atomic<int> turn_{nobody};
-    std::atomic<std::int64_t> seen_since_{0};         // the cycle (busy_since_) and the step of the newest sample; the supervisor's
+    // the cycle (busy_since_) and the step of the newest sample; the supervisor's
+    std::atomic<std::int64_t> seen_since_{0};
     std::atomic<const plan::Step*> seen_step_{nullptr};
-    std::atomic<plan::Plan*> shown_{nullptr};         // plan_, for the supervisor
-    Queue<Write> writes_{most_writes};                // session to thread
-    std::uint64_t pushed_ = 0;                        // the session's own
-    std::atomic<std::uint64_t> applied_{0};           // written by the thread
-    Queue<FaultEvent> faults_{256};                   // thread to session
-    FaultLimiter limiter_;                            // the thread's own
-    plan::Plan* plan_ = nullptr;          // the rest is the thread's own
+    std::atomic<plan::Plan*> shown_{nullptr};  // plan_, for the supervisor
+    Queue<Write> writes_{most_writes};  // session to thread
+    std::uint64_t pushed_ = 0;  // the session's own
+    std::atomic<std::uint64_t> applied_{0};  // written by the thread
+    Queue<FaultEvent> faults_{256};  // thread to session
+    FaultLimiter limiter_;  // the thread's own
+    plan::Plan* plan_ = nullptr;  // the rest is the thread's own
     plan::ProbeSet* probes_ = nullptr;
-    TraceRing* tracing_ = nullptr;        // trace_ during a cycle
+    TraceRing* tracing_ = nullptr;  // trace_ during a cycle
     hal_cycle info_{};
-    std::int64_t grid_ns_ = 0;            // position of the cycle that runs
+    std::int64_t grid_ns_ = 0;  // position of the cycle that runs
     CycleMark own_mark_;
-    CycleMark* const mark_;               // own_mark_, or one in shared memory
+    CycleMark* const mark_;  // own_mark_, or one in shared memory
     bool safe_ = true;
     std::size_t sampled_ = 0;
     bool in_budget_ = true;
 };
 
-/// The step that the compiler inserts after a function with a declared-finite output; `self` is a plan::FiniteCheck whose
-/// sink is the Core. [realtime]
+/// The step that the compiler inserts after a function with a declared-finite output; `self` is a
+/// plan::FiniteCheck whose sink is the Core. [realtime]
 void check_finite(void* self, const hal_cycle* cycle);
 
 }  // namespace hal

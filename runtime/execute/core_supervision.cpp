@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// How a thread that does not finish its cycle is noticed, in which function it is, and what stands in for it.
+// How a thread that does not finish its cycle is noticed, in which function it is, and what stands
+// in for it.
 #include <algorithm>
 #include <functional>
 #include <limits>
@@ -14,12 +15,14 @@ namespace {
 // The function that a step of the plan belongs to; 0: none.
 std::uint32_t function_of(const plan::Plan* plan, const plan::Step* step) noexcept {
     if (!plan || !step) return 0;
-    const auto among = [step](const std::vector<plan::Step>& steps, const std::vector<plan::Function>& functions) -> std::uint32_t {
+    const auto among = [step](const std::vector<plan::Step>& steps,
+                              const std::vector<plan::Function>& functions) -> std::uint32_t {
         const std::less<> before;
         if (before(step, steps.data()) || !before(step, steps.data() + steps.size())) return 0;
         const auto at = static_cast<std::uint32_t>(step - steps.data());
-        for (const plan::Function& function : functions)
+        for (const plan::Function& function : functions) {
             if (at >= function.begin && at < function.end) return function.id;
+        }
         return 0;
     };
     const std::uint32_t cyclic = among(plan->steps, plan->functions);
@@ -42,12 +45,14 @@ void Core::expect(std::int64_t now_ns) noexcept {
 
 void Core::woke_late(std::int64_t due_ns, std::int64_t now_ns) noexcept {
     const std::int64_t limit = supervise_ns.load(std::memory_order_relaxed);
-    const bool tolerant = max_gap_ns.load(std::memory_order_relaxed) > 0;  // then an excuse is a part of the gap
+    // then an excuse is a part of the gap
+    const bool tolerant = max_gap_ns.load(std::memory_order_relaxed) > 0;
     const std::int64_t excused = tolerant ? 0 : excused_.load(std::memory_order_acquire);
     const std::int64_t silent_ns = now_ns - std::max({due_ns, finished_ns(), excused});
     if (limit == 0 || silent_ns <= limit) return;
     if (tolerate_gap(silent_ns) || !declare_hung()) return;
-    raise({HAL_FAULT_SILENT_THREAD, 0, info_.number, info_.start_ns, static_cast<double>(silent_ns), nullptr, nullptr});
+    raise({HAL_FAULT_SILENT_THREAD, 0, info_.number, info_.start_ns, static_cast<double>(silent_ns),
+           nullptr, nullptr});
 }
 
 // The thread was ready, or its cycle was under way, while others had the CPU.
@@ -65,7 +70,9 @@ struct Usage {
 };
 
 Usage usage_of_this_thread() noexcept {
-    const auto ns = [](const timeval& t) noexcept { return (std::int64_t{t.tv_sec} * 1'000'000 + t.tv_usec) * 1000; };
+    const auto ns = [](const timeval& t) noexcept {
+        return (std::int64_t{t.tv_sec} * 1'000'000 + t.tv_usec) * 1000;
+    };
     rusage usage{};
     getrusage(RUSAGE_THREAD, &usage);
     return {ns(usage.ru_utime) + ns(usage.ru_stime), usage.ru_nvcsw};
@@ -82,7 +89,8 @@ void Core::note_usage() noexcept {
 // The cycle took longer than the limit, but neither by computing nor by waiting in the kernel.
 bool Core::was_preempted() const noexcept {
     const Usage usage = usage_of_this_thread();
-    return usage.waits == waits_before_ && usage.cpu_ns - cpu_before_ns_ < supervise_ns.load(std::memory_order_relaxed) / 2;
+    return usage.waits == waits_before_ &&
+           usage.cpu_ns - cpu_before_ns_ < supervise_ns.load(std::memory_order_relaxed) / 2;
 }
 
 bool Core::declare_hung() noexcept {
@@ -94,14 +102,18 @@ bool Core::declare_hung() noexcept {
     return true;
 }
 
-// A function writes the mark as an ordinary variable, millions of times a second; here one look at it is enough.
-__attribute__((no_sanitize("thread"))) const plan::Step* Core::where() const noexcept { return mark_->current; }
+// A function writes the mark as an ordinary variable, millions of times a second; here one look at
+// it is enough.
+__attribute__((no_sanitize("thread"))) const plan::Step* Core::where() const noexcept {
+    return mark_->current;
+}
 
 std::int64_t Core::overdue_since_ns() const noexcept {
     const std::int64_t busy_since = busy_since_ns();
     const std::int64_t due = due_.load(std::memory_order_acquire);
     if (due == 0 && busy_since == 0) return std::numeric_limits<std::int64_t>::max();
-    const std::int64_t since = busy_since != 0 ? busy_since : std::max(finished_ns(), due + period_ns_);
+    const std::int64_t since =
+        busy_since != 0 ? busy_since : std::max(finished_ns(), due + period_ns_);
     return std::max(since, excused_.load(std::memory_order_acquire));
 }
 
@@ -118,8 +130,11 @@ void Core::stand_in(std::int64_t now_ns, bool emergency) noexcept {
     int free = nobody;
     const bool mine = turn_.compare_exchange_strong(free, supervisor, std::memory_order_acq_rel);
     if (plan::Plan* const plan = shown_.load(std::memory_order_acquire)) {
-        for (const plan::Safe& safe : plan->safe) __atomic_store_n(&safe.pin->slot->raw, safe.value.raw, __ATOMIC_RELAXED);
-        __atomic_store_n(&pins_.missed->slot->u32, static_cast<std::uint32_t>(missed_by(now_ns)), __ATOMIC_RELAXED);
+        for (const plan::Safe& safe : plan->safe) {
+            __atomic_store_n(&safe.pin->slot->raw, safe.value.raw, __ATOMIC_RELAXED);
+        }
+        __atomic_store_n(&pins_.missed->slot->u32, static_cast<std::uint32_t>(missed_by(now_ns)),
+                         __ATOMIC_RELAXED);
         if (emergency) {
             hal_cycle info{};
             info.size = sizeof info;
@@ -127,16 +142,24 @@ void Core::stand_in(std::int64_t now_ns, bool emergency) noexcept {
             info.period_s = static_cast<double>(period_ns_) * 1e-9;
             info.start_ns = now_ns;
             info.number = cycles.load(std::memory_order_relaxed);
-            for (const plan::Step& step : plan->emergency) step.step(step.self, &info);
+            for (const plan::Step& step : plan->emergency) {
+                step.step(step.self, &info);
+            }
         }
-        if (mine) publish(*plan);
+        if (mine) {
+            publish(*plan);
+        }
     }
-    if (mine) turn_.store(nobody, std::memory_order_release);
+    if (mine) {
+        turn_.store(nobody, std::memory_order_release);
+    }
 }
 
 std::uint64_t Core::missed_by(std::int64_t now_ns) const noexcept {
     const std::uint64_t counted = missed.load(std::memory_order_acquire);
-    const std::int64_t due = due_.load(std::memory_order_acquire), late = due == 0 ? 0 : (now_ns - due) / period_ns_ - 1;
+    const std::int64_t due = due_.load(std::memory_order_acquire);
+
+    const std::int64_t late = due == 0 ? 0 : (now_ns - due) / period_ns_ - 1;
     return counted + (late > 0 ? static_cast<std::uint64_t>(late) : 0);
 }
 
@@ -146,9 +169,12 @@ std::uint32_t Core::interrupted_function() const noexcept {
     return in_function() ? function_of(shown_.load(std::memory_order_acquire), where()) : 0;
 }
 
-std::uint32_t Core::hung_function() const noexcept { return busy_since_ns() != 0 ? interrupted_function() : 0; }
+std::uint32_t Core::hung_function() const noexcept {
+    return busy_since_ns() != 0 ? interrupted_function() : 0;
+}
 
-// Where the newest sample of the cycle that woke at `woke_ns` found it; 0: that cycle has no sample.
+// Where the newest sample of the cycle that woke at `woke_ns` found it; 0: that cycle has no
+// sample.
 std::uint32_t Core::slow_function(std::int64_t woke_ns) const noexcept {
     if (seen_since_.load(std::memory_order_acquire) != woke_ns) return 0;
     return function_of(plan_, seen_step_.load(std::memory_order_relaxed));

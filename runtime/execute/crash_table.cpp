@@ -35,22 +35,30 @@ void unlist_core(const Core& core) {
 }
 
 Core* core_in_cycle() noexcept {
-    for (auto& place : listed_cores)
-        if (Core* const core = place.load(std::memory_order_acquire); core && core->in_function()) return core;
+    for (auto& place : listed_cores) {
+        if (Core* const core = place.load(std::memory_order_acquire); core && core->in_function()) {
+            return core;
+        }
+    }
     return nullptr;
 }
 
 CycleNow cycle_now() {
     const std::lock_guard lock(cycle_now_mutex);
-    if (const Core* const core = core_in_cycle()) return {core, core->cycles.load(std::memory_order_acquire), core->interrupted_function()};
+    if (const Core* const core = core_in_cycle()) {
+        return {core, core->cycles.load(std::memory_order_acquire), core->interrupted_function()};
+    }
     return {};
 }
 
 void fence_cycle_now() { const std::lock_guard lock(cycle_now_mutex); }
 
 void make_all_safe() noexcept {
-    for (auto& place : listed_cores)
-        if (Core* const core = place.load(std::memory_order_acquire)) core->make_safe();
+    for (auto& place : listed_cores) {
+        if (Core* const core = place.load(std::memory_order_acquire)) {
+            core->make_safe();
+        }
+    }
 }
 
 }  // namespace hal

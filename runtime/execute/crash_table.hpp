@@ -6,7 +6,8 @@ namespace hal {
 
 class Core;
 
-/// Registers a core. Crash handlers cover at most 256 cores; further ones are not registered. [setup]
+/// Registers a core. Crash handlers cover at most 256 cores; further ones are not registered.
+/// [setup]
 void list_core(Core& core) noexcept;
 /// Removes a core, before it is destroyed. [setup]
 void unlist_core(const Core& core);

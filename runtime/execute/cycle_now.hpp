@@ -14,9 +14,11 @@ struct CycleNow {
     std::uint64_t cycle = 0;
     std::uint32_t function = 0;  ///< the model's number
 };
-/// Returns the running cycle of any executor with a virtual clock. Not called by threads that run cycles.
+/// Returns the running cycle of any executor with a virtual clock. Not called by threads that run
+/// cycles.
 CycleNow cycle_now();
-/// Waits until no cycle_now() reads a core or its plan; whatever was removed or replaced before can then be freed. [setup]
+/// Waits until no cycle_now() reads a core or its plan; whatever was removed or replaced before can
+/// then be freed. [setup]
 void fence_cycle_now();
 
 }  // namespace hal

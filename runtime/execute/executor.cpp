@@ -15,20 +15,25 @@
 
 namespace hal {
 
-Executor::Executor(bool virtual_clock) : virtual_(virtual_clock), background_(virtual_clock), epoch_ns_(virtual_clock ? 0 : monotonic_ns()) {}
+Executor::Executor(bool virtual_clock)
+    : virtual_(virtual_clock),
+      background_(virtual_clock),
+      epoch_ns_(virtual_clock ? 0 : monotonic_ns()) {}
 
 Executor::~Executor() {
     while (!runners_.empty()) {
         if (remove(runners_.back()->core, 2'000'000'000)) continue;
         const std::scoped_lock own(runners_mutex_);
-        keep_for_good(std::move(runners_.back()));  // a thread that hangs in a component still uses it
+        // a thread that hangs in a component still uses it
+        keep_for_good(std::move(runners_.back()));
         runners_.pop_back();
     }
 }
 
 Runner& Executor::runner(const Core& core) const {
-    for (const auto& runner : runners_)
+    for (const auto& runner : runners_) {
         if (&runner->core == &core) return *runner;
+    }
     std::abort();
 }
 
@@ -38,7 +43,9 @@ std::uint64_t Executor::halt() {
     const std::uint64_t ticket = ++halt_tickets_;
     for (const auto& runner : runners_) {
         runner->core.ask_halted(ticket);
-        if (!virtual_) runner->call();
+        if (!virtual_) {
+            runner->call();
+        }
     }
     return ticket;
 }
@@ -54,10 +61,12 @@ Executor::Halt Executor::halted(std::uint64_t ticket) const {
 }
 
 Core& Executor::add(const CoreOptions& options, ThreadPins pins) {
-    auto owned = std::make_unique<Runner>(next_id_++, options, pins, board_, timeline_, running_, !virtual_, epoch_ns_);
+    auto owned = std::make_unique<Runner>(next_id_++, options, pins, board_, timeline_, running_,
+                                          !virtual_, epoch_ns_);
     Runner& runner = *owned;
-    const auto place = std::upper_bound(runners_.begin(), runners_.end(), options.period_ns,
-                                        [](std::int64_t period, const auto& other) { return period < other->options.period_ns; });
+    const auto place = std::upper_bound(
+        runners_.begin(), runners_.end(), options.period_ns,
+        [](std::int64_t period, const auto& other) { return period < other->options.period_ns; });
     {
         const std::scoped_lock own(runners_mutex_);
         runner.core.ask_halted(halt_tickets_);
@@ -76,7 +85,8 @@ Core& Executor::add(const CoreOptions& options, ThreadPins pins) {
         throw;
     }
     const Granted& granted = runner.granted;
-    supervisor_.add(runner.core, runner.thread, runner.tid, granted.policy == Granted::Policy::fifo ? granted.priority : 0, granted.cpu);
+    supervisor_.add(runner.core, runner.thread, runner.tid,
+                    granted.policy == Granted::Policy::fifo ? granted.priority : 0, granted.cpu);
     return runner.core;
 }
 
@@ -96,15 +106,19 @@ bool wait_for(Ready ready, std::int64_t timeout_ns) {
     const std::int64_t end = monotonic_ns() + timeout_ns;
     for (int turn = 0; !ready(); ++turn) {
         if (monotonic_ns() > end) return false;
-        if (turn < 20) std::this_thread::yield();
-        else std::this_thread::sleep_for(std::chrono::microseconds(20));
+        if (turn < 20) {
+            std::this_thread::yield();
+        } else {
+            std::this_thread::sleep_for(std::chrono::microseconds(20));
+        }
     }
     return true;
 }
 
 constexpr std::int64_t for_ever = std::numeric_limits<std::int64_t>::max() / 2;
 
-// Declared hung by the supervisor, or not supervised and in a cycle that an earlier call has already waited for.
+// Declared hung by the supervisor, or not supervised and in a cycle that an earlier call has
+// already waited for.
 bool hangs(const Core& core, std::int64_t timeout_ns) {
     if (core.hung()) return true;
     const std::int64_t since = core.busy_since_ns();
@@ -119,7 +133,8 @@ bool Executor::remove(Core& core, std::int64_t timeout_ns) {
     } else if (leaving.started()) {
         const std::int64_t longest_ns = timeout_ns + leaving.options.period_ns;
         leaving.ask_to_end();
-        if (!wait_for([&] { return leaving.ended() || core.hung(); }, longest_ns) || !leaving.ended()) {
+        if (!wait_for([&] { return leaving.ended() || core.hung(); }, longest_ns) ||
+            !leaving.ended()) {
             leaving.ask_to_go_on();
             return false;
         }
@@ -146,8 +161,11 @@ bool Executor::reset(Core& core) {
 }
 
 void Executor::call(Runner& runner) {
-    if (virtual_) runner.core.service();
-    else runner.call();
+    if (virtual_) {
+        runner.core.service();
+    } else {
+        runner.call();
+    }
 }
 
 std::vector<Core*> Executor::hanging(std::int64_t timeout_ns) const {
@@ -160,75 +178,117 @@ std::vector<Core*> Executor::hanging(std::int64_t timeout_ns) const {
         }
         const std::int64_t since = core.busy_since_ns();
         if (since == 0) continue;
-        if (!wait_for([&] { return core.busy_since_ns() != since || hangs(core, timeout_ns); }, for_ever) || hangs(core, timeout_ns))
+        if (!wait_for([&] { return core.busy_since_ns() != since || hangs(core, timeout_ns); },
+                      for_ever) ||
+            hangs(core, timeout_ns)) {
             found.push_back(&core);
+        }
     }
     return found;
 }
 
-std::vector<Core*> Executor::swap(const std::vector<std::pair<Core*, plan::Plan*>>& plans, std::int64_t timeout_ns) {
+std::vector<Core*> Executor::swap(const std::vector<std::pair<Core*, plan::Plan*>>& plans,
+                                  std::int64_t timeout_ns) {
     std::vector<Core*> silent;
-    for (const auto& [core, plan] : plans) core->offer(plan);
-    for (const auto& [core, plan] : plans) call(runner(*core));
+    for (const auto& [core, plan] : plans) {
+        core->offer(plan);
+    }
+    for (const auto& [core, plan] : plans) {
+        call(runner(*core));
+    }
     for (const auto& [core, plan] : plans) {
         const auto taken = [core = core, plan = plan] { return core->taken() == plan->epoch; };
-        wait_for([&, core = core] { return taken() || core->hung(); }, timeout_ns + 2 * core->period_ns());
+        wait_for([&, core = core] { return taken() || core->hung(); },
+                 timeout_ns + 2 * core->period_ns());
         if (taken()) continue;
-        if (core->withdraw(plan)) silent.push_back(core);
-        else wait_for(taken, for_ever);  // it is just taking it
+        if (core->withdraw(plan)) {
+            silent.push_back(core);
+        } else {
+            wait_for(taken, for_ever);  // it is just taking it
+        }
     }
     supervisor_.fence();  // the old plans and what they point to may go
-    if (virtual_) fence_cycle_now();
-    return silent;
-}
-
-std::vector<Core*> Executor::swap(const std::vector<std::pair<Core*, plan::ProbeSet*>>& probes, std::int64_t timeout_ns) {
-    std::vector<Core*> silent;
-    for (const auto& [core, set] : probes) core->offer(set);
-    for (const auto& [core, set] : probes) call(runner(*core));
-    for (const auto& [core, set] : probes) {
-        const auto taken = [core = core, set = set] { return core->probes_taken() == set->epoch; };
-        wait_for([&, core = core] { return taken() || hangs(*core, timeout_ns); }, timeout_ns + 2 * core->period_ns());
-        if (taken()) continue;
-        if (core->withdraw(set)) silent.push_back(core);
-        else wait_for(taken, for_ever);  // it is just taking it
+    if (virtual_) {
+        fence_cycle_now();
     }
     return silent;
 }
 
-bool Executor::observe(const std::vector<std::pair<Core*, Observation*>>& wishes, std::int64_t timeout_ns) {
-    for (const auto& [core, wish] : wishes) core->observe(wish);
-    for (const auto& [core, wish] : wishes) call(runner(*core));
+std::vector<Core*> Executor::swap(const std::vector<std::pair<Core*, plan::ProbeSet*>>& probes,
+                                  std::int64_t timeout_ns) {
+    std::vector<Core*> silent;
+    for (const auto& [core, set] : probes) {
+        core->offer(set);
+    }
+    for (const auto& [core, set] : probes) {
+        call(runner(*core));
+    }
+    for (const auto& [core, set] : probes) {
+        const auto taken = [core = core, set = set] { return core->probes_taken() == set->epoch; };
+        wait_for([&, core = core] { return taken() || hangs(*core, timeout_ns); },
+                 timeout_ns + 2 * core->period_ns());
+        if (taken()) continue;
+        if (core->withdraw(set)) {
+            silent.push_back(core);
+        } else {
+            wait_for(taken, for_ever);  // it is just taking it
+        }
+    }
+    return silent;
+}
+
+bool Executor::observe(const std::vector<std::pair<Core*, Observation*>>& wishes,
+                       std::int64_t timeout_ns) {
+    for (const auto& [core, wish] : wishes) {
+        core->observe(wish);
+    }
+    for (const auto& [core, wish] : wishes) {
+        call(runner(*core));
+    }
     bool all = true;
     for (const auto& [core, wish] : wishes) {
         const auto done = [wish = wish] { return wish->done.load(std::memory_order_acquire); };
-        wait_for([&, core = core] { return done() || hangs(*core, timeout_ns); }, timeout_ns + 2 * core->period_ns());
+        wait_for([&, core = core] { return done() || hangs(*core, timeout_ns); },
+                 timeout_ns + 2 * core->period_ns());
         if (done()) continue;
-        if (core->withdraw(wish)) all = false;
-        else wait_for(done, for_ever);  // it is being answered: never free it under the thread
+        if (core->withdraw(wish)) {
+            all = false;
+        } else {
+            wait_for(done, for_ever);  // it is being answered: never free it under the thread
+        }
     }
     return all;
 }
 
-bool Executor::write(const std::vector<std::pair<Core*, std::vector<Write>>>& rows, std::int64_t timeout_ns) {
-    for (const auto& [core, row] : rows)
+bool Executor::write(const std::vector<std::pair<Core*, std::vector<Write>>>& rows,
+                     std::int64_t timeout_ns) {
+    for (const auto& [core, row] : rows) {
         if (hangs(*core, timeout_ns)) return false;
+    }
     for (const auto& [core, row] : rows) {
         const auto fits = [&, core = core, needed = row.size()] { return core->room() >= needed; };
         if (fits()) continue;
-        wait_for([&, core = core] { return call(runner(*core)), fits() || hangs(*core, timeout_ns); }, timeout_ns + 2 * core->period_ns());
+        wait_for([&, core = core] {
+            call(runner(*core));
+            return fits() || hangs(*core, timeout_ns);
+        }, timeout_ns + 2 * core->period_ns());
         if (!fits()) return false;
     }
     for (const auto& [core, row] : rows) {
         core->write(row.data(), row.size());
-        if (virtual_) core->service();
+        if (virtual_) {
+            core->service();
+        }
     }
     return true;
 }
 
 void Executor::set_priority(Core& core, int priority) {
     Runner& target = runner(core);
-    if (virtual_ || target.granted.policy != Granted::Policy::fifo || target.granted.priority == priority) return;
+    if (virtual_ || target.granted.policy != Granted::Policy::fifo ||
+        target.granted.priority == priority) {
+        return;
+    }
     supervisor_.set_priority(core, priority);
     target.granted.priority = priority;
 }
@@ -237,18 +297,24 @@ void Executor::advance(std::int64_t ns) {
     if (!virtual_) {
         const std::int64_t until = monotonic_ns() + ns;
         const timespec at = to_timespec(until);
-        while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &at, nullptr) == EINTR) {}
+        while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &at, nullptr) == EINTR) {
+        }
         return;
     }
     clock_.advance(ns);
 }
 
-void Executor::advance_cycles(const Core& core, std::uint64_t cycles) { clock_.advance_cycles(runner(core), cycles); }
+void Executor::advance_cycles(const Core& core, std::uint64_t cycles) {
+    clock_.advance_cycles(runner(core), cycles);
+}
 
 void Executor::lead() {
     timeline_.lead();
-    for (const auto& runner : runners_)
-        if (!virtual_) runner->call();
+    for (const auto& runner : runners_) {
+        if (!virtual_) {
+            runner->call();
+        }
+    }
 }
 
 std::int64_t Executor::now_ns() const { return virtual_ ? clock_.now_ns() : monotonic_ns(); }
@@ -259,6 +325,8 @@ int Executor::tid(const Core& core) const { return runner(core).tid; }
 
 std::int64_t Executor::spin_ns(const Core& core) const { return runner(core).spin_ns(); }
 
-std::uint64_t Executor::page_faults(const Core& core) const { return virtual_ ? 0 : runner(core).page_faults(); }
+std::uint64_t Executor::page_faults(const Core& core) const {
+    return virtual_ ? 0 : runner(core).page_faults();
+}
 
 }  // namespace hal

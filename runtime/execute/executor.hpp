@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// All threads of one instance and the clock they share. [setup] throughout: the session calls it from one thread.
+// All threads of one instance and the clock they share. [setup] throughout: the session calls it
+// from one thread.
 #pragma once
 
 #include <atomic>
@@ -24,9 +25,11 @@ public:
     ~Executor();
     Executor(const Executor&) = delete;
 
-    /// Creates a thread, which serves its inbox at once. Returns its core, which lives until remove().
+    /// Creates a thread, which serves its inbox at once. Returns its core, which lives until
+    /// remove().
     Core& add(const CoreOptions& options, ThreadPins pins);
-    /// Sets a thread's outputs to their safe values and ends it. Returns false when it hangs or does not end within `timeout_ns`.
+    /// Sets a thread's outputs to their safe values and ends it. Returns false when it hangs or
+    /// does not end within `timeout_ns`.
     bool remove(Core& core, std::int64_t timeout_ns);
     /// Sets the outputs of a thread that does not end to their safe values and stops its functions.
     void abandon(Core& core);
@@ -36,32 +39,42 @@ public:
     void start() { running_.store(true, std::memory_order_release); }
     void stop() { running_.store(false, std::memory_order_release); }
     bool running() const { return running_.load(std::memory_order_acquire); }
-    /// Does the same as stop(), from any thread, and wakes slow threads. Returns a ticket for halted(). [any]
+    /// Does the same as stop(), from any thread, and wakes slow threads. Returns a ticket for
+    /// halted(). [any]
     std::uint64_t halt();
     enum class Halt { pending, done, hung };
-    /// Returns whether the outputs of all threads have had their safe values since halt() returned the ticket. [any]
+    /// Returns whether the outputs of all threads have had their safe values since halt() returned
+    /// the ticket. [any]
     Halt halted(std::uint64_t ticket) const;
 
-    /// Returns the threads that hang, or do not end their current cycle within the timeout. Called before an edit, so that
-    /// a hung thread rejects it before any other thread has taken its part.
+    /// Returns the threads that hang, or do not end their current cycle within the timeout. Called
+    /// before an edit, so that a hung thread rejects it before any other thread has taken its part.
     std::vector<Core*> hanging(std::int64_t timeout_ns) const;
-    /// Offers plans and waits until each thread has taken its own. Returns the cores that did not within the timeout;
-    /// their plans are withdrawn.
-    std::vector<Core*> swap(const std::vector<std::pair<Core*, plan::Plan*>>& plans, std::int64_t timeout_ns);
+    /// Offers plans and waits until each thread has taken its own. Returns the cores that did not
+    /// within the timeout; their plans are withdrawn.
+    std::vector<Core*> swap(const std::vector<std::pair<Core*, plan::Plan*>>& plans,
+                            std::int64_t timeout_ns);
     /// The same for probes, while the plans stay.
-    std::vector<Core*> swap(const std::vector<std::pair<Core*, plan::ProbeSet*>>& probes, std::int64_t timeout_ns);
-    /// Waits for all observations. Returns false when a thread did not answer; its observation is withdrawn.
-    bool observe(const std::vector<std::pair<Core*, Observation*>>& wishes, std::int64_t timeout_ns);
-    /// Queues a batch of at most Core::most_writes writes per thread; each batch takes effect in one cycle. Waits while a queue is
-    /// full. Returns false and queues nothing when it stays full for the timeout.
-    bool write(const std::vector<std::pair<Core*, std::vector<Write>>>& rows, std::int64_t timeout_ns);
-    /// Changes the priority of a running SCHED_FIFO thread: threads with a shorter period were added or removed.
+    std::vector<Core*> swap(const std::vector<std::pair<Core*, plan::ProbeSet*>>& probes,
+                            std::int64_t timeout_ns);
+    /// Waits for all observations. Returns false when a thread did not answer; its observation is
+    /// withdrawn.
+    bool observe(const std::vector<std::pair<Core*, Observation*>>& wishes,
+                 std::int64_t timeout_ns);
+    /// Queues a batch of at most Core::most_writes writes per thread; each batch takes effect in
+    /// one cycle. Waits while a queue is full. Returns false and queues nothing when it stays full
+    /// for the timeout.
+    bool write(const std::vector<std::pair<Core*, std::vector<Write>>>& rows,
+               std::int64_t timeout_ns);
+    /// Changes the priority of a running SCHED_FIFO thread: threads with a shorter period were
+    /// added or removed.
     void set_priority(Core& core, int priority);
 
-    /// Runs, under the virtual clock, until this thread has finished `cycles` more cycles, with all other cycles due until then.
+    /// Runs, under the virtual clock, until this thread has finished `cycles` more cycles, with all
+    /// other cycles due until then.
     void advance_cycles(const Core& core, std::uint64_t cycles);
-    /// Runs, under the virtual clock, every cycle due within the next `ns`, the fastest thread first at equal instants. Waits for that time
-    /// under the real clock.
+    /// Runs, under the virtual clock, every cycle due within the next `ns`, the fastest thread
+    /// first at equal instants. Waits for that time under the real clock.
     void advance(std::int64_t ns);
     std::int64_t now_ns() const;
     bool is_virtual() const { return virtual_; }
@@ -78,11 +91,12 @@ public:
     const Timeline& timeline() const { return timeline_; }
     hal_clock& clock() { return timeline_.shared; }
     const hal_background& background() const { return background_.shared(); }
-    /// Enables external clock adjustment: from now on threads poll for adjustments while they sleep; those in a long sleep do so at once.
+    /// Enables external clock adjustment: from now on threads poll for adjustments while they
+    /// sleep; those in a long sleep do so at once.
     void lead();
 
 private:
-    void call(Runner& runner);       // the virtual clock's is served at once
+    void call(Runner& runner);  // the virtual clock's is served at once
     Runner& runner(const Core& core) const;
     void forget(const Runner& leaving);
     const bool virtual_;
@@ -91,11 +105,12 @@ private:
     Supervisor supervisor_{board_};
     Timeline timeline_;
     Background background_;
-    mutable std::mutex runners_mutex_;              // held while runners_ changes, and by halt() and halted(), which need no session
+    // held while runners_ changes, and by halt() and halted(), which need no session
+    mutable std::mutex runners_mutex_;
     std::vector<std::unique_ptr<Runner>> runners_;  // fastest first
-    std::uint64_t halt_tickets_ = 0;                // guarded by runners_mutex_
+    std::uint64_t halt_tickets_ = 0;  // guarded by runners_mutex_
     VirtualClock clock_{runners_, timeline_, background_, supervisor_};
-    const std::int64_t epoch_ns_;    // all positions of the grid are epoch + k * period
+    const std::int64_t epoch_ns_;  // all positions of the grid are epoch + k * period
     std::uint32_t next_id_ = 1;
 };
 

@@ -17,8 +17,11 @@ namespace {
 /// CAP_IPC_LOCK: no limit counts (mlockall(2)).
 bool may_lock_memory() {
     std::ifstream file("/proc/self/status");
-    for (std::string line; std::getline(file, line);)
-        if (line.starts_with("CapEff:")) return std::strtoull(line.c_str() + 7, nullptr, 16) >> CAP_IPC_LOCK & 1;
+    for (std::string line; std::getline(file, line);) {
+        if (line.starts_with("CapEff:")) {
+            return std::strtoull(line.c_str() + 7, nullptr, 16) >> CAP_IPC_LOCK & 1;
+        }
+    }
     return false;
 }
 
@@ -30,19 +33,25 @@ void limit_helper_stacks() {
     pthread_attr_t attributes;
     if (pthread_getattr_default_np(&attributes) != 0) return;
     std::size_t size = 0;
-    if (pthread_attr_getstacksize(&attributes, &size) == 0 && size > most && pthread_attr_setstacksize(&attributes, most) == 0)
+    if (pthread_attr_getstacksize(&attributes, &size) == 0 && size > most &&
+        pthread_attr_setstacksize(&attributes, most) == 0) {
         pthread_setattr_default_np(&attributes);
+    }
     pthread_attr_destroy(&attributes);
 #endif
 }
 
 std::vector<std::string> prepare_process() {
     std::vector<std::string> refused;
-    // Under a small limit MCL_FUTURE would make later allocations fail, which is worse than a page fault.
+    // Under a small limit MCL_FUTURE would make later allocations fail, which is worse than a page
+    // fault.
     const rlimit all{RLIM_INFINITY, RLIM_INFINITY};
     rlimit now{};
-    const bool unlimited = setrlimit(RLIMIT_MEMLOCK, &all) == 0 || (getrlimit(RLIMIT_MEMLOCK, &now) == 0 && now.rlim_cur == RLIM_INFINITY);
-    if ((!unlimited && !may_lock_memory()) || mlockall(MCL_CURRENT | MCL_FUTURE) != 0) refused.emplace_back("memory locking");
+    const bool unlimited = setrlimit(RLIMIT_MEMLOCK, &all) == 0 ||
+                           (getrlimit(RLIMIT_MEMLOCK, &now) == 0 && now.rlim_cur == RLIM_INFINITY);
+    if ((!unlimited && !may_lock_memory()) || mlockall(MCL_CURRENT | MCL_FUTURE) != 0) {
+        refused.emplace_back("memory locking");
+    }
     // keeps the CPU out of deep sleep states for as long as the file stays open
     static const int latency = open("/dev/cpu_dma_latency", O_WRONLY | O_CLOEXEC);
     if (latency >= 0) {

@@ -11,8 +11,8 @@
 #include <iterator>
 #include <sched.h>
 #include <stdexcept>
-#include <sys/resource.h>
 #include <sys/prctl.h>
+#include <sys/resource.h>
 #include <sys/syscall.h>
 #include <thread>
 #include <unistd.h>
@@ -21,17 +21,21 @@ namespace hal {
 namespace {
 
 #if defined(__SANITIZE_THREAD__)
-constexpr std::size_t stack_bytes = 1 << 22;  // the sanitizer keeps more than half a megabyte of its own on each stack
+constexpr std::size_t stack_bytes =
+    1 << 22;  // the sanitizer keeps more than half a megabyte of its own on each stack
 #else
 constexpr std::size_t stack_bytes = 1 << 20;
 #endif
 constexpr std::int64_t calm_ns = 5'000;  // before the deadline nothing but the clock is looked at
-constexpr std::int64_t look_ns = 1'000;  // how often a spinning thread looks whether its deadline has moved
+// how often a spinning thread looks whether its deadline has moved
+constexpr std::int64_t look_ns = 1'000;
 constexpr std::size_t signal_stack_bytes = 1 << 16;
 
 void prefault_stack() noexcept {
     volatile char room[1 << 19];
-    for (std::size_t i = 0; i < sizeof room; i += 4096) room[i] = 0;
+    for (std::size_t i = 0; i < sizeof room; i += 4096) {
+        room[i] = 0;
+    }
 }
 
 std::uint64_t faults_of_this_thread() noexcept {
@@ -45,28 +49,35 @@ int default_cpu() {
     std::ifstream file("/sys/devices/system/cpu/isolated");
     std::string text;
     std::getline(file, text);
-    if (const auto at = text.find_last_of(",-"); !text.empty()) return std::atoi(text.c_str() + (at == std::string::npos ? 0 : at + 1));
+    if (const auto at = text.find_last_of(",-"); !text.empty()) {
+        return std::atoi(text.c_str() + (at == std::string::npos ? 0 : at + 1));
+    }
     return static_cast<int>(std::thread::hardware_concurrency()) - 1;
 }
 
 bool use_deadline(const CoreOptions& options) noexcept {
     struct {
-        std::uint32_t size = 48, policy = SCHED_DEADLINE;
+        std::uint32_t size = 48;
+        std::uint32_t policy = SCHED_DEADLINE;
         std::uint64_t flags = 0;
         std::int32_t nice = 0;
         std::uint32_t priority = 0;
-        std::uint64_t runtime = 0, deadline = 0, period = 0;
+        std::uint64_t runtime = 0;
+        std::uint64_t deadline = 0;
+        std::uint64_t period = 0;
     } attributes;  // struct sched_attr; glibc 2.36 has no declaration of it
     const auto period = static_cast<std::uint64_t>(options.period_ns);
-    attributes.runtime = options.budget_ns > 0 ? static_cast<std::uint64_t>(options.budget_ns) : period / 2;
+    attributes.runtime =
+        options.budget_ns > 0 ? static_cast<std::uint64_t>(options.budget_ns) : period / 2;
     attributes.deadline = attributes.period = period;
     return syscall(SYS_sched_setattr, 0, &attributes, 0) == 0;
 }
 
 }  // namespace
 
-Runner::Runner(std::uint32_t id, const CoreOptions& o, ThreadPins pins, FaultBoard& board, Timeline& timeline, const std::atomic<bool>& running,
-               bool measure, std::int64_t epoch_ns)
+Runner::Runner(std::uint32_t id, const CoreOptions& o, ThreadPins pins, FaultBoard& board,
+               Timeline& timeline, const std::atomic<bool>& running, bool measure,
+               std::int64_t epoch_ns)
     : core(id, o.period_ns, pins, board, timeline, running, measure, o.mark),
       options(o),
       timeline_(timeline),
@@ -75,7 +86,8 @@ Runner::Runner(std::uint32_t id, const CoreOptions& o, ThreadPins pins, FaultBoa
     core.budget_ns = o.budget_ns;
     core.supervise_ns = o.supervise_ns;
     core.profile_every = o.profile_every;
-    wait_.spin_ns = o.spin_ns >= 0 ? std::min(o.spin_ns, o.period_ns * 9 / 10) : Wait::default_spin_ns(o.period_ns);
+    wait_.spin_ns = o.spin_ns >= 0 ? std::min(o.spin_ns, o.period_ns * 9 / 10)
+                                   : Wait::default_spin_ns(o.period_ns);
 }
 
 void Runner::start() {
@@ -89,21 +101,28 @@ void Runner::start() {
     pthread_attr_destroy(&attributes);
     if (failed) {
         thread = {};
-        throw std::runtime_error(std::string("the system gives no thread: ") + std::strerror(failed));
+        throw std::runtime_error(std::string("the system gives no thread: ") +
+                                 std::strerror(failed));
     }
-    while (!ready_.load(std::memory_order_acquire)) std::this_thread::yield();
+    while (!ready_.load(std::memory_order_acquire)) {
+        std::this_thread::yield();
+    }
     bind();
 }
 
-// From outside: a thread that binds itself to the CPU of a busy real-time process does not return from that call.
+// From outside: a thread that binds itself to the CPU of a busy real-time process does not return
+// from that call.
 void Runner::bind() noexcept {
-    if (granted.policy == Granted::Policy::deadline) return;  // its affinity must stay the whole root domain
+    // its affinity must stay the whole root domain
+    if (granted.policy == Granted::Policy::deadline) return;
     const bool wants = options.priority > 0 || options.deadline;
     const int cpu = options.cpu >= 0 ? options.cpu : default_cpu();
     cpu_set_t set;
     CPU_ZERO(&set);
     CPU_SET(static_cast<std::size_t>(cpu), &set);
-    if ((wants || options.cpu >= 0) && pthread_setaffinity_np(thread, sizeof set, &set) == 0) granted.cpu = cpu;
+    if ((wants || options.cpu >= 0) && pthread_setaffinity_np(thread, sizeof set, &set) == 0) {
+        granted.cpu = cpu;
+    }
 }
 
 void Runner::ask_to_end() {
@@ -119,12 +138,16 @@ bool Runner::join(std::int64_t timeout_ns) {
 }
 
 void Runner::call() {
-    if (callable()) Wait::ring(bell_);
+    if (callable()) {
+        Wait::ring(bell_);
+    }
 }
 
 void Runner::set_up() noexcept {
     tid = static_cast<int>(syscall(SYS_gettid));
-    if (!options.name.empty()) pthread_setname_np(pthread_self(), options.name.substr(0, 15).c_str());
+    if (!options.name.empty()) {
+        pthread_setname_np(pthread_self(), options.name.substr(0, 15).c_str());
+    }
     const bool wants = options.priority > 0 || options.deadline;
     if (options.deadline && use_deadline(options)) {
         granted.policy = Granted::Policy::deadline;
@@ -136,11 +159,16 @@ void Runner::set_up() noexcept {
             granted.priority = parameters.sched_priority;
         }
     }
-    core.max_gap_ns = granted.policy == Granted::Policy::other ? options.max_gap_ns : options.max_gap_realtime_ns;
+    core.max_gap_ns =
+        granted.policy == Granted::Policy::other ? options.max_gap_ns : options.max_gap_realtime_ns;
     granted.refused = wants && granted.policy == Granted::Policy::other;
-    // Without a real-time policy spinning is charged like work, and the kernel preempts the thread for it.
-    if (granted.policy == Granted::Policy::other && options.spin_ns < 0) wait_.spin_ns = 0;
-    prctl(PR_SET_TIMERSLACK, 1UL, 0UL, 0UL, 0UL);  // else the kernel may wake an ordinary thread 50 us late, to save power
+    // Without a real-time policy spinning is charged like work, and the kernel preempts the thread
+    // for it.
+    if (granted.policy == Granted::Policy::other && options.spin_ns < 0) {
+        wait_.spin_ns = 0;
+    }
+    // else the kernel may wake an ordinary thread 50 us late, to save power
+    prctl(PR_SET_TIMERSLACK, 1UL, 0UL, 0UL, 0UL);
     // a crash handler must run even when it is the stack that overflowed
     stack_t other{};
     other.ss_sp = signal_stack_.get();
@@ -153,11 +181,14 @@ void Runner::set_up() noexcept {
 void Runner::place(std::int64_t now_ns) noexcept {
     const std::int64_t from = now_ns - timeline_.shift_ns();
     grid_ns = epoch_ns_ + ((from - epoch_ns_) / options.period_ns + 1) * options.period_ns;
-    while (timeline_.due_ns(grid_ns) <= now_ns) grid_ns += options.period_ns;
+    while (timeline_.due_ns(grid_ns) <= now_ns) {
+        grid_ns += options.period_ns;
+    }
 }
 
-// Until a sleeper has to look whether its deadline has moved: no step is longer than a tenth of the time between two of them, so
-// it cannot come before nine tenths of the remaining time. A spin window that is longer than that sees the steps anyway.
+// Until a sleeper has to look whether its deadline has moved: no step is longer than a tenth of the
+// time between two of them, so it cannot come before nine tenths of the remaining time. A spin
+// window that is longer than that sees the steps anyway.
 std::int64_t Runner::safe_until(std::int64_t due) const noexcept {
     if (!timeline_.led()) return due;
     constexpr std::int64_t least_ns = 50'000;
@@ -168,7 +199,8 @@ std::int64_t Runner::safe_until(std::int64_t due) const noexcept {
 // Sleeps up to the spin window before the next deadline. False: called between two cycles.
 bool Runner::sleep() noexcept {
     for (;;) {
-        const std::int64_t due = timeline_.due_ns(grid_ns), until = safe_until(due);
+        const std::int64_t due = timeline_.due_ns(grid_ns);
+        const std::int64_t until = safe_until(due);
         if (callable()) {
             const std::uint32_t heard = bell_.load(std::memory_order_acquire);
             core.service();  // what came before `heard` was read
@@ -189,7 +221,8 @@ Runner::Woken Runner::spin() const noexcept {
     }
 }
 
-// The thread. Positions are epoch + k * period for ever: an overrun skips periods and keeps the phase.
+// The thread. Positions are epoch + k * period for ever: an overrun skips periods and keeps the
+// phase.
 void Runner::loop() noexcept {
     set_up();
     place(monotonic_ns());
@@ -207,7 +240,9 @@ void Runner::loop() noexcept {
             woken = spin();  // steps made meanwhile may have put this one later
         }
         core.cycle(grid_ns, woken.due_ns, woken.now_ns);
-        if (++served == 100) faults_before_.store(faults_of_this_thread(), std::memory_order_release);
+        if (++served == 100) {
+            faults_before_.store(faults_of_this_thread(), std::memory_order_release);
+        }
         grid_ns += period;
     }
     core.make_safe_at_end();
@@ -222,9 +257,13 @@ std::uint64_t Runner::page_faults() const {
     std::string text((std::istreambuf_iterator<char>(file)), {});
     const auto name_end = text.rfind(')');
     if (name_end == std::string::npos) return 0;
-    unsigned long long minor = 0, major = 0;
+    unsigned long long minor = 0;
+    unsigned long long major = 0;
     // after the name: state ppid pgrp session tty tpgid flags minflt cminflt majflt
-    if (std::sscanf(text.c_str() + name_end + 1, " %*c %*d %*d %*d %*d %*d %*u %llu %*u %llu", &minor, &major) != 2) return 0;
+    if (std::sscanf(text.c_str() + name_end + 1, " %*c %*d %*d %*d %*d %*d %*u %llu %*u %llu",
+                    &minor, &major) != 2) {
+        return 0;
+    }
     return minor + major > before ? minor + major - before : 0;
 }
 

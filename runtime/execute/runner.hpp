@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// One core on a thread of its own, which sleeps and spins to its deadlines; under the virtual clock without a thread.
+// One core on a thread of its own, which sleeps and spins to its deadlines; under the virtual clock
+// without a thread.
 #pragma once
 
 #include <atomic>
@@ -17,33 +18,38 @@ namespace hal {
 
 struct CoreOptions {
     std::int64_t period_ns = 0;
-    int cpu = -1;             ///< -1: an isolated CPU if there is one, else the last
-    int priority = 0;         ///< SCHED_FIFO priority; 0: not a real-time policy
-    bool deadline = false;    ///< SCHED_DEADLINE with runtime `budget` (or half the period)
+    int cpu = -1;  ///< -1: an isolated CPU if there is one, else the last
+    int priority = 0;  ///< SCHED_FIFO priority; 0: not a real-time policy
+    bool deadline = false;  ///< SCHED_DEADLINE with runtime `budget` (or half the period)
     std::int64_t spin_ns = -1;
     std::int64_t budget_ns = 0;
     std::int64_t supervise_ns = 0;  ///< longest time without a finished cycle; 0: not supervised
     bool profile_every = false;
-    std::int64_t max_gap_ns = 0, max_gap_realtime_ns = 0;  ///< Core::max_gap_ns, the second with a real-time policy
-    std::string name{};       ///< as the system shows it: top -H, a debugger; its first 15 bytes
+    /// Core::max_gap_ns, the second with a real-time policy
+    std::int64_t max_gap_ns = 0;
+    std::int64_t max_gap_realtime_ns = 0;
+    std::string name{};  ///< as the system shows it: top -H, a debugger; its first 15 bytes
     CycleMark* mark = nullptr;  ///< nullptr: one of the thread's own
 };
 
 /// What the system granted a thread.
 struct Granted {
     enum class Policy { fifo, deadline, other } policy = Policy::other;
-    int priority = 0, cpu = -1;
-    bool refused = false;     ///< a real-time policy was requested and denied
+    int priority = 0;
+    int cpu = -1;
+    bool refused = false;  ///< a real-time policy was requested and denied
 };
 
 class Runner {
 public:
     /// `epoch_ns`: time of position 0 of the grid; `measure`: cycles take real time.
-    Runner(std::uint32_t id, const CoreOptions& options, ThreadPins pins, FaultBoard& board, Timeline& timeline, const std::atomic<bool>& running,
-           bool measure, std::int64_t epoch_ns);
+    Runner(std::uint32_t id, const CoreOptions& options, ThreadPins pins, FaultBoard& board,
+           Timeline& timeline, const std::atomic<bool>& running, bool measure,
+           std::int64_t epoch_ns);
     Runner(const Runner&) = delete;
 
-    /// Starts the thread and waits until it has what the system grants it. Throws std::runtime_error when the system cannot create a thread.
+    /// Starts the thread and waits until it has what the system grants it. Throws
+    /// std::runtime_error when the system cannot create a thread.
     void start();
     bool started() const { return thread != pthread_t{}; }
     /// Asks the thread to end, and wakes it.
@@ -51,7 +57,8 @@ public:
     /// Withdraws the request: the thread continues should its function return.
     void ask_to_go_on() { quit_.store(false, std::memory_order_release); }
     bool ended() const { return ended_.load(std::memory_order_acquire); }
-    /// Waits for the end of a thread that has finished its last cycle. Returns false if it still runs.
+    /// Waits for the end of a thread that has finished its last cycle. Returns false if it still
+    /// runs.
     bool join(std::int64_t timeout_ns);
     /// Wakes the thread before its next cycle where possible.
     void call();
@@ -66,8 +73,9 @@ public:
     const CoreOptions options;
     pthread_t thread{};
     std::atomic<int> tid{0};
-    Granted granted;                          ///< what the system granted the thread
-    std::int64_t grid_ns = 0;                 ///< position of the next cycle; the thread's, or the virtual clock's
+    Granted granted;  ///< what the system granted the thread
+    /// position of the next cycle; the thread's, or the virtual clock's
+    std::int64_t grid_ns = 0;
 
 private:
     bool callable() const { return options.period_ns >= Wait::callable_period_ns; }
@@ -84,11 +92,13 @@ private:
     const Timeline& timeline_;
     const std::int64_t epoch_ns_;
     Wait wait_;
-    std::atomic<bool> quit_{false}, ended_{false}, ready_{false};
-    std::atomic<std::uint32_t> bell_{0};      // futex of slow threads
+    std::atomic<bool> quit_{false};
+    std::atomic<bool> ended_{false};
+    std::atomic<bool> ready_{false};
+    std::atomic<std::uint32_t> bell_{0};  // futex of slow threads
     std::atomic<std::uint64_t> faults_before_{0};
     std::unique_ptr<char[]> signal_stack_;
-    stack_t signal_stack_before_{};           // a sanitizer's; it looks for it when the thread ends
+    stack_t signal_stack_before_{};  // a sanitizer's; it looks for it when the thread ends
 };
 
 }  // namespace hal

@@ -28,7 +28,9 @@ SchedulerUsage scheduler_usage(int tid) noexcept {
     read_small_file(path, text, sizeof text);
     long long cpu = 0;
     long long delay = 0;
-    if (std::sscanf(text, "%lld %lld", &cpu, &delay) != 2) return {};
+    if (std::sscanf(text, "%lld %lld", &cpu, &delay) != 2) {
+        return {};
+    }
     return {monotonic_ns(), cpu, delay};
 }
 
@@ -40,10 +42,16 @@ KernelView kernel_view(int tid) noexcept {
     KernelView view;
     if (const char* const at = std::strstr(text, "\nState:")) {
         const char* letter = at + 7;
-        while (*letter == ' ' || *letter == '\t') ++letter;
-        if (*letter) view.state = *letter;
+        while (*letter == ' ' || *letter == '\t') {
+            ++letter;
+        }
+        if (*letter) {
+            view.state = *letter;
+        }
     }
-    if (const char* const at = std::strstr(text, "\nTracerPid:")) view.tracer = std::atoi(at + 11);
+    if (const char* const at = std::strstr(text, "\nTracerPid:")) {
+        view.tracer = std::atoi(at + 11);
+    }
     return view;
 }
 

@@ -15,7 +15,8 @@
 namespace hal {
 namespace {
 
-constexpr std::int64_t shortest_interval_ns = 2'000'000, longest_interval_ns = 50'000'000;
+constexpr std::int64_t shortest_interval_ns = 2'000'000;
+constexpr std::int64_t longest_interval_ns = 50'000'000;
 constexpr std::int64_t feed_every_ns = 100'000'000;
 constexpr std::int64_t usage_interval_ns = 1'000'000'000;
 
@@ -41,7 +42,8 @@ void raise_priority() noexcept {
     if (pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameters) == 0) return;
     rlimit limit{};
     if (getrlimit(RLIMIT_RTPRIO, &limit) != 0 || limit.rlim_cur < 1) return;
-    parameters.sched_priority = static_cast<int>(std::min<rlim_t>(limit.rlim_cur, static_cast<rlim_t>(parameters.sched_priority)));
+    parameters.sched_priority = static_cast<int>(
+        std::min<rlim_t>(limit.rlim_cur, static_cast<rlim_t>(parameters.sched_priority)));
     pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameters);
 }
 
@@ -52,7 +54,9 @@ Supervisor::Supervisor(FaultBoard& board) : board_(board) {
     pthread_mutexattr_t attributes;
     pthread_mutexattr_init(&attributes);
     pthread_mutexattr_setprotocol(&attributes, PTHREAD_PRIO_INHERIT);
-    if (pthread_mutex_init(&mutex_, &attributes) != 0) pthread_mutex_init(&mutex_, nullptr);
+    if (pthread_mutex_init(&mutex_, &attributes) != 0) {
+        pthread_mutex_init(&mutex_, nullptr);
+    }
     pthread_mutexattr_destroy(&attributes);
 }
 
@@ -62,23 +66,34 @@ Supervisor::~Supervisor() {
         eventfd_write(wake_, 1);
         pthread_join(thread_, nullptr);
     }
-    if (wake_ >= 0) close(wake_);
+    if (wake_ >= 0) {
+        close(wake_);
+    }
     pthread_mutex_destroy(&mutex_);
 }
 
 void Supervisor::add(Core& core, pthread_t thread, int tid, int priority, int cpu) {
     {
         const Hold hold(mutex_);
-        watched_.push_back({.core = &core, .thread = thread, .tid = tid, .priority = priority, .cpu = cpu, .usage = scheduler_usage(tid)});
+        watched_.push_back({.core = &core,
+                            .thread = thread,
+                            .tid = tid,
+                            .priority = priority,
+                            .cpu = cpu,
+                            .usage = scheduler_usage(tid)});
         core.expect(monotonic_ns());
-        std::stable_sort(watched_.begin(), watched_.end(), [](const Watched& a, const Watched& b) { return a.priority > b.priority; });
+        std::stable_sort(watched_.begin(), watched_.end(), [](const Watched& a, const Watched& b) {
+            return a.priority > b.priority;
+        });
     }
     if (!started_) {
         wake_ = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
         looked_ns_ = monotonic_ns();
         sigset_t all, before;  // signals are for the program's own thread; a crash is this one's
         sigfillset(&all);
-        for (const int crash : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGSYS, SIGTRAP}) sigdelset(&all, crash);
+        for (const int crash : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGSYS, SIGTRAP}) {
+            sigdelset(&all, crash);
+        }
         pthread_sigmask(SIG_SETMASK, &all, &before);
         const int failed = pthread_create(&thread_, nullptr, [](void* self) -> void* {
             static_cast<Supervisor*>(self)->work();
@@ -87,7 +102,8 @@ void Supervisor::add(Core& core, pthread_t thread, int tid, int priority, int cp
         pthread_sigmask(SIG_SETMASK, &before, nullptr);
         if (failed) {
             remove(core);
-            throw std::runtime_error(std::string("no thread for the supervisor: ") + std::strerror(failed));
+            throw std::runtime_error(std::string("no thread for the supervisor: ") +
+                                     std::strerror(failed));
         }
         started_ = true;
     }
@@ -105,7 +121,8 @@ void Supervisor::remove(const Core& core) {
 void Supervisor::fence() { const Hold hold(mutex_); }
 
 Supervisor::Watched* Supervisor::find(const Core& core) {
-    const auto at = std::find_if(watched_.begin(), watched_.end(), [&](const Watched& one) { return one.core == &core; });
+    const auto at = std::find_if(watched_.begin(), watched_.end(),
+                                 [&](const Watched& one) { return one.core == &core; });
     return at == watched_.end() ? nullptr : &*at;
 }
 
@@ -116,8 +133,11 @@ void Supervisor::set_priority(const Core& core, int priority) {
     of->priority = priority;
     sched_param parameters{};
     parameters.sched_priority = priority;
-    if (!of->demoted) pthread_setschedparam(of->thread, SCHED_FIFO, &parameters);
-    std::stable_sort(watched_.begin(), watched_.end(), [](const Watched& a, const Watched& b) { return a.priority > b.priority; });
+    if (!of->demoted) {
+        pthread_setschedparam(of->thread, SCHED_FIFO, &parameters);
+    }
+    std::stable_sort(watched_.begin(), watched_.end(),
+                     [](const Watched& a, const Watched& b) { return a.priority > b.priority; });
 }
 
 bool Supervisor::reset(Core& core) {
@@ -146,24 +166,34 @@ bool Supervisor::demoted(const Core& core) {
 }
 
 std::int64_t Supervisor::process_gap_ns(std::int64_t until_ns, std::int64_t silent_ns) const {
-    const auto within = [&](std::int64_t end_ns, std::int64_t gap_ns) { return end_ns + silent_ns > until_ns && 2 * gap_ns > silent_ns; };
+    const auto within = [&](std::int64_t end_ns, std::int64_t gap_ns) {
+        return end_ns + silent_ns > until_ns && 2 * gap_ns > silent_ns;
+    };
     // it may not have looked yet since the process goes on
-    const std::int64_t now = monotonic_ns(), now_gap = now - looked_ns_ - interval_ns_;
+    const std::int64_t now = monotonic_ns();
+    const std::int64_t now_gap = now - looked_ns_ - interval_ns_;
     if (within(now, now_gap)) return now_gap;
     return within(gap_end_ns_, gap_ns_) ? gap_ns_.load() : 0;
 }
 
-// Half of the time of the shortest overrun that is a fault, so that each is seen at least once; a limit is looked at eight times.
+// Half of the time of the shortest overrun that is a fault, so that each is seen at least once; a
+// limit is looked at eight times.
 void Supervisor::settle_down() {
     const Hold hold(mutex_);
     std::int64_t interval = longest_interval_ns;
     cpu_set_t left;
-    if (sched_getaffinity(getpid(), sizeof left, &left) != 0) CPU_ZERO(&left);
+    if (sched_getaffinity(getpid(), sizeof left, &left) != 0) {
+        CPU_ZERO(&left);
+    }
     cpu_set_t all = left;
     for (const Watched& one : watched_) {
         interval = std::min(interval, Core::longest_overrun * one.core->period_ns() / 2);
-        if (const std::int64_t limit = one.core->supervise_ns; limit > 0) interval = std::min(interval, limit / 8);
-        if (one.cpu >= 0) CPU_CLR(static_cast<std::size_t>(one.cpu), &left);
+        if (const std::int64_t limit = one.core->supervise_ns; limit > 0) {
+            interval = std::min(interval, limit / 8);
+        }
+        if (one.cpu >= 0) {
+            CPU_CLR(static_cast<std::size_t>(one.cpu), &left);
+        }
     }
     interval_ns_ = std::max(interval, shortest_interval_ns);
     own_cpu_ = CPU_COUNT(&left) > 0;
@@ -186,7 +216,10 @@ void Supervisor::work() {
             eventfd_read(wake_, &ignored);
         }
         const Hold hold(mutex_);
-        const std::int64_t now = monotonic_ns(), gap = now - looked_ns_ - interval, slept = asleep();
+        const std::int64_t now = monotonic_ns();
+        const std::int64_t gap = now - looked_ns_ - interval;
+
+        const std::int64_t slept = asleep();
         if (gap > longest_interval_ns / 2) {
             gap_ns_ = gap;
             gap_end_ns_ = now;
@@ -216,7 +249,9 @@ bool Supervisor::look(std::int64_t now_ns, std::int64_t gap_ns, std::int64_t sus
         if (core.hung()) {  // what it goes on writing does not last
             core.stand_in(now_ns, false);
             look_at_late(one);
-            if (one.starved && uses_cpu(one)) declare_busy(one, now_ns);
+            if (one.starved && uses_cpu(one)) {
+                declare_busy(one, now_ns);
+            }
             well = false;
             continue;
         }
@@ -234,22 +269,29 @@ bool Supervisor::look(std::int64_t now_ns, std::int64_t gap_ns, std::int64_t sus
         } else {
             one.mark = {};
             one.blocked = false;
-            if (now_ns - one.usage.taken_ns > usage_interval_ns) one.usage = scheduler_usage(one.tid);
+            if (now_ns - one.usage.taken_ns > usage_interval_ns) {
+                one.usage = scheduler_usage(one.tid);
+            }
         }
     }
     return well;
 }
 
-// A thread of higher priority occupies its CPU and is about to be declared hung itself, which frees the CPU.
+// A thread of higher priority occupies its CPU and is about to be declared hung itself, which frees
+// the CPU.
 bool Supervisor::behind_hog(const Watched& watched, std::int64_t now_ns) const {
-    return watched.cpu >= 0 && std::any_of(watched_.begin(), watched_.end(), [&](const Watched& other) {
-        const std::int64_t limit = other.core->supervise_ns, since = other.core->busy_since_ns();
-        return other.cpu == watched.cpu && other.priority > watched.priority && limit > 0 && since != 0 && !other.core->hung() &&
-               2 * (now_ns - since) > limit && limit - (now_ns - since) < watched.core->supervise_ns / 4;
+    return watched.cpu >= 0 &&
+           std::any_of(watched_.begin(), watched_.end(), [&](const Watched& other) {
+        const std::int64_t limit = other.core->supervise_ns;
+        const std::int64_t since = other.core->busy_since_ns();
+        return other.cpu == watched.cpu && other.priority > watched.priority && limit > 0 &&
+               since != 0 && !other.core->hung() && 2 * (now_ns - since) > limit &&
+               limit - (now_ns - since) < watched.core->supervise_ns / 4;
     });
 }
 
-// The thread tolerates gaps, and has no CPU: as the whole process had none, or because others use it.
+// The thread tolerates gaps, and has no CPU: as the whole process had none, or because others use
+// it.
 bool Supervisor::in_gap(const Watched& watched, std::int64_t now_ns, std::int64_t gap_ns) const {
     const Core& core = *watched.core;
     const std::int64_t silent_ns = now_ns - core.finished_ns() - core.period_ns();
@@ -277,7 +319,8 @@ Stall stall_of(const Core& core, int cpu, std::int64_t now_ns) {
 
 }  // namespace
 
-void Supervisor::declare(Watched& watched, std::int64_t now_ns, std::int64_t gap_ns, std::int64_t suspended_ns) {
+void Supervisor::declare(Watched& watched, std::int64_t now_ns, std::int64_t gap_ns,
+                         std::int64_t suspended_ns) {
     Core& core = *watched.core;
     Stall stall = stall_of(core, watched.cpu, now_ns);
     if (!core.declare_hung()) return;
@@ -293,7 +336,9 @@ void Supervisor::declare(Watched& watched, std::int64_t now_ns, std::int64_t gap
         find_cause(watched, stall);
         name_starved(watched, stall, now_ns);  // before they run
         watched.starved = stall.cause == Stall::Cause::starved;
-        if (!watched.starved) demote(watched, stall);
+        if (!watched.starved) {
+            demote(watched, stall);
+        }
     }
     queue(stall);
 }
@@ -301,16 +346,19 @@ void Supervisor::declare(Watched& watched, std::int64_t now_ns, std::int64_t gap
 void Supervisor::demote(Watched& watched, Stall& stall) noexcept {
     if (watched.priority == 0 || watched.demoted) return;
     const sched_param ordinary{};
-    stall.demoted = watched.demoted = pthread_setschedparam(watched.thread, SCHED_OTHER, &ordinary) == 0;
+    stall.demoted = watched.demoted =
+        pthread_setschedparam(watched.thread, SCHED_OTHER, &ordinary) == 0;
 }
 
 void Supervisor::queue(const Stall& stall) noexcept {
-    board_.count({HAL_FAULT_SILENT_THREAD, stall.function, stall.cycle, stall.time_ns, static_cast<double>(stall.silent_ns), nullptr, nullptr},
+    board_.count({HAL_FAULT_SILENT_THREAD, stall.function, stall.cycle, stall.time_ns,
+                  static_cast<double>(stall.silent_ns), nullptr, nullptr},
                  stall.thread);
     stalls_.push(stall);
 }
 
-// A thread that seemed to be starved has got CPU time since, and its cycle does not end: its function is the cause after all.
+// A thread that seemed to be starved has got CPU time since, and its cycle does not end: its
+// function is the cause after all.
 void Supervisor::declare_busy(Watched& watched, std::int64_t now_ns) {
     const Core& core = *watched.core;
     Stall stall = stall_of(core, watched.cpu, now_ns);
@@ -322,12 +370,15 @@ void Supervisor::declare_busy(Watched& watched, std::int64_t now_ns) {
 // As much CPU time since it was first seen late as a whole cycle may take.
 bool Supervisor::uses_cpu(const Watched& watched) noexcept {
     const SchedulerUsage now = scheduler_usage(watched.tid);
-    return watched.mark.taken_ns != 0 && now.cpu_ns - watched.mark.cpu_ns > watched.core->supervise_ns;
+    return watched.mark.taken_ns != 0 &&
+           now.cpu_ns - watched.mark.cpu_ns > watched.core->supervise_ns;
 }
 
 namespace {
 
-bool is_blocked(const KernelView& view) noexcept { return view.state == 'S' || view.state == 'D' || view.state == 'I'; }
+bool is_blocked(const KernelView& view) noexcept {
+    return view.state == 'S' || view.state == 'D' || view.state == 'I';
+}
 
 }  // namespace
 
@@ -337,10 +388,13 @@ void Supervisor::look_at_late(Watched& watched) noexcept {
         watched.mark = scheduler_usage(watched.tid);
         watched.blocked = false;
     }
-    if (!watched.blocked) watched.blocked = is_blocked(kernel_view(watched.tid));
+    if (!watched.blocked) {
+        watched.blocked = is_blocked(kernel_view(watched.tid));
+    }
 }
 
-// Less than a tenth since it was first seen late. A function that loops for ever on a busy host has used more than its limit soon.
+// Less than a tenth since it was first seen late. A function that loops for ever on a busy host has
+// used more than its limit soon.
 bool Supervisor::got_no_cpu(const Watched& watched) noexcept {
     const SchedulerUsage now = scheduler_usage(watched.tid);
     if (watched.mark.taken_ns == 0 || now.taken_ns == 0) return false;
@@ -364,23 +418,34 @@ void Supervisor::find_cause(const Watched& watched, Stall& stall) const {
         stall.cause = Stall::Cause::waiting;
     } else if (got_no_cpu(watched)) {
         stall.cause = Stall::Cause::starved;
-        for (const Watched& other : watched_)
-            if (&other != &watched && other.cpu == watched.cpu && other.priority > watched.priority && other.core->busy_since_ns() != 0) {
+        for (const Watched& other : watched_) {
+            if (&other != &watched && other.cpu == watched.cpu &&
+                other.priority > watched.priority && other.core->busy_since_ns() != 0) {
                 stall.occupant = other.core->id();
                 break;
             }
+        }
     } else {
         stall.cause = Stall::Cause::busy;
     }
 }
 
-// The threads that got no CPU time beside it; they have as long again to go on now that the CPU is free.
+// The threads that got no CPU time beside it; they have as long again to go on now that the CPU is
+// free.
 void Supervisor::name_starved(Watched& hog, Stall& stall, std::int64_t now_ns) {
     if (stall.cause != Stall::Cause::busy || hog.cpu < 0 || hog.priority == 0) return;
     for (Watched& other : watched_) {
-        if (&other == &hog || other.cpu != hog.cpu || other.priority >= hog.priority || other.core->hung()) continue;
-        if (now_ns - other.core->finished_ns() < 2 * other.core->period_ns() + shortest_interval_ns) continue;
-        if (stall.starved_count < Stall::most_starved) stall.starved[stall.starved_count++] = other.core->id();
+        if (&other == &hog || other.cpu != hog.cpu || other.priority >= hog.priority ||
+            other.core->hung()) {
+            continue;
+        }
+        if (now_ns - other.core->finished_ns() <
+            2 * other.core->period_ns() + shortest_interval_ns) {
+            continue;
+        }
+        if (stall.starved_count < Stall::most_starved) {
+            stall.starved[stall.starved_count++] = other.core->id();
+        }
         other.core->excuse(now_ns);
     }
 }

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Supervises the real-time threads: it stops a thread that finishes no cycle within its limit, sets the thread's outputs to their safe
-// values and reports the cause to the session. It is an ordinary thread whose priority is above those of the supervised threads where
-// the system grants that, so that an endless loop cannot block it.
+// Supervises the real-time threads: it stops a thread that finishes no cycle within its limit, sets
+// the thread's outputs to their safe values and reports the cause to the session. It is an ordinary
+// thread whose priority is above those of the supervised threads where the system grants that, so
+// that an endless loop cannot block it.
 #pragma once
 
 #include <atomic>
@@ -21,22 +22,27 @@ namespace hal {
 /// What the supervisor found when a thread hung.
 struct Stall {
     enum class Cause : std::uint8_t {
-        busy,       ///< uses CPU time: a long computation or an endless loop
-        waiting,    ///< blocked in the kernel
-        stopped,    ///< by a debugger or a signal
-        starved,    ///< ready to run, but gets no CPU time
-        process,    ///< the whole process got no CPU time
+        busy,  ///< uses CPU time: a long computation or an endless loop
+        waiting,  ///< blocked in the kernel
+        stopped,  ///< by a debugger or a signal
+        starved,  ///< ready to run, but gets no CPU time
+        process,  ///< the whole process got no CPU time
         suspended,  ///< the host was suspended
     };
     static constexpr std::size_t most_starved = 8;
     Cause cause = Cause::busy;
-    bool demoted = false;              ///< lost its real-time priority
-    std::uint32_t thread = 0;          ///< Core::id
-    std::uint32_t function = 0;        ///< the model's number; 0: between two functions or two cycles
-    std::uint32_t occupant = 0;        ///< starved: Core::id of the thread that uses its CPU; 0: unknown
-    std::int32_t tracer = 0, cpu = -1; ///< process ID of the debugger; CPU the thread is bound to
+    bool demoted = false;  ///< lost its real-time priority
+    std::uint32_t thread = 0;  ///< Core::id
+    /// the model's number; 0: between two functions or two cycles
+    std::uint32_t function = 0;
+    /// starved: Core::id of the thread that uses its CPU; 0: unknown
+    std::uint32_t occupant = 0;
+    std::int32_t tracer = 0;
+    std::int32_t cpu = -1;  ///< process ID of the debugger; CPU the thread is bound to
     std::uint64_t cycle = 0;
-    std::int64_t time_ns = 0, silent_ns = 0, limit_ns = 0;
+    std::int64_t time_ns = 0;
+    std::int64_t silent_ns = 0;
+    std::int64_t limit_ns = 0;
     std::uint32_t starved[most_starved]{};  ///< Core::id of further threads that got no CPU time
     std::uint32_t starved_count = 0;
 };
@@ -48,33 +54,41 @@ public:
     Supervisor(const Supervisor&) = delete;
 
     // [setup], like all below
-    /// Begins to supervise a thread. `priority`: of SCHED_FIFO, 0: another policy; `cpu`: -1: not bound to a CPU.
+    /// Begins to supervise a thread. `priority`: of SCHED_FIFO, 0: another policy; `cpu`: -1: not
+    /// bound to a CPU.
     void add(Core& core, pthread_t thread, int tid, int priority, int cpu);
     /// Ends the supervision of a thread; waits until actions on it are complete.
     void remove(const Core& core);
-    /// Waits until no action on any thread is in progress; called after a plan was taken and before the old one is freed.
+    /// Waits until no action on any thread is in progress; called after a plan was taken and before
+    /// the old one is freed.
     void fence();
     void set_priority(const Core& core, int priority);
-    /// Lets the thread's functions run again, at their previous priority. Returns false if the thread still hangs.
+    /// Lets the thread's functions run again, at their previous priority. Returns false if the
+    /// thread still hangs.
     bool reset(Core& core);
-    /// Returns true if the thread is late and ready to run, but has got no CPU time, or hardly any, since it is late.
+    /// Returns true if the thread is late and ready to run, but has got no CPU time, or hardly any,
+    /// since it is late.
     bool starved(const Core& core);
-    /// Returns how long the thread was ready to run without running, within the last one to two seconds before it was late, and since.
+    /// Returns how long the thread was ready to run without running, within the last one to two
+    /// seconds before it was late, and since.
     std::int64_t run_delay_ns(const Core& core);
     /// Returns true if the thread has lost its real-time priority.
     bool demoted(const Core& core);
     /// Removes and returns the oldest fault in the queue.
     bool next(Stall& stall) { return stalls_.pop(stall); }
-    /// Whether the process as a whole got no CPU time, or hardly any, in the time before `until_ns`: how long.
+    /// Whether the process as a whole got no CPU time, or hardly any, in the time before
+    /// `until_ns`: how long.
     std::int64_t process_gap_ns(std::int64_t until_ns, std::int64_t silent_ns) const;
     /// Returns true if at least one CPU has no thread bound to it, and while there are no threads.
     bool has_own_cpu() const { return own_cpu_.load(); }
     std::int64_t interval_ns() const { return interval_ns_.load(); }
-    /// Sets a file descriptor to which the supervisor writes a byte several times a second while all supervised threads make progress.
+    /// Sets a file descriptor to which the supervisor writes a byte several times a second while
+    /// all supervised threads make progress.
     void feed(int descriptor) { watchdog_.store(descriptor); }
     int feeding() const { return watchdog_.load(); }
 
-    hal_supervision shared{};  ///< given out as extension "hal.supervision/1"; written with atomic builtins
+    /// given out as extension "hal.supervision/1"; written with atomic builtins
+    hal_supervision shared{};
 
 private:
     struct Watched {
@@ -82,16 +96,19 @@ private:
         pthread_t thread;
         int tid, priority, cpu;
         bool demoted = false;
-        bool starved = false;                         // declared hung because it got no CPU time
-        SchedulerUsage mark{};                        // when it was first seen late
-        bool blocked = false;                         // it was seen blocked in the kernel since then
-        SchedulerUsage usage{};                       // when it was last seen in time, read once a second
+        bool starved = false;  // declared hung because it got no CPU time
+        SchedulerUsage mark{};  // when it was first seen late
+        // it was seen blocked in the kernel since then
+        bool blocked = false;
+        // when it was last seen in time, read once a second
+        SchedulerUsage usage{};
     };
     void work();
     bool look(std::int64_t now_ns, std::int64_t gap_ns, std::int64_t suspended_ns);
     bool behind_hog(const Watched& watched, std::int64_t now_ns) const;
     bool in_gap(const Watched& watched, std::int64_t now_ns, std::int64_t gap_ns) const;
-    void declare(Watched& watched, std::int64_t now_ns, std::int64_t gap_ns, std::int64_t suspended_ns);
+    void declare(Watched& watched, std::int64_t now_ns, std::int64_t gap_ns,
+                 std::int64_t suspended_ns);
     void name_starved(Watched& hog, Stall& stall, std::int64_t now_ns);
     void declare_busy(Watched& watched, std::int64_t now_ns);
     void demote(Watched& watched, Stall& stall) noexcept;
@@ -105,14 +122,19 @@ private:
     Watched* find(const Core& core);
 
     FaultBoard& board_;
-    pthread_mutex_t mutex_;                   // of watched_; its holder inherits the priority of who waits
-    std::vector<Watched> watched_;            // highest priority first
+    // of watched_; its holder inherits the priority of who waits
+    pthread_mutex_t mutex_;
+    std::vector<Watched> watched_;  // highest priority first
     pthread_t thread_{};
     bool started_ = false;
-    int wake_ = -1;                           // eventfd
-    std::atomic<bool> quit_{false}, own_cpu_{true};
+    int wake_ = -1;  // eventfd
+    std::atomic<bool> quit_{false};
+    std::atomic<bool> own_cpu_{true};
     std::atomic<std::int64_t> interval_ns_{50'000'000};
-    std::atomic<std::int64_t> looked_ns_{0}, gap_end_ns_{0}, gap_ns_{0};  // the newest look, and the newest time without one
+    // the newest look, and the newest time without one
+    std::atomic<std::int64_t> looked_ns_{0};
+    std::atomic<std::int64_t> gap_end_ns_{0};
+    std::atomic<std::int64_t> gap_ns_{0};
     std::atomic<int> watchdog_{-1};
     std::int64_t fed_ns_ = 0;
     Queue<Stall> stalls_{64};

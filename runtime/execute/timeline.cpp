@@ -13,7 +13,9 @@ constexpr std::int64_t rate_over_ns = 1'000'000'000;
 Timeline::Timeline() noexcept {
     shared.size = sizeof shared;
     shared.step = [](const hal_clock*, std::int64_t ns) {
-        if (Core* const core = Core::current()) core->step_clock(ns);
+        if (Core* const core = Core::current()) {
+            core->step_clock(ns);
+        }
     };
 }
 
@@ -39,7 +41,8 @@ void Timeline::step(std::int64_t grid_ns, std::int64_t ns) noexcept {
         mark_grid_ns_ = grid_ns;
         mark_shift_ns_ = now;
     } else if (const std::int64_t passed = grid_ns - mark_grid_ns_; passed >= rate_over_ns) {
-        rate_.store(static_cast<double>(now - mark_shift_ns_) / static_cast<double>(passed), std::memory_order_relaxed);
+        rate_.store(static_cast<double>(now - mark_shift_ns_) / static_cast<double>(passed),
+                    std::memory_order_relaxed);
         mark_grid_ns_ = grid_ns;
         mark_shift_ns_ = now;
     }

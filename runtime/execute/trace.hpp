@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What a traced thread records: when each of its functions ran, and the frames that it sent and received.
+// What a traced thread records: when each of its functions ran, and the frames that it sent and
+// received.
 #pragma once
 
 #include <algorithm>
@@ -23,7 +24,8 @@ struct TraceEvent {
         ethernet_sent = 7,  ///< id: type of the frame
         ethernet_received = 8,
     };
-    std::int64_t begin_ns = 0, end_ns = 0;  ///< CLOCK_MONOTONIC
+    std::int64_t begin_ns = 0;
+    std::int64_t end_ns = 0;  ///< CLOCK_MONOTONIC
     std::uint64_t cycle_number = 0;
     std::uint32_t id = 0;
     std::uint16_t kind = 0;
@@ -31,20 +33,25 @@ struct TraceEvent {
 };
 static_assert(sizeof(TraceEvent) == 32);
 
-/// The events of one thread. The thread writes, one reader reads; neither waits. An event that does not fit is counted and dropped.
+/// The events of one thread. The thread writes, one reader reads; neither waits. An event that does
+/// not fit is counted and dropped.
 class TraceRing {
 public:
     /// Allocates and touches the memory. [setup]
     TraceRing() : events_(capacity) {}
-    static constexpr std::size_t capacity = std::size_t{1} << 16;  // 2 MiB: 0.3 s of a thread with 10 functions at 20 kHz
+    // 2 MiB: 0.3 s of a thread with 10 functions at 20 kHz
+    static constexpr std::size_t capacity = std::size_t{1} << 16;
 
     /// Numbers that do not fit into the event are limited. [realtime] writer
-    void put(TraceEvent::Kind kind, std::int64_t begin_ns, std::int64_t end_ns, std::uint64_t cycle, std::uint64_t id,
-             std::size_t bytes = 0) noexcept {
-        const TraceEvent event{begin_ns, end_ns,
-                               cycle,    static_cast<std::uint32_t>(std::min<std::uint64_t>(id, UINT32_MAX)),
-                               kind,     static_cast<std::uint16_t>(std::min<std::size_t>(bytes, UINT16_MAX))};
-        if (!events_.push(event)) lost_.store(lost_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+    void put(TraceEvent::Kind kind, std::int64_t begin_ns, std::int64_t end_ns, std::uint64_t cycle,
+             std::uint64_t id, std::size_t bytes = 0) noexcept {
+        const TraceEvent event{
+            begin_ns, end_ns,
+            cycle,    static_cast<std::uint32_t>(std::min<std::uint64_t>(id, UINT32_MAX)),
+            kind,     static_cast<std::uint16_t>(std::min<std::size_t>(bytes, UINT16_MAX))};
+        if (!events_.push(event)) {
+            lost_.store(lost_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+        }
     }
     /// Removes the oldest event. Returns false when the ring is empty. [any] reader
     bool take(TraceEvent& event) noexcept { return events_.pop(event); }
@@ -58,5 +65,7 @@ private:
 
 }  // namespace hal
 
-/// Records a frame in the trace of the calling thread; does nothing in a thread that is not traced. For drivers/link/trace_frame.hpp. [realtime]
-extern "C" [[gnu::visibility("default")]] void hal_trace_frame(unsigned kind, std::uint32_t id, std::size_t bytes) noexcept;
+/// Records a frame in the trace of the calling thread; does nothing in a thread that is not traced.
+/// For drivers/link/trace_frame.hpp. [realtime]
+extern "C" [[gnu::visibility("default")]] void hal_trace_frame(unsigned kind, std::uint32_t id,
+                                                               std::size_t bytes) noexcept;

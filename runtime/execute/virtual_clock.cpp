@@ -8,13 +8,16 @@ void VirtualClock::advance(std::int64_t ns) {
     for (bool ran = false;;) {
         Runner* next = nullptr;
         std::int64_t next_ns = 0;
-        for (const auto& runner : runners_)  // fastest first, so it wins at equal instants
-            if (const std::int64_t due = timeline_.due_ns(runner->grid_ns); due <= end && (!next || due < next_ns)) {
+        for (const auto& runner : runners_) {  // fastest first, so it wins at equal instants
+            if (const std::int64_t due = timeline_.due_ns(runner->grid_ns);
+                due <= end && (!next || due < next_ns)) {
                 next = runner.get();
                 next_ns = due;
             }
-        if (ran && (!next || next_ns != now_ns_))
+        }
+        if (ran && (!next || next_ns != now_ns_)) {
             background_.run(now_ns_);
+        }
         if (!next) break;
         ran = true;
         now_ns_ = next_ns;
@@ -27,7 +30,9 @@ void VirtualClock::advance(std::int64_t ns) {
 
 void VirtualClock::advance_cycles(const Runner& of, std::uint64_t cycles) {
     if (!timeline_.led()) return advance(static_cast<std::int64_t>(cycles) * of.core.period_ns());
-    for (; cycles > 0; --cycles) advance(timeline_.due_ns(of.grid_ns) - now_ns_);
+    for (; cycles > 0; --cycles) {
+        advance(timeline_.due_ns(of.grid_ns) - now_ns_);
+    }
 }
 
 }  // namespace hal

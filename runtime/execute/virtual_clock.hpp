@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The clock of `hal sim`: advances from one due cycle to the next and runs each on the caller's thread.
+// The clock of `hal sim`: advances from one due cycle to the next and runs each on the caller's
+// thread.
 #pragma once
 
 #include <cstdint>
@@ -17,13 +18,18 @@ namespace hal {
 class VirtualClock {
 public:
     /// `runners`: fastest first, so that the fastest runs first at equal instants.
-    VirtualClock(const std::vector<std::unique_ptr<Runner>>& runners, const Timeline& timeline, Background& background, Supervisor& supervisor)
-        : runners_(runners), timeline_(timeline), background_(background), supervisor_(supervisor) {}
+    VirtualClock(const std::vector<std::unique_ptr<Runner>>& runners, const Timeline& timeline,
+                 Background& background, Supervisor& supervisor)
+        : runners_(runners),
+          timeline_(timeline),
+          background_(background),
+          supervisor_(supervisor) {}
 
     std::int64_t now_ns() const { return now_ns_; }
     /// Runs every cycle due within the next `ns`.
     void advance(std::int64_t ns);
-    /// Runs until `of` has finished this many more cycles, with all other cycles that are due until then.
+    /// Runs until `of` has finished this many more cycles, with all other cycles that are due until
+    /// then.
     void advance_cycles(const Runner& of, std::uint64_t cycles);
 
 private:

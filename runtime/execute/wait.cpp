@@ -40,14 +40,18 @@ std::int64_t Wait::spin(std::int64_t deadline_ns) noexcept {
 
 void Wait::sleep(std::int64_t deadline_ns) const noexcept {
     const timespec at = to_timespec(deadline_ns - spin_ns);
-    while (monotonic_ns() < deadline_ns - spin_ns) clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &at, nullptr);
+    while (monotonic_ns() < deadline_ns - spin_ns) {
+        clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &at, nullptr);
+    }
 }
 
-bool Wait::sleep(std::int64_t deadline_ns, const std::atomic<std::uint32_t>& bell, std::uint32_t heard) const noexcept {
+bool Wait::sleep(std::int64_t deadline_ns, const std::atomic<std::uint32_t>& bell,
+                 std::uint32_t heard) const noexcept {
     const timespec at = to_timespec(deadline_ns - spin_ns);
     while (monotonic_ns() < deadline_ns - spin_ns) {
         // FUTEX_WAIT_BITSET takes an absolute CLOCK_MONOTONIC time
-        syscall(futex_call, &bell, FUTEX_WAIT_BITSET_PRIVATE, heard, &at, nullptr, FUTEX_BITSET_MATCH_ANY);
+        syscall(futex_call, &bell, FUTEX_WAIT_BITSET_PRIVATE, heard, &at, nullptr,
+                FUTEX_BITSET_MATCH_ANY);
         if (bell.load(std::memory_order_acquire) != heard) return false;
     }
     return true;
@@ -58,6 +62,8 @@ void Wait::ring(std::atomic<std::uint32_t>& bell) noexcept {
     syscall(futex_call, &bell, FUTEX_WAKE_PRIVATE, INT_MAX, nullptr, nullptr, 0);
 }
 
-std::int64_t Wait::default_spin_ns(std::int64_t period_ns) noexcept { return std::min<std::int64_t>(period_ns * 2 / 5, 150'000); }
+std::int64_t Wait::default_spin_ns(std::int64_t period_ns) noexcept {
+    return std::min<std::int64_t>(period_ns * 2 / 5, 150'000);
+}
 
 }  // namespace hal

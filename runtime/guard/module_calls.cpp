@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Ends the process when a function of a LinuxCNC module makes one of these calls. In a program with the real-time sanitizer only.
+// Ends the process when a function of a LinuxCNC module makes one of these calls. In a program with
+// the real-time sanitizer only.
 #include <cstdarg>
 #include <cstdio>
 #include <cstdlib>
@@ -46,7 +47,9 @@ void stop(const char* call, const void* caller) {
 // The C library's own function. Found when the program starts, because dlsym() allocates.
 template <class F>
 F* find(F*& known, const char* name) {
-    if (!known) known = reinterpret_cast<F*>(dlsym(RTLD_NEXT, name));
+    if (!known) {
+        known = reinterpret_cast<F*>(dlsym(RTLD_NEXT, name));
+    }
     return known;
 }
 
@@ -73,12 +76,18 @@ STOPPED(ssize_t, write, (int file, const void* from, std::size_t bytes), (file, 
 STOPPED(ssize_t, readv, (int file, const iovec* to, int count), (file, to, count))
 STOPPED(ssize_t, writev, (int file, const iovec* from, int count), (file, from, count))
 STOPPED(int, poll, (pollfd * files, nfds_t count, int ms), (files, count, ms))
-STOPPED(int, ppoll, (pollfd * files, nfds_t count, const timespec* most, const sigset_t* signals), (files, count, most, signals))
-STOPPED(int, select, (int count, fd_set* reads, fd_set* writes, fd_set* others, timeval* most), (count, reads, writes, others, most))
-STOPPED(int, epoll_wait, (int file, epoll_event* events, int most, int ms), (file, events, most, ms))
-STOPPED(int, recvmmsg, (int file, mmsghdr* to, unsigned count, int flags, timespec* most), (file, to, count, flags, most))
-STOPPED(int, sendmmsg, (int file, mmsghdr* from, unsigned count, int flags), (file, from, count, flags))
-STOPPED(int, clock_nanosleep, (clockid_t clock, int flags, const timespec* wanted, timespec* left), (clock, flags, wanted, left))
+STOPPED(int, ppoll, (pollfd * files, nfds_t count, const timespec* most, const sigset_t* signals),
+        (files, count, most, signals))
+STOPPED(int, select, (int count, fd_set* reads, fd_set* writes, fd_set* others, timeval* most),
+        (count, reads, writes, others, most))
+STOPPED(int, epoll_wait, (int file, epoll_event* events, int most, int ms),
+        (file, events, most, ms))
+STOPPED(int, recvmmsg, (int file, mmsghdr* to, unsigned count, int flags, timespec* most),
+        (file, to, count, flags, most))
+STOPPED(int, sendmmsg, (int file, mmsghdr* from, unsigned count, int flags),
+        (file, from, count, flags))
+STOPPED(int, clock_nanosleep, (clockid_t clock, int flags, const timespec* wanted, timespec* left),
+        (clock, flags, wanted, left))
 STOPPED(int, sem_wait, (sem_t * semaphore), (semaphore))
 STOPPED(pid_t, waitpid, (pid_t process, int* status, int flags), (process, status, flags))
 STOPPED(int, fsync, (int file), (file))

@@ -27,9 +27,11 @@ bool held(const std::string& path) {
 
 bool good_instance_name(std::string_view name) {
     const auto good = [](char c) {
-        return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_' || c == '.';
+        return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+               c == '-' || c == '_' || c == '.';
     };
-    return !name.empty() && name.size() <= 64 && name[0] != '.' && std::all_of(name.begin(), name.end(), good);
+    return !name.empty() && name.size() <= 64 && name[0] != '.' &&
+           std::all_of(name.begin(), name.end(), good);
 }
 
 std::string socket_folder() {
@@ -38,17 +40,24 @@ std::string socket_folder() {
     return "/tmp/halcyon-" + std::to_string(getuid());
 }
 
-std::string socket_path(std::string_view name) { return socket_folder() + "/" + std::string(name) + ".sock"; }
+std::string socket_path(std::string_view name) {
+    return socket_folder() + "/" + std::string(name) + ".sock";
+}
 
 bool was_killed(std::string_view name) {
-    constexpr int looks = 100, apart_us = 10'000;  // the kernel closes the connections of a killed process a little before its lock
+    constexpr int looks = 100;
+
+    constexpr int apart_us =
+        10'000;  // the kernel closes the connections of a killed process a little before its lock
     for (int i = 0; i < looks && access(socket_path(name).c_str(), F_OK) == 0; ++i) {
         if (!held(lock_path(name))) return true;
         usleep(apart_us);
     }
     return false;
 }
-std::string lock_path(std::string_view name) { return socket_folder() + "/" + std::string(name) + std::string(lock_ending); }
+std::string lock_path(std::string_view name) {
+    return socket_folder() + "/" + std::string(name) + std::string(lock_ending);
+}
 
 std::vector<std::string> running_instances() {
     std::vector<std::string> names;

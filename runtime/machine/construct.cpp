@@ -19,8 +19,12 @@ std::string dashed(std::string text) {
 }
 
 void* allocate_for(Instance& instance, std::size_t bytes, std::size_t align) noexcept {
-    if (bytes > std::min<std::uint64_t>(std::uint64_t{1} << 32, PTRDIFF_MAX - 4096) || align == 0 || align > 4096) return nullptr;
-    // What lies together is fetched into the caches together: blocks of growing size, aligned by hand.
+    if (bytes > std::min<std::uint64_t>(std::uint64_t{1} << 32, PTRDIFF_MAX - 4096) || align == 0 ||
+        align > 4096) {
+        return nullptr;
+    }
+    // What lies together is fetched into the caches together: blocks of growing size, aligned by
+    // hand.
     constexpr std::size_t most = 64 * 1024;
     const auto take = [&](Instance::Block& block) -> void* {
         const auto begin = reinterpret_cast<std::uintptr_t>(block.memory.get());
@@ -45,29 +49,39 @@ void* allocate_for(Instance& instance, std::size_t bytes, std::size_t align) noe
 
 namespace {
 
-// A given argument that nothing asked for, and that is nearly one of those that were: more of the truth than what the constructor missed.
-bool is_misspelled(const LoadedComponent& component, const LoadRequest& request, const std::set<std::string>& asked,
-                   Diagnostics& diagnostics) {
+// A given argument that nothing asked for, and that is nearly one of those that were: more of the
+// truth than what the constructor missed.
+bool is_misspelled(const LoadedComponent& component, const LoadRequest& request,
+                   const std::set<std::string>& asked, Diagnostics& diagnostics) {
     const std::vector<std::string> all(asked.begin(), asked.end());
-    for (const auto& [name, given] : request.arguments)
-        if (const std::string hint = asked.contains(name) ? "" : did_you_mean(name, all); !hint.empty()) {
-            diagnostics.error("unknown-argument", given.at, "component '" + component.name + "' has no argument '" + name + "'", hint);
+    for (const auto& [name, given] : request.arguments) {
+        if (const std::string hint = asked.contains(name) ? "" : did_you_mean(name, all);
+            !hint.empty()) {
+            diagnostics.error("unknown-argument", given.at,
+                              "component '" + component.name + "' has no argument '" + name + "'",
+                              hint);
             return true;
         }
+    }
     return false;
 }
 
-// The invalid bytes of an argument; the whole argument where its text is not NAME=VALUE as the constructor got it.
+// The invalid bytes of an argument; the whole argument where its text is not NAME=VALUE as the
+// constructor got it.
 Span span_of(const GivenArgument& given, const Failure& why, const Sources& sources) {
     const std::size_t before = why.name.size() + 1;
-    if (why.begin >= why.end || why.end > given.value.size() || sources.text(given.at) != why.name + "=" + given.value) return given.at;
+    if (why.begin >= why.end || why.end > given.value.size() ||
+        sources.text(given.at) != why.name + "=" + given.value) {
+        return given.at;
+    }
     const auto first = static_cast<std::uint32_t>(given.at.begin + before);
     return {given.at.source, first + why.begin, first + why.end};
 }
 
 // One instance: memory, constructor, declarations into the model.
-bool construct_one(Edit& edit, LoadedComponent& component, const LoadRequest& request, Sources& sources, Diagnostics& diagnostics,
-                   std::unique_ptr<Instance> instance, Construction& c) {
+bool construct_one(Edit& edit, LoadedComponent& component, const LoadRequest& request,
+                   Sources& sources, Diagnostics& diagnostics, std::unique_ptr<Instance> instance,
+                   Construction& c) {
     Instance& made = *instance;
     c.sources = &sources;
     c.diagnostics = &diagnostics;
@@ -83,33 +97,44 @@ bool construct_one(Edit& edit, LoadedComponent& component, const LoadRequest& re
         if (c.no_memory) throw std::bad_alloc();
         if (c.said_why && c.failure.empty()) return false;
         const Failure& why = c.failure;
-        const auto given = why.subject == HAL_SUBJECT_ARGUMENT ? request.arguments.find(why.name) : request.arguments.end();
+        const auto given = why.subject == HAL_SUBJECT_ARGUMENT ? request.arguments.find(why.name)
+                                                               : request.arguments.end();
         if (given != request.arguments.end()) {
-            diagnostics.error(Code::named(why.code).value_or(Code("bad-argument")), span_of(given->second, why, sources),
-                              "component '" + component.name + "': " + why.text, "",
-                              why.help.empty() ? "hal doc " + component.name + " lists its arguments" : why.help);
+            diagnostics.error(
+                Code::named(why.code).value_or(Code("bad-argument")),
+                span_of(given->second, why, sources),
+                "component '" + component.name + "': " + why.text, "",
+                why.help.empty() ? "hal doc " + component.name + " lists its arguments" : why.help);
             return false;
         }
         if (is_misspelled(component, request, c.asked, diagnostics)) return false;
         diagnostics.error(Code::named(why.code).value_or(Code("construct-failed")), request.at,
-                          "component '" + component.name + "' cannot make '" + made.name + "': " +
-                              (why.empty() ? "it gave no reason" : why.text), "", why.help);
+                          "component '" + component.name + "' cannot make '" + made.name +
+                              "': " + (why.empty() ? "it gave no reason" : why.text),
+                          "", why.help);
         return false;
     }
     made.constructed = true;
     // whatever goes wrong from here, what was constructed is destroyed, until the model owns it
     struct Undo {
         std::unique_ptr<Instance>& instance;
-        ~Undo() { if (instance) destroy_instance(*instance); }
+        ~Undo() {
+            if (instance) {
+                destroy_instance(*instance);
+            }
+        }
     } const undo{instance};
     if (c.no_memory) throw std::bad_alloc();
     if (!c.failure.empty()) {
         diagnostics.error("construct-failed", request.at,
-                          "component '" + component.name + "' cannot make '" + made.name + "': " + c.failure.text);
+                          "component '" + component.name + "' cannot make '" + made.name +
+                              "': " + c.failure.text);
         return false;
     }
     if (!enter_declared(c)) return false;
-    for (const auto& [function, step] : c.extended) edit.extend_function(*function, step, made);
+    for (const auto& [function, step] : c.extended) {
+        edit.extend_function(*function, step, made);
+    }
     return true;
 }
 
@@ -155,28 +180,40 @@ bool enter_declared(Construction& c) {
             own.push_back(std::move(made));
         }
         c.by_identity[decl.identity] = function;
-        if (*c.owned) instance.functions.push_back(function);
+        if (*c.owned) {
+            instance.functions.push_back(function);
+        }
     }
     std::vector<std::unique_ptr<Pin>> later;
     for (auto& [pin, identity] : std::exchange(c.pins, {})) {
-        if (identity) pin->function = c.by_identity[identity];
-        if (pin->dir == HAL_DIR_OUT && (pin->flags & HAL_PIN_FINITE)) instance.finite.push_back(pin.get());
+        if (identity) {
+            pin->function = c.by_identity[identity];
+        }
+        if (pin->dir == HAL_DIR_OUT && (pin->flags & HAL_PIN_FINITE)) {
+            instance.finite.push_back(pin.get());
+        }
         (*c.owned ? instance.pins : later).push_back(std::move(pin));
     }
-    if (!*c.owned) return c.edit->add_declared(instance, std::move(later), std::move(own)) && add_threads(c);
+    if (!*c.owned) {
+        return c.edit->add_declared(instance, std::move(later), std::move(own)) && add_threads(c);
+    }
     std::set<std::string_view> names;
-    for (const auto& pin : instance.pins)
+    for (const auto& pin : instance.pins) {
         if (!names.insert(pin->name).second) {
-            c.diagnostics->error("construct-failed", c.request.at, "component '" + component.name + "' declares pin '" + pin->name + "' twice");
+            c.diagnostics->error(
+                "construct-failed", c.request.at,
+                "component '" + component.name + "' declares pin '" + pin->name + "' twice");
             return false;
         }
+    }
     return c.edit->add_instance(component, *c.owned, std::move(own)) && add_threads(c);
 }
 
 namespace {
 
 std::size_t stride_of(const hal_component& plugin) {
-    return (plugin.instance_size + plugin.instance_align - 1) / plugin.instance_align * plugin.instance_align;
+    return (plugin.instance_size + plugin.instance_align - 1) / plugin.instance_align *
+           plugin.instance_align;
 }
 
 // Cleared memory for so many instances in a row.
@@ -190,7 +227,9 @@ std::shared_ptr<void> block_of(const hal_component& plugin, std::size_t count) {
 /// In the indices, for more instances like `one`: they grow once and not twenty times.
 void make_room(Model& model, const Instance& one, std::size_t more) {
     std::size_t pins = one.pins.size();
-    for (const LoadedFunction* const function : one.functions) pins += function->pins.size();
+    for (const LoadedFunction* const function : one.functions) {
+        pins += function->pins.size();
+    }
     model.instance.reserve(model.instance.size() + more);
     model.function.reserve(model.function.size() + more * one.functions.size());
     model.pin.reserve(model.pin.size() + more * pins);
@@ -198,20 +237,25 @@ void make_room(Model& model, const Instance& one, std::size_t more) {
 
 }  // namespace
 
-bool all_known(const LoadedComponent& component, const LoadRequest& request, const std::set<std::string>& asked, Diagnostics& diagnostics) {
+bool all_known(const LoadedComponent& component, const LoadRequest& request,
+               const std::set<std::string>& asked, Diagnostics& diagnostics) {
     for (const auto& [name, given] : request.arguments) {
         if (asked.contains(name)) continue;
         std::vector<std::string> all(asked.begin(), asked.end());
-        if (!(component.plugin->flags & HAL_COMPONENT_WHOLE_NAMES)) all.insert(all.end(), {"names", "count", "personality"});
-        diagnostics.error("unknown-argument", given.at, "component '" + component.name + "' has no argument '" + name + "'",
+        if (!(component.plugin->flags & HAL_COMPONENT_WHOLE_NAMES)) {
+            all.insert(all.end(), {"names", "count", "personality"});
+        }
+        diagnostics.error("unknown-argument", given.at,
+                          "component '" + component.name + "' has no argument '" + name + "'",
                           did_you_mean(name, all), "its arguments: " + listed(all));
         return false;
     }
     return true;
 }
 
-bool construct_again(Model& beside, Edit& edit, const LoadedComponent& old, LoadedComponent& fresh, Span at, const hal_faults* faults,
-                     Sources& sources, Diagnostics& diagnostics) {
+bool construct_again(Model& beside, Edit& edit, const LoadedComponent& old, LoadedComponent& fresh,
+                     Span at, const hal_faults* faults, Sources& sources,
+                     Diagnostics& diagnostics) {
     edit.diagnostics = &diagnostics;
     const std::shared_ptr<void> storage = block_of(*fresh.plugin, old.instances.size());
     for (std::size_t i = 0; i < old.instances.size(); ++i) {
@@ -220,7 +264,9 @@ bool construct_again(Model& beside, Edit& edit, const LoadedComponent& old, Load
         LoadRequest request;
         request.at = at;
         request.faults = faults;
-        for (const auto& [name, value] : load.arguments) request.arguments.emplace(name, GivenArgument{value, at});
+        for (const auto& [name, value] : load.arguments) {
+            request.arguments.emplace(name, GivenArgument{value, at});
+        }
         auto instance = std::make_unique<Instance>();
         instance->component = &fresh;
         instance->loaded = before.loaded;
@@ -229,24 +275,31 @@ bool construct_again(Model& beside, Edit& edit, const LoadedComponent& old, Load
         instance->number = before.number;
         instance->memory = static_cast<char*>(storage.get()) + i * stride_of(*fresh.plugin);
         instance->storage = storage;
-        const std::string personality = load.personalities.empty() ? "" : load.personalities[before.number % load.personalities.size()];
-        Construction c{beside, request, *instance, before.number, personality, {}, {}, {}, {}, 0, {}, {}};
-        if (!construct_one(edit, fresh, request, sources, diagnostics, std::move(instance), c)) return false;
+        const std::string personality =
+            load.personalities.empty()
+                ? ""
+                : load.personalities[before.number % load.personalities.size()];
+        Construction c{beside, request, *instance, before.number, personality, {}, {}, {}, {},
+                       0,      {},      {}};
+        if (!construct_one(edit, fresh, request, sources, diagnostics, std::move(instance), c)) {
+            return false;
+        }
         if (!all_known(fresh, request, c.asked, diagnostics)) return false;
     }
     return true;
 }
 
-bool construct(Model& model, Edit& edit, LoadedComponent& component, const LoadRequest& request, Sources& sources,
-               Diagnostics& diagnostics) {
+bool construct(Model& model, Edit& edit, LoadedComponent& component, const LoadRequest& request,
+               Sources& sources, Diagnostics& diagnostics) {
     const hal_component& plugin = *component.plugin;
     const bool singleton = plugin.flags & HAL_COMPONENT_SINGLETON;
     const std::size_t stride = stride_of(plugin);
     const auto block = [&](std::size_t count) { return block_of(plugin, count); };
     bool known = singleton || !request.names.empty() || request.count >= 0;
-    std::size_t total = singleton                ? 1
-                        : !request.names.empty() ? request.names.size()
-                                                 : static_cast<std::size_t>(std::max<std::int64_t>(request.count, 0));
+    std::size_t total = singleton ? 1
+                        : !request.names.empty()
+                            ? request.names.size()
+                            : static_cast<std::size_t>(std::max<std::int64_t>(request.count, 0));
     if (singleton && (request.names.size() > 1 || request.count > 1)) {
         diagnostics.error("bad-argument", request.count_at.known() ? request.count_at : request.at,
                           "component '" + component.name + "' has one instance only");
@@ -259,7 +312,8 @@ bool construct(Model& model, Edit& edit, LoadedComponent& component, const LoadR
         auto instance = std::make_unique<Instance>();
         instance->component = &component;
         instance->loaded = request.at;
-        const std::string serial = !request.names.empty() || singleton ? "" : std::to_string(edit.take_number(component));
+        const std::string serial =
+            !request.names.empty() || singleton ? "" : std::to_string(edit.take_number(component));
         instance->name = !request.names.empty() ? request.names[i]
                          : singleton            ? dashed(component.name)
                                                 : dashed(component.name) + "." + serial;
@@ -267,26 +321,40 @@ bool construct(Model& model, Edit& edit, LoadedComponent& component, const LoadR
         instance->storage = storage;
         instance->load = component.loads.empty() ? 0 : component.loads.size() - 1;
         instance->number = i;
-        const std::string personality = request.personalities.empty() ? "" : request.personalities[i % request.personalities.size()];
+        const std::string personality =
+            request.personalities.empty() ? ""
+                                          : request.personalities[i % request.personalities.size()];
         Construction c{model, request, *instance, i, personality, {}, {}, {}, {}, 0, {}, {}};
         c.serial = serial;
-        if (!construct_one(edit, component, request, sources, diagnostics, std::move(instance), c)) return false;
+        if (!construct_one(edit, component, request, sources, diagnostics, std::move(instance),
+                           c)) {
+            return false;
+        }
         asked.insert(c.asked.begin(), c.asked.end());
         if (i == 0) {
             if (!all_known(component, request, c.asked, diagnostics)) return false;
             if (!known) {
                 known = true;
                 total = c.list_length > 0 ? c.list_length : plugin.default_count;
-                if (total > 1) storage = block(total - 1);
+                if (total > 1) {
+                    storage = block(total - 1);
+                }
                 in_block = 0;
-            } else if (const auto list = c.list_length > total ? request.arguments.find(*c.lists.begin()) : request.arguments.end();
-                       list != request.arguments.end()) {  // a default may list more values than there are instances
+            } else if (const auto list = c.list_length > total
+                                             ? request.arguments.find(*c.lists.begin())
+                                             : request.arguments.end();
+                       // a default may list more values than there are instances
+                       list != request.arguments.end()) {
                 diagnostics.error("bad-argument", list->second.at,
-                                  "argument '" + list->first + "' lists " + std::to_string(c.list_length) + " values for " +
-                                      std::to_string(total) + (total == 1 ? " instance" : " instances"));
+                                  "argument '" + list->first + "' lists " +
+                                      std::to_string(c.list_length) + " values for " +
+                                      std::to_string(total) +
+                                      (total == 1 ? " instance" : " instances"));
                 return false;
             }
-            if (total > 1) make_room(model, *component.instances.back(), total - 1);
+            if (total > 1) {
+                make_room(model, *component.instances.back(), total - 1);
+            }
         }
     }
     return true;

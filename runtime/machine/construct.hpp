@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: MIT
-// Hosting the C interface: makes instances of a component and takes their declarations into the model.
+// Hosting the C interface: makes instances of a component and takes their declarations into the
+// model.
 #pragma once
 
 #include <map>
 #include <string>
 #include <vector>
 
-#include "text/diagnostic.hpp"
 #include "hal/messages.h"
 #include "hal/status.h"
 #include "model/edit.hpp"
 #include "model/model.hpp"
+#include "text/diagnostic.hpp"
 
 namespace hal {
 
@@ -31,36 +32,44 @@ struct LoadRequest {
     std::vector<std::string> personalities;
     std::map<std::string, GivenArgument> arguments;
     const hal_faults* faults = nullptr;         ///< of the machine; nullptr where none runs
-    Elaboration* on = nullptr;                  ///< the command's; what a LinuxCNC module does beside its instance belongs to its transaction
+    /// the command's; what a LinuxCNC module does beside its instance belongs to its transaction
+    Elaboration* on = nullptr;
 };
 
-/// The instances of a component once more, from another plugin and in a model beside: same names, arguments and personalities.
-bool construct_again(Model& beside, Edit& edit, const LoadedComponent& old, LoadedComponent& fresh, Span at, const hal_faults* faults,
-                     Sources& sources, Diagnostics& diagnostics);
+/// The instances of a component once more, from another plugin and in a model beside: same names,
+/// arguments and personalities.
+bool construct_again(Model& beside, Edit& edit, const LoadedComponent& old, LoadedComponent& fresh,
+                     Span at, const hal_faults* faults, Sources& sources, Diagnostics& diagnostics);
 
 /// Instances of `my_comp` and their pins are named my-comp…
 std::string dashed(std::string component);
 
-/// Why a constructor or start() fails: hal_rejection with its texts copied. Empty while nothing is known against the instance.
+/// Why a constructor or start() fails: hal_rejection with its texts copied. Empty while nothing is
+/// known against the instance.
 struct Failure {
-    std::string text = {}, name = {}, code = {}, help = {};
+    std::string text = {};
+    std::string name = {};
+    std::string code = {};
+    std::string help = {};
     hal_subject subject = HAL_SUBJECT_INSTANCE;
-    std::uint32_t begin = 0, end = 0;
+    std::uint32_t begin = 0;
+    std::uint32_t end = 0;
     bool empty() const { return text.empty(); }
 };
 /// Throws std::bad_alloc.
 Failure copy_of(const hal_rejection& rejection);
 
-/// Makes the instances of one loadrt line. False after reporting. Constructs only; start() comes with the commit. `sources` takes the
-/// texts that components find something wrong in.
-bool construct(Model& model, Edit& edit, LoadedComponent& component, const LoadRequest& request, Sources& sources,
-               Diagnostics& diagnostics);
+/// Makes the instances of one loadrt line. False after reporting. Constructs only; start() comes
+/// with the commit. `sources` takes the texts that components find something wrong in.
+bool construct(Model& model, Edit& edit, LoadedComponent& component, const LoadRequest& request,
+               Sources& sources, Diagnostics& diagnostics);
 
 /// Memory that lives as long as the instance; nullptr: there is none, or the request is senseless.
 void* allocate_for(Instance& instance, std::size_t bytes, std::size_t align) noexcept;
 
 /// Starts one instance: it may acquire hardware. Returns why it failed, or an empty Failure.
-Failure start_instance(Instance& instance, const Model& model, Executor& executor, const hal_status& status, const hal_messages& messages);
+Failure start_instance(Instance& instance, const Model& model, Executor& executor,
+                       const hal_status& status, const hal_messages& messages);
 /// The instance that disciplines the threads (external clock reference), or nullptr.
 const Instance* clock_leader(const Model& model);
 /// [setup] Not while a thread runs its functions.

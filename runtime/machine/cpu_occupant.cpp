@@ -18,11 +18,16 @@ namespace fs = std::filesystem;
 
 /// The fields of /proc/PID/task/TID/stat that are needed; numbers as in proc(5).
 struct TaskStat {
-    static constexpr std::size_t processor = 39, priority = 40, policy = 41, first_behind_name = 3;
+    static constexpr std::size_t processor = 39;
+    static constexpr std::size_t priority = 40;
+    static constexpr std::size_t policy = 41;
+    static constexpr std::size_t first_behind_name = 3;
     std::string name;
     std::vector<std::string> fields;  // from field 3, the state
 
-    const std::string& field(std::size_t number) const { return fields[number - first_behind_name]; }
+    const std::string& field(std::size_t number) const {
+        return fields[number - first_behind_name];
+    }
 };
 
 bool read_stat(const fs::path& path, TaskStat& stat) {
@@ -39,18 +44,23 @@ bool read_stat(const fs::path& path, TaskStat& stat) {
 
 bool occupies(const TaskStat& stat, int cpu) {
     const int policy = std::atoi(stat.field(TaskStat::policy).c_str());
-    const bool is_real_time = policy == SCHED_FIFO || policy == SCHED_RR || policy == SCHED_DEADLINE;
-    return is_real_time && stat.field(3) == "R" && std::atoi(stat.field(TaskStat::processor).c_str()) == cpu;
+    const bool is_real_time =
+        policy == SCHED_FIFO || policy == SCHED_RR || policy == SCHED_DEADLINE;
+    return is_real_time && stat.field(3) == "R" &&
+           std::atoi(stat.field(TaskStat::processor).c_str()) == cpu;
 }
 
 std::string description(const std::string& pid, const TaskStat& stat) {
     const int policy = std::atoi(stat.field(TaskStat::policy).c_str());
     const std::string who = "process " + pid + " (" + stat.name + ", ";
     if (policy == SCHED_DEADLINE) return who + "SCHED_DEADLINE)";
-    return who + (policy == SCHED_FIFO ? "SCHED_FIFO " : "SCHED_RR ") + stat.field(TaskStat::priority) + ")";
+    return who + (policy == SCHED_FIFO ? "SCHED_FIFO " : "SCHED_RR ") +
+           stat.field(TaskStat::priority) + ")";
 }
 
-bool is_number(const std::string& name) { return !name.empty() && name.find_first_not_of("0123456789") == std::string::npos; }
+bool is_number(const std::string& name) {
+    return !name.empty() && name.find_first_not_of("0123456789") == std::string::npos;
+}
 
 }  // namespace
 
@@ -63,7 +73,9 @@ std::string cpu_occupant(int cpu) {
         std::error_code ended;
         for (const auto& task : fs::directory_iterator(process.path() / "task", ended)) {
             TaskStat stat;
-            if (read_stat(task.path() / "stat", stat) && occupies(stat, cpu)) return description(pid, stat);
+            if (read_stat(task.path() / "stat", stat) && occupies(stat, cpu)) {
+                return description(pid, stat);
+            }
         }
     }
     return "";
@@ -74,7 +86,8 @@ std::string starvation_help(int cpu) {
     if (cpu < 0) return "end what keeps the host busy, or grant a real-time priority: hal doctor";
     const std::string occupant = cpu_occupant(cpu);
     const std::string who = occupant.empty() ? "another process of higher priority" : occupant;
-    return who + " uses CPU " + std::to_string(cpu) + ": move it to another CPU (taskset -cp), or " + pin;
+    return who + " uses CPU " + std::to_string(cpu) +
+           ": move it to another CPU (taskset -cp), or " + pin;
 }
 
 }  // namespace hal

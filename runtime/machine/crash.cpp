@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The last resort: a crash signal or an exception inside a cycle. Outputs first, then a report, then the end.
+// The last resort: a crash signal or an exception inside a cycle. Outputs first, then a report,
+// then the end.
 #include <algorithm>
 #include <atomic>
 #include <csetjmp>
@@ -9,8 +10,8 @@
 #include <cstdlib>
 #include <cstring>
 #include <cxxabi.h>
-#include <exception>
 #include <dlfcn.h>
+#include <exception>
 #include <pthread.h>
 #include <sys/syscall.h>
 #include <unistd.h>
@@ -26,16 +27,20 @@ extern "C" [[gnu::weak]] void __rtsan_realtime_enter();  // a program with the r
 namespace hal {
 namespace {
 
-std::atomic<SessionState*> watched[64];  // the machines of this process; further ones are not named in reports
+// the machines of this process; further ones are not named in reports
+std::atomic<SessionState*> watched[64];
 
-void print(const char* text) noexcept { [[maybe_unused]] const auto written = write(STDERR_FILENO, text, std::strlen(text)); }
+void print(const char* text) noexcept {
+    [[maybe_unused]] const auto written = write(STDERR_FILENO, text, std::strlen(text));
+}
 
 void print(std::uint64_t number) noexcept {
     char digits[24];
     char* at = digits + sizeof digits;
     *--at = '\0';
-    do *--at = static_cast<char>('0' + number % 10);
-    while (number /= 10);
+    do {
+        *--at = static_cast<char>('0' + number % 10);
+    } while (number /= 10);
     print(at);
 }
 
@@ -55,15 +60,20 @@ const char* signal_text(int signal) noexcept {
 void name_function(const Core* core, std::uint32_t id) noexcept {
     for (const auto& one : watched) {
         const SessionState* const state = one.load();
-        if (!state || std::none_of(state->cores.begin(), state->cores.end(), [&](const auto& pair) { return pair.second == core; })) continue;
-        for (const auto& component : state->model.components)
-            for (const auto& function : component->functions)
+        if (!state || std::none_of(state->cores.begin(), state->cores.end(),
+                                   [&](const auto& pair) { return pair.second == core; })) {
+            continue;
+        }
+        for (const auto& component : state->model.components) {
+            for (const auto& function : component->functions) {
                 if (function->id == id) {
                     print(component->name.c_str());
                     print(": function '");
                     print(function->name.c_str());
                     return print("'");
                 }
+            }
+        }
     }
     print("a function");
 }
@@ -101,10 +111,12 @@ void on_signal(int signal) {
 std::atomic<pid_t> owner{0};  // the process of the machines; one that it forks ends without a word
 
 bool has_machine() noexcept {
-    return std::any_of(std::begin(watched), std::end(watched), [](const auto& one) { return one.load() != nullptr; });
+    return std::any_of(std::begin(watched), std::end(watched),
+                       [](const auto& one) { return one.load() != nullptr; });
 }
 
-// What calls: a function in its cycle, a task of a module, a constructor, start or stop of an instance, or any other thread.
+// What calls: a function in its cycle, a task of a module, a constructor, start or stop of an
+// instance, or any other thread.
 void name_caller(const Core* in_function, const char* module) noexcept {
     if (in_function) return name_function(in_function, in_function->current_function());
     if (module) {
@@ -125,7 +137,8 @@ void name_caller(const Core* in_function, const char* module) noexcept {
     print("'");
 }
 
-// A machine ends by its own orders. Returns false when this is such an end, or one that was reported already.
+// A machine ends by its own orders. Returns false when this is such an end, or one that was
+// reported already.
 bool report_end(const char* call) noexcept {
     if (owner.load() != getpid()) return false;
     const Core* const core = Core::current();
@@ -140,17 +153,27 @@ bool report_end(const char* call) noexcept {
     name_caller(in_function, module);
     if (__rtsan_realtime_enter && (in_function || module)) {
         print(" made the call that the real-time guard prints above");
-        if (in_function) print(", at cycle ");
+        if (in_function) {
+            print(", at cycle ");
+        }
     } else {
         print(" called ");
         print(call);
-        if (in_function) print(" at cycle ");
-        else if (SetupCall::is_mine()) print(" in ");
-        else if (!module) print(" while the machine runs");
+        if (in_function) {
+            print(" at cycle ");
+        } else if (SetupCall::is_mine()) {
+            print(" in ");
+        } else if (!module) {
+            print(" while the machine runs");
+        }
     }
-    if (in_function) print(in_function->cycle_number());
-    else if (!module && SetupCall::is_mine()) print(SetupCall::now.what);
-    print(machine ? "; outputs were set to their safe values; the process ends\n" : "; the process ends\n");
+    if (in_function) {
+        print(in_function->cycle_number());
+    } else if (!module && SetupCall::is_mine()) {
+        print(SetupCall::now.what);
+    }
+    print(machine ? "; outputs were set to their safe values; the process ends\n"
+                  : "; the process ends\n");
     return true;
 }
 
@@ -159,27 +182,39 @@ int failure(int status) noexcept { return status != 0 ? status : 1; }
 // Static destructors must not run beside threads that use the objects.
 void on_exit_of_process(int status, void*) {
     if (!report_end("exit()")) {
-        if (reported.load()) end_process(failure(status));
+        if (reported.load()) {
+            end_process(failure(status));
+        }
         return;
     }
-    if (ftrylockfile(stdout) == 0) fflush_unlocked(stdout);
+    if (ftrylockfile(stdout) == 0) {
+        fflush_unlocked(stdout);
+    }
     end_process(failure(status));
 }
 
 void on_quick_exit() {
-    if (report_end("quick_exit()")) end_process(1);
+    if (report_end("quick_exit()")) {
+        end_process(1);
+    }
 }
 
 // A noexcept function let an exception out. The cycle goes on without the thread's functions.
 [[noreturn]] void on_terminate() {
     if (Core* const core = Core::current(); core && core->in_function()) {
-        if (std::current_exception()) abi::__cxa_end_catch();  // gives the exception's memory back
+        if (std::current_exception()) {
+            abi::__cxa_end_catch();  // gives the exception's memory back
+        }
         std::longjmp(core->recover, 1);
     }
-    if (reported.exchange(true)) std::abort();
+    if (reported.exchange(true)) {
+        std::abort();
+    }
     ExitObserver::silence();
     make_all_safe();
-    print("hal: an exception outside of the cycle was not caught; outputs were set to their safe values; the process ends\n");
+    print(
+        "hal: an exception outside of the cycle was not caught; outputs were set to their safe "
+        "values; the process ends\n");
     std::abort();
 }
 
@@ -188,7 +223,9 @@ void on_quick_exit() {
 void end_process(int status) noexcept {
     reported = true;
     ExitObserver::silence();
-    for (;;) syscall(SYS_exit_group, status);
+    for (;;) {
+        syscall(SYS_exit_group, status);
+    }
 }
 
 CycleNames names_of(const CycleNow& now) {
@@ -196,19 +233,25 @@ CycleNames names_of(const CycleNow& now) {
     for (const auto& one : watched) {
         const SessionState* const state = one.load();
         if (!state) continue;
-        const auto of = std::find_if(state->cores.begin(), state->cores.end(), [&](const auto& pair) { return pair.second == now.core; });
+        const auto of = std::find_if(state->cores.begin(), state->cores.end(),
+                                     [&](const auto& pair) { return pair.second == now.core; });
         if (of == state->cores.end()) continue;
         names.thread = of->first->name;
-        for (const auto& component : state->model.components)
-            for (const auto& function : component->functions)
-                if (function->id == now.function) names.function = "function '" + function->name + "' (" + component->name + ")";
+        for (const auto& component : state->model.components) {
+            for (const auto& function : component->functions) {
+                if (function->id == now.function) {
+                    names.function = "function '" + function->name + "' (" + component->name + ")";
+                }
+            }
+        }
     }
     return names;
 }
 
 void watch_for_exits() {
     owner = getpid();
-    static const bool installed = ::on_exit(on_exit_of_process, nullptr) == 0 && std::at_quick_exit(on_quick_exit) == 0;
+    static const bool installed =
+        ::on_exit(on_exit_of_process, nullptr) == 0 && std::at_quick_exit(on_quick_exit) == 0;
     (void)installed;
 }
 
@@ -217,14 +260,16 @@ void watch_for_crashes(SessionState* state) {
     static const bool installed = [] {
         std::set_terminate(on_terminate);
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-        // for the program's own thread, which runs the cycles of a virtual clock; the executor's threads have one each
+        // for the program's own thread, which runs the cycles of a virtual clock; the executor's
+        // threads have one each
         alignas(16) static char room[1 << 15];
         const stack_t other{.ss_sp = room, .ss_flags = 0, .ss_size = sizeof room};
         sigaltstack(&other, nullptr);
         struct sigaction action{};
         action.sa_handler = on_signal;
         action.sa_flags = SA_RESETHAND | SA_NODEFER | SA_ONSTACK;
-        for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGSYS, SIGTRAP}) sigaction(signal, &action, nullptr);
+        for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGSYS, SIGTRAP})
+            sigaction(signal, &action, nullptr);
 #endif
         return true;
     }();
@@ -244,20 +289,25 @@ void end_watch_for_crashes(SessionState* state) {
 
 }  // namespace hal
 
-// The program exports these functions: what a plugin or a library of the process calls by these names ends here, safe and named. A sanitizer
-// has its own.
+// The program exports these functions: what a plugin or a library of the process calls by these
+// names ends here, safe and named. A sanitizer has its own.
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 
 namespace {
 
 [[noreturn]] void end_directly(int status, const char* call) noexcept {
-    if (hal::report_end(call)) hal::end_process(hal::failure(status));
-    for (;;) syscall(SYS_exit_group, status);
+    if (hal::report_end(call)) {
+        hal::end_process(hal::failure(status));
+    }
+    for (;;) {
+        syscall(SYS_exit_group, status);
+    }
 }
 
 using Syscall = long (*)(long, ...);
 Syscall next_syscall() noexcept {
-    static std::atomic<Syscall> next{nullptr};  // no guarded initialisation: the guard may need a system call
+    // no guarded initialisation: the guard may need a system call
+    static std::atomic<Syscall> next{nullptr};
     Syscall found = next.load(std::memory_order_relaxed);
     if (found == nullptr) {
         found = reinterpret_cast<Syscall>(dlsym(RTLD_NEXT, "syscall"));
@@ -271,16 +321,23 @@ Syscall next_syscall() noexcept {
 extern "C" {
 
 [[noreturn, gnu::visibility("default")]] void _exit(int status) { end_directly(status, "_exit()"); }
-[[noreturn, gnu::visibility("default")]] void _Exit(int status) noexcept { end_directly(status, "_Exit()"); }
+[[noreturn, gnu::visibility("default")]] void _Exit(int status) noexcept {
+    end_directly(status, "_Exit()");
+}
 
 [[gnu::visibility("default")]] long syscall(long number, ...) noexcept {
     va_list list;
     va_start(list, number);
     long argument[6];
-    for (long& one : argument) one = va_arg(list, long);
+    for (long& one : argument) {
+        one = va_arg(list, long);
+    }
     va_end(list);
-    if (number == SYS_exit_group && hal::report_end("the system call exit_group")) argument[0] = hal::failure(static_cast<int>(argument[0]));
-    return next_syscall()(number, argument[0], argument[1], argument[2], argument[3], argument[4], argument[5]);
+    if (number == SYS_exit_group && hal::report_end("the system call exit_group")) {
+        argument[0] = hal::failure(static_cast<int>(argument[0]));
+    }
+    return next_syscall()(number, argument[0], argument[1], argument[2], argument[3], argument[4],
+                          argument[5]);
 }
 
 }  // extern "C"

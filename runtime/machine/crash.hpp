@@ -13,7 +13,8 @@ namespace hal {
 struct CycleNames {
     std::string thread, function;
 };
-/// Returns the names for a cycle that does not end. The model is read without a lock: an edit waits for the end of the cycle.
+/// Returns the names for a cycle that does not end. The model is read without a lock: an edit waits
+/// for the end of the cycle.
 CycleNames names_of(const CycleNow& now);
 
 /// Ends the process as _exit() does; the caller has reported why. async-signal-safe

@@ -25,7 +25,10 @@ CycleTimeLimit::Action CycleTimeLimit::check(const CycleNow& now, std::int64_t n
     const std::int64_t took = cycle_ns(now_ns);
     if (limit_ns > 0 && took >= limit_ns) return Action::end;
     if (took < first_report_ns) return Action::none;
-    if (!slow_) slow_ = true, ++slow_cycles_;
+    if (!slow_) {
+        slow_ = true;
+        ++slow_cycles_;
+    }
     if (reported_ns_ != 0) {
         if (now_ns - reported_ns_ < pause_ns_) return Action::none;
         pause_ns_ = std::min(2 * pause_ns_, longest_pause_ns);
@@ -51,21 +54,31 @@ void CycleGuard::begin(std::int64_t limit_ns) {
 
 void CycleGuard::end_soon() {
     const std::lock_guard lock(mutex_);
-    const std::int64_t limit = ending_limit_ns + (time_limit_.in_cycle() ? time_limit_.cycle_ns(monotonic_ns()) : 0);
-    if (time_limit_.limit_ns == 0 || time_limit_.limit_ns > limit) time_limit_.limit_ns = limit;
+    const std::int64_t limit =
+        ending_limit_ns + (time_limit_.in_cycle() ? time_limit_.cycle_ns(monotonic_ns()) : 0);
+    if (time_limit_.limit_ns == 0 || time_limit_.limit_ns > limit) {
+        time_limit_.limit_ns = limit;
+    }
 }
 
 namespace {
 
-std::string wall_time(std::int64_t ns) { return format_duration(static_cast<double>(ns / 100'000'000 * 100'000'000)); }
+std::string wall_time(std::int64_t ns) {
+    return format_duration(static_cast<double>(ns / 100'000'000 * 100'000'000));
+}
 
 }  // namespace
 
 void CycleGuard::work() {
     std::unique_lock lock(mutex_);
     while (!over_) {
-        const std::int64_t interval = time_limit_.limit_ns > 0 ? std::clamp<std::int64_t>(time_limit_.limit_ns / 8, 1'000'000, 100'000'000) : 100'000'000;
-        if (wake_.wait_for(lock, std::chrono::nanoseconds(interval), [this] { return over_; })) return;
+        const std::int64_t interval =
+            time_limit_.limit_ns > 0
+                ? std::clamp<std::int64_t>(time_limit_.limit_ns / 8, 1'000'000, 100'000'000)
+                : 100'000'000;
+        if (wake_.wait_for(lock, std::chrono::nanoseconds(interval), [this] { return over_; })) {
+            return;
+        }
         const CycleNow now = cycle_now();
         const std::int64_t now_ns = monotonic_ns();
         const CycleTimeLimit::Action action = time_limit_.check(now, now_ns);
@@ -74,22 +87,31 @@ void CycleGuard::work() {
         const bool end = action == CycleTimeLimit::Action::end;
         const std::int64_t took = time_limit_.cycle_ns(now_ns);
         std::string text = "hal: " + names.thread + ": ";
-        if (!names.function.empty() && time_limit_.one_function()) text += names.function + " has not returned for ";
-        else text += "the cycle has not ended for ";
+        if (!names.function.empty() && time_limit_.one_function()) {
+            text += names.function + " has not returned for ";
+        } else {
+            text += "the cycle has not ended for ";
+        }
         text += took < 1'000'000'000 ? format_duration(static_cast<double>(took)) : wall_time(took);
         text += " of wall time";
-        if (!names.function.empty() && !time_limit_.one_function()) text += ", now in " + names.function;
+        if (!names.function.empty() && !time_limit_.one_function()) {
+            text += ", now in " + names.function;
+        }
         text += " (cycle " + std::to_string(now.cycle) + ")";
         if (end) {
             make_all_safe();
             text += "; outputs were set to their safe values; the process ends [hung-thread]\n";
         } else {
-            if (time_limit_.slow_cycles() > 1)
-                text += "; " + std::to_string(time_limit_.slow_cycles()) + " cycles took longer than " + wall_time(CycleTimeLimit::first_report_ns);
+            if (time_limit_.slow_cycles() > 1) {
+                text += "; " + std::to_string(time_limit_.slow_cycles()) +
+                        " cycles took longer than " + wall_time(CycleTimeLimit::first_report_ns);
+            }
             text += "; it goes on (--cycle-limit TIME ends it)\n";
         }
         [[maybe_unused]] const auto written = ::write(STDERR_FILENO, text.data(), text.size());
-        if (end) end_process(1);
+        if (end) {
+            end_process(1);
+        }
     }
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Wall time of the cycles of a virtual clock, where no supervisor is: one that never ends is reported while it runs.
+// Wall time of the cycles of a virtual clock, where no supervisor is: one that never ends is
+// reported while it runs.
 #pragma once
 
 #include <condition_variable>
@@ -11,11 +12,15 @@
 
 namespace hal {
 
-/// Decides when a long cycle is reported and when it ends the process. Reports are rate-limited over all cycles, because a component that is
-/// slow in every cycle, for example under a sanitizer, does not hang.
+/// Decides when a long cycle is reported and when it ends the process. Reports are rate-limited
+/// over all cycles, because a component that is slow in every cycle, for example under a sanitizer,
+/// does not hang.
 class CycleTimeLimit {
 public:
-    static constexpr std::int64_t first_report_ns = 10'000'000'000, longest_pause_ns = 600'000'000'000;
+    static constexpr std::int64_t first_report_ns = 10'000'000'000;
+
+public:
+    static constexpr std::int64_t longest_pause_ns = 600'000'000'000;
     enum class Action : std::uint8_t { none, report, end };
 
     /// What the cycle does that runs now, if any, in real time. [any]
@@ -25,20 +30,25 @@ public:
 
     bool in_cycle() const noexcept { return seen_.core != nullptr; }
     std::int64_t cycle_ns(std::int64_t now_ns) const noexcept { return now_ns - cycle_since_ns_; }
-    std::int64_t function_ns(std::int64_t now_ns) const noexcept { return now_ns - function_since_ns_; }
+    std::int64_t function_ns(std::int64_t now_ns) const noexcept {
+        return now_ns - function_since_ns_;
+    }
     /// The cycle was in one function all the time, as far as was seen.
     bool one_function() const noexcept { return function_since_ns_ == cycle_since_ns_; }
     std::uint64_t slow_cycles() const noexcept { return slow_cycles_; }
 
 private:
     CycleNow seen_{};
-    std::int64_t cycle_since_ns_ = 0, function_since_ns_ = 0;
-    std::int64_t reported_ns_ = 0, pause_ns_ = first_report_ns;  // reported_ns_ 0: never
-    std::uint64_t slow_cycles_ = 0;                              // longer than first_report_ns
-    bool slow_ = false;                                          // this one is counted
+    std::int64_t cycle_since_ns_ = 0;
+    std::int64_t function_since_ns_ = 0;
+    std::int64_t reported_ns_ = 0;
+    std::int64_t pause_ns_ = first_report_ns;  // reported_ns_ 0: never
+    std::uint64_t slow_cycles_ = 0;  // longer than first_report_ns
+    bool slow_ = false;  // this one is counted
 };
 
-/// While it lives, watches the cycles of all virtual clocks of the process from a thread of its own.
+/// While it lives, watches the cycles of all virtual clocks of the process from a thread of its
+/// own.
 class CycleGuard {
 public:
     /// After the end of the run was asked for.

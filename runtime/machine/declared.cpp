@@ -28,12 +28,16 @@ bool take_pin(const hal_host* host, const hal_pin_decl* decl, hal_pin* memory) {
     Gathering& g = of(host);
     memory->own = decl->initial;
     memory->slot = &memory->own;
-    if (decl->size >= sizeof *decl && decl->pointer) *decl->pointer = memory->slot;
+    if (decl->size >= sizeof *decl && decl->pointer) {
+        *decl->pointer = memory->slot;
+    }
     Declared::Pin pin;
     pin.name = text(decl->name);
     pin.doc = text(decl->doc);
     pin.unit = text(decl->unit);
-    if (const auto user = g.names.find(decl->function); user != g.names.end()) pin.function = user->second;
+    if (const auto user = g.names.find(decl->function); user != g.names.end()) {
+        pin.function = user->second;
+    }
     pin.type = decl->type;
     pin.dir = decl->dir;
     pin.initial = decl->initial;
@@ -48,14 +52,15 @@ bool take_pin(const hal_host* host, const hal_pin_decl* decl, hal_pin* memory) {
 bool take_function(const hal_host* host, const hal_function_decl* decl) {
     Gathering& g = of(host);
     if (decl->flags & HAL_FUNCTION_EMERGENCY) return true;
-    g.page.functions.push_back({text(decl->name), text(decl->doc), (decl->flags & HAL_FUNCTION_SHARED) != 0});
+    g.page.functions.push_back(
+        {text(decl->name), text(decl->doc), (decl->flags & HAL_FUNCTION_SHARED) != 0});
     g.names[decl->identity] = g.page.full_name(g.page.functions.back());
     return true;
 }
 
 const char* take_argument(const hal_host* host, const hal_argument_decl* decl) {
-    of(host).page.arguments.push_back(
-        {text(decl->name), text(decl->doc), text(decl->fallback), (decl->flags & HAL_ARGUMENT_PER_INSTANCE) != 0});
+    of(host).page.arguments.push_back({text(decl->name), text(decl->doc), text(decl->fallback),
+                                       (decl->flags & HAL_ARGUMENT_PER_INSTANCE) != 0});
     return decl->fallback;
 }
 
@@ -67,7 +72,9 @@ void* allocate(const hal_host* host, std::size_t bytes, std::size_t align) {
 }
 
 void take_failure(const hal_host* host, const char* reason) { of(host).failure = text(reason); }
-void take_rejection(const hal_host* host, const hal_rejection* rejection) { take_failure(host, rejection->text); }
+void take_rejection(const hal_host* host, const hal_rejection* rejection) {
+    take_failure(host, rejection->text);
+}
 const void* no_extension(const hal_host*, const char*) { return nullptr; }
 
 }  // namespace
@@ -76,7 +83,8 @@ std::string Declared::instance() const { return singleton ? name : name + ".N"; 
 
 std::string Declared::full_name(const Function& function) const {
     if (whole_names) return function.name;
-    return (function.shared ? name : instance()) + (function.name.empty() ? "" : "." + function.name);
+    return (function.shared ? name : instance()) +
+           (function.name.empty() ? "" : "." + function.name);
 }
 
 bool gather(const hal_component& component, Declared& page, std::string& problem) {
@@ -89,17 +97,23 @@ bool gather(const hal_component& component, Declared& page, std::string& problem
     page.default_count = component.default_count;
     if (component.flags & HAL_COMPONENT_MODULE) {  // not run: it may access hardware
         const auto& module = reinterpret_cast<const halcyon_module&>(component);
-        for (std::size_t i = 0; i < module.parameter_count; ++i) page.arguments.push_back({module.parameters[i].name, text(module.parameters[i].doc), "", false});
+        for (std::size_t i = 0; i < module.parameter_count; ++i) {
+            page.arguments.push_back(
+                {module.parameters[i].name, text(module.parameters[i].doc), "", false});
+        }
         return true;
     }
     Gathering gathering{page, {}, {}, {}};
-    const hal_host host{sizeof host, &gathering, take_pin, take_function, take_argument, allocate, take_failure, no_extension, take_rejection};
+    const hal_host host{sizeof host, &gathering,   take_pin,     take_function, take_argument,
+                        allocate,    take_failure, no_extension, take_rejection};
     const std::align_val_t align{component.instance_align};
     const auto release = [align](void* memory) { ::operator delete(memory, align); };
-    const std::unique_ptr<void, decltype(release)> memory(::operator new(component.instance_size, align), release);
+    const std::unique_ptr<void, decltype(release)> memory(
+        ::operator new(component.instance_size, align), release);
     std::fill_n(static_cast<char*>(memory.get()), component.instance_size, '\0');
     if (!component.create(&host, memory.get())) {
-        problem = gathering.failure.empty() ? "its constructor failed without a reason" : gathering.failure;
+        problem = gathering.failure.empty() ? "its constructor failed without a reason"
+                                            : gathering.failure;
         return false;
     }
     component.destroy(memory.get());

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What a component declares about itself, gathered by constructing it once with default arguments: for manuals and completion.
+// What a component declares about itself, gathered by constructing it once with default arguments:
+// for manuals and completion.
 #pragma once
 
 #include <string>
@@ -23,23 +24,30 @@ struct Declared {
         std::string name, doc, unit, function;  ///< function: of the one that uses it; empty: all
         hal_type type = HAL_TYPE_BIT;
         hal_dir dir = HAL_DIR_IN;
-        hal_value initial{}, safe{};
-        bool has_safe = false, finite = false, read_only = false;
+        hal_value initial{};
+        hal_value safe{};
+        bool has_safe = false;
+        bool finite = false;
+        bool read_only = false;
     };
     std::string name, summary, doc;
-    bool singleton = false, built_in = false;
-    bool whole_names = false;  ///< names of pins and functions stand for themselves, not below the instance's
+    bool singleton = false;
+    bool built_in = false;
+    /// names of pins and functions stand for themselves, not below the instance's
+    bool whole_names = false;
     unsigned default_count = 1;
     std::vector<Argument> arguments;
     std::vector<Function> functions;
     std::vector<Pin> pins;
 
-    /// Prefix of an instance's names: "pid.N", or the name itself for a component with one instance.
+    /// Prefix of an instance's names: "pid.N", or the name itself for a component with one
+    /// instance.
     std::string instance() const;
     std::string full_name(const Function& function) const;
 };
 
-/// Runs the component's constructor and gathers its declarations. Returns false and sets `problem` to the reason. [setup]
+/// Runs the component's constructor and gathers its declarations. Returns false and sets `problem`
+/// to the reason. [setup]
 bool gather(const hal_component& component, Declared& declared, std::string& problem);
 
 }  // namespace hal

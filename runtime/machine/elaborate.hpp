@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: MIT
-// What carries out the commands that change the model: the functions of the command table's edits. Step 3 of docs/design.md.
+// What carries out the commands that change the model: the functions of the command table's edits.
+// Step 3 of docs/design.md.
 #pragma once
 
 #include <span>
 #include <vector>
 
-#include "text/diagnostic.hpp"
+#include "machine/plugins.hpp"
 #include "model/edit.hpp"
 #include "netlist/netlist.hpp"
 #include "netlist/usage.hpp"
-#include "machine/plugins.hpp"
+#include "text/diagnostic.hpp"
 
 namespace hal {
 
@@ -36,10 +37,11 @@ struct Elaboration {
 };
 
 /// Carries out `addf --auto`.
-void apply_auto_order(Model& model, Edit& edit, const std::vector<AutoOrder>& orders, Diagnostics& diagnostics);
+void apply_auto_order(Model& model, Edit& edit, const std::vector<AutoOrder>& orders,
+                      Diagnostics& diagnostics);
 
-/// Each carries out one plain (expanded) command on the model. The number of arguments is right; arrows are still among them.
-/// Problems go to the diagnostics.
+/// Each carries out one plain (expanded) command on the model. The number of arguments is right;
+/// arrows are still among them. Problems go to the diagnostics.
 namespace edits {
 
 using Args = std::span<const Token>;

@@ -16,7 +16,9 @@ using edits::word;
 
 void edits::newthread(Elaboration& on, Args args) {
     NewThread thread;
-    if (!parse_new_thread(args, thread, on.diagnostics)) return on.edit.absences().note(args[0].text);
+    if (!parse_new_thread(args, thread, on.diagnostics)) {
+        return on.edit.absences().note(args[0].text);
+    }
     fit_period(on.model, thread, on.diagnostics);
     on.edit.add_thread({thread.name, thread.at}, thread.options);
 }
@@ -30,17 +32,28 @@ void add_automatically(Elaboration& on, Args args) {
     if (!thread) return;
     AutoOrder order{thread, {}, args[0].span};
     if (args.size() > 1) {
-        for (const Token& token : args.subspan(1))
-            if (on.edit.add_function(word(token), word(args[0]), -1, {}, false))
+        for (const Token& token : args.subspan(1)) {
+            if (on.edit.add_function(word(token), word(args[0]), -1, {}, false)) {
                 order.functions.push_back(on.model.find_function(token.text));
+            }
+        }
     } else {
-        for (const auto& component : on.model.components)
-            for (const auto& function : component->functions)
-                if (!function->thread && on.edit.add_function({function->name, args[0].span}, word(args[0]), -1, {}, false))
+        for (const auto& component : on.model.components) {
+            for (const auto& function : component->functions) {
+                if (!function->thread && on.edit.add_function({function->name, args[0].span},
+                                                              word(args[0]), -1, {}, false)) {
                     order.functions.push_back(function.get());
-        if (order.functions.empty()) on.diagnostics.error("no-such-function", args[0].span, "every function is already in a thread");
+                }
+            }
+        }
+        if (order.functions.empty()) {
+            on.diagnostics.error("no-such-function", args[0].span,
+                                 "every function is already in a thread");
+        }
     }
-    if (!order.functions.empty()) on.auto_orders.push_back(std::move(order));
+    if (!order.functions.empty()) {
+        on.auto_orders.push_back(std::move(order));
+    }
 }
 
 void place_function(Elaboration& on, Args args, bool init) {
@@ -52,7 +65,8 @@ void place_function(Elaboration& on, Args args, bool init) {
         const char* const first = text.data() + (text.starts_with('+') ? 1 : 0);
         const auto [end, problem] = std::from_chars(first, text.data() + text.size(), position);
         if (problem != std::errc{} || end != text.data() + text.size()) {
-            on.diagnostics.error("bad-position", position_at, quoted(text) + " is not a position", "", "1 is the first place, -1 the last");
+            on.diagnostics.error("bad-position", position_at, quoted(text) + " is not a position",
+                                 "", "1 is the first place, -1 the last");
             return;
         }
     }
@@ -68,10 +82,14 @@ void edits::addf(Elaboration& on, Args args) {
 
 void edits::initf(Elaboration& on, Args args) { place_function(on, args, true); }
 
-void edits::delf(Elaboration& on, Args args) { on.edit.remove_function(word(args[0]), word(args[1])); }
+void edits::delf(Elaboration& on, Args args) {
+    on.edit.remove_function(word(args[0]), word(args[1]));
+}
 
-// Each line's functions among the places they have; each thread is put in order once, however many lines there are.
-void apply_auto_order(Model&, Edit& edit, const std::vector<AutoOrder>& orders, Diagnostics& diagnostics) {
+// Each line's functions among the places they have; each thread is put in order once, however many
+// lines there are.
+void apply_auto_order(Model&, Edit& edit, const std::vector<AutoOrder>& orders,
+                      Diagnostics& diagnostics) {
     struct Row {
         std::vector<LoadedFunction*> functions;
         std::unordered_map<const LoadedFunction*, std::size_t> places;
@@ -84,7 +102,9 @@ void apply_auto_order(Model&, Edit& edit, const std::vector<AutoOrder>& orders, 
         Row& row = at->second;
         if (fresh) {
             row.functions = order.thread->functions;
-            for (std::size_t i = 0; i < row.functions.size(); ++i) row.places.emplace(row.functions[i], i);
+            for (std::size_t i = 0; i < row.functions.size(); ++i) {
+                row.places.emplace(row.functions[i], i);
+            }
         }
         std::vector<LoadedFunction*> there;
         std::vector<std::size_t> places;
@@ -102,8 +122,11 @@ void apply_auto_order(Model&, Edit& edit, const std::vector<AutoOrder>& orders, 
         }
         row.changed = true;
     }
-    for (auto& [thread, row] : rows)
-        if (row.changed) edit.reorder(*thread, std::move(row.functions));
+    for (auto& [thread, row] : rows) {
+        if (row.changed) {
+            edit.reorder(*thread, std::move(row.functions));
+        }
+    }
 }
 
 }  // namespace hal

@@ -29,12 +29,17 @@ constexpr off_t max_text = off_t{1} << 26;  // per thread; the file is sparse
 std::atomic<std::atomic<bool>*> silent_flag{nullptr};
 
 [[noreturn]] void end_observer() {
-    for (;;) ::syscall(SYS_exit_group, 0);
+    for (;;) {
+        ::syscall(SYS_exit_group, 0);
+    }
 }
 
-/// Of the observer: it holds nothing of the machine's except its standard error, and no signal that is for the machine ends it.
+/// Of the observer: it holds nothing of the machine's except its standard error, and no signal that
+/// is for the machine ends it.
 void let_go(int parent, int names) {
-    for (int number = 1; number < NSIG; ++number) ::signal(number, SIG_IGN);
+    for (int number = 1; number < NSIG; ++number) {
+        ::signal(number, SIG_IGN);
+    }
     ::signal(SIGSEGV, SIG_DFL);
     ::prctl(PR_SET_NAME, "hal-observer");
     const int nothing = ::open("/dev/null", O_RDWR | O_CLOEXEC);
@@ -46,12 +51,18 @@ void let_go(int parent, int names) {
     std::sort(kept.begin(), kept.end());
     for (const int one : kept) {
         if (one < from) continue;
-        if (one > from && ::syscall(SYS_close_range, from, one - 1, 0) != 0)
-            for (int file = from; file < one; ++file) ::close(file);
+        if (one > from && ::syscall(SYS_close_range, from, one - 1, 0) != 0) {
+            for (int file = from; file < one; ++file) {
+                ::close(file);
+            }
+        }
         from = one + 1;
     }
-    if (::syscall(SYS_close_range, from, ~0U, 0) != 0)
-        for (int file = from; file < limit; ++file) ::close(file);
+    if (::syscall(SYS_close_range, from, ~0U, 0) != 0) {
+        for (int file = from; file < limit; ++file) {
+            ::close(file);
+        }
+    }
     if (::chdir("/") != 0) return;
 }
 
@@ -61,21 +72,27 @@ void rename_command_line() {
     const int file = ::open("/proc/self/cmdline", O_RDONLY | O_CLOEXEC);
     char text[4096];
     const ssize_t length = file < 0 ? 0 : ::read(file, text, sizeof text);
-    if (file >= 0) ::close(file);
+    if (file >= 0) {
+        ::close(file);
+    }
     if (length <= 1 || std::memcmp(first, text, std::strlen(first) + 1) != 0) return;
     std::memset(first, 0, static_cast<std::size_t>(length));
     std::strncpy(first, "hal-observer", static_cast<std::size_t>(length) - 1);
 }
 
-void print(const std::string& text) { [[maybe_unused]] const auto written = ::write(STDERR_FILENO, text.data(), text.size()); }
+void print(const std::string& text) {
+    [[maybe_unused]] const auto written = ::write(STDERR_FILENO, text.data(), text.size());
+}
 
-/// One thread as describe() wrote it: a line "BASE THREAD", then "END NAME" per function, END being the index behind its last step.
+/// One thread as describe() wrote it: a line "BASE THREAD", then "END NAME" per function, END being
+/// the index behind its last step.
 struct Described {
     std::uintptr_t base = 0;
     std::string thread, functions;
 
     std::string function_at(const plan::Step* step) const {
-        const std::uintptr_t index = (reinterpret_cast<std::uintptr_t>(step) - base) / sizeof(plan::Step);
+        const std::uintptr_t index =
+            (reinterpret_cast<std::uintptr_t>(step) - base) / sizeof(plan::Step);
         const char* at = functions.data();
         const char* const end = at + functions.size();
         while (at < end) {
@@ -94,7 +111,8 @@ bool read_description(int file, std::size_t index, Described& described) {
     std::string text;
     std::array<char, 4096> part;
     for (off_t at = 0; at < max_text;) {
-        const ssize_t got = ::pread(file, part.data(), part.size(), static_cast<off_t>(index) * max_text + at);
+        const ssize_t got =
+            ::pread(file, part.data(), part.size(), static_cast<off_t>(index) * max_text + at);
         if (got <= 0) break;
         const char* const end = std::find(part.data(), part.data() + got, '\0');
         text.append(part.data(), static_cast<std::size_t>(end - part.data()));
@@ -104,17 +122,22 @@ bool read_description(int file, std::size_t index, Described& described) {
     const auto first = std::from_chars(text.data(), text.data() + text.size(), described.base, 16);
     const auto line_end = text.find('\n');
     if (first.ec != std::errc{} || line_end == std::string::npos) return false;
-    described.thread = text.substr(static_cast<std::size_t>(first.ptr + 1 - text.data()), static_cast<std::size_t>(text.data() + line_end - first.ptr - 1));
+    described.thread =
+        text.substr(static_cast<std::size_t>(first.ptr + 1 - text.data()),
+                    static_cast<std::size_t>(text.data() + line_end - first.ptr - 1));
     described.functions = text.substr(line_end + 1);
     return true;
 }
 
 void wait_for_end(int parent, pid_t machine) {
     pollfd end{parent, POLLIN, 0};
-    while (parent >= 0)
+    while (parent >= 0) {
         if (::poll(&end, 1, -1) > 0 || errno != EINTR) return;
+    }
     constexpr timespec pause{0, 100'000'000};  // a kernel before 5.3
-    while (::getppid() == machine) ::nanosleep(&pause, nullptr);
+    while (::getppid() == machine) {
+        ::nanosleep(&pause, nullptr);
+    }
 }
 
 }  // namespace
@@ -126,17 +149,24 @@ struct ExitObserver::Shared {
 };
 
 ExitObserver::ExitObserver(const std::string& name) {
-    void* const memory = ::mmap(nullptr, sizeof(Shared), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+    void* const memory =
+        ::mmap(nullptr, sizeof(Shared), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
     if (memory == MAP_FAILED) return;
     shared_ = new (memory) Shared;
     name.copy(shared_->name, sizeof shared_->name - 1);
     names_ = static_cast<int>(::syscall(SYS_memfd_create, "hal-functions", MFD_CLOEXEC));
     const pid_t machine = ::getpid();
     const int parent = static_cast<int>(::syscall(SYS_pidfd_open, machine, 0));
-    if (parent >= 0) ::fcntl(parent, F_SETFD, FD_CLOEXEC);
+    if (parent >= 0) {
+        ::fcntl(parent, F_SETFD, FD_CLOEXEC);
+    }
     observer_ = names_ < 0 ? -1 : ::fork();
-    if (observer_ == 0) observe(parent, machine);
-    if (parent >= 0) ::close(parent);
+    if (observer_ == 0) {
+        observe(parent, machine);
+    }
+    if (parent >= 0) {
+        ::close(parent);
+    }
     silent_flag = &shared_->silent;
 }
 
@@ -145,14 +175,19 @@ ExitObserver::~ExitObserver() {
     if (observer_ > 0) {
         shared_->silent = true;
         ::kill(observer_, SIGKILL);
-        while (::waitpid(observer_, nullptr, 0) < 0 && errno == EINTR) {}
+        while (::waitpid(observer_, nullptr, 0) < 0 && errno == EINTR) {
+        }
     }
-    if (names_ >= 0) ::close(names_);
+    if (names_ >= 0) {
+        ::close(names_);
+    }
     // shared_ stays: a thread that hangs may still use its mark
 }
 
 void ExitObserver::silence() noexcept {
-    if (std::atomic<bool>* const flag = silent_flag.load()) flag->store(true);
+    if (std::atomic<bool>* const flag = silent_flag.load()) {
+        flag->store(true);
+    }
 }
 
 CycleMark* ExitObserver::take_mark() {
@@ -164,10 +199,13 @@ CycleMark* ExitObserver::take_mark() {
 }
 
 void ExitObserver::give_back(const CycleMark* mark) {
-    if (mark) taken_[static_cast<std::size_t>(mark - shared_->marks.data())] = false;
+    if (mark) {
+        taken_[static_cast<std::size_t>(mark - shared_->marks.data())] = false;
+    }
 }
 
-void ExitObserver::describe(const CycleMark* mark, const Thread& thread, const plan::Plan& plan) noexcept {
+void ExitObserver::describe(const CycleMark* mark, const Thread& thread,
+                            const plan::Plan& plan) noexcept {
     if (!mark) return;
     try {
         char number[32];
@@ -179,7 +217,8 @@ void ExitObserver::describe(const CycleMark* mark, const Thread& thread, const p
         text += " " + thread.name + "\n";
         auto function = thread.functions.begin();
         for (const plan::Function& planned : plan.functions) {
-            function = std::find_if(function, thread.functions.end(), [&](const auto& one) { return one->id == planned.id; });
+            function = std::find_if(function, thread.functions.end(),
+                                    [&](const auto& one) { return one->id == planned.id; });
             if (function == thread.functions.end()) break;
             add_number(text, planned.end, 10);
             text += " '" + (*function)->name + "' (" + (*function)->component->name + ")\n";
@@ -188,14 +227,17 @@ void ExitObserver::describe(const CycleMark* mark, const Thread& thread, const p
         const off_t at = (mark - shared_->marks.data()) * max_text;
         if (text.size() >= static_cast<std::size_t>(max_text)) return;
         [[maybe_unused]] const auto written = ::pwrite(names_, text.data(), text.size(), at);
-    } catch (const std::bad_alloc&) {}  // then the plan before is named
+    } catch (const std::bad_alloc&) {
+    }  // then the plan before is named
 }
 
 void ExitObserver::observe(int parent, pid_t machine) const {
     let_go(parent, names_);
     rename_command_line();
     wait_for_end(parent, machine);
-    if (!shared_->silent) report(machine);
+    if (!shared_->silent) {
+        report(machine);
+    }
     end_observer();
 }
 
@@ -209,8 +251,10 @@ void ExitObserver::report(pid_t machine) const {
         running += (running.empty() ? "" : ", ") + ("thread '" + described.thread + "' ran ") +
                    (function.empty() ? std::string("a function") : "function " + function);
     }
-    print("hal: machine '" + std::string(shared_->name) + "' (process " + std::to_string(machine) + ") ended without shutting down: " +
-          (running.empty() ? "it was killed outside of a cycle" : "it was killed, or a function ended it by a system call; " + running) +
+    print("hal: machine '" + std::string(shared_->name) + "' (process " + std::to_string(machine) +
+          ") ended without shutting down: " +
+          (running.empty() ? "it was killed outside of a cycle"
+                           : "it was killed, or a function ended it by a system call; " + running) +
           "; its outputs were not set to their safe values\n");
 }
 

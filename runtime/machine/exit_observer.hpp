@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// A process that outlives the machine's for a moment: when the machine's process ends in a way that no handler inside sees (a system call
-// exit_group of a component, SIGKILL), it names the functions that ran. Decision 34.
+// A process that outlives the machine's for a moment: when the machine's process ends in a way that
+// no handler inside sees (a system call exit_group of a component, SIGKILL), it names the functions
+// that ran. Decision 34.
 #pragma once
 
 #include <cstddef>
@@ -20,7 +21,8 @@ class ExitObserver {
 public:
     static constexpr std::size_t max_threads = 64;  ///< further threads are not named
 
-    /// Forks the observer of the machine `name`: before the process has other threads. Without shared memory or a process there is none. [setup]
+    /// Forks the observer of the machine `name`: before the process has other threads. Without
+    /// shared memory or a process there is none. [setup]
     explicit ExitObserver(const std::string& name);
     /// The machine has shut down: ends the observer without a message. [setup]
     ~ExitObserver();
@@ -41,8 +43,8 @@ private:
     [[noreturn]] void observe(int parent, pid_t machine) const;
     void report(pid_t machine) const;
 
-    Shared* shared_ = nullptr;      // in both processes
-    int names_ = -1;                // memfd: what describe() wrote, max_text bytes per mark
+    Shared* shared_ = nullptr;  // in both processes
+    int names_ = -1;  // memfd: what describe() wrote, max_text bytes per mark
     pid_t observer_ = -1;
     std::vector<bool> taken_ = std::vector<bool>(max_threads);
 };

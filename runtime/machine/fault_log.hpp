@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Turns the faults that threads and their supervisor queue into records with messages. Private to this folder.
+// Turns the faults that threads and their supervisor queue into records with messages. Private to
+// this folder.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +20,8 @@ struct Stall;
 /// Why a thread finished no cycle, when its functions are not the cause.
 struct Absence {
     std::int64_t process_ns = 0;  ///< duration without CPU time for the whole process
-    std::int64_t starved_ns = 0;  ///< duration for which the thread was ready to run without running
+    /// duration for which the thread was ready to run without running
+    std::int64_t starved_ns = 0;
     int cpu = -1;                 ///< the thread is bound to; -1: to none
 };
 
@@ -27,10 +29,12 @@ class FaultLog {
 public:
     explicit FaultLog(const SessionState& state) : state_(state) {}
 
-    /// Takes what is queued. Before an instance or thread leaves, because messages contain their names.
+    /// Takes what is queued. Before an instance or thread leaves, because messages contain their
+    /// names.
     void collect();
     void collect(const Thread& thread);
-    /// Instances are about to be destroyed: later faults, even from the same address, start records of their own.
+    /// Instances are about to be destroyed: later faults, even from the same address, start records
+    /// of their own.
     void close_rows();
     /// Returns the records with ages relative to `now_ns`, the oldest first.
     std::vector<FaultRecord> records(std::int64_t now_ns) const;
@@ -44,8 +48,9 @@ public:
 
 private:
     struct Row {
-        FaultRecord record;      // its age is the time of the first fault
-        FaultEvent event;        // the latest; compared with those that follow. HAL_FAULT_NONE: closed
+        FaultRecord record;  // its age is the time of the first fault
+        // the latest; compared with those that follow. HAL_FAULT_NONE: closed
+        FaultEvent event;
         Core::Condition condition;  // that may last
     };
     bool lasts(const Row& row) const;
@@ -56,7 +61,7 @@ private:
 
     const SessionState& state_;
     std::deque<Row> rows_;
-    std::uint64_t number_ = 0;   // of the newest
+    std::uint64_t number_ = 0;  // of the newest
 };
 
 /// Returns the function with that number in the plan, or nullptr.

@@ -12,7 +12,10 @@
 namespace hal {
 namespace {
 
-std::string missing(std::uint64_t lines) { return "missing here: " + counted(static_cast<std::size_t>(lines), "line") + ", because the reader was too slow"; }
+std::string missing(std::uint64_t lines) {
+    return "missing here: " + counted(static_cast<std::size_t>(lines), "line") +
+           ", because the reader was too slow";
+}
 
 }  // namespace
 
@@ -38,7 +41,9 @@ void Journal::add(const char* kind, std::string text) {
 void Journal::append(JournalEntry entry) {
     entries_.push_back(std::move(entry));
     ++count_;
-    if (entries_.size() > kept) entries_.pop_front();
+    if (entries_.size() > kept) {
+        entries_.pop_front();
+    }
 }
 
 void Journal::note(const char* kind, std::string_view line) noexcept {
@@ -46,9 +51,13 @@ void Journal::note(const char* kind, std::string_view line) noexcept {
     try {
         JournalEntry entry{state_.executor->now_ns(), kind, std::string(line)};
         const std::scoped_lock own(messages_mutex_);
-        if (messages_.size() < kept) messages_.push_back(std::move(entry));
-        else ++messages_lost_;
-    } catch (const std::bad_alloc&) {}  // it was printed
+        if (messages_.size() < kept) {
+            messages_.push_back(std::move(entry));
+        } else {
+            ++messages_lost_;
+        }
+    } catch (const std::bad_alloc&) {
+    }  // it was printed
 }
 
 void Journal::collect_messages() {
@@ -59,8 +68,12 @@ void Journal::collect_messages() {
         messages.swap(messages_);
         lost = std::exchange(messages_lost_, 0);
     }
-    for (JournalEntry& one : messages) append(std::move(one));
-    if (lost != 0) append({state_.executor->now_ns(), "message", missing(lost)});
+    for (JournalEntry& one : messages) {
+        append(std::move(one));
+    }
+    if (lost != 0) {
+        append({state_.executor->now_ns(), "message", missing(lost)});
+    }
 }
 
 std::vector<JournalEntry> Journal::after(Position& position) {
@@ -68,15 +81,21 @@ std::vector<JournalEntry> Journal::after(Position& position) {
     collect_messages();
     std::vector<JournalEntry> all;
     const std::uint64_t first = count_ - entries_.size();
-    if (first > position.entry) all.push_back({entries_.front().time_ns, "message", missing(first - position.entry)});
-    for (std::uint64_t i = std::max(first, position.entry); i < count_; ++i) all.push_back(entries_[static_cast<std::size_t>(i - first)]);
+    if (first > position.entry) {
+        all.push_back({entries_.front().time_ns, "message", missing(first - position.entry)});
+    }
+    for (std::uint64_t i = std::max(first, position.entry); i < count_; ++i) {
+        all.push_back(entries_[static_cast<std::size_t>(i - first)]);
+    }
     position.entry = count_;
     for (const FaultRecord& record : state_.faults.records(0)) {
         if (record.number <= position.fault) continue;
         all.push_back({-record.age_ns, "fault", record.sentence});  // an age at time 0
         position.fault = record.number;
     }
-    std::stable_sort(all.begin(), all.end(), [](const JournalEntry& a, const JournalEntry& b) { return a.time_ns < b.time_ns; });
+    std::stable_sort(all.begin(), all.end(), [](const JournalEntry& a, const JournalEntry& b) {
+        return a.time_ns < b.time_ns;
+    });
     return all;
 }
 

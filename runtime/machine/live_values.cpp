@@ -14,31 +14,44 @@ struct Source {
     bool shared = false;   // the session writes it, too
 };
 
-// Of an open transaction: where the value is that the object would have now if the transaction took effect.
+// Of an open transaction: where the value is that the object would have now if the transaction took
+// effect.
 Source source(const SessionState& s, const Pin& pin);
 
 Source source(const SessionState& s, const Signal& signal) {
     if (s.edit) {
-        if (const auto set = s.edit->signal_values.find(&signal); set != s.edit->signal_values.end()) return {&set->second, nullptr};
+        if (const auto set = s.edit->signal_values.find(&signal);
+            set != s.edit->signal_values.end()) {
+            return {&set->second, nullptr};
+        }
         if (const auto from = s.edit->inherited.find(&signal); from != s.edit->inherited.end()) {
             const auto own = s.edit->pin_values.find(from->second);
-            if (own != s.edit->pin_values.end()) return {&own->second, nullptr};
+            if (own != s.edit->pin_values.end()) {
+                return {&own->second, nullptr};
+            }
             return {s.edit->present(*from->second).slot, from->second->home, true};
         }
     }
-    if (signal.cell || !signal.home) return {signal.slot, nullptr};
+    if (signal.cell || !signal.home) {
+        return {signal.slot, nullptr};
+    }
     return {signal.slot, signal.home, signal.ios != 0};
 }
 
 Source source(const SessionState& s, const Pin& pin) {
     if (pin.signal) return source(s, *pin.signal);
-    if (!s.edit) return {pin.memory->slot, pin.home, true};
-    if (const auto own = s.edit->pin_values.find(&pin); own != s.edit->pin_values.end()) return {&own->second, nullptr};
+    if (!s.edit) {
+        return {pin.memory->slot, pin.home, true};
+    }
+    if (const auto own = s.edit->pin_values.find(&pin); own != s.edit->pin_values.end()) {
+        return {&own->second, nullptr};
+    }
     return {s.edit->present(pin).slot, pin.home, true};
 }
 
 // `together`: all values of one thread are of one cycle.
-std::vector<hal_value> read_all(SessionState& s, const std::vector<Source>& sources, bool together = true) {
+std::vector<hal_value> read_all(SessionState& s, const std::vector<Source>& sources,
+                                bool together = true) {
     struct Group {
         std::vector<const hal_value*> from;
         std::vector<std::size_t> at;
@@ -50,7 +63,8 @@ std::vector<hal_value> read_all(SessionState& s, const std::vector<Source>& sour
     for (std::size_t i = 0; i < sources.size(); ++i) {
         const Source from = sources[i];
         Core* const core = from.owner ? s.core(from.owner) : nullptr;
-        // a single value is coherent with itself: no need to wait for the thread, unless it has news of it in its queue
+        // a single value is coherent with itself: no need to wait for the thread, unless it has
+        // news of it in its queue
         const bool alone = !together || sources.size() == 1;
         if (!core || (alone && (core->settled() || (!together && !from.shared)))) {
             values[i].raw = __atomic_load_n(&from.from->raw, __ATOMIC_RELAXED);
@@ -67,12 +81,19 @@ std::vector<hal_value> read_all(SessionState& s, const std::vector<Source>& sour
         group.wish.count = group.from.size();
         wishes.emplace_back(core, &group.wish);
     }
-    if (!wishes.empty()) s.executor->observe(wishes, answer_timeout_ns);
+    if (!wishes.empty()) {
+        s.executor->observe(wishes, answer_timeout_ns);
+    }
     for (auto& [core, group] : groups) {
         const bool answered = group.wish.done.load();
         for (std::size_t k = 0; k < group.at.size(); ++k) {
-            if (answered) values[group.at[k]] = group.to[k];
-            else values[group.at[k]].raw = __atomic_load_n(&group.from[k]->raw, __ATOMIC_RELAXED);  // it hangs: its memory does not change
+            if (answered) {
+                values[group.at[k]] = group.to[k];
+            }
+            // it hangs: its memory does not change
+            else {
+                values[group.at[k]].raw = __atomic_load_n(&group.from[k]->raw, __ATOMIC_RELAXED);
+            }
         }
     }
     return values;
@@ -81,19 +102,27 @@ std::vector<hal_value> read_all(SessionState& s, const std::vector<Source>& sour
 template <class Object>
 std::vector<Source> sources_of(const SessionState& s, const std::vector<const Object*>& objects) {
     std::vector<Source> all;
-    for (const Object* object : objects) all.push_back(source(s, *object));
+    for (const Object* object : objects) {
+        all.push_back(source(s, *object));
+    }
     return all;
 }
 
 }  // namespace
 
-std::vector<hal_value> LiveValues::read_pins(const std::vector<const Pin*>& pins) { return read_all(state_, sources_of(state_, pins)); }
+std::vector<hal_value> LiveValues::read_pins(const std::vector<const Pin*>& pins) {
+    return read_all(state_, sources_of(state_, pins));
+}
 std::vector<hal_value> LiveValues::peek(const std::vector<Pin*>& pins) {
     std::vector<Source> all;
-    for (const Pin* const pin : pins) all.push_back(source(state_, *pin));
+    for (const Pin* const pin : pins) {
+        all.push_back(source(state_, *pin));
+    }
     return read_all(state_, all, false);
 }
-std::vector<hal_value> LiveValues::read_signals(const std::vector<const Signal*>& signals) { return read_all(state_, sources_of(state_, signals)); }
+std::vector<hal_value> LiveValues::read_signals(const std::vector<const Signal*>& signals) {
+    return read_all(state_, sources_of(state_, signals));
+}
 
 std::vector<std::optional<Reading>> LiveValues::read(const std::vector<std::string>& names) {
     std::vector<std::optional<Reading>> readings(names.size());
@@ -112,7 +141,9 @@ std::vector<std::optional<Reading>> LiveValues::read(const std::vector<std::stri
         at.push_back(i);
     }
     const auto values = read_all(state_, wanted);
-    for (std::size_t k = 0; k < at.size(); ++k) readings[at[k]]->value = values[k];
+    for (std::size_t k = 0; k < at.size(); ++k) {
+        readings[at[k]]->value = values[k];
+    }
     return readings;
 }
 
@@ -120,7 +151,9 @@ void LiveValues::write(const std::vector<std::pair<Pin*, hal_value>>& values) {
     Notes<Signal, hal_value> row;
     const auto flush = [&] {
         Diagnostics ignored;  // a thread that hangs is found by every edit; it takes no values
-        if (!row.empty()) state_.write_values({}, row, ignored);
+        if (!row.empty()) {
+            state_.write_values({}, row, ignored);
+        }
         row.clear();
     };
     for (const auto& [pin, value] : values) {
@@ -129,9 +162,14 @@ void LiveValues::write(const std::vector<std::pair<Pin*, hal_value>>& values) {
             __atomic_store_n(&pin->memory->slot->raw, value.raw, __ATOMIC_RELAXED);
             continue;
         }
-        if (pin->type == HAL_TYPE_PORT || (pin->dir == HAL_DIR_IN && (signal->writer || signal->home))) continue;
+        if (pin->type == HAL_TYPE_PORT ||
+            (pin->dir == HAL_DIR_IN && (signal->writer || signal->home))) {
+            continue;
+        }
         row[signal] = value;
-        if (row.size() >= Core::most_writes / 2) flush();
+        if (row.size() >= Core::most_writes / 2) {
+            flush();
+        }
     }
     flush();
 }

@@ -27,25 +27,34 @@ struct Library {
 std::atomic<const halcyon_modules*> opened{nullptr};  // for signal handlers
 
 std::string library_name() {
-    return "libhalcyon_modules.so." + std::string(paths::version.substr(0, paths::version.rfind('.')));
+    return "libhalcyon_modules.so." +
+           std::string(paths::version.substr(0, paths::version.rfind('.')));
 }
 
-/// Opens the library where it is beside this program, or was built or installed; no host and no problem: it is nowhere.
+/// Opens the library where it is beside this program, or was built or installed; no host and no
+/// problem: it is nowhere.
 Library find_library() {
     std::error_code none;
     const fs::path program = fs::read_symlink("/proc/self/exe", none).parent_path();
     const std::string name = library_name();
-    // beside the program's own libraries, or, for other programs such as python3, where this was built or installed
-    const fs::path folders[] = {program / paths::libraries_from_programs, program / "../lib", fs::path(paths::build_components) / "../lib",
+    // beside the program's own libraries, or, for other programs such as python3, where this was
+    // built or installed
+    const fs::path folders[] = {program / paths::libraries_from_programs, program / "../lib",
+                                fs::path(paths::build_components) / "../lib",
                                 fs::path(paths::install_components) / "../.."};
     for (const fs::path& folder : folders) {
         const fs::path file = folder / name;
         if (!fs::is_regular_file(file, none)) continue;
-        void* const library = dlopen(fs::weakly_canonical(file, none).c_str(), RTLD_NOW | RTLD_GLOBAL);
-        if (!library) return {nullptr, dlerror()};
-        const auto entry = reinterpret_cast<const halcyon_modules* (*)()>(dlsym(library, "halcyon_module_host"));
-        if (!entry || entry()->size != sizeof(halcyon_modules))
+        void* const library =
+            dlopen(fs::weakly_canonical(file, none).c_str(), RTLD_NOW | RTLD_GLOBAL);
+        if (!library) {
+            return {nullptr, dlerror()};
+        }
+        const auto entry =
+            reinterpret_cast<const halcyon_modules* (*)()>(dlsym(library, "halcyon_module_host"));
+        if (!entry || entry()->size != sizeof(halcyon_modules)) {
             return {nullptr, file.string() + " belongs to another version of this program"};
+        }
         opened = entry();
         return {entry(), ""};
     }
@@ -55,8 +64,13 @@ Library find_library() {
 Library open_library() {
     Library found = find_library();
     const auto missing = [&] { return !found.host && found.problem.empty(); };
-    if (missing() && build_on_demand("modules")) found = find_library();
-    if (missing()) found.problem = library_name() + ", which runs LinuxCNC's modules, is missing beside this program";
+    if (missing() && build_on_demand("modules")) {
+        found = find_library();
+    }
+    if (missing()) {
+        found.problem =
+            library_name() + ", which runs LinuxCNC's modules, is missing beside this program";
+    }
     return found;
 }
 
@@ -73,7 +87,9 @@ std::string module_folder() {
 }
 
 std::string find_module(std::string_view name) {
-    if (name.empty() || name.find('/') != name.npos) return {};
+    if (name.empty() || name.find('/') != name.npos) {
+        return {};
+    }
     std::string underlined(name), dashed(name);
     std::replace(underlined.begin(), underlined.end(), '-', '_');
     std::replace(dashed.begin(), dashed.end(), '_', '-');
@@ -94,25 +110,33 @@ std::string meaningless_preference() {
     return wanted && !prefers_modules() ? wanted : "";
 }
 
-Origin usual_origin(std::string_view name) { return prefers_modules() && !find_module(name).empty() ? Origin::linuxcnc : Origin::any; }
+Origin usual_origin(std::string_view name) {
+    return prefers_modules() && !find_module(name).empty() ? Origin::linuxcnc : Origin::any;
+}
 
 std::optional<Plugin> open_module(const std::string& name, Span at, Diagnostics& diagnostics) {
     const std::string path = module_folder() + "/" + name + ".so";
     const auto bad = [&](const std::string& why, const std::string& help) {
-        diagnostics.error("bad-plugin", at, "'" + path + "' is not a usable LinuxCNC module: " + why, "", help);
+        diagnostics.error("bad-plugin", at,
+                          "'" + path + "' is not a usable LinuxCNC module: " + why, "", help);
         return std::nullopt;
     };
-    if (name == "hal_lib") return bad("it is LinuxCNC's own HAL, whose place this runtime takes", "other modules need no loadrt hal_lib");
+    if (name == "hal_lib") {
+        return bad("it is LinuxCNC's own HAL, whose place this runtime takes",
+                   "other modules need no loadrt hal_lib");
+    }
     if (!library().host) {
-        diagnostics.error("bad-plugin", at, "'" + path + "' cannot be loaded: " + library().problem, "",
-                          "type ./hal build modules in the source tree, or reinstall Halcyon");
+        diagnostics.error("bad-plugin", at, "'" + path + "' cannot be loaded: " + library().problem,
+                          "", "type ./hal build modules in the source tree, or reinstall Halcyon");
         return {};
     }
     halcyon_module_problem problem{};
-    const halcyon_module* const module = library().host->open(module_folder().c_str(), name.c_str(), &problem);
+    const halcyon_module* const module =
+        library().host->open(module_folder().c_str(), name.c_str(), &problem);
     if (!module) return bad(problem.why, problem.help);
     return Plugin{&module->component,
-                  {const_cast<halcyon_module*>(module), [](void* m) { library().host->close(static_cast<const halcyon_module*>(m)); }},
+                  {const_cast<halcyon_module*>(module),
+                   [](void* m) { library().host->close(static_cast<const halcyon_module*>(m)); }},
                   path};
 }
 
@@ -122,7 +146,8 @@ const char* module_of_task() noexcept {
 }
 
 std::string user_of_module(const hal_component& component, std::size_t index) {
-    const char* const user = library().host->user(reinterpret_cast<const halcyon_module*>(&component), index);
+    const char* const user =
+        library().host->user(reinterpret_cast<const halcyon_module*>(&component), index);
     return user ? user : "";
 }
 

@@ -6,31 +6,43 @@
 namespace hal {
 
 hal_stream* PluginHost::find_stream(std::string_view name) const {
-    for (const auto& component : state_.model.components)
-        for (const auto& instance : component->instances)
-            for (const auto& [stream_name, stream] : instance->streams)
+    for (const auto& component : state_.model.components) {
+        for (const auto& instance : component->instances) {
+            for (const auto& [stream_name, stream] : instance->streams) {
                 if (stream_name == name) return stream;
+            }
+        }
+    }
     return nullptr;
 }
 
 std::vector<std::string> PluginHost::stream_names() const {
     std::vector<std::string> names;
-    for (const auto& component : state_.model.components)
-        for (const auto& instance : component->instances)
-            for (const auto& [name, stream] : instance->streams) names.push_back(name);
+    for (const auto& component : state_.model.components) {
+        for (const auto& instance : component->instances) {
+            for (const auto& [name, stream] : instance->streams) {
+                names.push_back(name);
+            }
+        }
+    }
     return names;
 }
 
-std::vector<std::string> PluginHost::available_components() const { return state_.plugins.available(); }
+std::vector<std::string> PluginHost::available_components() const {
+    return state_.plugins.available();
+}
 
 std::optional<Declared> PluginHost::declared(std::string_view component) const {
     Diagnostics ignored;
     const LoadedComponent* const loaded = state_.model.find_component(component);
-    const std::optional<Plugin> plugin =
-        loaded && loaded->plugin ? Plugin{loaded->plugin, loaded->library, loaded->path} : state_.plugins.open(component, {}, ignored);
+    const std::optional<Plugin> plugin = loaded && loaded->plugin
+                                             ? Plugin{loaded->plugin, loaded->library, loaded->path}
+                                             : state_.plugins.open(component, {}, ignored);
     Declared found;
     std::string problem;
-    if (!plugin || !gather(*plugin->component, found, problem)) return {};
+    if (!plugin || !gather(*plugin->component, found, problem)) {
+        return {};
+    }
     return found;
 }
 

@@ -21,7 +21,8 @@ public:
 
     /// Returns the names of all components that can be loaded from the search path, sorted.
     std::vector<std::string> available_components() const;
-    /// Returns what a component declares with default arguments; nothing when it cannot be constructed with them.
+    /// Returns what a component declares with default arguments; nothing when it cannot be
+    /// constructed with them.
     std::optional<Declared> declared(std::string_view component) const;
     /// Returns the stream of that name of a loaded instance, or nullptr.
     hal_stream* find_stream(std::string_view name) const;

@@ -17,7 +17,8 @@ struct RingGroup {
     const Thread* thread = nullptr;
     std::vector<std::size_t> columns;
     std::shared_ptr<plan::ProbeRing> ring;
-    std::vector<std::uint64_t> last = {};  ///< of a group without a thread: the values of its newest row
+    /// of a group without a thread: the values of its newest row
+    std::vector<std::uint64_t> last = {};
     std::uint64_t reported = 0;            ///< lost rows that results have named
 };
 
@@ -30,7 +31,8 @@ struct LiveProbe {
         std::uint64_t number;
         std::vector<RingGroup> groups;
     };
-    std::vector<Ended> ended;              ///< layouts before this one, until their rows have been taken
+    /// layouts before this one, until their rows have been taken
+    std::vector<Ended> ended;
     std::uint64_t announced = 1;           ///< the newest layout that a result has had
     std::uint64_t lost = 0;                ///< in rings that are gone
     std::int64_t until_ns = 0;
@@ -50,7 +52,9 @@ class Places {
 public:
     Places(const Model& model, const Compiled* compiled) : model_(model), compiled_(compiled) {
         if (!compiled) return;
-        for (const auto& [pin, thread] : compiled->homes) homes_[pin] = thread;
+        for (const auto& [pin, thread] : compiled->homes) {
+            homes_[pin] = thread;
+        }
     }
 
     std::optional<Place> find(const ProbeColumn& column) const {
@@ -70,17 +74,25 @@ private:
         return moved == homes_.end() ? pin.home : moved->second;
     }
 
-    // The writer's slot; without a writer in a thread, a slot that a thread reads; a cell is seen from any thread.
+    // The writer's slot; without a writer in a thread, a slot that a thread reads; a cell is seen
+    // from any thread.
     Place of(const Signal& signal, const Thread* reader) const {
         const Compiled::Place* const next = compiled_ ? &compiled_->places[signal.index] : nullptr;
         const Thread* const owner = next ? next->home : signal.home;
-        if (owner) return {next ? next->slot : signal.slot, owner};
+        if (owner) {
+            return {next ? next->slot : signal.slot, owner};
+        }
         const auto& copies = next ? next->copies : signal.copies;
-        if (const auto& cell = next ? next->cell : signal.cell)
-            return {cell.get(), reader           ? reader
-                                : copies.empty() ? model_.threads.empty() ? nullptr : model_.threads.front().get()
-                                                 : copies.front().first};
-        if (!copies.empty()) return {copies.front().second, copies.front().first};
+        if (const auto& cell = next ? next->cell : signal.cell) {
+            return {cell.get(),
+                    reader ? reader
+                    : copies.empty()
+                        ? model_.threads.empty() ? nullptr : model_.threads.front().get()
+                        : copies.front().first};
+        }
+        if (!copies.empty()) {
+            return {copies.front().second, copies.front().first};
+        }
         return {&signal.value, nullptr};
     }
 
@@ -93,26 +105,33 @@ private:
 std::uint64_t word(hal_type type, std::uint64_t raw) {
     switch (type) {
     case HAL_TYPE_BIT: return (raw & 0xff) != 0;
-    case HAL_TYPE_S32: return static_cast<std::uint64_t>(std::int64_t{static_cast<std::int32_t>(raw)});
+    case HAL_TYPE_S32:
+        return static_cast<std::uint64_t>(std::int64_t{static_cast<std::int32_t>(raw)});
     case HAL_TYPE_U32: return raw & 0xffffffff;
     default: return raw;
     }
 }
 
 void append(std::string& bytes, std::uint64_t value) {
-    for (int i = 0; i < 8; ++i) bytes += static_cast<char>(value >> (8 * i));
+    for (int i = 0; i < 8; ++i) {
+        bytes += static_cast<char>(value >> (8 * i));
+    }
 }
 
 std::uint64_t lost_in(const std::vector<RingGroup>& groups) {
     std::uint64_t sum = 0;
-    for (const RingGroup& group : groups)
-        if (group.ring) sum += group.ring->lost();
+    for (const RingGroup& group : groups) {
+        if (group.ring) {
+            sum += group.ring->lost();
+        }
+    }
     return sum;
 }
 
 std::size_t rows_for(const ProbeRequest& request, const Thread& thread) {
     const std::int64_t period = thread.options.period_ns * request.every;
-    return static_cast<std::size_t>(std::max<std::int64_t>(request.buffer_ns / std::max<std::int64_t>(period, 1), 16));
+    return static_cast<std::size_t>(
+        std::max<std::int64_t>(request.buffer_ns / std::max<std::int64_t>(period, 1), 16));
 }
 
 struct Found {
@@ -140,15 +159,20 @@ Found resolve(const Model& model, const Compiled* compiled, const LiveProbe& pro
 
 ProbeLayout described(const LiveProbe& probe, std::uint64_t number) {
     ProbeLayout layout{number, {}};
-    for (const RingGroup& group : probe.groups)
-        layout.groups.push_back({group.thread ? group.thread->name : "",
-                                 group.thread ? group.thread->options.period_ns * probe.request.every : 0, group.columns});
+    for (const RingGroup& group : probe.groups) {
+        layout.groups.push_back(
+            {group.thread ? group.thread->name : "",
+             group.thread ? group.thread->options.period_ns * probe.request.every : 0,
+             group.columns});
+    }
     return layout;
 }
 
 bool same_groups(const std::vector<RingGroup>& a, const std::vector<RingGroup>& b) {
     return std::equal(a.begin(), a.end(), b.begin(), b.end(),
-                      [](const RingGroup& x, const RingGroup& y) { return x.thread == y.thread && x.columns == y.columns; });
+                      [](const RingGroup& x, const RingGroup& y) {
+        return x.thread == y.thread && x.columns == y.columns;
+    });
 }
 
 // While threads and columns stay, so do the rings: an edit elsewhere costs no row.
@@ -157,10 +181,12 @@ void adopt(LiveProbe& probe, Found& found) {
         if (same_groups(probe.groups, found.groups)) return;
         probe.ended.push_back({probe.layout.number, std::move(probe.groups)});
     }
-    for (RingGroup& group : found.groups)
-        if (group.thread)
-            group.ring =
-                std::make_shared<plan::ProbeRing>(group.columns.size(), rows_for(probe.request, *group.thread), probe.request.every);
+    for (RingGroup& group : found.groups) {
+        if (group.thread) {
+            group.ring = std::make_shared<plan::ProbeRing>(
+                group.columns.size(), rows_for(probe.request, *group.thread), probe.request.every);
+        }
+    }
     probe.groups = std::move(found.groups);
     probe.layout = described(probe, probe.layout.number + 1);
 }
@@ -174,7 +200,9 @@ const std::vector<ProbeColumn>& Probes::columns(const LiveProbe& probe) { return
 const ProbeLayout& Probes::layout(const LiveProbe& probe) { return probe.layout; }
 std::uint64_t Probes::lost(const LiveProbe& probe) {
     std::uint64_t sum = probe.lost + lost_in(probe.groups);
-    for (const auto& ended : probe.ended) sum += lost_in(ended.groups);
+    for (const auto& ended : probe.ended) {
+        sum += lost_in(ended.groups);
+    }
     return sum;
 }
 
@@ -185,7 +213,9 @@ std::shared_ptr<LiveProbe> Probes::attach(const ProbeRequest& request, std::stri
         return nullptr;
     };
     if (request.names.empty()) return reject("a probe needs at least one name");
-    if (request.names.size() > most_names) return reject("a probe has at most " + std::to_string(most_names) + " names");
+    if (request.names.size() > most_names) {
+        return reject("a probe has at most " + std::to_string(most_names) + " names");
+    }
     auto probe = std::make_shared<LiveProbe>();
     probe->request = request;
     for (const std::string& name : request.names) {
@@ -193,23 +223,39 @@ std::shared_ptr<LiveProbe> Probes::attach(const ProbeRequest& request, std::stri
         const Signal* const signal = pin ? nullptr : model.find_signal(name);
         if (!pin && !signal) {
             std::vector<std::string> all;
-            for (const auto& [known, unused] : model.pin) all.emplace_back(known);
-            for (const auto& [known, unused] : model.signal) all.emplace_back(known);
+            for (const auto& [known, unused] : model.pin) {
+                all.emplace_back(known);
+            }
+            for (const auto& [known, unused] : model.signal) {
+                all.emplace_back(known);
+            }
             std::sort(all.begin(), all.end());
             const std::string hint = did_you_mean(name, all);
-            return reject("unknown pin, parameter or signal '" + name.substr(0, 60) + "'" + (hint.empty() ? "" : "; " + hint));
+            return reject("unknown pin, parameter or signal '" + name.substr(0, 60) + "'" +
+                          (hint.empty() ? "" : "; " + hint));
         }
         const hal_type type = pin ? pin->type : signal->type;
-        if (type == HAL_TYPE_PORT) return reject("'" + name + "' is a port: a probe samples values, not bytes");
-        probe->columns.push_back({name, type, pin ? pin->unit : signal->writer ? signal->writer->unit : ""});
+        if (type == HAL_TYPE_PORT) {
+            return reject("'" + name + "' is a port: a probe samples values, not bytes");
+        }
+        probe->columns.push_back({name, type,
+                                  pin              ? pin->unit
+                                  : signal->writer ? signal->writer->unit
+                                                   : ""});
     }
     Found found = resolve(model, nullptr, *probe);
     std::size_t bytes = 0;
-    for (const RingGroup& group : found.groups)
-        if (group.thread) bytes += 2 * rows_for(request, *group.thread) * (group.columns.size() + 2) * 8;  // rounded up to a power of two
-    if (bytes > most_bytes)
-        return reject("the probe needs up to " + std::to_string(bytes >> 20) + " MiB of memory, more than " +
-                      std::to_string(most_bytes >> 20) + "; sample fewer values, a shorter buffer_ms, or a larger every");
+    for (const RingGroup& group : found.groups) {
+        if (group.thread) {
+            bytes += 2 * rows_for(request, *group.thread) * (group.columns.size() + 2) *
+                     8;  // rounded up to a power of two
+        }
+    }
+    if (bytes > most_bytes) {
+        return reject("the probe needs up to " + std::to_string(bytes >> 20) +
+                      " MiB of memory, more than " + std::to_string(most_bytes >> 20) +
+                      "; sample fewer values, a shorter buffer_ms, or a larger every");
+    }
     adopt(*probe, found);
     probe->until_ns = state_.executor->now_ns();
     live_.push_back(probe);
@@ -218,7 +264,9 @@ std::shared_ptr<LiveProbe> Probes::attach(const ProbeRequest& request, std::stri
 }
 
 void Probes::detach(const std::shared_ptr<LiveProbe>& probe) {
-    if (std::erase(live_, probe) != 0) offer();
+    if (std::erase(live_, probe) != 0) {
+        offer();
+    }
 }
 
 // Between two plans: each thread takes a new set of probes.
@@ -232,20 +280,30 @@ void Probes::offer() {
     }
     for (const auto& probe : live_) {
         const Found found = resolve(state_.model, nullptr, *probe);
-        if (probe->groups.empty() || !same_groups(probe->groups, found.groups)) continue;  // after an edit that a hung thread did not take
-        for (std::size_t i = 0; i < found.groups.size(); ++i)
-            if (const auto set = sets.find(found.groups[i].thread); set != sets.end())
+        // after an edit that a hung thread did not take
+        if (probe->groups.empty() || !same_groups(probe->groups, found.groups)) continue;
+        for (std::size_t i = 0; i < found.groups.size(); ++i) {
+            if (const auto set = sets.find(found.groups[i].thread); set != sets.end()) {
                 set->second->probes.push_back({probe->groups[i].ring, found.from[i]});
+            }
+        }
     }
     std::vector<std::pair<Core*, plan::ProbeSet*>> offers;
-    for (const auto& [thread, set] : sets)
-        if (!set->probes.empty() || state_.plans.at(thread)->probes) offers.emplace_back(state_.core(thread), set.get());
+    for (const auto& [thread, set] : sets) {
+        if (!set->probes.empty() || state_.plans.at(thread)->probes) {
+            offers.emplace_back(state_.core(thread), set.get());
+        }
+    }
     const std::vector<Core*> silent = state_.executor->swap(offers, answer_timeout_ns);
     for (auto& [thread, set] : sets) {
-        if (std::find(silent.begin(), silent.end(), state_.core(thread)) != silent.end()) continue;  // it hangs and keeps the old one
+        // it hangs and keeps the old one
+        if (std::find(silent.begin(), silent.end(), state_.core(thread)) != silent.end()) continue;
         auto& kept = state_.plans.at(thread)->probes;
-        if (!set->probes.empty()) kept = std::move(set);
-        else if (kept) kept.reset();
+        if (!set->probes.empty()) {
+            kept = std::move(set);
+        } else if (kept) {
+            kept.reset();
+        }
     }
 }
 
@@ -255,11 +313,14 @@ void Probes::enter(Compiled& compiled) {
         Found found = resolve(state_.model, &compiled, *probe);
         adopt(*probe, found);
         for (std::size_t i = 0; i < probe->groups.size(); ++i) {
-            const auto plan = std::find_if(compiled.plans.begin(), compiled.plans.end(),
-                                           [&](const auto& one) { return one.first == probe->groups[i].thread; });
+            const auto plan =
+                std::find_if(compiled.plans.begin(), compiled.plans.end(),
+                             [&](const auto& one) { return one.first == probe->groups[i].thread; });
             if (plan == compiled.plans.end()) continue;
             auto& set = plan->second->probes;
-            if (!set) set = std::make_unique<plan::ProbeSet>();
+            if (!set) {
+                set = std::make_unique<plan::ProbeSet>();
+            }
             set->probes.push_back({probe->groups[i].ring, found.from[i]});
         }
     }
@@ -268,7 +329,8 @@ void Probes::enter(Compiled& compiled) {
 namespace {
 
 // Appends the rows before `until_ns`, as many as fit.
-std::size_t move_rows(const LiveProbe& probe, RingGroup& group, std::int64_t until_ns, std::size_t most, std::string& bytes) {
+std::size_t move_rows(const LiveProbe& probe, RingGroup& group, std::int64_t until_ns,
+                      std::size_t most, std::string& bytes) {
     plan::ProbeRing& ring = *group.ring;
     const std::size_t size = ring.size();
     std::size_t rows = 0;
@@ -277,7 +339,9 @@ std::size_t move_rows(const LiveProbe& probe, RingGroup& group, std::int64_t unt
         if (static_cast<std::int64_t>(row[1]) >= until_ns) break;
         append(bytes, row[0]);
         append(bytes, row[1]);
-        for (std::size_t i = 2; i < ring.width; ++i) append(bytes, word(probe.columns[group.columns[i - 2]].type, row[i]));
+        for (std::size_t i = 2; i < ring.width; ++i) {
+            append(bytes, word(probe.columns[group.columns[i - 2]].type, row[i]));
+        }
     }
     ring.drop(rows);
     return rows;
@@ -294,10 +358,15 @@ std::vector<ProbeRows> Probes::take(LiveProbe& probe, std::size_t most) {
         for (std::size_t i = 0; i < groups.size(); ++i) {
             RingGroup& group = groups[i];
             if (!group.ring) continue;
-            const std::uint64_t lost = group.ring->lost();  // before the rows: a loss is named with or before the row after it
+            // before the rows: a loss is named with or before the row after it
+            const std::uint64_t lost = group.ring->lost();
             const std::size_t rows = move_rows(probe, group, until_ns, most, to.bytes);
-            if (rows > 0 || lost > group.reported) to.parts.push_back({i, rows, lost - std::exchange(group.reported, lost)});
-            if (group.ring->size() > 0) reached_ns = std::min(reached_ns, static_cast<std::int64_t>(group.ring->row(0)[1]));
+            if (rows > 0 || lost > group.reported) {
+                to.parts.push_back({i, rows, lost - std::exchange(group.reported, lost)});
+            }
+            if (group.ring->size() > 0) {
+                reached_ns = std::min(reached_ns, static_cast<std::int64_t>(group.ring->row(0)[1]));
+            }
         }
         return reached_ns;
     };
@@ -307,7 +376,9 @@ std::vector<ProbeRows> Probes::take(LiveProbe& probe, std::size_t most) {
         rows.layout_number = ended.number;
         rows.until_ns = probe.until_ns;
         const bool all = collect(ended.groups, rows, INT64_MAX) == INT64_MAX;
-        if (!rows.parts.empty()) results.push_back(std::move(rows));
+        if (!rows.parts.empty()) {
+            results.push_back(std::move(rows));
+        }
         if (!all) return results;
         probe.lost += lost_in(ended.groups);
         probe.ended.erase(probe.ended.begin());
@@ -319,8 +390,11 @@ std::vector<ProbeRows> Probes::take(LiveProbe& probe, std::size_t most) {
         probe.announced = probe.layout.number;
     }
     std::int64_t until_ns = INT64_MAX;
-    for (const RingGroup& group : probe.groups)
-        if (group.ring) until_ns = std::min(until_ns, std::max(group.ring->reached_ns(), now_ns - patience_ns));
+    for (const RingGroup& group : probe.groups) {
+        if (group.ring) {
+            until_ns = std::min(until_ns, std::max(group.ring->reached_ns(), now_ns - patience_ns));
+        }
+    }
     until_ns = std::max(until_ns == INT64_MAX ? now_ns : until_ns, probe.until_ns);
     probe.until_ns = std::max(probe.until_ns, collect(probe.groups, rows, until_ns));
     rows.until_ns = probe.until_ns;
@@ -328,15 +402,23 @@ std::vector<ProbeRows> Probes::take(LiveProbe& probe, std::size_t most) {
         RingGroup& group = probe.groups[i];
         if (group.ring) continue;
         std::vector<std::string> names;
-        for (const std::size_t column : group.columns) names.push_back(probe.columns[column].name);
+        for (const std::size_t column : group.columns) {
+            names.push_back(probe.columns[column].name);
+        }
         const auto readings = LiveValues(state_).read(names);
         std::vector<std::uint64_t> values;
-        for (std::size_t k = 0; k < names.size(); ++k)
-            values.push_back(readings[k] ? word(probe.columns[group.columns[k]].type, readings[k]->value.raw) : 0);
+        for (std::size_t k = 0; k < names.size(); ++k) {
+            values.push_back(
+                readings[k] ? word(probe.columns[group.columns[k]].type, readings[k]->value.raw)
+                            : 0);
+        }
         if (values == group.last) continue;
         append(rows.bytes, 0);
-        append(rows.bytes, static_cast<std::uint64_t>(std::max<std::int64_t>(rows.until_ns - 1, 0)));
-        for (const std::uint64_t value : values) append(rows.bytes, value);
+        append(rows.bytes,
+               static_cast<std::uint64_t>(std::max<std::int64_t>(rows.until_ns - 1, 0)));
+        for (const std::uint64_t value : values) {
+            append(rows.bytes, value);
+        }
         group.last = std::move(values);
         rows.parts.push_back({i, 1, 0});
     }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Probes of a session: values sampled at the end of every n-th cycle of their threads, for observers that may come and go. Nothing of the
-// netlist changes; a thread only gets a list of places to copy from (plan/probe.hpp).
+// Probes of a session: values sampled at the end of every n-th cycle of their threads, for
+// observers that may come and go. Nothing of the netlist changes; a thread only gets a list of
+// places to copy from (plan/probe.hpp).
 #pragma once
 
 #include <cstdint>
@@ -32,13 +33,15 @@ struct ProbeColumn {
 
 /// The columns whose values one thread owns, or reads while no thread owns them.
 struct ProbeGroup {
-    std::string thread;                  ///< empty: no thread reads them; they are looked at when rows are taken
+    /// empty: no thread reads them; they are looked at when rows are taken
+    std::string thread;
     std::int64_t period_ns = 0;          ///< between two rows; 0: a row when a value has changed
     std::vector<std::size_t> columns;
 };
 
 struct ProbeLayout {
-    std::uint64_t number = 0;            ///< counts from 1; another one after an edit that moves or removes a value
+    /// counts from 1; another one after an edit that moves or removes a value
+    std::uint64_t number = 0;
     std::vector<ProbeGroup> groups;
 };
 
@@ -50,7 +53,8 @@ struct ProbeRows {
     };
     std::optional<ProbeLayout> layout;   ///< when it is not that of the rows before
     std::uint64_t layout_number = 0;
-    std::int64_t until_ns = 0;           ///< all rows of earlier cycles are in this or in an earlier result
+    /// all rows of earlier cycles are in this or in an earlier result
+    std::int64_t until_ns = 0;
     std::vector<Part> parts;
     std::string bytes;
 };
@@ -63,7 +67,8 @@ public:
     explicit Probes(SessionState& state);
     ~Probes();
 
-    /// Begins to sample. Returns nullptr and sets `problem` when a name is unknown or a limit is exceeded.
+    /// Begins to sample. Returns nullptr and sets `problem` when a name is unknown or a limit is
+    /// exceeded.
     std::shared_ptr<LiveProbe> attach(const ProbeRequest& request, std::string& problem);
     /// Ends it. Rows that were not taken are discarded.
     void detach(const std::shared_ptr<LiveProbe>& probe);
@@ -71,7 +76,8 @@ public:
     static const ProbeLayout& layout(const LiveProbe& probe);
     /// Returns how many rows did not fit since the probe was attached.
     static std::uint64_t lost(const LiveProbe& probe);
-    /// Takes the rows that have come, at most so many bytes in each result. There is one result per layout in force since the last call.
+    /// Takes the rows that have come, at most so many bytes in each result. There is one result per
+    /// layout in force since the last call.
     std::vector<ProbeRows> take(LiveProbe& probe, std::size_t most_bytes = most_at_once);
     static constexpr std::size_t most_at_once = std::size_t{1} << 18;
 

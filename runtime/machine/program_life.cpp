@@ -15,10 +15,10 @@
 
 #include <sys/wait.h>
 
-#include "machine/session.hpp"
-#include "machine/address.hpp"
 #include "execute/core.hpp"
+#include "machine/address.hpp"
 #include "machine/programs.hpp"
+#include "machine/session.hpp"
 
 namespace hal {
 namespace {
@@ -34,42 +34,62 @@ constexpr std::int64_t stop_ns = 5'000'000'000;
 }  // namespace
 
 std::string Programs::Entry::state() const {
-    if (!dead())
-        return std::string(!ready            ? "initializing"
+    if (!dead()) {
+        return std::string(!ready                 ? "initializing"
                            : unresponsive.empty() ? "ready"
                                                   : "not responding " + unresponsive) +
                (stopping ? ", stopping" : "");
-    return "dead " + end_report + (restart_ns != 0 ? ", starts again" : again && !ended ? ", started again" : "");
+    }
+    return "dead " + end_report +
+           (restart_ns != 0   ? ", starts again"
+            : again && !ended ? ", started again"
+                              : "");
 }
 
 std::string Programs::name_in_use(const Entry& entry) const {
-    return "the name '" + entry.name + "' is in use by process " + std::to_string(entry.pid) + " (" + entry.state() + ")";
+    return "the name '" + entry.name + "' is in use by process " + std::to_string(entry.pid) +
+           " (" + entry.state() + ")";
 }
 
-std::string Programs::announce(pid_t pid, const std::string& name, std::uint64_t owner, bool ready) {
+std::string Programs::announce(pid_t pid, const std::string& name, std::uint64_t owner,
+                               bool ready) {
     if (!good_instance_name(name)) return "'" + name + "' is not a valid name for a component";
     Entry* entry = find(name);
     const auto refuse = [&](std::string why) {
-        const bool child =
-            std::any_of(entries_.begin(), entries_.end(), [&](const Entry& e) { return e.pid == pid && e.child && !e.ended; });
-        if (child) refusals_.emplace_front(pid, why);
-        if (refusals_.size() > most_refusals) refusals_.pop_back();
+        const bool child = std::any_of(entries_.begin(), entries_.end(), [&](const Entry& e) {
+            return e.pid == pid && e.child && !e.ended;
+        });
+        if (child) {
+            refusals_.emplace_front(pid, why);
+        }
+        if (refusals_.size() > most_refusals) {
+            refusals_.pop_back();
+        }
         return why;
     };
-    if (entry && !entry->dead() && (entry->ready || entry->owner != 0)) return refuse(name_in_use(*entry));
+    if (entry && !entry->dead() && (entry->ready || entry->owner != 0)) {
+        return refuse(name_in_use(*entry));
+    }
     if (entry && entry->reserved && !entry->ended && entry->pid != pid) {
         // an earlier program must not take the name of the one that was just started
-        const auto older = start_time(pid), newer = start_time(entry->pid);
-        if (older != 0 && older < newer)
-            return refuse("the name '" + name + "' is reserved for process " + std::to_string(entry->pid) + ", which loadusr has started");
+        const auto older = start_time(pid);
+        const auto newer = start_time(entry->pid);
+        if (older != 0 && older < newer) {
+            return refuse("the name '" + name + "' is reserved for process " +
+                          std::to_string(entry->pid) + ", which loadusr has started");
+        }
     }
     if (entry && entry->dead()) {
-        // loadusr has entered the newcomer under a name of its own, because this one was taken: the two become one
+        // loadusr has entered the newcomer under a name of its own, because this one was taken: the
+        // two become one
         const auto fresh = std::find_if(entries_.begin(), entries_.end(), [&](const Entry& e) {
-            return &e != entry && e.pid == pid && e.child && !e.ended && !e.ready && e.owner == 0 && !e.reserved;
+            return &e != entry && e.pid == pid && e.child && !e.ended && !e.ready && e.owner == 0 &&
+                   !e.reserved;
         });
         if (fresh != entries_.end()) {
-            if (!fresh->name.empty()) remove_from_model(fresh->name);
+            if (!fresh->name.empty()) {
+                remove_from_model(fresh->name);
+            }
             entry->number = fresh->number;
             entry->child = true;
             entry->waited = fresh->waited;
@@ -87,14 +107,20 @@ std::string Programs::announce(pid_t pid, const std::string& name, std::uint64_t
         entry->pins.clear();
         replace_in_model(name, pid);
     } else if (!entry) {
-        if (session_.model().find_component(name) || session_.model().find_instance(name))
+        if (session_.model().find_component(name) || session_.model().find_instance(name)) {
             return refuse("the name '" + name + "' is in use by a component in the machine");
+        }
         entry = find(pid);
-        if (entry && entry->ready && owner == 0)
-            return "process " + std::to_string(pid) + " is the component '" + entry->name + "' already";
-        if (!entry || entry->ready || entry->owner != 0 || entry->reserved)
+        if (entry && entry->ready && owner == 0) {
+            return "process " + std::to_string(pid) + " is the component '" + entry->name +
+                   "' already";
+        }
+        if (!entry || entry->ready || entry->owner != 0 || entry->reserved) {
             entry = &entries_.emplace_back(Entry{.number = ++numbers_, .pid = pid});
-        if (!entry->name.empty()) remove_from_model(entry->name);
+        }
+        if (!entry->name.empty()) {
+            remove_from_model(entry->name);
+        }
         entry->name = name;
         add_to_model(name, pid, Command{});
     }
@@ -115,15 +141,23 @@ Programs::Entry* Programs::owned(std::string_view name, std::uint64_t owner) {
 void Programs::set_ready(Entry& entry, bool ready) {
     entry.ready = ready;
     note_alive(entry);
-    if (ready) entry.reserved = false;
-    if (ready && entry.every_ns != 0) work();
-    if (const LoadedComponent* const component = ready ? session_.model().find_component(entry.name) : nullptr;
+    if (ready) {
+        entry.reserved = false;
+    }
+    if (ready && entry.every_ns != 0) {
+        work();
+    }
+    if (const LoadedComponent* const component =
+            ready ? session_.model().find_component(entry.name) : nullptr;
         component && !component->instances.empty()) {
         // of a dead program's pins those that its successor does not have go
         const std::unordered_set<const Pin*> kept(entry.pins.begin(), entry.pins.end());
         std::vector<Pin*> orphans;
-        for (const auto& pin : component->instances.front()->pins)
-            if (!kept.contains(pin.get())) orphans.push_back(pin.get());
+        for (const auto& pin : component->instances.front()->pins) {
+            if (!kept.contains(pin.get())) {
+                orphans.push_back(pin.get());
+            }
+        }
         if (!orphans.empty()) {
             Transaction transaction = session_.begin();
             remove_pins(transaction, entry.name, orphans);
@@ -135,16 +169,21 @@ void Programs::set_ready(Entry& entry, bool ready) {
 }
 
 ProgramStream* Programs::find_stream(std::string_view name) {
-    for (const Entry& entry : entries_)
-        for (const auto& stream : entry.streams)
+    for (const Entry& entry : entries_) {
+        for (const auto& stream : entry.streams) {
             if (stream->name == name) return stream.get();
+        }
+    }
     return nullptr;
 }
 
 std::vector<std::string> Programs::stream_names() const {
     std::vector<std::string> names;
-    for (const Entry& entry : entries_)
-        for (const auto& stream : entry.streams) names.push_back(stream->name);
+    for (const Entry& entry : entries_) {
+        for (const auto& stream : entry.streams) {
+            names.push_back(stream->name);
+        }
+    }
     return names;
 }
 
@@ -158,14 +197,20 @@ void Programs::leave(Entry& entry) {
     entry.every_ns = 0;
     entry.unresponsive.clear();
     entry.before_timeout.clear();
-    if (!entry.child || entry.ended) std::erase_if(entries_, [&](const Entry& e) { return &e == &entry; });
+    if (!entry.child || entry.ended) {
+        std::erase_if(entries_, [&](const Entry& e) { return &e == &entry; });
+    }
     changed_.notify_all();
 }
 
 void Programs::forget(Entry& entry) {
-    if (!entry.name.empty()) remove_from_model(entry.name);
+    if (!entry.name.empty()) {
+        remove_from_model(entry.name);
+    }
     entry.name.clear();
-    if (!entry.waited) std::erase_if(entries_, [&](const Entry& e) { return &e == &entry; });
+    if (!entry.waited) {
+        std::erase_if(entries_, [&](const Entry& e) { return &e == &entry; });
+    }
     changed_.notify_all();
 }
 
@@ -175,9 +220,13 @@ void Programs::withdraw(std::uint64_t owner) {
         if (entry.owner != owner) continue;
         entry.owner = 0;
         entry.ready = false;
-        if (entry.stopping) leave(entry);  // it was asked to end
-        else if (has_pins(entry)) die(entry, "its connection ended");
-        else if (!entry.child) forget(entry);
+        if (entry.stopping) {
+            leave(entry);  // it was asked to end
+        } else if (has_pins(entry)) {
+            die(entry, "its connection ended");
+        } else if (!entry.child) {
+            forget(entry);
+        }
     }
 }
 
@@ -201,21 +250,27 @@ void Programs::child_ended(pid_t pid, int status) {
     for (std::size_t i = entries_.size(); i-- > 0;) {
         Entry* entry = &entries_[i];
         if (entry->pid != pid || entry->ended) continue;
-        if (!entry->child) {  // a second component of the same process; its connection may end a moment later
-            if (entry->stopping) leave(*entry);
-            else if (has_pins(*entry) && !entry->dead()) die(*entry, ending(status));
+        // a second component of the same process; its connection may end a moment later
+        if (!entry->child) {
+            if (entry->stopping) {
+                leave(*entry);
+            } else if (has_pins(*entry) && !entry->dead()) {
+                die(*entry, ending(status));
+            }
             continue;
         }
         entry->ended = true;
         entry->status = status;
         entry->kill_ns = 0;
         const bool restarts = !ending_children_ && !entry->stopping &&
-                              (entry->restart.when == Restart::always || (entry->restart.when == Restart::on_failure && status != 0));
+                              (entry->restart.when == Restart::always ||
+                               (entry->restart.when == Restart::on_failure && status != 0));
         if (entry->stopping || (!has_pins(*entry) && !restarts)) {
             forget(*entry);
             continue;
         }
-        if (entry->waited) {  // its status is still to be collected: the component goes on as an entry of its own
+        // its status is still to be collected: the component goes on as an entry of its own
+        if (entry->waited) {
             Entry component = *entry;
             component.number = ++numbers_;
             component.waited = false;
@@ -224,7 +279,9 @@ void Programs::child_ended(pid_t pid, int status) {
             entry = &entries_.emplace_back(std::move(component));
         }
         die(*entry, ending(status));
-        if (restarts) schedule(*entry);
+        if (restarts) {
+            schedule(*entry);
+        }
     }
 }
 
@@ -237,18 +294,27 @@ void Programs::keep_alive(pid_t pid, const ProcessStart& start, const RestartPol
 
 std::string Programs::unload(Transaction& transaction, Entry& entry) {
     const bool lives = !entry.ended && !(entry.dead() && !entry.child);
-    if (lives && kill(entry.pid, 0) != 0 && errno == EPERM)
-        return "'" + entry.name + "' (process " + std::to_string(entry.pid) + ") belongs to another user and cannot be ended from here";
-    if (entry.dead() && (entry.ended || !entry.child)) remove_component(transaction, entry.name);
+    if (lives && kill(entry.pid, 0) != 0 && errno == EPERM) {
+        return "'" + entry.name + "' (process " + std::to_string(entry.pid) +
+               ") belongs to another user and cannot be ended from here";
+    }
+    if (entry.dead() && (entry.ended || !entry.child)) {
+        remove_component(transaction, entry.name);
+    }
     transaction.when_committed([this, name = entry.name] {
-        if (Entry* const there = find(name)) terminate(*there);
+        if (Entry* const there = find(name)) {
+            terminate(*there);
+        }
     });
     return "";
 }
 
 bool Programs::terminate(Entry& entry) {
-    for (Entry& each : entries_)
-        if (each.pid == entry.pid) each.stopping = true;  // the process may be several components
+    for (Entry& each : entries_) {
+        if (each.pid == entry.pid) {
+            each.stopping = true;  // the process may be several components
+        }
+    }
     entry.restart_ns = 0;
     if (entry.dead() && (entry.ended || !entry.child)) {
         forget(entry);
@@ -262,8 +328,12 @@ bool Programs::terminate(Entry& entry) {
 void Programs::give_up(Entry& entry) {
     entry.kill_ns = monotonic_ns() + stop_ns;
     if (!terminate(entry)) return;
-    if (!entry.name.empty() && !entry.dead()) remove_from_model(entry.name);
-    if (!entry.dead()) entry.name.clear();
+    if (!entry.name.empty() && !entry.dead()) {
+        remove_from_model(entry.name);
+    }
+    if (!entry.dead()) {
+        entry.name.clear();
+    }
     work();
     changed_.notify_all();
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Programs as components of the model: an instance without a plugin, whose pins belong to no thread. The session owns them, and their
-// values reach threads like those of signals without a writer.
+// Programs as components of the model: an instance without a plugin, whose pins belong to no
+// thread. The session owns them, and their values reach threads like those of signals without a
+// writer.
 #include <deque>
 
 #include "machine/construct.hpp"
@@ -19,12 +20,15 @@ Instance* instance_of(const LoadedComponent& component) {
 
 }  // namespace
 
-void Programs::add_component(Transaction&, const std::string& name, std::int64_t pid, const Command& command) {
+void Programs::add_component(Transaction&, const std::string& name, std::int64_t pid,
+                             const Command& command) {
     Diagnostics none;
     LoadedComponent& component = state_.editing(none).add_component(name, command.span);
     component.process = pid;
     std::string text;
-    for (const Token& token : command.args) text += (text.empty() ? "" : " ") + token.text;
+    for (const Token& token : command.args) {
+        text += (text.empty() ? "" : " ") + token.text;
+    }
     component.arguments.push_back(std::move(text));
 }
 
@@ -39,14 +43,18 @@ void Programs::replace_in_model(std::string_view name, pid_t pid) {
     Transaction transaction = session_.begin();
     Diagnostics none;
     LoadedComponent* const component = state_.model.find_component(name);
-    if (component && component->process != 0) state_.editing(none).set_process(*component, pid);
+    if (component && component->process != 0) {
+        state_.editing(none).set_process(*component, pid);
+    }
     transaction.commit(none);
 }
 
 void Programs::remove_component(Transaction&, std::string_view name) {
     Diagnostics none;
     LoadedComponent* const component = state_.model.find_component(name);
-    if (component && component->process != 0) state_.editing(none).remove_component(*component);
+    if (component && component->process != 0) {
+        state_.editing(none).remove_component(*component);
+    }
 }
 
 void Programs::remove_from_model(std::string_view name) {
@@ -54,16 +62,21 @@ void Programs::remove_from_model(std::string_view name) {
     remove_component(transaction, name);
     Diagnostics refused;
     if (transaction.commit(refused)) return;
-    // A thread that hangs may use its pins: the component stays in the model, but no process answers for it.
-    if (LoadedComponent* const component = state_.model.find_component(name)) component->process = 0;
+    // A thread that hangs may use its pins: the component stays in the model, but no process
+    // answers for it.
+    if (LoadedComponent* const component = state_.model.find_component(name)) {
+        component->process = 0;
+    }
 }
 
 bool Programs::has_pins(const Entry& entry) const {
-    const LoadedComponent* const component = entry.name.empty() ? nullptr : state_.model.find_component(entry.name);
+    const LoadedComponent* const component =
+        entry.name.empty() ? nullptr : state_.model.find_component(entry.name);
     return component && component->process != 0 && !component->instances.empty();
 }
 
-Pin* Programs::add_pin(Transaction&, std::string_view component_name, const ProgramPin& wanted, std::string& problem) {
+Pin* Programs::add_pin(Transaction&, std::string_view component_name, const ProgramPin& wanted,
+                       std::string& problem) {
     SessionState& s = state_;
     LoadedComponent* const component = s.model.find_component(component_name);
     if (!component || component->process == 0) {
@@ -88,7 +101,9 @@ Pin* Programs::add_pin(Transaction&, std::string_view component_name, const Prog
         pin->name = wanted.name;
         pin->type = wanted.type;
         pin->dir = wanted.dir;
-        if (wanted.read_only) pin->flags |= HAL_PIN_READ_ONLY;
+        if (wanted.read_only) {
+            pin->flags |= HAL_PIN_READ_ONLY;
+        }
         pin->doc = s.model.keep(wanted.doc);
         pin->unit = s.model.keep(wanted.unit);
         pin->initial = wanted.initial;
@@ -110,13 +125,16 @@ Pin* Programs::add_pin(Transaction&, std::string_view component_name, const Prog
     return nullptr;
 }
 
-void Programs::remove_pins(Transaction&, std::string_view component_name, const std::vector<Pin*>& pins) {
+void Programs::remove_pins(Transaction&, std::string_view component_name,
+                           const std::vector<Pin*>& pins) {
     LoadedComponent* const component = state_.model.find_component(component_name);
     Instance* const instance = component ? instance_of(*component) : nullptr;
     if (!instance || pins.empty()) return;
     Diagnostics none;
     Edit& edit = state_.editing(none);
-    for (Pin* const pin : pins) edit.unlink(*pin);
+    for (Pin* const pin : pins) {
+        edit.unlink(*pin);
+    }
     edit.remove_pins(*instance, pins);
 }
 

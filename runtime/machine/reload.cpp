@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
 // The life of instances that take the place of others: docs/decisions/0011.
 //
-// A component without start and stop holds nothing: its new instances are there before the swap, the old ones go after it, and
-// no cycle passes without them. One that acquires something may not be there twice:
+// A component without start and stop holds nothing: its new instances are there before the swap,
+// the old ones go after it, and no cycle passes without them. One that acquires something may not
+// be there twice:
 //   1. its functions leave the threads; outputs that declare a safe value take it
 //   2. the old instances stop       3. the new ones start
 //   4. the functions are back, in their old places
@@ -24,10 +25,16 @@ bool SessionState::start_replaced(Diagnostics& diagnostics) {
     const auto start = [&](const LoadedComponent& component) {
         for (const auto& instance : component.instances) {
             if (instance->started) continue;
-            if (const Failure why = start_instance(*instance, model, *executor, status, journal.for_plugins()); !why.empty())
+            if (const Failure why =
+                    start_instance(*instance, model, *executor, status, journal.for_plugins());
+                !why.empty()) {
                 diagnostics.error("start-failed", instance->loaded,
-                                  "'" + instance->name + "' (" + component.name + ") cannot start in its new version: " + why.text,
-                                  "loaded here", why.help.empty() ? "the old version goes on" : why.help + "; the old version goes on");
+                                  "'" + instance->name + "' (" + component.name +
+                                      ") cannot start in its new version: " + why.text,
+                                  "loaded here",
+                                  why.help.empty() ? "the old version goes on"
+                                                   : why.help + "; the old version goes on");
+            }
         }
         return !diagnostics.failed();
     };
@@ -37,17 +44,26 @@ bool SessionState::start_replaced(Diagnostics& diagnostics) {
             if (!start(*one.component)) return false;
             continue;
         }
-        for (const auto& function : one.component->functions) out.insert(function.get());
-        for (const auto& instance : one.component->instances)
+        for (const auto& function : one.component->functions) {
+            out.insert(function.get());
+        }
+        for (const auto& instance : one.component->instances) {
             for (const auto& pin : instance->pins) {
                 if (pin->dir != HAL_DIR_OUT || !(pin->flags & HAL_PIN_SAFE)) continue;
-                if (pin->signal) edit->signal_values.try_emplace(pin->signal, pin->safe);
-                else edit->pin_values.try_emplace(pin.get(), pin->safe);
+                if (pin->signal) {
+                    edit->signal_values.try_emplace(pin->signal, pin->safe);
+                } else {
+                    edit->pin_values.try_emplace(pin.get(), pin->safe);
+                }
             }
+        }
     }
     if (out.empty()) return true;
     out.merge(moving(model));
-    if (!make_threads(diagnostics) || !end_threads(edit->removed().threads, diagnostics) || !swap(out, diagnostics)) return false;
+    if (!make_threads(diagnostics) || !end_threads(edit->removed().threads, diagnostics) ||
+        !swap(out, diagnostics)) {
+        return false;
+    }
     for (Edit::Replaced& one : edit->replaced()) {
         one.stopped = true;
         for (auto it = one.other->instances.rbegin(); it != one.other->instances.rend(); ++it) {
@@ -55,20 +71,28 @@ bool SessionState::start_replaced(Diagnostics& diagnostics) {
             end_conditions(**it);
         }
     }
-    for (const Edit::Replaced& one : edit->replaced())
+    for (const Edit::Replaced& one : edit->replaced()) {
         if (!start(*one.component)) return false;
+    }
     return true;
 }
 
-// After undo(): the old instances are in the model again, the new ones beside it, and perhaps in the threads.
+// After undo(): the old instances are in the model again, the new ones beside it, and perhaps in
+// the threads.
 void SessionState::restart_replaced(Diagnostics& diagnostics) {
     std::unordered_set<const LoadedFunction*> out;
-    for (const Edit::Replaced& one : edit->replaced())
-        if (one.stopped)
-            for (const auto& function : one.component->functions) out.insert(function.get());
+    for (const Edit::Replaced& one : edit->replaced()) {
+        if (one.stopped) {
+            for (const auto& function : one.component->functions) {
+                out.insert(function.get());
+            }
+        }
+    }
     if (out.empty()) return;
     Diagnostics ignored;
-    if (!swap(out, ignored)) return;  // a thread hangs, perhaps in a new one
+    if (!swap(out, ignored)) {
+        return;  // a thread hangs, perhaps in a new one
+    }
     for (const Edit::Replaced& one : edit->replaced()) {
         for (auto it = one.other->instances.rbegin(); it != one.other->instances.rend(); ++it) {
             stop_instance(**it);
@@ -76,14 +100,19 @@ void SessionState::restart_replaced(Diagnostics& diagnostics) {
         }
         for (const auto& instance : one.component->instances) {
             if (instance->started || !one.stopped) continue;
-            const Failure why = start_instance(*instance, model, *executor, status, journal.for_plugins());
+            const Failure why =
+                start_instance(*instance, model, *executor, status, journal.for_plugins());
             if (why.empty()) continue;
-            for (LoadedFunction* const function : instance->functions) function->halted = true;
+            for (LoadedFunction* const function : instance->functions) {
+                function->halted = true;
+            }
             diagnostics.error("start-failed", instance->loaded,
-                              "'" + instance->name + "' (" + one.component->name + ") cannot start again in its old version: " + why.text,
+                              "'" + instance->name + "' (" + one.component->name +
+                                  ") cannot start again in its old version: " + why.text,
                               "loaded here",
-                              "its functions do not run; repair the plugin and 'reload " + one.component->name + "', or 'unload " +
-                                  one.component->name + "'");
+                              "its functions do not run; repair the plugin and 'reload " +
+                                  one.component->name + "', or 'unload " + one.component->name +
+                                  "'");
         }
     }
 }

@@ -16,17 +16,24 @@ namespace {
 
 std::string policy_text(const Granted& granted, bool virtual_clock) {
     if (virtual_clock) return "virtual clock";
-    if (granted.policy == Granted::Policy::fifo) return "SCHED_FIFO " + std::to_string(granted.priority);
+    if (granted.policy == Granted::Policy::fifo) {
+        return "SCHED_FIFO " + std::to_string(granted.priority);
+    }
     if (granted.policy == Granted::Policy::deadline) return "SCHED_DEADLINE";
     return granted.refused ? "SCHED_OTHER (no privilege)" : "SCHED_OTHER";
 }
 
 std::string delay_text(const PathDelay& path) {
     const std::string& pin = path.pin->name;
-    std::string line = path.pin->signal->name + ": " + (path.pin->dir == HAL_DIR_OUT ? path.far + " => " + pin : pin + " => " + path.far);
-    line += "  " + std::to_string(path.cycles) + (path.cycles == 1 ? " cycle" : " cycles") + " on the wire, " +
-            format_duration(static_cast<double>(path.worst_ns)) + " at worst";
-    if (path.round_trip != 0) line += "; there and back " + std::to_string(path.round_trip) + (path.round_trip == 1 ? " cycle" : " cycles");
+    std::string line =
+        path.pin->signal->name + ": " +
+        (path.pin->dir == HAL_DIR_OUT ? path.far + " => " + pin : pin + " => " + path.far);
+    line += "  " + std::to_string(path.cycles) + (path.cycles == 1 ? " cycle" : " cycles") +
+            " on the wire, " + format_duration(static_cast<double>(path.worst_ns)) + " at worst";
+    if (path.round_trip != 0) {
+        line += "; there and back " + std::to_string(path.round_trip) +
+                (path.round_trip == 1 ? " cycle" : " cycles");
+    }
     return line;
 }
 
@@ -39,7 +46,8 @@ std::vector<FaultRecord> Reports::faults() const {
 
 std::uint64_t Reports::fault_count() const {
     const hal_faults& shared = state_.executor->board().shared.faults;
-    return __atomic_load_n(&shared.count, __ATOMIC_ACQUIRE) - __atomic_load_n(&shared.cleared, __ATOMIC_ACQUIRE);
+    return __atomic_load_n(&shared.count, __ATOMIC_ACQUIRE) -
+           __atomic_load_n(&shared.cleared, __ATOMIC_ACQUIRE);
 }
 
 std::uint64_t Reports::lasting_count() const {
@@ -82,9 +90,14 @@ ThreadReport Reports::thread(const Thread& thread) const {
     if (report.hung) {
         report.silent_ns = monotonic_ns() - core->finished_ns();
         const std::uint32_t id = core->hung_function();
-        if (const LoadedFunction* const function = id != 0 ? function_with_id(s.model, id) : nullptr) report.function = function->name;
+        if (const LoadedFunction* const function =
+                id != 0 ? function_with_id(s.model, id) : nullptr) {
+            report.function = function->name;
+        }
     }
-    if (s.executor->supervisor().demoted(*core)) report.policy = "SCHED_OTHER (hung: no real-time priority until start)";
+    if (s.executor->supervisor().demoted(*core)) {
+        report.policy = "SCHED_OTHER (hung: no real-time priority until start)";
+    }
     return report;
 }
 
@@ -93,8 +106,11 @@ ThreadHistograms Reports::histograms(const Thread& thread) const {
     const Core* const core = state_.core(&thread);
     if (!core) return histograms;
     const auto copy = [](const Histogram& from, std::vector<std::uint64_t>& to) {
-        for (std::size_t i = 0; i < Histogram::buckets; ++i)
-            if (const std::uint64_t count = from.count(i); count != 0) to.insert(to.end(), {Histogram::edge(i), count});
+        for (std::size_t i = 0; i < Histogram::buckets; ++i) {
+            if (const std::uint64_t count = from.count(i); count != 0) {
+                to.insert(to.end(), {Histogram::edge(i), count});
+            }
+        }
     };
     copy(core->wakeup, histograms.wakeup);
     copy(core->busy, histograms.busy);
@@ -103,13 +119,17 @@ ThreadHistograms Reports::histograms(const Thread& thread) const {
 
 std::vector<ThreadReport> Reports::threads() const {
     std::vector<ThreadReport> reports;
-    for (const auto& thread : state_.model.threads) reports.push_back(this->thread(*thread));
+    for (const auto& thread : state_.model.threads) {
+        reports.push_back(this->thread(*thread));
+    }
     return reports;
 }
 
 std::optional<ClockReport> Reports::clock() const {
     const Instance* const leader = clock_leader(state_.model);
-    if (!leader) return {};
+    if (!leader) {
+        return {};
+    }
     const Timeline& timeline = state_.executor->timeline();
     return ClockReport{leader->name, timeline.shift_ns(), timeline.rate()};
 }
@@ -118,18 +138,26 @@ std::vector<std::string> Reports::missing_privileges() const {
     const SessionState& s = state_;
     std::vector<std::string> missing;
     std::string what, effect;
-    for (const auto& [thread, core] : s.cores)
-        if (s.executor->granted(*core).refused) what = "real-time scheduling", effect = "threads are late under load";
+    for (const auto& [thread, core] : s.cores) {
+        if (s.executor->granted(*core).refused) {
+            what = "real-time scheduling";
+            effect = "threads are late under load";
+        }
+    }
     for (const std::string& one : s.refused) {
         what += (what.empty() ? "" : " and ") + one;
         effect += std::string(effect.empty() ? "" : ", and ") + "a page fault can delay a cycle";
     }
-    if (!what.empty())
-        missing.push_back("no " + what + " here: " + effect + "; grant it with: " + grant_command() +
-                          " (or by limits of a group: hal doctor)");
-    if (!s.cores.empty() && !s.options.virtual_clock && !s.executor->supervisor().has_own_cpu())
-        missing.push_back("the threads use every CPU: their supervisor interrupts them every " +
-                          format_duration(static_cast<double>(s.executor->supervisor().interval_ns())) + " for some microseconds");
+    if (!what.empty()) {
+        missing.push_back("no " + what + " here: " + effect + "; grant it with: " +
+                          grant_command() + " (or by limits of a group: hal doctor)");
+    }
+    if (!s.cores.empty() && !s.options.virtual_clock && !s.executor->supervisor().has_own_cpu()) {
+        missing.push_back(
+            "the threads use every CPU: their supervisor interrupts them every " +
+            format_duration(static_cast<double>(s.executor->supervisor().interval_ns())) +
+            " for some microseconds");
+    }
     return missing;
 }
 
@@ -138,31 +166,44 @@ std::vector<std::string> Reports::latencies() const {
     for (const Delay& delay : delays(state_.model)) {
         std::string line = delay.signal->name + ": ";
         const std::string reader = delay.reader->name;
-        const auto thread_name = [](const Pin& pin) { const Thread* t = thread_of(pin); return t ? t->name : std::string("no thread"); };
+        const auto thread_name = [](const Pin& pin) {
+            const Thread* t = thread_of(pin);
+            return t ? t->name : std::string("no thread");
+        };
         switch (delay.kind) {
         case Delay::Kind::same_cycle:
-            line += delay.writer->name + " => " + reader + "  0 cycles (" + thread_name(*delay.reader) + ", writer runs first)";
+            line += delay.writer->name + " => " + reader + "  0 cycles (" +
+                    thread_name(*delay.reader) + ", writer runs first)";
             break;
         case Delay::Kind::next_cycle:
-            line += delay.writer->name + " => " + reader + "  1 cycle (" + thread_name(*delay.reader) + ", reader runs first)";
+            line += delay.writer->name + " => " + reader + "  1 cycle (" +
+                    thread_name(*delay.reader) + ", reader runs first)";
             break;
         case Delay::Kind::other_thread:
-            line += delay.writer->name + " => " + reader + "  the last finished cycle of " + thread_name(*delay.writer) + ", read in " +
-                    thread_name(*delay.reader);
+            line += delay.writer->name + " => " + reader + "  the last finished cycle of " +
+                    thread_name(*delay.writer) + ", read in " + thread_name(*delay.reader);
             break;
         case Delay::Kind::session: line += "=> " + reader + "  no writer: as set by sets"; break;
-        case Delay::Kind::cell: line += "<=> " + reader + "  I/O pins: at once within a thread"; break;
+        case Delay::Kind::cell:
+            line += "<=> " + reader + "  I/O pins: at once within a thread";
+            break;
         case Delay::Kind::unscheduled:
-            line += delay.writer->name + " => " + reader + "  never: " + (thread_of(*delay.writer) ? "the reader" : "the writer") +
+            line += delay.writer->name + " => " + reader +
+                    "  never: " + (thread_of(*delay.writer) ? "the reader" : "the writer") +
                     " is in no thread";
             break;
         }
         lines.push_back(std::move(line));
     }
-    for (const auto& component : state_.model.components)
-        for (const auto& instance : component->instances)
-            for (const PathDelay& path : instance->path_delays)
-                if (path.pin->signal) lines.push_back(delay_text(path));
+    for (const auto& component : state_.model.components) {
+        for (const auto& instance : component->instances) {
+            for (const PathDelay& path : instance->path_delays) {
+                if (path.pin->signal) {
+                    lines.push_back(delay_text(path));
+                }
+            }
+        }
+    }
     std::sort(lines.begin(), lines.end());
     return lines;
 }
@@ -170,14 +211,19 @@ std::vector<std::string> Reports::latencies() const {
 std::string Reports::status_text() const {
     char host[256] = "";
     ::gethostname(host, sizeof host - 1);
-    std::string text = "instance " + state_.options.name + "\nhost " + host + "\npid " + std::to_string(::getpid()) + "\nrunning " +
+    std::string text = "instance " + state_.options.name + "\nhost " + host + "\npid " +
+                       std::to_string(::getpid()) + "\nrunning " +
                        (state_.executor->running() ? "1" : "0") + "\n";
-    for (const ThreadReport& thread : threads())
-        text += "thread " + thread.name + " " + std::to_string(thread.period_ns) + " " + std::to_string(thread.cycles) + " " +
-                std::to_string(thread.missed) + " " + (thread.faulted ? "1" : "0") + "\n";
+    for (const ThreadReport& thread : threads()) {
+        text += "thread " + thread.name + " " + std::to_string(thread.period_ns) + " " +
+                std::to_string(thread.cycles) + " " + std::to_string(thread.missed) + " " +
+                (thread.faulted ? "1" : "0") + "\n";
+    }
     text += "faults " + std::to_string(fault_count()) + "\n";
     state_.faults.collect();
-    if (!state_.faults.empty()) text += "fault " + state_.faults.newest().line() + "\n";
+    if (!state_.faults.empty()) {
+        text += "fault " + state_.faults.newest().line() + "\n";
+    }
     return text;
 }
 

@@ -16,8 +16,12 @@
 namespace hal {
 
 SessionState::SessionState(SessionOptions o)
-    : options(std::move(o)), plugins(options.plugin_path), executor(std::make_unique<Executor>(options.virtual_clock)) {
-    if (!options.virtual_clock && !options.check_only) refused = prepare_process();
+    : options(std::move(o)),
+      plugins(options.plugin_path),
+      executor(std::make_unique<Executor>(options.virtual_clock)) {
+    if (!options.virtual_clock && !options.check_only) {
+        refused = prepare_process();
+    }
 }
 
 SessionState::~SessionState() = default;
@@ -34,7 +38,9 @@ std::size_t status_for_plugins(const hal_status* self, char* to, std::size_t roo
         const std::size_t length = std::min(room, text.size());
         std::memcpy(to, text.data(), length);
         return length;
-    } catch (const std::bad_alloc&) { return 0; }
+    } catch (const std::bad_alloc&) {
+        return 0;
+    }
 }
 
 }  // namespace
@@ -48,15 +54,20 @@ Session::Session(SessionOptions options)
       programs_(std::make_unique<Programs>(*this, *state_)) {
     state_->status.text = status_for_plugins;
     state_->status.data = this;
-    if (state_->options.check_only) watch_for_exits();
-    else watch_for_crashes(state_.get());
+    if (state_->options.check_only) {
+        watch_for_exits();
+    } else {
+        watch_for_crashes(state_.get());
+    }
 }
 
 Session::~Session() {
     programs_.reset();
     shut_down();
     end_watch_for_crashes(state_.get());
-    if (state_->abandoned) keep_for_good(std::move(state_));
+    if (state_->abandoned) {
+        keep_for_good(std::move(state_));
+    }
 }
 
 const SessionOptions& Session::options() const { return state_->options; }
@@ -81,7 +92,9 @@ void Session::sweep_texts() noexcept {
         std::vector<bool> in_use;
         state_->model.sweep(in_use);
         const std::uint32_t advance = threads().first_advance().source;
-        if (advance >= in_use.size()) in_use.resize(advance + 1);
+        if (advance >= in_use.size()) {
+            in_use.resize(advance + 1);
+        }
         in_use[advance] = true;
         sources.sweep(in_use);
     } catch (const std::bad_alloc&) {  // then it is done another time
@@ -90,7 +103,9 @@ void Session::sweep_texts() noexcept {
 
 bool Session::in_transaction() const { return state_->open; }
 void Session::when_committed(std::function<void()> action) {
-    if (state_->open) state_->when_committed.push_back(std::move(action));
+    if (state_->open) {
+        state_->when_committed.push_back(std::move(action));
+    }
 }
 
 void Session::shut_down() {
@@ -99,10 +114,15 @@ void Session::shut_down() {
     s.shut = true;
     s.when_committed.clear();
     s.needs_threads = false;
-    if (s.edit) s.withdraw();
+    if (s.edit) {
+        s.withdraw();
+    }
     if (s.options.check_only) {
-        for (auto c = s.model.components.rbegin(); c != s.model.components.rend(); ++c)
-            for (auto i = (*c)->instances.rbegin(); i != (*c)->instances.rend(); ++i) destroy_instance(**i);
+        for (auto c = s.model.components.rbegin(); c != s.model.components.rend(); ++c) {
+            for (auto i = (*c)->instances.rbegin(); i != (*c)->instances.rend(); ++i) {
+                destroy_instance(**i);
+            }
+        }
         return;
     }
     threads_.stop();
@@ -112,14 +132,19 @@ void Session::shut_down() {
         s.executor->abandon(*core);
         all_ended = false;
     }
-    if (!all_ended) {  // a function that hangs may still use its instance: leave everything as it is, and a watchdog to its time-out
+    // a function that hangs may still use its instance: leave everything as it is, and a watchdog
+    // to its time-out
+    if (!all_ended) {
         s.abandoned = true;
         return;
     }
     s.cores.clear();
     threads_.disarm_watchdog();
-    for (auto c = s.model.components.rbegin(); c != s.model.components.rend(); ++c)
-        for (auto i = (*c)->instances.rbegin(); i != (*c)->instances.rend(); ++i) destroy_instance(**i);
+    for (auto c = s.model.components.rbegin(); c != s.model.components.rend(); ++c) {
+        for (auto i = (*c)->instances.rbegin(); i != (*c)->instances.rend(); ++i) {
+            destroy_instance(**i);
+        }
+    }
 }
 
 }  // namespace hal

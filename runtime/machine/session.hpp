@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// One running machine, as its parts: the model and its transactions, the threads, the values, the plugin host, the programs and the
-// reports (docs/design.md). Only the command language, the tools and tests use it.
+// One running machine, as its parts: the model and its transactions, the threads, the values, the
+// plugin host, the programs and the reports (docs/design.md). Only the command language, the tools
+// and tests use it.
 //
 //   Session session;
 //   const auto lock = session.lock();
@@ -9,7 +10,8 @@
 //   if (transaction.commit(diagnostics)) session.threads().start();
 //   const auto reading = session.values().read({"pid.0.output"})[0];
 //
-// Every member of the session and of its parts is [setup] and is called with lock() held, unless it is marked otherwise.
+// Every member of the session and of its parts is [setup] and is called with lock() held, unless it
+// is marked otherwise.
 #pragma once
 
 #include <atomic>
@@ -19,10 +21,6 @@
 #include <string>
 #include <vector>
 
-#include "text/diagnostic.hpp"
-#include "model/absence.hpp"
-#include "model/model.hpp"
-#include "netlist/netlist.hpp"
 #include "machine/journal.hpp"
 #include "machine/live_values.hpp"
 #include "machine/plugin_host.hpp"
@@ -31,6 +29,10 @@
 #include "machine/thread_control.hpp"
 #include "machine/traces.hpp"
 #include "machine/transaction.hpp"
+#include "model/absence.hpp"
+#include "model/model.hpp"
+#include "netlist/netlist.hpp"
+#include "text/diagnostic.hpp"
 
 namespace hal {
 
@@ -40,17 +42,28 @@ struct SessionState;
 class ExitObserver;
 
 struct SessionOptions {
-    std::string name = "default";    ///< of the instance; its control socket carries it
-    bool virtual_clock = false;      ///< `hal sim`: threads run only in ThreadControl::advance_ns()
-    bool check_only = false;         ///< `hal check`: construct, but start nothing
-    /// Longest gap without CPU that is reported and does not stop a thread: without a real-time policy, and with one.
-    std::int64_t max_gap_ns = 0, max_gap_realtime_ns = 0;
+    std::string name = "default";  ///< of the instance; its control socket carries it
+    bool virtual_clock = false;  ///< `hal sim`: threads run only in ThreadControl::advance_ns()
+    bool check_only = false;  ///< `hal check`: construct, but start nothing
+    /// Longest gap without CPU that is reported and does not stop a thread: without a real-time
+    /// policy, and with one.
+    std::int64_t max_gap_ns = 0;
+    std::int64_t max_gap_realtime_ns = 0;
     std::vector<std::string> plugin_path;  ///< searched first
-    ExitObserver* observer = nullptr;      ///< made before the session, and outlives it; nullptr: none
+    /// made before the session, and outlives it; nullptr: none
+    ExitObserver* observer = nullptr;
 };
 
 /// Groups of commands that the `lock` command locks; LinuxCNC's names and bits.
-enum class Lock : unsigned { none = 0, load = 1, config = 2, params = 4, run = 8, tune = 3, all = 255 };
+enum class Lock : unsigned {
+    none = 0,
+    load = 1,
+    config = 2,
+    params = 4,
+    run = 8,
+    tune = 3,
+    all = 255
+};
 
 /// Exclusive access to a session; a command that waits releases it meanwhile.
 using SessionLock = std::unique_lock<std::mutex>;
@@ -68,26 +81,32 @@ public:
     /// The same without waiting: the result owns nothing while another thread has access. [any]
     [[nodiscard]] SessionLock try_lock() const { return {mutex_, std::try_to_lock}; }
 
-    /// Opens the transaction. Throws std::logic_error while another one is open. Values, model and reports show the machine with
-    /// the edits made so far.
+    /// Opens the transaction. Throws std::logic_error while another one is open. Values, model and
+    /// reports show the machine with the edits made so far.
     Transaction begin();
     bool in_transaction() const;
-    /// As Transaction::when_committed(), for what is destroyed at the end of the open transaction. Forgotten when none is open.
+    /// As Transaction::when_committed(), for what is destroyed at the end of the open transaction.
+    /// Forgotten when none is open.
     void when_committed(std::function<void()> action);
-    /// Offers the names of the model to diagnostics about unknown ones. To be called before Diagnostics::look_up(), which needs no lock.
+    /// Offers the names of the model to diagnostics about unknown ones. To be called before
+    /// Diagnostics::look_up(), which needs no lock.
     void offer_names(Diagnostics& diagnostics);
-    /// Frees texts of `sources` that nothing refers to any more, when that is worth the time. Not while a transaction is open.
+    /// Frees texts of `sources` that nothing refers to any more, when that is worth the time. Not
+    /// while a transaction is open.
     void sweep_texts() noexcept;
-    /// Interrupts what other threads do with this session: the commands of a text end at the next line, and queries end early. Used
-    /// before shut_down(), which would wait for them. [any]
+    /// Interrupts what other threads do with this session: the commands of a text end at the next
+    /// line, and queries end early. Used before shut_down(), which would wait for them. [any]
     void interrupt() noexcept { ending_.store(true, std::memory_order_release); }
-    bool ending() const noexcept { return ending_.load(std::memory_order_acquire); }  ///< after interrupt() [any]
-    /// Rolls back an open transaction, stops the threads with safe outputs, and stops and destroys all instances. Idempotent.
+    /// after interrupt() [any]
+    bool ending() const noexcept { return ending_.load(std::memory_order_acquire); }
+    /// Rolls back an open transaction, stops the threads with safe outputs, and stops and destroys
+    /// all instances. Idempotent.
     void shut_down();
 
     const SessionOptions& options() const;
     const Model& model() const;
-    /// What `hal check` knows to exist elsewhere or could not read, and the lines that depend on it.
+    /// What `hal check` knows to exist elsewhere or could not read, and the lines that depend on
+    /// it.
     Absences& absences();
 
     ThreadControl& threads() { return threads_; }
@@ -101,9 +120,10 @@ public:
     const PluginHost& host() const { return host_; }
     Programs& programs() { return *programs_; }
 
-    Sources sources;                 ///< the texts that spans of the model refer to
-    Ini ini;                         ///< values of [SECTION]KEY
-    std::atomic<unsigned> locked{0}; ///< may be read without the session's lock; command groups that are locked: bits of Lock
+    Sources sources;  ///< the texts that spans of the model refer to
+    Ini ini;  ///< values of [SECTION]KEY
+    /// may be read without the session's lock; command groups that are locked: bits of Lock
+    std::atomic<unsigned> locked{0};
 
 private:
     friend class Transaction;

@@ -14,7 +14,9 @@ namespace hal {
 namespace {
 
 // The thread that is in the call may hold any lock, the allocator's among them.
-void print(const char* text) noexcept { [[maybe_unused]] const auto written = write(STDERR_FILENO, text, std::strlen(text)); }
+void print(const char* text) noexcept {
+    [[maybe_unused]] const auto written = write(STDERR_FILENO, text, std::strlen(text));
+}
 
 /// Prints a duration in whole seconds, rounded up.
 void print_seconds(std::int64_t ns) noexcept {
@@ -22,8 +24,9 @@ void print_seconds(std::int64_t ns) noexcept {
     char* at = text + sizeof text;
     *--at = '\0';
     std::int64_t seconds = (ns + 999'999'999) / 1'000'000'000;
-    do *--at = static_cast<char>('0' + seconds % 10);
-    while ((seconds /= 10) != 0);
+    do {
+        *--at = static_cast<char>('0' + seconds % 10);
+    } while ((seconds /= 10) != 0);
     print(at);
     print(" s");
 }
@@ -48,16 +51,24 @@ void print_announced(const SetupCallNow& call, std::int64_t expected_ns) noexcep
 }
 
 void watch(const SetupGuard::Flags& flags) noexcept {
-    constexpr std::int64_t patience_ns = 2'000'000'000, end_after_ns = 13'000'000'000;
+    constexpr std::int64_t patience_ns = 2'000'000'000;
+    constexpr std::int64_t end_after_ns = 13'000'000'000;
     const SetupCallNow& call = SetupCall::now;
-    std::int64_t named_ns = 0, announced_ns = 0, ending_ns = 0;
+    std::int64_t named_ns = 0;
+    std::int64_t announced_ns = 0;
+    std::int64_t ending_ns = 0;
     while (!flags.over.load()) {
         const timespec nap{0, ending_ns == 0 ? 100'000'000 : 20'000'000};
         nanosleep(&nap, nullptr);
-        if (ending_ns == 0 && flags.ending.load()) ending_ns = monotonic_ns(), named_ns = 0;
+        if (ending_ns == 0 && flags.ending.load()) {
+            ending_ns = monotonic_ns();
+            named_ns = 0;
+        }
         const std::int64_t since = call.since_ns.load(std::memory_order_acquire);
         if (since == 0) continue;
-        const std::int64_t waited = monotonic_ns() - std::max(ending_ns, since), expected = call.expected_ns.load();
+        const std::int64_t waited = monotonic_ns() - std::max(ending_ns, since);
+
+        const std::int64_t expected = call.expected_ns.load();
         const std::int64_t name_after_ns = patience_ns + expected;
         if (expected > patience_ns && waited >= patience_ns && announced_ns != since) {
             announced_ns = since;
@@ -66,7 +77,9 @@ void watch(const SetupGuard::Flags& flags) noexcept {
         const bool ends = ending_ns != 0 && waited > name_after_ns + end_after_ns;
         if (!ends && (waited < name_after_ns || named_ns == since)) continue;
         named_ns = since;
-        if (ends) make_all_safe();
+        if (ends) {
+            make_all_safe();
+        }
         print_name(call);
         print(" has not returned from ");
         print(call.what);
@@ -75,7 +88,9 @@ void watch(const SetupGuard::Flags& flags) noexcept {
         print(ends             ? "; outputs set to their safe values; the process ends\n"
               : ending_ns != 0 ? "; the machine ends when it returns, at the latest in 13 s\n"
                                : "; all commands wait for it\n");
-        if (ends) end_process(1);
+        if (ends) {
+            end_process(1);
+        }
     }
 }
 

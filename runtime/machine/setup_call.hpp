@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// What the machine is doing in a component outside of the cycle: its constructor, start, stop or destructor. It holds the session's lock
-// meanwhile, so when the call does not return, nothing else can be reported.
+// What the machine is doing in a component outside of the cycle: its constructor, start, stop or
+// destructor. It holds the session's lock meanwhile, so when the call does not return, nothing else
+// can be reported.
 #pragma once
 
 #include <algorithm>
@@ -22,14 +23,15 @@ struct SetupCallNow {
     std::atomic<const char*> what{""};
     std::atomic<const char*> why{""};
     std::atomic<std::int64_t> expected_ns{0};  ///< duration that the component has announced
-    std::atomic<pthread_t> thread{};        ///< that makes the call
+    std::atomic<pthread_t> thread{};  ///< that makes the call
     std::atomic<std::int64_t> since_ns{0};  ///< on the monotonic clock; 0: none
 };
 
 class SetupCall {
 public:
     /// There is one at a time in a process: the session's lock is held.
-    SetupCall(const std::string& instance, const std::string& component, const char* what) noexcept {
+    SetupCall(const std::string& instance, const std::string& component,
+              const char* what) noexcept {
         copy(instance, now.instance);
         copy(component, now.component);
         now.what = what;
@@ -50,7 +52,8 @@ public:
     inline static SetupCallNow now;  ///< [any]
     /// Returns true if the calling thread is in such a call. async-signal-safe
     static bool is_mine() noexcept {
-        return now.since_ns.load(std::memory_order_acquire) != 0 && pthread_equal(now.thread.load(), pthread_self()) != 0;
+        return now.since_ns.load(std::memory_order_acquire) != 0 &&
+               pthread_equal(now.thread.load(), pthread_self()) != 0;
     }
 
 private:
@@ -61,12 +64,13 @@ private:
     }
 };
 
-/// Names a call that does not return within 2 s, or 2 s after the duration that the component has announced. After end_soon() it ends the
-/// process when the call does not return 13 s later.
+/// Names a call that does not return within 2 s, or 2 s after the duration that the component has
+/// announced. After end_soon() it ends the process when the call does not return 13 s later.
 class SetupGuard {
 public:
     struct Flags {
-        std::atomic<bool> ending{false}, over{false};
+        std::atomic<bool> ending{false};
+        std::atomic<bool> over{false};
     };
 
     SetupGuard();

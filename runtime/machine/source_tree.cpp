@@ -27,7 +27,9 @@ std::map<std::string, ComponentSummary> listed_components(const std::vector<std:
             ComponentSummary about;
             words >> name >> about.group >> std::ws;
             std::getline(words, about.summary);
-            if (!name.empty()) all.emplace(std::move(name), std::move(about));
+            if (!name.empty()) {
+                all.emplace(std::move(name), std::move(about));
+            }
         }
     }
     return all;
@@ -36,7 +38,9 @@ std::map<std::string, ComponentSummary> listed_components(const std::vector<std:
 bool build_on_demand(const std::string& name) {
     const char* const script = std::getenv("HALCYON_BUILD");
     if (!script || !*script || forbidden.load()) return false;
-    std::string program = script, command = "build", argument = name;
+    std::string program = script;
+    std::string command = "build";
+    std::string argument = name;
     char* const arguments[] = {program.data(), command.data(), argument.data(), nullptr};
     posix_spawn_file_actions_t actions;
     if (posix_spawn_file_actions_init(&actions) != 0) return false;
@@ -46,8 +50,9 @@ bool build_on_demand(const std::string& name) {
     posix_spawn_file_actions_destroy(&actions);
     if (problem != 0) return false;
     int status = 0;
-    while (waitpid(child, &status, 0) < 0)
+    while (waitpid(child, &status, 0) < 0) {
         if (errno != EINTR) return false;
+    }
     return WIFEXITED(status) && WEXITSTATUS(status) == 0;
 }
 

@@ -16,11 +16,13 @@ struct ComponentSummary {
 /// The components that the build lists in the file `groups` of these plugin folders, built or not.
 std::map<std::string, ComponentSummary> listed_components(const std::vector<std::string>& folders);
 
-/// Builds a component, or `bus`, the program of the bus tools, with the script in $HALCYON_BUILD; progress is printed to stderr. False when
-/// this program was not started by that script, after forbid_builds(), and when the build failed. [setup]
+/// Builds a component, or `bus`, the program of the bus tools, with the script in $HALCYON_BUILD;
+/// progress is printed to stderr. False when this program was not started by that script, after
+/// forbid_builds(), and when the build failed. [setup]
 bool build_on_demand(const std::string& name);
 
-/// Disables build_on_demand() for the rest of this process: compilers must not disturb running threads. [any]
+/// Disables build_on_demand() for the rest of this process: compilers must not disturb running
+/// threads. [any]
 void forbid_builds() noexcept;
 
 }  // namespace hal

@@ -11,17 +11,17 @@
 #include <iterator>
 
 #include <fcntl.h>
+#include <new>
 #include <sched.h>
+#include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/syscall.h>
-#include <new>
-#include <sys/mman.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "paths.hpp"
 #include "machine/plugins.hpp"
 #include "machine/programs.hpp"
+#include "paths.hpp"
 
 namespace hal {
 namespace {
@@ -33,25 +33,34 @@ std::string with_folders(const char* variable, const std::vector<std::string>& f
     std::string all;
     for (const std::string& folder : folders) {
         std::error_code ignored;
-        if ((":" + there + ":").find(":" + folder + ":") == std::string::npos && std::filesystem::is_directory(folder, ignored))
+        if ((":" + there + ":").find(":" + folder + ":") == std::string::npos &&
+            std::filesystem::is_directory(folder, ignored)) {
             all += folder + ":";
+        }
     }
     all += there;
-    if (all.ends_with(':')) all.pop_back();
+    if (all.ends_with(':')) {
+        all.pop_back();
+    }
     return all;
 }
 
-/// Where the Python module may be: beside the program first, so that a build tree or an installation that was moved finds its own.
+/// Where the Python module may be: beside the program first, so that a build tree or an
+/// installation that was moved finds its own.
 std::vector<std::string> python_folders(const std::filesystem::path& programs) {
-    for (const auto& folder : {programs / "../python", programs / paths::libraries_from_programs / "halcyon/python"}) {
+    for (const auto& folder :
+         {programs / "../python", programs / paths::libraries_from_programs / "halcyon/python"}) {
         std::error_code none;
-        if (std::filesystem::exists(folder / "hal/__init__.py", none)) return {std::filesystem::canonical(folder, none).string()};
+        if (std::filesystem::exists(folder / "hal/__init__.py", none)) {
+            return {std::filesystem::canonical(folder, none).string()};
+        }
     }
     return {std::string(paths::build_python), std::string(paths::install_python)};
 }
 
-/// The environment of a child: ours, plus which instance started it, so that `hal shell` in it talks to that one; our own
-/// programs and Python module are found; and it ends when the machine is lost, unless the user wants otherwise.
+/// The environment of a child: ours, plus which instance started it, so that `hal shell` in it
+/// talks to that one; our own programs and Python module are found; and it ends when the machine is
+/// lost, unless the user wants otherwise.
 std::vector<std::string> environment_of(const std::string& instance) {
     std::error_code ignored;
     const auto program = std::filesystem::read_symlink("/proc/self/exe", ignored);
@@ -61,16 +70,23 @@ std::vector<std::string> environment_of(const std::string& instance) {
         {"HALCYON_INSTANCE=", instance},
         {"HALCYON_LOST=", lost && *lost ? lost : "end"},
         {"HALCYON_PARENT=", std::to_string(getpid())},
-        {"PATH=", with_folders("PATH", {linuxcnc.empty() ? linuxcnc : linuxcnc + "/bin", program.parent_path().string(), user_folder("bin")})},
+        {"PATH=", with_folders("PATH", {linuxcnc.empty() ? linuxcnc : linuxcnc + "/bin",
+                                        program.parent_path().string(), user_folder("bin")})},
         {"LD_LIBRARY_PATH=", with_folders("LD_LIBRARY_PATH", {linuxcnc})},
         {"PYTHONPATH=", with_folders("PYTHONPATH", python_folders(program.parent_path()))}};
     std::vector<std::string> all;
-    for (char** entry = environ; *entry; ++entry)
-        if (std::none_of(std::begin(ours), std::end(ours),
-                         [&](const auto& one) { return std::string_view(*entry).starts_with(one.first); }))
+    for (char** entry = environ; *entry; ++entry) {
+        if (std::none_of(std::begin(ours), std::end(ours), [&](const auto& one) {
+            return std::string_view(*entry).starts_with(one.first);
+        })) {
             all.push_back(*entry);
-    for (const auto& [name, value] : ours)
-        if (!value.empty()) all.push_back(name + value);
+        }
+    }
+    for (const auto& [name, value] : ours) {
+        if (!value.empty()) {
+            all.push_back(name + value);
+        }
+    }
     return all;
 }
 
@@ -86,7 +102,9 @@ std::string program_in(const std::vector<std::string>& environment, const std::s
             std::error_code ignored;
             if (!std::filesystem::is_regular_file(file, ignored)) continue;
             if (access(file.c_str(), X_OK) == 0) return file;
-            if (not_executable.empty()) not_executable = file;
+            if (not_executable.empty()) {
+                not_executable = file;
+            }
         }
     }
     return not_executable;
@@ -94,7 +112,9 @@ std::string program_in(const std::vector<std::string>& environment, const std::s
 
 std::vector<char*> pointers(std::vector<std::string>& texts) {
     std::vector<char*> all;
-    for (auto& text : texts) all.push_back(text.data());
+    for (auto& text : texts) {
+        all.push_back(text.data());
+    }
     all.push_back(nullptr);
     return all;
 }
@@ -104,8 +124,12 @@ std::vector<char*> pointers(std::vector<std::string>& texts) {
 std::string linuxcnc_folder() {
     std::error_code none;
     const auto programs = std::filesystem::read_symlink("/proc/self/exe", none).parent_path();
-    for (const auto& folder : {programs / "../lib/halcyon/linuxcnc", programs / paths::libraries_from_programs / "halcyon/linuxcnc"})
-        if (std::filesystem::exists(folder / "liblinuxcnchal.so.0", none)) return std::filesystem::canonical(folder, none).string();
+    for (const auto& folder : {programs / "../lib/halcyon/linuxcnc",
+                               programs / paths::libraries_from_programs / "halcyon/linuxcnc"}) {
+        if (std::filesystem::exists(folder / "liblinuxcnchal.so.0", none)) {
+            return std::filesystem::canonical(folder, none).string();
+        }
+    }
     return {};
 }
 
@@ -114,7 +138,7 @@ struct Spawner::Job {
     char** arguments;
     char** environment;
     const char* directory;  // nullptr: ours
-    int out, err;           // -1: ours
+    int out, err;  // -1: ours
     bool keep_stdin;
     pid_t parent;
     pid_t pid;
@@ -124,29 +148,43 @@ struct Spawner::Job {
 
 namespace {
 
-// Bare system calls only: this runs in the parent's memory, where a sanitizer's wrappers would note what only the child does.
+// Bare system calls only: this runs in the parent's memory, where a sanitizer's wrappers would note
+// what only the child does.
 template <class T>
 __attribute__((no_sanitize("address", "thread", "undefined"))) int child_main(void* given) {
     T& job = *static_cast<T*>(given);
-    const auto fail = [&](int error) __attribute__((no_sanitize("address", "thread", "undefined"))) {
+    const auto fail = [&](int error)
+                          __attribute__((no_sanitize("address", "thread", "undefined"))) {
         job.error = error;
         syscall(SYS_exit_group, 127);
     };
     unsigned long long as_it_was[8] = {};  // a kernel's sigaction: SIG_DFL, no flags, an empty mask
-    for (int number = 1; number <= 64; ++number) syscall(SYS_rt_sigaction, number, as_it_was, nullptr, 8);
+    for (int number = 1; number <= 64; ++number) {
+        syscall(SYS_rt_sigaction, number, as_it_was, nullptr, 8);
+    }
     syscall(SYS_prctl, PR_SET_PDEATHSIG, SIGTERM, 0, 0, 0);
-    if (syscall(SYS_getppid) != job.parent) fail(ECHILD);
+    if (syscall(SYS_getppid) != job.parent) {
+        fail(ECHILD);
+    }
     if (!job.keep_stdin) {
         const long nothing = syscall(SYS_openat, AT_FDCWD, "/dev/null", O_RDONLY, 0);
-        if (nothing < 0) fail(errno);
+        if (nothing < 0) {
+            fail(errno);
+        }
         if (nothing != 0) {
             syscall(SYS_dup3, nothing, 0, 0);
             syscall(SYS_close, nothing);
         }
     }
-    if (job.out >= 0 && syscall(SYS_dup3, job.out, 1, 0) < 0) fail(errno);
-    if (job.err >= 0 && syscall(SYS_dup3, job.err, 2, 0) < 0) fail(errno);
-    if (job.directory && syscall(SYS_chdir, job.directory) < 0) fail(errno);
+    if (job.out >= 0 && syscall(SYS_dup3, job.out, 1, 0) < 0) {
+        fail(errno);
+    }
+    if (job.err >= 0 && syscall(SYS_dup3, job.err, 2, 0) < 0) {
+        fail(errno);
+    }
+    if (job.directory && syscall(SYS_chdir, job.directory) < 0) {
+        fail(errno);
+    }
     // An ordinary program, whatever the thread that made it blocks or is scheduled as.
     const int ordinary_priority = 0;
     syscall(SYS_sched_setscheduler, 0, SCHED_OTHER, &ordinary_priority);
@@ -159,7 +197,8 @@ __attribute__((no_sanitize("address", "thread", "undefined"))) int child_main(vo
 }  // namespace
 
 Spawner::Spawner() : stack_(new std::byte[stack_size]) {
-    sigset_t all_signals, before;  // signals are for the program's own thread, and none may come between
+    // signals are for the program's own thread, and none may come between
+    sigset_t all_signals, before;
     sigfillset(&all_signals);
     pthread_sigmask(SIG_SETMASK, &all_signals, &before);
     thread_ = std::thread([this] { work(); });
@@ -189,18 +228,28 @@ void Spawner::work() {
 pid_t Spawner::make_child(Job& job) {
     job.parent = getpid();
     job.error = 0;
-    const auto top = reinterpret_cast<std::uintptr_t>(stack_.get() + stack_size) & ~std::uintptr_t{15};
+    const auto top =
+        reinterpret_cast<std::uintptr_t>(stack_.get() + stack_size) & ~std::uintptr_t{15};
 #ifdef __SANITIZE_THREAD__
-    // The thread sanitizer takes every clone for a fork, and would ignore this thread from then on: the child gets memory of its own.
-    void* const page = mmap(nullptr, sizeof job, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
-    if (page == MAP_FAILED) return job.error = errno, 0;
+    // The thread sanitizer takes every clone for a fork, and would ignore this thread from then on:
+    // the child gets memory of its own.
+    void* const page =
+        mmap(nullptr, sizeof job, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+    if (page == MAP_FAILED) {
+        job.error = errno;
+        return 0;
+    }
     Job& shared = *new (page) Job(job);
-    const pid_t pid = clone(child_main<Job>, reinterpret_cast<void*>(top), CLONE_VFORK | SIGCHLD, &shared);
+    const pid_t pid =
+        clone(child_main<Job>, reinterpret_cast<void*>(top), CLONE_VFORK | SIGCHLD, &shared);
     job.error = pid < 0 ? errno : shared.error;
     munmap(page, sizeof job);
 #else
-    const pid_t pid = clone(child_main<Job>, reinterpret_cast<void*>(top), CLONE_VM | CLONE_VFORK | SIGCHLD, &job);
-    if (pid < 0) job.error = errno;
+    const pid_t pid = clone(child_main<Job>, reinterpret_cast<void*>(top),
+                            CLONE_VM | CLONE_VFORK | SIGCHLD, &job);
+    if (pid < 0) {
+        job.error = errno;
+    }
 #endif
     if (pid > 0 && job.error != 0) {
         siginfo_t ended{};
@@ -213,7 +262,9 @@ pid_t Spawner::start(const ProcessStart& start, const std::string& instance, std
     auto arguments = start.arguments;
     auto environment = environment_of(instance);
     const std::string file = program_in(environment, arguments[0]);
-    const auto argument_pointers = pointers(arguments), environment_pointers = pointers(environment);
+    const auto argument_pointers = pointers(arguments);
+
+    const auto environment_pointers = pointers(environment);
     if (file.empty()) {
         problem = std::strerror(ENOENT);
         return 0;
@@ -236,7 +287,9 @@ pid_t Spawner::start(const ProcessStart& start, const std::string& instance, std
     changed_.wait(lock, [&] { return job.done; });
     job_ = nullptr;
     changed_.notify_all();
-    if (job.pid == 0) problem = std::strerror(job.error);
+    if (job.pid == 0) {
+        problem = std::strerror(job.error);
+    }
     return job.pid;
 }
 

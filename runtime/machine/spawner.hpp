@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
 // Starts programs. Internal to the shell.
 //
-// The kernel sends a child its parent-death signal when the thread that made it ends, so all children are made by one thread,
-// which lives as long as they may. It shares its memory with the child until that runs its program, as posix_spawn does: a fork
-// would make the real-time threads pay for each page they write.
+// The kernel sends a child its parent-death signal when the thread that made it ends, so all
+// children are made by one thread, which lives as long as they may. It shares its memory with the
+// child until that runs its program, as posix_spawn does: a fork would make the real-time threads
+// pay for each page they write.
 #pragma once
 
 #include <condition_variable>
@@ -20,8 +21,9 @@ namespace hal {
 
 struct ProcessStart;
 
-/// Returns the folder of liblinuxcnchal.so.0 (runtime/programs), by which LinuxCNC's programs connect to us, or "". Its `bin` has our programs
-/// under LinuxCNC's names. Both come before LinuxCNC's own in the environment of what is started. [setup]
+/// Returns the folder of liblinuxcnchal.so.0 (runtime/programs), by which LinuxCNC's programs
+/// connect to us, or "". Its `bin` has our programs under LinuxCNC's names. Both come before
+/// LinuxCNC's own in the environment of what is started. [setup]
 std::string linuxcnc_folder();
 
 class Spawner {
@@ -30,7 +32,8 @@ public:
     ~Spawner();  ///< children that still run get SIGTERM from the kernel
     Spawner(const Spawner&) = delete;
 
-    /// Starts a program, in the environment of a program of that instance. Returns 0 with the reason in `problem`.
+    /// Starts a program, in the environment of a program of that instance. Returns 0 with the
+    /// reason in `problem`.
     pid_t start(const ProcessStart& start, const std::string& instance, std::string& problem);
 
 private:

@@ -12,8 +12,6 @@
 
 #include "execute/executor.hpp"
 #include "hal/status.h"
-#include "model/compile.hpp"
-#include "model/names.hpp"
 #include "machine/elaborate.hpp"
 #include "machine/fault_log.hpp"
 #include "machine/journal.hpp"
@@ -21,6 +19,8 @@
 #include "machine/probes.hpp"
 #include "machine/session.hpp"
 #include "machine/traces.hpp"
+#include "model/compile.hpp"
+#include "model/names.hpp"
 
 namespace hal {
 
@@ -33,44 +33,53 @@ struct SessionState {
     Model model;
     std::unique_ptr<Executor> executor;
     std::unordered_map<const Thread*, Core*> cores;
-    std::unordered_map<const Thread*, std::unique_ptr<plan::Plan>> plans;  ///< what each thread runs
-    std::vector<std::unique_ptr<plan::Plan>> stuck;  ///< kept after an edit that a thread did not answer: places in them may be in use
-    std::vector<std::shared_ptr<void>> left_cells;   ///< of the swap before: a loose pin's other thread may use one a moment longer
+    /// what each thread runs
+    std::unordered_map<const Thread*, std::unique_ptr<plan::Plan>> plans;
+    /// kept after an edit that a thread did not answer: places in them may be in use
+    std::vector<std::unique_ptr<plan::Plan>> stuck;
+    /// of the swap before: a loose pin's other thread may use one a moment longer
+    std::vector<std::shared_ptr<void>> left_cells;
     std::uint64_t epoch = 0;
 
     bool open = false;                       ///< a Transaction exists
     std::unique_ptr<Edit> edit;              ///< what it has edited; made by its first edit
     std::vector<std::function<void()>> when_committed;
-    bool needs_threads = false;              ///< the open transaction does not take effect while a thread hangs
+    /// the open transaction does not take effect while a thread hangs
+    bool needs_threads = false;
     ModelNames names;
     Absences absences;                       ///< of `hal check`: of all texts so far
     std::vector<AutoOrder> auto_orders;
     std::size_t commands = 0;                ///< in the open transaction
-    std::map<std::string, bool> reported;    ///< warnings and notes that were printed before and still hold; TRUE: of a check of a whole text
+    /// warnings and notes that were printed before and still hold; TRUE: of a check of a whole text
+    std::map<std::string, bool> reported;
 
-    /// What the open transaction put in place of, should it be withdrawn after a thread has taken it.
+    /// What the open transaction put in place of, should it be withdrawn after a thread has taken
+    /// it.
     struct {
         Notes<Pin, hal_value> pins;
         Notes<Signal, hal_value> signals;
     } before;
-    bool touched = false;                    ///< threads may have been made, ended or given a plan for the open transaction
-    std::unique_ptr<char[]> reserve;         ///< given back when memory has run out, so that undoing has some
+    /// threads may have been made, ended or given a plan for the open transaction
+    bool touched = false;
+    /// given back when memory has run out, so that undoing has some
+    std::unique_ptr<char[]> reserve;
 
     Probes probes{*this};
     FaultLog faults{*this};
     Journal journal{*this};
     Traces traces{*this};
     hal_status status{sizeof status, nullptr, nullptr};  ///< for plugins
-    std::vector<std::string> refused;        ///< by the system: "memory locking"
+    std::vector<std::string> refused;  ///< by the system: "memory locking"
     bool shut = false;
-    bool abandoned = false;                  ///< a thread hangs and may go on using everything here
+    bool abandoned = false;  ///< a thread hangs and may go on using everything here
 
     Core* core(const Thread* thread) const;
     /// Adds threads that have no core yet. False after reporting.
     bool make_threads(Diagnostics& diagnostics);
     /// Ends threads that left the model.
     bool end_threads(std::vector<std::unique_ptr<Thread>>& threads, Diagnostics& diagnostics);
-    /// Compiles the model and makes all threads run it; in two steps when functions move between threads.
+    /// Compiles the model and makes all threads run it; in two steps when functions move between
+    /// threads.
     bool synchronise(Diagnostics& diagnostics);
     /// Makes the open transaction take effect. False after reporting; then it is to be withdrawn.
     bool carry_out(Diagnostics& diagnostics);
@@ -109,7 +118,8 @@ private:
     void silent_thread(const Core* core, Diagnostics& diagnostics) const;
 };
 
-/// Reports of crashes and escaped exceptions name what `state` knows. nullptr: nothing is known any more.
+/// Reports of crashes and escaped exceptions name what `state` knows. nullptr: nothing is known any
+/// more.
 void watch_for_crashes(SessionState* state);
 /// Of these, only: a component that ends the process while it is constructed, started or stopped.
 void watch_for_exits();

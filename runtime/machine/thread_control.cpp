@@ -14,26 +14,32 @@
 
 namespace hal {
 
-bool SessionState::starved_thread(const Thread& thread, const Core& core, Diagnostics& diagnostics) const {
+bool SessionState::starved_thread(const Thread& thread, const Core& core,
+                                  Diagnostics& diagnostics) const {
     if (!executor->supervisor().starved(core)) return false;
-    const std::string silent = format_duration(static_cast<double>(monotonic_ns() - core.finished_ns()));
+    const std::string silent =
+        format_duration(static_cast<double>(monotonic_ns() - core.finished_ns()));
     const int cpu = executor->granted(core).cpu;
     diagnostics.error("starved-thread", thread.made,
                       "thread '" + thread.name + "' is ready to run, but has got no CPU time" +
                           (cpu >= 0 ? " on CPU " + std::to_string(cpu) : "") + " for " + silent,
-                      core.hung() ? "its outputs are at their safe values" : "", starvation_help(cpu));
+                      core.hung() ? "its outputs are at their safe values" : "",
+                      starvation_help(cpu));
     return true;
 }
 
-void SessionState::hung_thread(const Thread& thread, const Core& core, Diagnostics& diagnostics) const {
+void SessionState::hung_thread(const Thread& thread, const Core& core,
+                               Diagnostics& diagnostics) const {
     if (starved_thread(thread, core, diagnostics)) return;
     const std::uint32_t id = core.hung_function();
     const LoadedFunction* const function = id != 0 ? function_with_id(model, id) : nullptr;
-    const std::string silent = format_duration(static_cast<double>(monotonic_ns() - core.finished_ns()));
+    const std::string silent =
+        format_duration(static_cast<double>(monotonic_ns() - core.finished_ns()));
     diagnostics.error("hung-thread", thread.made,
                       "thread '" + thread.name + "' has not finished a cycle for " + silent +
                           (function ? ": " + function_text(*function) + " does not return" : ""),
-                      "its outputs are at their safe values", "see: show fault; a function that never returns ends only with the process");
+                      "its outputs are at their safe values",
+                      "see: show fault; a function that never returns ends only with the process");
 }
 
 bool ThreadControl::start(Diagnostics* diagnostics) {
@@ -41,11 +47,12 @@ bool ThreadControl::start(Diagnostics* diagnostics) {
     Diagnostics ignored;
     if (report_hung(diagnostics ? *diagnostics : ignored)) return false;
     bool all = true;
-    for (const auto& [thread, core] : s.cores)
+    for (const auto& [thread, core] : s.cores) {
         if (!s.executor->reset(*core)) {
             s.hung_thread(*thread, *core, diagnostics ? *diagnostics : ignored);
             all = false;
         }
+    }
     if (all) {
         s.executor->start();
         was_started_ = true;
@@ -55,11 +62,12 @@ bool ThreadControl::start(Diagnostics* diagnostics) {
 
 bool ThreadControl::report_hung(Diagnostics& diagnostics) const {
     bool any = false;
-    for (const auto& thread : state_.model.threads)
+    for (const auto& thread : state_.model.threads) {
         if (const Core* const core = state_.core(thread.get()); core && core->hung()) {
             state_.hung_thread(*thread, *core, diagnostics);
             any = true;
         }
+    }
     return any;
 }
 
@@ -71,13 +79,18 @@ bool ThreadControl::stop(Diagnostics* diagnostics) {
     // every thread makes its outputs safe at the end of its next cycle; see it done
     std::deque<Observation> observations;
     std::vector<std::pair<Core*, Observation*>> wishes;
-    for (const auto& [thread, core] : s.cores) wishes.emplace_back(core, &observations.emplace_back());
+    for (const auto& [thread, core] : s.cores) {
+        wishes.emplace_back(core, &observations.emplace_back());
+    }
     const bool answered = s.executor->observe(wishes, answer_timeout_ns);
     if (report_hung(diagnostics ? *diagnostics : ignored)) return false;
     if (answered) return true;
-    if (diagnostics)  // not supervised, or a long period of supervision
-        diagnostics->error("silent-thread", {}, "a thread did not stop within " + format_duration(static_cast<double>(answer_timeout_ns)),
+    if (diagnostics) {  // not supervised, or a long period of supervision
+        diagnostics->error("silent-thread", {},
+                           "a thread did not stop within " +
+                               format_duration(static_cast<double>(answer_timeout_ns)),
                            "", "see: show thread, show fault");
+    }
     return false;
 }
 
@@ -99,8 +112,12 @@ void ThreadControl::note_functions() {
     const auto& threads = state_.model.threads;
     const auto has_functions = [](const auto& thread) { return !thread->functions.empty(); };
     const auto has_init = [](const auto& thread) { return !thread->init.empty(); };
-    if (running() && std::any_of(threads.begin(), threads.end(), has_functions)) functions_ran_ = true;
-    if (std::any_of(threads.begin(), threads.end(), has_init)) functions_ran_ = true;
+    if (running() && std::any_of(threads.begin(), threads.end(), has_functions)) {
+        functions_ran_ = true;
+    }
+    if (std::any_of(threads.begin(), threads.end(), has_init)) {
+        functions_ran_ = true;
+    }
 }
 
 void ThreadControl::advance_ns(std::int64_t ns) {
@@ -118,7 +135,9 @@ void ThreadControl::advance_cycles(std::uint64_t cycles) {
     if (s.executor->is_virtual()) return s.executor->advance_cycles(*core, cycles);
     s.executor->advance(static_cast<std::int64_t>(cycles) * fastest.options.period_ns);
     // under the real clock periods may have been missed: cycles are what was asked for
-    for (int turn = 0; turn < 10'000 && core->cycles.load() < wanted; ++turn) s.executor->advance(fastest.options.period_ns);
+    for (int turn = 0; turn < 10'000 && core->cycles.load() < wanted; ++turn) {
+        s.executor->advance(fastest.options.period_ns);
+    }
 }
 
 std::int64_t ThreadControl::now_ns() const { return state_.executor->now_ns(); }
@@ -136,7 +155,8 @@ bool ThreadControl::attach_watchdog(const std::string& path, std::string& proble
         problem = "cannot open '" + path + "': " + std::strerror(errno);
         return false;
     }
-    if (::write(device, "", 1) != 1) {  // a device that accepts no write would reset the host, or never protect it
+    // a device that accepts no write would reset the host, or never protect it
+    if (::write(device, "", 1) != 1) {
         problem = "cannot write to '" + path + "': " + std::strerror(errno);
         ::close(device);
         return false;

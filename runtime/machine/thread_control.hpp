@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Starts, stops and advances the threads of a session, and feeds a watchdog device while they make progress.
+// Starts, stops and advances the threads of a session, and feeds a watchdog device while they make
+// progress.
 #pragma once
 
 #include <cstdint>
@@ -17,18 +18,19 @@ class ThreadControl {
 public:
     explicit ThreadControl(SessionState& state) : state_(state) {}
 
-    /// Starts all threads, also those that a fault stopped. Returns false after reporting when one hangs; then no thread that was
-    /// stopped is started.
+    /// Starts all threads, also those that a fault stopped. Returns false after reporting when one
+    /// hangs; then no thread that was stopped is started.
     bool start(Diagnostics* diagnostics = nullptr);
-    /// Stops the functions and sets the outputs to their safe values. Returns false after reporting when a thread does not answer;
-    /// the outputs of a thread that hangs are safe all the same.
+    /// Stops the functions and sets the outputs to their safe values. Returns false after reporting
+    /// when a thread does not answer; the outputs of a thread that hangs are safe all the same.
     bool stop(Diagnostics* diagnostics = nullptr);
     /// Reports the threads that hang as errors. Returns false when there are none.
     bool report_hung(Diagnostics& diagnostics) const;
     bool running() const;
     /// Returns true when start() was successful once.
     bool was_started() const { return was_started_; }
-    /// Notes a command that lets time pass. Returns true for the first one, whose text is needed later.
+    /// Notes a command that lets time pass. Returns true for the first one, whose text is needed
+    /// later.
     bool note_advance(Span command) {
         if (first_advance_.known()) return false;
         first_advance_ = command;
@@ -38,13 +40,13 @@ public:
     bool functions_ran() const { return functions_ran_; }
     /// Returns the first command that was noted, or an unknown span.
     Span first_advance() const { return first_advance_; }
-    /// Stops the functions as stop() does, but waits for nothing and nobody: needs no lock of the session. Returns a ticket for
-    /// halted(). [any]
+    /// Stops the functions as stop() does, but waits for nothing and nobody: needs no lock of the
+    /// session. Returns a ticket for halted(). [any]
     std::uint64_t halt();
     enum class Halt {
         pending,
-        done,    ///< the outputs of all threads have their safe values
-        hung     ///< a thread hangs: stop() reports it
+        done,  ///< the outputs of all threads have their safe values
+        hung  ///< a thread hangs: stop() reports it
     };
     /// Returns how far the halt with this ticket is. Needs no lock of the session. [any]
     Halt halted(std::uint64_t ticket) const;
@@ -56,14 +58,15 @@ public:
     /// The runtime's clock: CLOCK_MONOTONIC or the virtual clock.
     std::int64_t now_ns() const;
 
-    /// Feeds a watchdog device (Linux watchdog API) while all supervised threads make progress. Returns false and sets `problem` to
-    /// the reason.
+    /// Feeds a watchdog device (Linux watchdog API) while all supervised threads make progress.
+    /// Returns false and sets `problem` to the reason.
     bool attach_watchdog(const std::string& path, std::string& problem);
     /// Closes the watchdog device so that it does not reset the host.
     void disarm_watchdog();
     /// Returns true when there is no watchdog device or it accepted the disarming.
     bool watchdog_disarmed() const { return watchdog_ < 0; }
-    /// Returns why the watchdog device rejected the disarming. Empty: it was not asked to, because a thread does not end.
+    /// Returns why the watchdog device rejected the disarming. Empty: it was not asked to, because
+    /// a thread does not end.
     const std::string& watchdog_problem() const { return watchdog_problem_; }
 
 private:

@@ -28,33 +28,49 @@ bool set_period(NewThread& thread, std::string_view text, Span at, Diagnostics& 
     return false;
 }
 
-// cpu=, policy=, priority=, spin=, budget=, supervise=, profile=, fp=; `known` is false for any other key
-bool set_option(NewThread& thread, std::string_view key, std::string_view value, Span at, Diagnostics& diagnostics, bool& known) {
+// cpu=, policy=, priority=, spin=, budget=, supervise=, profile=, fp=; `known` is false for any
+// other key
+bool set_option(NewThread& thread, std::string_view key, std::string_view value, Span at,
+                Diagnostics& diagnostics, bool& known) {
     ThreadOptions& o = thread.options;
     const auto bad = [&](const char* help) {
-        diagnostics.error("bad-argument", at, "'" + std::string(value) + "' is not a value of " + std::string(key), "", help);
+        diagnostics.error("bad-argument", at,
+                          "'" + std::string(value) + "' is not a value of " + std::string(key), "",
+                          help);
         return false;
     };
     known = true;
     std::int64_t number = 0;
-    if (key == "fp") return true;  // every thread has floating point
+    if (key == "fp") {
+        return true;  // every thread has floating point
+    }
     if (key == "cpu") {
-        if (!whole(value, number) || number < 0 || number > 1023) return bad("cpu=0 is the first CPU");
+        if (!whole(value, number) || number < 0 || number > 1023) {
+            return bad("cpu=0 is the first CPU");
+        }
         o.cpu = static_cast<int>(number);
     } else if (key == "priority") {
-        if (!whole(value, number) || number < 1 || number > 99) return bad("SCHED_FIFO priorities are 1 to 99");
+        if (!whole(value, number) || number < 1 || number > 99) {
+            return bad("SCHED_FIFO priorities are 1 to 99");
+        }
         o.priority = static_cast<int>(number);
     } else if (key == "policy") {
-        if (value == "fifo") o.policy = Policy::fifo;
-        else if (value == "deadline") o.policy = Policy::deadline;
-        else if (value == "other") o.policy = Policy::other;
-        else return bad("policy is fifo, deadline or other");
+        if (value == "fifo") {
+            o.policy = Policy::fifo;
+        } else if (value == "deadline") {
+            o.policy = Policy::deadline;
+        } else if (value == "other") {
+            o.policy = Policy::other;
+        } else {
+            return bad("policy is fifo, deadline or other");
+        }
     } else if (key == "spin" || key == "budget") {
         const auto ns = parse_duration_ns(value, 1.0);
         if (!ns || *ns < 0) return bad("a time in ns, or with a unit: 20us");
         (key == "spin" ? o.spin_ns : o.budget_ns) = *ns;
     } else if (key == "supervise") {
-        const auto ns = value == "off" ? std::optional<std::int64_t>(0) : parse_duration_ns(value, 1.0);
+        const auto ns =
+            value == "off" ? std::optional<std::int64_t>(0) : parse_duration_ns(value, 1.0);
         if (!ns || *ns < 0) return bad("a time: supervise=200ms, or supervise=off");
         o.supervise_ns = *ns;
         thread.supervise_at = at;
@@ -67,14 +83,18 @@ bool set_option(NewThread& thread, std::string_view key, std::string_view value,
     return true;
 }
 
-// A limit that every ordinary cycle exceeds would stop the thread at once. The period may be given behind it.
+// A limit that every ordinary cycle exceeds would stop the thread at once. The period may be given
+// behind it.
 bool fits_period(const NewThread& thread, Diagnostics& diagnostics) {
     const ThreadOptions& o = thread.options;
     if (o.supervise_ns <= 0 || o.supervise_ns >= 3 * o.period_ns) return true;
-    diagnostics.error("bad-argument", thread.supervise_at,
-                      "a supervision limit of " + format_duration(static_cast<double>(o.supervise_ns)) + " is too short for a period of " +
-                          format_duration(static_cast<double>(o.period_ns)),
-                      "", "at least 3 periods: supervise=" + std::to_string(3 * o.period_ns) + "ns; supervise=off: no limit");
+    diagnostics.error(
+        "bad-argument", thread.supervise_at,
+        "a supervision limit of " + format_duration(static_cast<double>(o.supervise_ns)) +
+            " is too short for a period of " + format_duration(static_cast<double>(o.period_ns)),
+        "",
+        "at least 3 periods: supervise=" + std::to_string(3 * o.period_ns) +
+            "ns; supervise=off: no limit");
     return false;
 }
 
@@ -88,19 +108,23 @@ bool parse_new_thread(std::span<const Token> args, NewThread& thread, Diagnostic
         if (token.text == "fp" || token.text == "nofp") continue;
         const auto equals = token.text.find('=');
         bool known = false;
-        if (equals != std::string::npos && !set_option(thread, std::string_view(token.text).substr(0, equals),
-                                                       std::string_view(token.text).substr(equals + 1), token.span, diagnostics, known))
+        if (equals != std::string::npos &&
+            !set_option(thread, std::string_view(token.text).substr(0, equals),
+                        std::string_view(token.text).substr(equals + 1), token.span, diagnostics,
+                        known)) {
             good = false;
-        else if (!known) {
-            diagnostics.error("unknown-argument", token.span, "newthread has no option '" + token.text + "'", "",
-                              "options: fp nofp cpu= policy= priority= spin= budget= supervise= profile=every");
+        } else if (!known) {
+            diagnostics.error(
+                "unknown-argument", token.span, "newthread has no option '" + token.text + "'", "",
+                "options: fp nofp cpu= policy= priority= spin= budget= supervise= profile=every");
             good = false;
         }
     }
     return fits_period(thread, diagnostics) && good;
 }
 
-bool parse_threads(std::span<const Token> args, Span at, std::vector<NewThread>& threads, Diagnostics& diagnostics) {
+bool parse_threads(std::span<const Token> args, Span at, std::vector<NewThread>& threads,
+                   Diagnostics& diagnostics) {
     std::map<std::int64_t, NewThread> by_number;
     bool good = true;
     for (const Token& token : args) {
@@ -109,8 +133,10 @@ bool parse_threads(std::span<const Token> args, Span at, std::vector<NewThread>&
         const auto digits = text.substr(0, equals).find_last_not_of("0123456789") + 1;
         std::int64_t number = 0;
         bool known = false;
-        if (equals != std::string_view::npos && digits < equals && whole(text.substr(digits, equals - digits), number)) {
-            const std::string_view key = text.substr(0, digits), value = text.substr(equals + 1);
+        if (equals != std::string_view::npos && digits < equals &&
+            whole(text.substr(digits, equals - digits), number)) {
+            const std::string_view key = text.substr(0, digits);
+            const std::string_view value = text.substr(equals + 1);
             NewThread& thread = by_number[number];
             known = true;
             if (key == "name") {
@@ -123,16 +149,26 @@ bool parse_threads(std::span<const Token> args, Span at, std::vector<NewThread>&
             }
         }
         if (!known) {
-            diagnostics.error("unknown-argument", token.span, "threads has no argument '" + token.text + "'", "",
-                              "arguments: name1=NAME period1=NS cpu1=N policy1=… spin1=… budget1=… supervise1=…, then name2= and so on");
+            diagnostics.error("unknown-argument", token.span,
+                              "threads has no argument '" + token.text + "'", "",
+                              "arguments: name1=NAME period1=NS cpu1=N policy1=… spin1=… budget1=… "
+                              "supervise1=…, then name2= and so on");
             good = false;
         }
     }
-    if (by_number.empty()) by_number[1];
+    if (by_number.empty()) {
+        by_number[1];
+    }
     for (auto& [number, thread] : by_number) {
-        if (thread.name.empty()) thread.name = "thread" + std::to_string(number);
-        if (!thread.at.known()) thread.at = thread.period_at.known() ? thread.period_at : at;
-        if (thread.options.period_ns == 0) thread.options.period_ns = 1'000'000;
+        if (thread.name.empty()) {
+            thread.name = "thread" + std::to_string(number);
+        }
+        if (!thread.at.known()) {
+            thread.at = thread.period_at.known() ? thread.period_at : at;
+        }
+        if (thread.options.period_ns == 0) {
+            thread.options.period_ns = 1'000'000;
+        }
         good = fits_period(thread, diagnostics) && good;
         threads.push_back(std::move(thread));
     }
@@ -142,13 +178,16 @@ bool parse_threads(std::span<const Token> args, Span at, std::vector<NewThread>&
 void fit_period(const Model& model, NewThread& thread, Diagnostics& diagnostics) {
     if (model.threads.empty()) return;
     const Thread& fastest = *model.threads.front();
-    const std::int64_t base = fastest.options.period_ns, wanted = thread.options.period_ns;
+    const std::int64_t base = fastest.options.period_ns;
+    const std::int64_t wanted = thread.options.period_ns;
     if (wanted < base || wanted % base == 0) return;
     thread.options.period_ns = (wanted + base / 2) / base * base;
     diagnostics.warning("period-multiple", thread.period_at,
-                        "a period of " + std::to_string(wanted) + " ns is not a multiple of the fastest thread's (" + fastest.name + ", " +
-                            std::to_string(base) + " ns)",
-                        "taken as " + std::to_string(thread.options.period_ns), "write " + std::to_string(thread.options.period_ns));
+                        "a period of " + std::to_string(wanted) +
+                            " ns is not a multiple of the fastest thread's (" + fastest.name +
+                            ", " + std::to_string(base) + " ns)",
+                        "taken as " + std::to_string(thread.options.period_ns),
+                        "write " + std::to_string(thread.options.period_ns));
 }
 
 }  // namespace hal

@@ -7,25 +7,34 @@ namespace hal {
 
 std::string Traces::begin() {
     if (on_) return "another client traces this instance; wait for its end";
-    if (state_.executor->is_virtual())
-        return "this instance runs on a virtual clock, whose cycles take no time; trace an instance of: hal run";
+    if (state_.executor->is_virtual()) {
+        return "this instance runs on a virtual clock, whose cycles take no time; trace an "
+               "instance of: hal run";
+    }
     on_ = true;
     named_.clear();
-    for (const auto& [thread, core] : state_.cores) start(*core);
+    for (const auto& [thread, core] : state_.cores) {
+        start(*core);
+    }
     return "";
 }
 
 void Traces::end() {
     if (!on_) return;
     on_ = false;
-    for (const auto& [thread, core] : state_.cores) core->trace(nullptr);
+    for (const auto& [thread, core] : state_.cores) {
+        core->trace(nullptr);
+    }
 }
 
 // A core that was made at the address of a removed one uses its ring: the old thread has ended.
 void Traces::start(Core& core) {
     Ring*& ring = of_[&core];
-    if (!ring) ring = rings_.emplace_back(std::make_unique<Ring>()).get();
-    for (TraceEvent event; ring->ring.take(event);) {}  // of an earlier trace
+    if (!ring) {
+        ring = rings_.emplace_back(std::make_unique<Ring>()).get();
+    }
+    for (TraceEvent event; ring->ring.take(event);) {
+    }  // of an earlier trace
     ring->lost = ring->ring.lost();
     core.trace(&ring->ring);
 }
@@ -36,20 +45,24 @@ TraceBatch Traces::take(std::size_t most) {
     for (const auto& owned : state_.model.threads) {
         Core* const core = state_.core(owned.get());
         if (!core) continue;
-        if (!core->traced()) start(*core);
+        if (!core->traced()) {
+            start(*core);
+        }
         Ring& ring = *of_.at(core);
         TraceBatch::Part part;
         for (TraceEvent event; part.events.size() < most && ring.ring.take(event);) {
             part.events.push_back(event);
             if (event.kind != TraceEvent::function || !named_.insert(event.id).second) continue;
-            if (const LoadedFunction* const function = function_with_id(state_.model, event.id))
+            if (const LoadedFunction* const function = function_with_id(state_.model, event.id)) {
                 batch.names.emplace(event.id, function->name);
+            }
         }
         const std::uint64_t lost = ring.ring.lost();
         part.lost = lost - ring.lost;
         ring.lost = lost;
         if (part.events.empty() && part.lost == 0) continue;
-        part.thread = {owned->name, owned->options.period_ns, state_.executor->tid(*core), state_.executor->granted(*core).cpu};
+        part.thread = {owned->name, owned->options.period_ns, state_.executor->tid(*core),
+                       state_.executor->granted(*core).cpu};
         batch.parts.push_back(std::move(part));
     }
     return batch;

@@ -32,7 +32,8 @@ struct TraceBatch {
         std::uint64_t lost = 0;      ///< events that did not fit since the part before
     };
     std::vector<Part> parts;         ///< only threads that have something to report
-    std::map<std::uint32_t, std::string> names;  ///< of functions in it that no earlier batch has named
+    /// of functions in it that no earlier batch has named
+    std::map<std::uint32_t, std::string> names;
 };
 
 /// Part of a Session. [setup]
@@ -44,20 +45,22 @@ public:
     std::string begin();
     /// Ends it. What was not taken is discarded.
     void end();
-    /// Takes the events that have come, at most so many of each thread. Threads that were added meanwhile are recorded from now on.
+    /// Takes the events that have come, at most so many of each thread. Threads that were added
+    /// meanwhile are recorded from now on.
     TraceBatch take(std::size_t most = 1 << 14);
 
 private:
     struct Ring {
         TraceRing ring;
-        std::uint64_t lost = 0;      ///< reported so far
+        std::uint64_t lost = 0;  ///< reported so far
     };
     void start(Core& core);
 
     SessionState& state_;
     bool on_ = false;
     std::map<const Core*, Ring*> of_;
-    std::vector<std::unique_ptr<Ring>> rings_;  ///< kept as long as the session: a thread may be writing to one
+    /// kept as long as the session: a thread may be writing to one
+    std::vector<std::unique_ptr<Ring>> rings_;
     std::set<std::uint32_t> named_;
 };
 

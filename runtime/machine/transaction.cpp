@@ -15,8 +15,13 @@
 namespace hal {
 
 Edit& SessionState::editing(Diagnostics& diagnostics) {
-    if (!reserve) reserve = std::make_unique<char[]>(1 << 20);
-    if (!edit) edit = options.check_only ? std::make_unique<Edit>(model, absences) : std::make_unique<Edit>(model);
+    if (!reserve) {
+        reserve = std::make_unique<char[]>(1 << 20);
+    }
+    if (!edit) {
+        edit = options.check_only ? std::make_unique<Edit>(model, absences)
+                                  : std::make_unique<Edit>(model);
+    }
     edit->diagnostics = &diagnostics;
     return *edit;
 }
@@ -33,9 +38,15 @@ void elaborate(Elaboration& on, const EditForm& form, const Command& plain) {
     } else {
         args = plain.args;
     }
-    std::copy_if(args.begin(), args.end(), std::back_inserter(counted), [&](const Token& t) { return !form.arrows || !is_arrow(t.text); });
-    if (check_arity(form.usage, plain.name, counted, on.diagnostics)) return form.elaborate(on, args);
-    if (!args.empty()) on.edit.absences().note(args[0].text);  // what it names may be missing because of this
+    std::copy_if(args.begin(), args.end(), std::back_inserter(counted),
+                 [&](const Token& t) { return !form.arrows || !is_arrow(t.text); });
+    if (check_arity(form.usage, plain.name, counted, on.diagnostics)) {
+        return form.elaborate(on, args);
+    }
+    // what it names may be missing because of this
+    if (!args.empty()) {
+        on.edit.absences().note(args[0].text);
+    }
 }
 
 }  // namespace
@@ -44,10 +55,16 @@ void Transaction::apply(const EditForm& form, const Command& command, Diagnostic
     SessionState& s = *session_->state_;
     try {
         Edit& edit = s.editing(diagnostics);
-        for (const auto& thread : s.model.threads)
-            if (const Core* const core = s.core(thread.get())) thread->init_done = core->passed();
-        Elaboration on{s.model, edit, s.plugins, session_->sources, diagnostics, s.auto_orders, form.usage, s.options.check_only, this,
-                       s.executor ? &s.executor->board().shared.faults : nullptr};
+        for (const auto& thread : s.model.threads) {
+            if (const Core* const core = s.core(thread.get())) {
+                thread->init_done = core->passed();
+            }
+        }
+        Elaboration on{s.model,     edit,
+                       s.plugins,   session_->sources,
+                       diagnostics, s.auto_orders,
+                       form.usage,  s.options.check_only,
+                       this,        s.executor ? &s.executor->board().shared.faults : nullptr};
         for (const Command& plain : expand(command, diagnostics)) {
             ++s.commands;
             elaborate(on, form, plain);
@@ -59,12 +76,16 @@ void Transaction::apply(const EditForm& form, const Command& command, Diagnostic
 
 void SessionState::offer_names(Diagnostics& diagnostics) {
     try {
-        diagnostics.offer([this](std::uint32_t group) { return names.get(model, static_cast<NameGroup>(group)); });
+        diagnostics.offer([this](std::uint32_t group) {
+            return names.get(model, static_cast<NameGroup>(group));
+        });
     } catch (const std::bad_alloc&) {  // then no names are offered
     }
 }
 
-void Transaction::when_committed(std::function<void()> action) { session_->state_->when_committed.push_back(std::move(action)); }
+void Transaction::when_committed(std::function<void()> action) {
+    session_->state_->when_committed.push_back(std::move(action));
+}
 
 void Transaction::needs_threads() { session_->state_->needs_threads = true; }
 
@@ -73,14 +94,17 @@ void Transaction::roll_back() {
     SessionState& s = *std::exchange(session_, nullptr)->state_;
     s.when_committed.clear();
     s.needs_threads = false;
-    if (s.edit) s.withdraw();
+    if (s.edit) {
+        s.withdraw();
+    }
     s.when_committed.clear();  // what modules wanted while they were unloaded again
     s.open = false;
 }
 
 namespace {
 
-// What may still be incomplete after a single shell line (net before addf) is checked for whole files only.
+// What may still be incomplete after a single shell line (net before addf) is checked for whole
+// files only.
 void check_all(const Model& model, bool whole, bool complete, bool open, Diagnostics& diagnostics) {
     check_periods(model, diagnostics);
     check_spread_pins(model, diagnostics);
@@ -88,8 +112,11 @@ void check_all(const Model& model, bool whole, bool complete, bool open, Diagnos
     if (!whole) return;
     // a file that has looked at its values before its first addf is not complete yet
     const bool scheduled =
-        std::any_of(model.threads.begin(), model.threads.end(), [](const auto& thread) { return !thread->functions.empty(); });
-    if ((complete || scheduled) && !open) check_unthreaded_functions(model, diagnostics);
+        std::any_of(model.threads.begin(), model.threads.end(),
+                    [](const auto& thread) { return !thread->functions.empty(); });
+    if ((complete || scheduled) && !open) {
+        check_unthreaded_functions(model, diagnostics);
+    }
     check_cross_thread_io(model, diagnostics);
     check_stale_reads(model, diagnostics);
 }
@@ -101,21 +128,32 @@ bool Transaction::commit(Diagnostics& diagnostics) {
     Session& session = *std::exchange(session_, nullptr);
     SessionState& s = *session.state_;
     bool good = false;
-    if (s.edit) s.edit->absences().report(diagnostics);
+    if (s.edit) {
+        s.edit->absences().report(diagnostics);
+    }
     try {
-        if (std::exchange(s.needs_threads, false)) s.all_answer(diagnostics);
+        if (std::exchange(s.needs_threads, false)) {
+            s.all_answer(diagnostics);
+        }
         good = !diagnostics.failed() && (!s.edit || s.carry_out(diagnostics));
     } catch (const std::bad_alloc&) {
         s.out_of_memory(diagnostics);
     }
     s.offer_names(diagnostics);  // also those that are rolled back now
-    // Nothing runs under `hal check`: what could be made stays, so that the texts after this one are checked against it.
-    if (!good && s.edit && s.options.check_only) s.close_edit();
-    else if (!good && s.edit) s.withdraw(&diagnostics);
+    // Nothing runs under `hal check`: what could be made stays, so that the texts after this one
+    // are checked against it.
+    if (!good && s.edit && s.options.check_only) {
+        s.close_edit();
+    } else if (!good && s.edit) {
+        s.withdraw(&diagnostics);
+    }
     s.open = false;
     const auto actions = std::exchange(s.when_committed, {});
-    if (good)
-        for (const auto& action : actions) action();
+    if (good) {
+        for (const auto& action : actions) {
+            action();
+        }
+    }
     return good;
 }
 
@@ -123,12 +161,17 @@ bool Transaction::commit(Diagnostics& diagnostics) {
 void SessionState::forget_reported(const Diagnostics& found, bool whole) {
     if (reported.empty()) return;
     std::set<std::string_view> messages;
-    for (const Diagnostic& one : found.all()) messages.insert(one.message);
-    std::erase_if(reported, [&](const auto& entry) { return (whole || !entry.second) && !messages.contains(entry.first); });
+    for (const Diagnostic& one : found.all()) {
+        messages.insert(one.message);
+    }
+    std::erase_if(reported, [&](const auto& entry) {
+        return (whole || !entry.second) && !messages.contains(entry.first);
+    });
 }
 
 bool SessionState::carry_out(Diagnostics& diagnostics) {
-    if (!edit->structural() && edit->pin_values.size() + edit->signal_values.size() <= Core::most_writes / 2) {
+    if (!edit->structural() &&
+        edit->pin_values.size() + edit->signal_values.size() <= Core::most_writes / 2) {
         if (!write_values(edit->pin_values, edit->signal_values, diagnostics)) return false;
         close_edit();
         return true;
@@ -140,61 +183,94 @@ bool SessionState::carry_out(Diagnostics& diagnostics) {
     forget_reported(found, whole);
     for (const Diagnostic& one : found.all()) {
         // a warning is printed once, not with every later edit
-        if (reported.emplace(one.message, whole).second || (one.severity == Severity::error && !options.check_only)) diagnostics.add(one);
+        if (reported.emplace(one.message, whole).second ||
+            (one.severity == Severity::error && !options.check_only)) {
+            diagnostics.add(one);
+        }
     }
     if (diagnostics.failed()) return false;
     if (options.check_only) {  // no thread takes them
-        for (const auto& [signal, value] : edit->signal_values) signal->value = value;
-        return close_edit(), true;
+        for (const auto& [signal, value] : edit->signal_values) {
+            signal->value = value;
+        }
+        close_edit();
+        return true;
     }
     if (!all_answer(diagnostics)) return false;
 
     for (Instance* const instance : edit->added_instances()) {
-        if (!instance->constructed || instance->started || model.find_instance(instance->name) != instance)
+        if (!instance->constructed || instance->started ||
+            model.find_instance(instance->name) != instance) {
             continue;  // unloaded again in the same edit
-        if (const Failure why = start_instance(*instance, model, *executor, status, journal.for_plugins()); !why.empty())
-            diagnostics.error(Code::named(why.code).value_or(Code("start-failed")), instance->loaded,
-                              "'" + instance->name + "' (" + instance->component->name + ") cannot start: " + why.text, "", why.help);
+        }
+        if (const Failure why =
+                start_instance(*instance, model, *executor, status, journal.for_plugins());
+            !why.empty()) {
+            diagnostics.error(Code::named(why.code).value_or(Code("start-failed")),
+                              instance->loaded,
+                              "'" + instance->name + "' (" + instance->component->name +
+                                  ") cannot start: " + why.text,
+                              "", why.help);
+        }
     }
     if (diagnostics.failed()) return false;
     touched = true;
     if (!start_replaced(diagnostics)) return false;
-    if (!make_threads(diagnostics) || !end_threads(edit->removed().threads, diagnostics) || !synchronise(diagnostics)) return false;
+    if (!make_threads(diagnostics) || !end_threads(edit->removed().threads, diagnostics) ||
+        !synchronise(diagnostics)) {
+        return false;
+    }
     stuck.clear();
     close_edit();
     return true;
 }
 
 // Values only: straight into the threads' queues, whatever the size of the machine.
-bool SessionState::write_values(const Notes<Pin, hal_value>& pins, const Notes<Signal, hal_value>& signals,
-                                  Diagnostics& diagnostics) {
+bool SessionState::write_values(const Notes<Pin, hal_value>& pins,
+                                const Notes<Signal, hal_value>& signals, Diagnostics& diagnostics) {
     std::vector<std::pair<Core*, std::vector<Write>>> rows;
     const auto write = [&](const Thread* thread, hal_value* to, hal_value value) {
         Core* const to_core = core(thread);
         if (!to_core) return;
-        auto row = std::find_if(rows.begin(), rows.end(), [&](const auto& one) { return one.first == to_core; });
-        if (row == rows.end()) row = rows.insert(row, {to_core, {}});
+        auto row = std::find_if(rows.begin(), rows.end(),
+                                [&](const auto& one) { return one.first == to_core; });
+        if (row == rows.end()) {
+            row = rows.insert(row, {to_core, {}});
+        }
         row->second.push_back({to, value});
     };
-    for (const auto& [pin, value] : pins) write(pin->home, pin->memory->slot, value);
+    for (const auto& [pin, value] : pins) {
+        write(pin->home, pin->memory->slot, value);
+    }
     for (const auto& [signal, value] : signals) {
         if (signal->cell) continue;
-        if (signal->home) write(signal->home, signal->slot, value);
-        else
-            for (const auto& [thread, copy] : signal->copies) write(thread, copy, value);
+        if (signal->home) {
+            write(signal->home, signal->slot, value);
+        } else {
+            for (const auto& [thread, copy] : signal->copies) {
+                write(thread, copy, value);
+            }
+        }
     }
-    for (const auto& [thread, one] : cores)
-        if (one->hung() && std::any_of(rows.begin(), rows.end(), [one = one](const auto& row) { return row.first == one; }))
+    for (const auto& [thread, one] : cores) {
+        if (one->hung() && std::any_of(rows.begin(), rows.end(),
+                                       [one = one](const auto& row) { return row.first == one; })) {
             hung_thread(*thread, *one, diagnostics);
+        }
+    }
     if (diagnostics.failed()) return false;
     if (!executor->write(rows, answer_timeout_ns)) {
-        diagnostics.error("silent-thread", {}, "a thread did not take the new value: one of its functions hangs", "",
+        diagnostics.error("silent-thread", {},
+                          "a thread did not take the new value: one of its functions hangs", "",
                           "see: show thread, show fault");
         return false;
     }
     for (const auto& [signal, value] : signals) {
-        if (signal->cell) __atomic_store_n(&signal->cell->raw, value.raw, __ATOMIC_RELAXED);
-        else if (!signal->home) signal->value = value;
+        if (signal->cell) {
+            __atomic_store_n(&signal->cell->raw, value.raw, __ATOMIC_RELAXED);
+        } else if (!signal->home) {
+            signal->value = value;
+        }
     }
     return true;
 }
@@ -207,7 +283,8 @@ void SessionState::out_of_memory(Diagnostics& diagnostics) {
 
 void SessionState::end_conditions(const Instance& instance) {
     const auto* const first = static_cast<const char*>(instance.memory);
-    const std::size_t size = instance.component->plugin ? instance.component->plugin->instance_size : 0;
+    const std::size_t size =
+        instance.component->plugin ? instance.component->plugin->instance_size : 0;
     executor->board().end_all(first, first + size);
 }
 
@@ -220,12 +297,16 @@ void SessionState::close_edit() {
         end_conditions(**it);
     }
     auto& replaced = edit->replaced();
-    for (auto one = replaced.rbegin(); one != replaced.rend(); ++one)
+    for (auto one = replaced.rbegin(); one != replaced.rend(); ++one) {
         for (auto it = one->other->instances.rbegin(); it != one->other->instances.rend(); ++it) {
             destroy_instance(**it);
             end_conditions(**it);
         }
-    if (!removed.instances.empty() || !replaced.empty()) faults.close_rows();  // another instance may soon be where theirs was
+    }
+    // another instance may soon be where theirs was
+    if (!removed.instances.empty() || !replaced.empty()) {
+        faults.close_rows();
+    }
     edit.reset();
     auto_orders.clear();
     before.pins.clear();

@@ -6,9 +6,9 @@
 #include <span>
 #include <utility>
 
-#include "text/diagnostic.hpp"
 #include "netlist/netlist.hpp"
 #include "netlist/usage.hpp"
+#include "text/diagnostic.hpp"
 
 namespace hal {
 
@@ -22,25 +22,28 @@ struct EditForm {
     bool arrows = false;  ///< arrows may stand among its arguments and are not counted
 };
 
-/// The open transaction of a session, made by Session::begin(). There is at most one at a time, and its owner holds
-/// the session's lock. Destruction rolls back. [setup]
+/// The open transaction of a session, made by Session::begin(). There is at most one at a time, and
+/// its owner holds the session's lock. Destruction rolls back. [setup]
 class Transaction {
 public:
     Transaction(Transaction&& other) noexcept : session_(std::exchange(other.session_, nullptr)) {}
     Transaction& operator=(Transaction&&) = delete;
     ~Transaction() { roll_back(); }
 
-    /// Elaborates one command, whose names of several things stand for a command each, by the form of its row in the command
-    /// table. Problems, among them a wrong number of arguments, go to `diagnostics`.
+    /// Elaborates one command, whose names of several things stand for a command each, by the form
+    /// of its row in the command table. Problems, among them a wrong number of arguments, go to
+    /// `diagnostics`.
     void apply(const EditForm& form, const Command& command, Diagnostics& diagnostics);
-    /// Queues an action that commit() carries out right after the edits have taken effect, in the order of these calls. A
-    /// transaction that is rolled back forgets it. The action may begin a transaction of its own.
+    /// Queues an action that commit() carries out right after the edits have taken effect, in the
+    /// order of these calls. A transaction that is rolled back forgets it. The action may begin a
+    /// transaction of its own.
     void when_committed(std::function<void()> action);
     Session& session() { return *session_; }
     /// It is rejected when a thread hangs at the commit: what is done then needs its answer.
     void needs_threads();
-    /// Ends the transaction: checks, starts new instances, compiles, swaps and returns true; or reports and rolls back everything.
-    /// With any error already in `diagnostics` it rolls back. Throws std::logic_error when the transaction has ended before.
+    /// Ends the transaction: checks, starts new instances, compiles, swaps and returns true; or
+    /// reports and rolls back everything. With any error already in `diagnostics` it rolls back.
+    /// Throws std::logic_error when the transaction has ended before.
     bool commit(Diagnostics& diagnostics);
     /// Ends the transaction and undoes everything. Does nothing when it has ended before.
     void roll_back();

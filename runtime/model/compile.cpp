@@ -11,21 +11,34 @@ namespace {
 template <class Action>
 void for_all_pins(const Model& model, Action action) {
     for (const auto& component : model.components) {
-        for (const auto& instance : component->instances)
-            for (const auto& pin : instance->pins) action(*pin);
-        for (const auto& function : component->functions)
-            for (const auto& pin : function->pins) action(*pin);
+        for (const auto& instance : component->instances) {
+            for (const auto& pin : instance->pins) {
+                action(*pin);
+            }
+        }
+        for (const auto& function : component->functions) {
+            for (const auto& pin : function->pins) {
+                action(*pin);
+            }
+        }
     }
-    for (const auto& thread : model.threads)
-        for (const auto& pin : thread->pins) action(*pin);
+    for (const auto& thread : model.threads) {
+        for (const auto& pin : thread->pins) {
+            action(*pin);
+        }
+    }
 }
 
 class Compiler {
 public:
     Compiler(const Model& model, const CompileInput& input) : model_(model), input_(input) {
-        for (const auto& component : model.components)
-            if (is_module(*component))
-                for (const auto& function : component->functions) module_functions_.push_back(function.get());
+        for (const auto& component : model.components) {
+            if (is_module(*component)) {
+                for (const auto& function : component->functions) {
+                    module_functions_.push_back(function.get());
+                }
+            }
+        }
     }
 
     Compiled run() {
@@ -36,17 +49,31 @@ public:
             out_.plans.emplace_back(thread.get(), std::move(plan));
         }
         out_.places.resize(model_.signals.size());
-        for (const auto& signal : model_.signals) find_home(*signal);
-        for (auto& [thread, plan] : out_.plans) lay_out(*thread, *plan);
-        for (auto& [thread, plan] : out_.plans) steps(*thread, *plan);
-        for (auto& place : out_.places) connect(place);
+        for (const auto& signal : model_.signals) {
+            find_home(*signal);
+        }
+        for (auto& [thread, plan] : out_.plans) {
+            lay_out(*thread, *plan);
+        }
+        for (auto& [thread, plan] : out_.plans) {
+            steps(*thread, *plan);
+        }
+        for (auto& place : out_.places) {
+            connect(place);
+        }
         for (const auto& [pair, at] : channels_) {
             plan::Export& out = plans_[pair.first]->exports[at.first];
-            out.channel = plans_[pair.second]->imports[at.second].channel = std::make_shared<plan::Channel>(out.from.size());
+            out.channel = plans_[pair.second]->imports[at.second].channel =
+                std::make_shared<plan::Channel>(out.from.size());
         }
         for_all_pins(model_, [this](Pin& pin) { bind(pin); });
-        for (auto& [thread, plan] : out_.plans) plan->scratch.resize(plan->carries.size());
-        for (const auto& wish : unknown_) out_.unknowns.push_back({&plans_[wish.plan]->carries[wish.index], wish.from, wish.owner});
+        for (auto& [thread, plan] : out_.plans) {
+            plan->scratch.resize(plan->carries.size());
+        }
+        for (const auto& wish : unknown_) {
+            out_.unknowns.push_back(
+                {&plans_[wish.plan]->carries[wish.index], wish.from, wish.owner});
+        }
         return std::move(out_);
     }
 
@@ -64,17 +91,23 @@ private:
     Thread* thread_for(const Pin& pin) const {
         if (pin.of_thread) return pin.of_thread;
         if (pin.function) return excluded(pin.function) ? nullptr : pin.function->thread;
-        for (const LoadedFunction* function : users_of(pin))
+        for (const LoadedFunction* function : users_of(pin)) {
             if (function->thread && !excluded(function)) return function->thread;
+        }
         return nullptr;
     }
 
-    // LinuxCNC modules call each other: the pins of one without a function, such as a kinematics module, are used by functions of others.
+    // LinuxCNC modules call each other: the pins of one without a function, such as a kinematics
+    // module, are used by functions of others.
     const std::vector<LoadedFunction*>& users_of(const Pin& pin) const {
-        return pin.instance->functions.empty() && pin.instance->component && is_module(*pin.instance->component) ? module_functions_ : pin.instance->functions;
+        return pin.instance->functions.empty() && pin.instance->component &&
+                       is_module(*pin.instance->component)
+                   ? module_functions_
+                   : pin.instance->functions;
     }
 
-    // A loose pin whose functions are in two threads, or that threads of its component's own use; what it is linked to cannot live with one of them.
+    // A loose pin whose functions are in two threads, or that threads of its component's own use;
+    // what it is linked to cannot live with one of them.
     bool spread(const Pin& pin) const {
         if (!is_loose(pin)) return false;
         if (pin.instance->own_threads) return true;
@@ -88,15 +121,20 @@ private:
     }
 
     // The pin's slot is the cell itself, not a copy of it.
-    bool in_cell(const Compiled::Place& place, const Pin& pin) const { return place.cell && (pin.dir != HAL_DIR_IN || spread(pin)); }
+    bool in_cell(const Compiled::Place& place, const Pin& pin) const {
+        return place.cell && (pin.dir != HAL_DIR_IN || spread(pin));
+    }
 
-    // Values live with their writer: an OUT pin's thread, the thread of all I/O pins, or a cell they share.
+    // Values live with their writer: an OUT pin's thread, the thread of all I/O pins, or a cell
+    // they share.
     void find_home(Signal& signal) {
         Compiled::Place& place = out_.places[signal.index];
         place = {&signal, nullptr, nullptr, {}, nullptr};
         if (signal.type != HAL_TYPE_PORT &&
-            std::any_of(signal.pins.begin(), signal.pins.end(), [this](const Pin* pin) { return spread(*pin); })) {
-            place.cell = signal.cell ? signal.cell : std::make_shared<hal_value>(known_value(signal));
+            std::any_of(signal.pins.begin(), signal.pins.end(),
+                        [this](const Pin* pin) { return spread(*pin); })) {
+            place.cell =
+                signal.cell ? signal.cell : std::make_shared<hal_value>(known_value(signal));
             place.slot = place.cell.get();
         } else if (signal.writer) {
             place.home = thread_for(*signal.writer);
@@ -111,7 +149,8 @@ private:
             }
             if (several) {
                 place.home = nullptr;
-                place.cell = signal.cell ? signal.cell : std::make_shared<hal_value>(known_value(signal));
+                place.cell =
+                    signal.cell ? signal.cell : std::make_shared<hal_value>(known_value(signal));
                 place.slot = place.cell.get();
             }
         }
@@ -119,9 +158,13 @@ private:
 
     // For a cell made now, before any thread takes part: what the session knows.
     hal_value known_value(const Signal& signal) const {
-        if (const auto at = input_.signal_values->find(&signal); at != input_.signal_values->end()) return at->second;
-        if (const auto at = input_.inherited->find(&signal); at != input_.inherited->end())
+        if (const auto at = input_.signal_values->find(&signal);
+            at != input_.signal_values->end()) {
+            return at->second;
+        }
+        if (const auto at = input_.inherited->find(&signal); at != input_.inherited->end()) {
             return *present(*at->second).slot;
+        }
         return *signal.slot;
     }
 
@@ -132,28 +175,46 @@ private:
             if (!pin.signal || thread_for(pin) != &thread) return;
             Compiled::Place& place = out_.places[pin.signal->index];
             if (in_cell(place, pin)) return;
-            const bool there = place.home == &thread ? place.slot != nullptr
-                                                     : std::any_of(place.copies.begin(), place.copies.end(),
-                                                                   [&](const auto& c) { return c.first == &thread; });
+            const bool there = place.home == &thread
+                                   ? place.slot != nullptr
+                                   : std::any_of(place.copies.begin(), place.copies.end(),
+                                                 [&](const auto& c) { return c.first == &thread; });
             if (there) return;
             static hal_value pending;  // a mark until the image exists
-            if (place.home == &thread) place.slot = &pending;
-            else place.copies.emplace_back(&thread, &pending);
+            if (place.home == &thread) {
+                place.slot = &pending;
+            } else {
+                place.copies.emplace_back(&thread, &pending);
+            }
             wanted.push_back(&place);
         };
-        for (const auto* row : {&thread.init, &thread.functions})
+        for (const auto* row : {&thread.init, &thread.functions}) {
             for (const LoadedFunction* function : *row) {
                 if (excluded(function)) continue;
-                for (const Instance* instance : function->instances)
-                    for (const auto& pin : instance->pins) want(*pin);
-                for (const auto& pin : function->pins) want(*pin);
+                for (const Instance* instance : function->instances) {
+                    for (const auto& pin : instance->pins) {
+                        want(*pin);
+                    }
+                }
+                for (const auto& pin : function->pins) {
+                    want(*pin);
+                }
             }
-        for (const auto& component : model_.components)
-            if (is_module(*component))
-                for (const auto& instance : component->instances)
-                    if (instance->functions.empty())
-                        for (const auto& pin : instance->pins) want(*pin);
-        for (const auto& pin : thread.pins) want(*pin);
+        }
+        for (const auto& component : model_.components) {
+            if (is_module(*component)) {
+                for (const auto& instance : component->instances) {
+                    if (instance->functions.empty()) {
+                        for (const auto& pin : instance->pins) {
+                            want(*pin);
+                        }
+                    }
+                }
+            }
+        }
+        for (const auto& pin : thread.pins) {
+            want(*pin);
+        }
 
         plan.image_size = wanted.size();
         plan.image = std::make_unique<hal_value[]>(wanted.size());
@@ -162,17 +223,24 @@ private:
             if (wanted[i]->home == &thread) {
                 wanted[i]->slot = slot;
             } else {
-                for (auto& [reader, copy] : wanted[i]->copies)
-                    if (reader == &thread) copy = slot;
+                for (auto& [reader, copy] : wanted[i]->copies) {
+                    if (reader == &thread) {
+                        copy = slot;
+                    }
+                }
             }
         }
     }
 
     void steps(Thread& thread, plan::Plan& plan) {
         std::size_t checks = 0;
-        for (const auto* row : {&thread.init, &thread.functions})
-            for (const LoadedFunction* function : *row)
-                for (const Instance* instance : function->instances) checks += instance->finite.size();
+        for (const auto* row : {&thread.init, &thread.functions}) {
+            for (const LoadedFunction* function : *row) {
+                for (const Instance* instance : function->instances) {
+                    checks += instance->finite.size();
+                }
+            }
+        }
         plan.finite_checks = std::make_unique<plan::FiniteCheck[]>(checks);
         std::size_t check = 0;
         std::unordered_set<const Instance*> met;
@@ -182,16 +250,22 @@ private:
                 if (excluded(function)) continue;
                 const auto begin = static_cast<std::uint32_t>(to.size());
                 to.insert(to.end(), function->steps.begin(), function->steps.end());
-                for (const Instance* instance : function->instances)
+                for (const Instance* instance : function->instances) {
                     for (const Pin* pin : instance->finite) {
                         if (pin->function && pin->function != function) continue;
-                        plan.finite_checks[check] = {pin->memory, pin->safe, pin->id, input_.core_of(thread), false};
+                        plan.finite_checks[check] = {pin->memory, pin->safe, pin->id,
+                                                     input_.core_of(thread), false};
                         to.push_back({input_.check_finite, &plan.finite_checks[check++]});
                     }
-                functions.push_back({begin, static_cast<std::uint32_t>(to.size()), function->id, function->times.get()});
-                for (const Instance* instance : function->instances)
-                    if (met.insert(instance).second)
-                        plan.emergency.insert(plan.emergency.end(), instance->emergency.begin(), instance->emergency.end());
+                }
+                functions.push_back({begin, static_cast<std::uint32_t>(to.size()), function->id,
+                                     function->times.get()});
+                for (const Instance* instance : function->instances) {
+                    if (met.insert(instance).second) {
+                        plan.emergency.insert(plan.emergency.end(), instance->emergency.begin(),
+                                              instance->emergency.end());
+                    }
+                }
             }
         };
         fill(thread.init, plan.init_steps, plan.init);
@@ -202,15 +276,23 @@ private:
 
     void rows(const Thread& thread, plan::Plan& plan) const {
         std::unordered_map<hal_step, hal_row> known;
-        for (const LoadedFunction* function : thread.functions)
-            if (function->row.run) known[function->row.step] = function->row.run;
+        for (const LoadedFunction* function : thread.functions) {
+            if (function->row.run) {
+                known[function->row.step] = function->row.run;
+            }
+        }
         const auto add = [&](hal_row row, std::size_t end) {
-            if (!plan.rows.empty() && !row && !plan.rows.back().run) plan.rows.back().end = static_cast<std::uint32_t>(end);
-            else plan.rows.push_back({row, static_cast<std::uint32_t>(end)});
+            if (!plan.rows.empty() && !row && !plan.rows.back().run) {
+                plan.rows.back().end = static_cast<std::uint32_t>(end);
+            } else {
+                plan.rows.push_back({row, static_cast<std::uint32_t>(end)});
+            }
         };
         for (std::size_t begin = 0, end; begin < plan.steps.size(); begin = end) {
             const hal_step step = plan.steps[begin].step;
-            for (end = begin + 1; end < plan.steps.size() && plan.steps[end].step == step;) ++end;
+            for (end = begin + 1; end < plan.steps.size() && plan.steps[end].step == step;) {
+                ++end;
+            }
             const auto row = end - begin < plan::Row::worth ? known.end() : known.find(step);
             add(row == known.end() ? nullptr : row->second, end);
         }
@@ -218,16 +300,23 @@ private:
 
     // Instances of one loadrt lie in a row: mostly one entry for all of them.
     void note_working_set(const Thread& thread, plan::Plan& plan) const {
-        constexpr std::size_t gap = 64;     // closer than that is in a row
-        constexpr std::size_t code = 2048;  // assumed size of a function's code: its length is unknown
+        constexpr std::size_t gap = 64;  // closer than that is in a row
+        // assumed size of a function's code: its length is unknown
+        constexpr std::size_t code = 2048;
         auto& set = plan.working_set;
         set.push_back({plan.steps.data(), plan.steps.size() * sizeof(plan::Step)});
         set.push_back({plan.image.get(), plan.image_size * sizeof(hal_value)});
         std::unordered_set<hal_step> met;
-        for (const plan::Step& step : plan.steps)
-            if (met.insert(step.step).second) set.push_back({reinterpret_cast<const void*>(step.step), code});
-        for (const plan::Row& row : plan.rows)
-            if (row.run) set.push_back({reinterpret_cast<const void*>(row.run), code});
+        for (const plan::Step& step : plan.steps) {
+            if (met.insert(step.step).second) {
+                set.push_back({reinterpret_cast<const void*>(step.step), code});
+            }
+        }
+        for (const plan::Row& row : plan.rows) {
+            if (row.run) {
+                set.push_back({reinterpret_cast<const void*>(row.run), code});
+            }
+        }
         const std::size_t before = set.size();
         for (const LoadedFunction* function : thread.functions) {
             if (excluded(function)) continue;
@@ -236,18 +325,25 @@ private:
                 const std::size_t bytes = instance->component->plugin->instance_size;
                 plan::Memory& last = set.back();
                 const auto end = reinterpret_cast<std::uintptr_t>(last.begin) + last.bytes;
-                if (set.size() > before && begin >= end && begin - end < gap) last.bytes += begin - end + bytes;
-                else set.push_back({instance->memory, bytes});
+                if (set.size() > before && begin >= end && begin - end < gap) {
+                    last.bytes += begin - end + bytes;
+                } else {
+                    set.push_back({instance->memory, bytes});
+                }
             }
         }
         // what instances have beside their own memory: once each, in a row where it lies so
         std::unordered_set<const Instance*> noted;
-        for (const LoadedFunction* function : thread.functions)
-            for (const Instance* instance : function->instances)
+        for (const LoadedFunction* function : thread.functions) {
+            for (const Instance* instance : function->instances) {
                 if (!excluded(function) && noted.insert(instance).second) {
-                    for (const Instance::Block& block : instance->blocks) set.push_back({block.memory.get(), block.used});
+                    for (const Instance::Block& block : instance->blocks) {
+                        set.push_back({block.memory.get(), block.used});
+                    }
                     set.insert(set.end(), instance->further.begin(), instance->further.end());
                 }
+            }
+        }
     }
 
     plan::Export& channel(Thread* from, Thread* to) {
@@ -271,7 +367,9 @@ private:
             place.slot = &signal.value;
         }
         if (place.cell) {
-            for (const auto& [thread, plan] : plans_) plan->keep.push_back(place.cell);
+            for (const auto& [thread, plan] : plans_) {
+                plan->keep.push_back(place.cell);
+            }
         }
         for (auto& [reader, slot] : place.copies) {
             carry(signal, reader, slot);
@@ -288,20 +386,28 @@ private:
     void carry(Signal& signal, Thread* thread, hal_value* to) {
         const hal_value* from = nullptr;
         hal_value value{};
-        if (const auto set = input_.signal_values->find(&signal); set != input_.signal_values->end()) {
+        if (const auto set = input_.signal_values->find(&signal);
+            set != input_.signal_values->end()) {
             value = set->second;
-        } else if (const auto given = input_.inherited->find(&signal); given != input_.inherited->end()) {
+        } else if (const auto given = input_.inherited->find(&signal);
+                   given != input_.inherited->end()) {
             const Pin& pin = *given->second;
-            if (const auto pinned = input_.pin_values->find(given->second); pinned != input_.pin_values->end()) value = pinned->second;
-            else if (pin.home == thread) from = present(pin).slot;
-            else if (!pin.home) value = *present(pin).slot;
-            else return unknown(thread, to, present(pin).slot, pin.home);
+            if (const auto pinned = input_.pin_values->find(given->second);
+                pinned != input_.pin_values->end()) {
+                value = pinned->second;
+            } else if (pin.home == thread) {
+                from = present(pin).slot;
+            } else if (!pin.home) {
+                value = *present(pin).slot;
+            } else {
+                return unknown(thread, to, present(pin).slot, pin.home);
+            }
         } else if (signal.cell) {
             from = signal.cell.get();
         } else if (signal.home == thread) {
             from = signal.slot;
-        } else if (const auto copy =
-                       std::find_if(signal.copies.begin(), signal.copies.end(), [&](const auto& c) { return c.first == thread; });
+        } else if (const auto copy = std::find_if(signal.copies.begin(), signal.copies.end(),
+                                                  [&](const auto& c) { return c.first == thread; });
                    copy != signal.copies.end() && signal.home) {
             from = copy->second;
         } else if (!signal.home) {
@@ -319,32 +425,54 @@ private:
 
     void bind(Pin& pin) {
         Thread* const thread = thread_for(pin);
-        if (thread != pin.home) out_.homes.emplace_back(&pin, thread);
+        if (thread != pin.home) {
+            out_.homes.emplace_back(&pin, thread);
+        }
         plan::Plan* const plan = thread ? plans_[thread] : nullptr;
         hal_value* slot = &pin.memory->own;
         const hal_pin& now = present(pin);
         if (pin.signal) {
             const Compiled::Place& place = out_.places[pin.signal->index];
-            if (!thread) slot = in_cell(place, pin) ? place.slot : &pin.signal->value;
-            else if (in_cell(place, pin)) slot = place.slot;
-            else if (place.home == thread) slot = place.slot;
-            else
-                for (const auto& [reader, copy] : place.copies)
-                    if (reader == thread) slot = copy;
-        } else if (const auto set = input_.pin_values->find(&pin); set != input_.pin_values->end() && plan) {
+            if (!thread) {
+                slot = in_cell(place, pin) ? place.slot : &pin.signal->value;
+            } else if (in_cell(place, pin)) {
+                slot = place.slot;
+            } else if (place.home == thread) {
+                slot = place.slot;
+            } else {
+                for (const auto& [reader, copy] : place.copies) {
+                    if (reader == thread) {
+                        slot = copy;
+                    }
+                }
+            }
+        } else if (const auto set = input_.pin_values->find(&pin);
+                   set != input_.pin_values->end() && plan) {
             plan->carries.push_back({slot, nullptr, set->second});
         } else if (now.slot != slot && plan) {
             // an unlinked pin keeps the last value; a stream's buffer stays with its signal
-            if (pin.type == HAL_TYPE_PORT) plan->carries.push_back({slot, nullptr, {.raw = 0}});
-            else if (pin.home == thread) plan->carries.push_back({slot, now.slot, {}});
-            else plan->carries.push_back({slot, nullptr, *now.slot});
+            if (pin.type == HAL_TYPE_PORT) {
+                plan->carries.push_back({slot, nullptr, {.raw = 0}});
+            } else if (pin.home == thread) {
+                plan->carries.push_back({slot, now.slot, {}});
+            } else {
+                plan->carries.push_back({slot, nullptr, *now.slot});
+            }
         }
         if (pin.memory->slot != slot || (&now != pin.memory && !plan)) {
-            if (plan) plan->rebinds.push_back({pin.memory, slot});
-            else out_.session_rebinds.push_back({pin.memory, slot, now.slot, pin.type != HAL_TYPE_PORT});
+            if (plan) {
+                plan->rebinds.push_back({pin.memory, slot});
+            } else {
+                out_.session_rebinds.push_back(
+                    {pin.memory, slot, now.slot, pin.type != HAL_TYPE_PORT});
+            }
         }
-        if (pin.pointer) (plan ? plan->pointers : out_.session_pointers).push_back({pin.pointer, slot});
-        if (plan && (pin.flags & HAL_PIN_SAFE)) plan->safe.push_back({pin.memory, pin.safe});
+        if (pin.pointer) {
+            (plan ? plan->pointers : out_.session_pointers).push_back({pin.pointer, slot});
+        }
+        if (plan && (pin.flags & HAL_PIN_SAFE)) {
+            plan->safe.push_back({pin.memory, pin.safe});
+        }
     }
 
     struct Wish {
@@ -366,15 +494,20 @@ private:
 
 }  // namespace
 
-Compiled compile(const Model& model, const CompileInput& input) { return Compiler(model, input).run(); }
+Compiled compile(const Model& model, const CompileInput& input) {
+    return Compiler(model, input).run();
+}
 
 std::unordered_set<const LoadedFunction*> moving(const Model& model) {
     std::unordered_set<const LoadedFunction*> functions;
     for_all_pins(model, [&](const Pin& pin) {
         Thread* const to = thread_of(pin);
         if (!pin.home || !to || pin.home == to) return;
-        if (pin.function) functions.insert(pin.function);
-        else if (pin.instance) functions.insert(pin.instance->functions.begin(), pin.instance->functions.end());
+        if (pin.function) {
+            functions.insert(pin.function);
+        } else if (pin.instance) {
+            functions.insert(pin.instance->functions.begin(), pin.instance->functions.end());
+        }
     });
     return functions;
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// From the model to a plan per thread. Pure: reads the model, changes nothing; the session applies the result.
+// From the model to a plan per thread. Pure: reads the model, changes nothing; the session applies
+// the result.
 #pragma once
 
 #include <functional>
@@ -23,7 +24,8 @@ struct CompileInput {
     const Notes<Pin, hal_value>* pin_values = nullptr;
     const Notes<Signal, hal_value>* signal_values = nullptr;
     const Notes<Signal, Pin*>* inherited = nullptr;
-    const std::unordered_map<const Pin*, hal_pin*>* old_memory = nullptr;  ///< of pins whose instance was replaced
+    /// of pins whose instance was replaced
+    const std::unordered_map<const Pin*, hal_pin*>* old_memory = nullptr;
     std::function<void*(const Thread&)> core_of;  ///< the sink of finite checks
     hal_step check_finite = nullptr;
 };
@@ -44,10 +46,12 @@ struct Compiled {
         hal_pin* pin;
         hal_value* slot;
         const hal_value* from;  ///< where its value is now
-        bool keeps_value;  ///< what it had when it was linked; false for a port, whose buffer stays with its signal
+        /// what it had when it was linked; false for a port, whose buffer stays with its signal
+        bool keeps_value;
     };
-    std::vector<SessionRebind> session_rebinds;       ///< of pins that no thread uses; done after the swap
-    std::vector<plan::Pointer> session_pointers;      ///< with them
+    /// of pins that no thread uses; done after the swap
+    std::vector<SessionRebind> session_rebinds;
+    std::vector<plan::Pointer> session_pointers;  ///< with them
     /// Carries whose value another thread owns now: to be observed and filled in before the swap.
     struct Unknown {
         plan::Carry* carry;
@@ -59,7 +63,8 @@ struct Compiled {
 
 Compiled compile(const Model& model, const CompileInput& input);
 
-/// Functions whose instances move from one thread to another: they need two swaps. Empty: one is enough.
+/// Functions whose instances move from one thread to another: they need two swaps. Empty: one is
+/// enough.
 std::unordered_set<const LoadedFunction*> moving(const Model& model);
 
 }  // namespace hal

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Edits of the model as one transaction: every rule a single edit can break is checked here, with the place of every
-// word; everything can be rolled back. LinuxCNC's rules (docs/linuxcnc-compatibility.md).
+// Edits of the model as one transaction: every rule a single edit can break is checked here, with
+// the place of every word; everything can be rolled back. LinuxCNC's rules
+// (docs/linuxcnc-compatibility.md).
 #pragma once
 
 #include <algorithm>
@@ -13,10 +14,10 @@
 #include <unordered_set>
 #include <vector>
 
-#include "text/diagnostic.hpp"
 #include "model/absence.hpp"
 #include "model/model.hpp"
 #include "model/names.hpp"
+#include "text/diagnostic.hpp"
 
 namespace hal {
 
@@ -42,7 +43,8 @@ public:
     Signal* add_signal(Word name, hal_type type, Span typed_at);
     bool remove_signal(Word name);
     bool remove_all_signals();
-    /// Links a pin to a signal if the rules allow it. Accepts a pin that is already linked to this signal.
+    /// Links a pin to a signal if the rules allow it. Accepts a pin that is already linked to this
+    /// signal.
     bool link(Pin& pin, Signal& signal, Word pin_word, Arrow arrow);
     void unlink(Pin& pin);
 
@@ -66,13 +68,16 @@ public:
 
     // --- components and instances -----------------------------------------------------------------------------------
     LoadedComponent& add_component(std::string name, Span at);
-    /// Takes an instance with its pins and functions into the indices; reports names that are taken.
-    /// Leaves `instance` unchanged on failure.
+    /// Takes an instance with its pins and functions into the indices; reports names that are
+    /// taken. Leaves `instance` unchanged on failure.
     bool add_instance(LoadedComponent& component, std::unique_ptr<Instance>& instance,
                       std::vector<std::unique_ptr<LoadedFunction>> functions);
-    /// An instance that this edit has added gets further pins and functions. Reports names that are taken.
-    bool add_declared(Instance& instance, std::vector<std::unique_ptr<Pin>> pins, std::vector<std::unique_ptr<LoadedFunction>> functions);
-    /// A program's component gets pins; they belong to no thread, so no plan changes. Reports names that are taken.
+    /// An instance that this edit has added gets further pins and functions. Reports names that are
+    /// taken.
+    bool add_declared(Instance& instance, std::vector<std::unique_ptr<Pin>> pins,
+                      std::vector<std::unique_ptr<LoadedFunction>> functions);
+    /// A program's component gets pins; they belong to no thread, so no plan changes. Reports names
+    /// that are taken.
     bool add_pins(Instance& instance, std::vector<std::unique_ptr<Pin>> pins, Span at);
     /// Removes pins of a program's component that are in no signal.
     void remove_pins(Instance& instance, const std::vector<Pin*>& pins);
@@ -88,9 +93,10 @@ public:
     void remove_instance(Instance& instance);
     void remove_component(LoadedComponent& component);
     void add_time_pins(LoadedFunction& function);
-    /// Exchanges a component's code and instances with those of `fresh`, which was made beside the model and has an instance for
-    /// each. Pins and functions that both declare stay the same objects: links, values, places in threads and times are kept.
-    /// False after reporting what stands against it; then `fresh` is as it was.
+    /// Exchanges a component's code and instances with those of `fresh`, which was made beside the
+    /// model and has an instance for each. Pins and functions that both declare stay the same
+    /// objects: links, values, places in threads and times are kept. False after reporting what
+    /// stands against it; then `fresh` is as it was.
     bool replace(LoadedComponent& component, std::unique_ptr<LoadedComponent>& fresh, Span at);
 
     // --- look-ups that report ---------------------------------------------------------------------------------------
@@ -100,13 +106,18 @@ public:
     Thread* thread(Word name);
     /// What could not be made: a missing pin, function or the like of it is not an error again.
     Absences& absences() { return absences_; }
-    bool is_absent(std::string_view name, Absences::Kind kind) { return absences_.explains(name, kind, model_); }
+    bool is_absent(std::string_view name, Absences::Kind kind) {
+        return absences_.explains(name, kind, model_);
+    }
 
     // --- what the transaction did -----------------------------------------------------------------------------------
     bool structural() const { return structural_; }
-    bool changed() const { return structural_ || !pin_values.empty() || !signal_values.empty() || !undo_.empty(); }
+    bool changed() const {
+        return structural_ || !pin_values.empty() || !signal_values.empty() || !undo_.empty();
+    }
     void undo();
-    /// Forgets how to undo; what was removed is handed over to be destroyed after the threads have let go of it.
+    /// Forgets how to undo; what was removed is handed over to be destroyed after the threads have
+    /// let go of it.
     struct Removed {
         std::vector<std::unique_ptr<Instance>> instances;
         std::vector<std::unique_ptr<Pin>> pins;
@@ -118,7 +129,8 @@ public:
     };
     Removed& removed() { return removed_; }
     const std::vector<Instance*>& added_instances() const { return added_instances_; }
-    /// A component that was replaced, and the one that is not in the model: the old one; after undo() the new one.
+    /// A component that was replaced, and the one that is not in the model: the old one; after
+    /// undo() the new one.
     struct Replaced {
         LoadedComponent* component;
         std::unique_ptr<LoadedComponent> other;
@@ -126,7 +138,8 @@ public:
     };
     std::deque<Replaced>& replaced() { return replaced_; }
 
-    // New values of what the threads own now; for the compiler (structural) or the write queues (not).
+    // New values of what the threads own now; for the compiler (structural) or the write queues
+    // (not).
     Notes<Pin, hal_value> pin_values;
     Notes<Signal, hal_value> signal_values;
     Notes<Signal, Pin*> inherited;  ///< a signal that takes the value the pin has
@@ -142,17 +155,22 @@ private:
     void change_alias(Pin& pin, std::string alias);
     void warn_of_wrap(Word value, hal_type type, const Parsed& parsed);
     bool unknown_name(Code code, Word name, const char* what, NameGroup group, std::string help);
-    bool fail(Code code, Span at, std::string message, std::string label = "", std::string help = "");
+    bool fail(Code code, Span at, std::string message, std::string label = "",
+              std::string help = "");
     bool name_free(std::string_view name, Span at, const char* what);
-    bool names_free(const Instance& of, const std::vector<std::unique_ptr<Pin>>& pins, const std::vector<std::unique_ptr<LoadedFunction>>& functions);
+    bool names_free(const Instance& of, const std::vector<std::unique_ptr<Pin>>& pins,
+                    const std::vector<std::unique_ptr<LoadedFunction>>& functions);
     void enter_functions(LoadedComponent& component, std::size_t before);
     void withdraw_functions(LoadedComponent& of, std::size_t before);
     void keep_value(Pin& pin);
-    // Memory may end at any line. So every edit first allocates the space that it needs, then registers its undo action, and only
-    // then changes the model, without allocating; entries of an index come last, and undoing copes with missing ones.
+    // Memory may end at any line. So every edit first allocates the space that it needs, then
+    // registers its undo action, and only then changes the model, without allocating; entries of an
+    // index come last, and undoing copes with missing ones.
     template <class T>
     static void make_room(std::vector<T>& row, std::size_t more = 1) {
-        if (row.capacity() - row.size() < more) row.reserve(row.size() + std::max(more, row.size()));
+        if (row.capacity() - row.size() < more) {
+            row.reserve(row.size() + std::max(more, row.size()));
+        }
     }
     void on_undo(std::function<void()> action) { undo_.push_back(std::move(action)); }
 

@@ -13,18 +13,24 @@ template <class T>
 std::vector<std::string> names(const Index<T>& index) {
     std::vector<std::string> all;
     all.reserve(index.size());
-    for (const auto& [name, object] : index) all.emplace_back(name);
+    for (const auto& [name, object] : index) {
+        all.emplace_back(name);
+    }
     return all;
 }
 
 // "inputs of pos (pid): enable, command" for a name that begins with an instance's
 std::string pins_of_instance(const Model& model, std::string_view name) {
-    for (auto dot = name.rfind('.'); dot != std::string_view::npos && dot != 0; dot = name.rfind('.', dot - 1)) {
+    for (auto dot = name.rfind('.'); dot != std::string_view::npos && dot != 0;
+         dot = name.rfind('.', dot - 1)) {
         const Instance* const instance = model.find_instance(name.substr(0, dot));
         if (!instance) continue;
         std::vector<std::string> pins;
-        for (const auto& pin : instance->pins) pins.push_back(pin->name.substr(dot + 1));
-        return "pins of " + instance->name + " (" + instance->component->name + "): " + listed(pins, 16);
+        for (const auto& pin : instance->pins) {
+            pins.push_back(pin->name.substr(dot + 1));
+        }
+        return "pins of " + instance->name + " (" + instance->component->name +
+               "): " + listed(pins, 16);
     }
     return {};
 }
@@ -34,15 +40,22 @@ std::string nothing_yet(std::string_view kind) { return "no " + std::string(kind
 }  // namespace
 
 std::string conversion(hal_type from, hal_type to) {
-    if (from == to || !row(from).number || !row(to).number) return {};
-    if (from == HAL_TYPE_BIT || to != HAL_TYPE_BIT || from == HAL_TYPE_S32 || from == HAL_TYPE_U32)
+    if (from == to || !row(from).number || !row(to).number) {
+        return {};
+    }
+    if (from == HAL_TYPE_BIT || to != HAL_TYPE_BIT || from == HAL_TYPE_S32 ||
+        from == HAL_TYPE_U32) {
         return std::string("conv_") + name(from) + "_" + name(to);
+    }
     return {};
 }
 
 bool Edit::unknown_name(Code code, Word name, const char* what, NameGroup group, std::string help) {
-    UnknownName unknown{.name = std::string(name.text), .group = static_cast<std::uint32_t>(group), .before = model_.next_id};
-    diagnostics->error(code, name.span, std::string("unknown ") + what + " " + quoted(name.text), std::move(unknown), std::move(help));
+    UnknownName unknown{.name = std::string(name.text),
+                        .group = static_cast<std::uint32_t>(group),
+                        .before = model_.next_id};
+    diagnostics->error(code, name.span, std::string("unknown ") + what + " " + quoted(name.text),
+                       std::move(unknown), std::move(help));
     return false;
 }
 
@@ -55,9 +68,13 @@ Pin* Edit::pin(Word name) {
     if (Pin* const found = model_.find_pin(name.text)) return found;
     if (is_absent(name.text, Absences::Kind::pin)) return nullptr;
     std::string help = pins_of_instance(model_, name.text);
-    if (model_.find_signal(name.text))
-        help = quoted(name.text) + " is a signal; gets and sets take signals, net takes one signal and then pins";
-    if (help.empty() && model_.pin.empty()) help = nothing_yet("pin") + "; loadrt creates instances with pins";
+    if (model_.find_signal(name.text)) {
+        help = quoted(name.text) +
+               " is a signal; gets and sets take signals, net takes one signal and then pins";
+    }
+    if (help.empty() && model_.pin.empty()) {
+        help = nothing_yet("pin") + "; loadrt creates instances with pins";
+    }
     unknown_name("no-such-pin", name, "pin", NameGroup::pins, std::move(help));
     return nullptr;
 }
@@ -65,9 +82,10 @@ Pin* Edit::pin(Word name) {
 Signal* Edit::signal(Word name) {
     if (Signal* const found = model_.find_signal(name.text)) return found;
     if (is_absent(name.text, Absences::Kind::signal)) return nullptr;
-    std::string help = model_.find_pin(name.text) ? quoted(name.text) + " is a pin; getp, setp and unlinkp take pins"
-                             : model_.signal.empty()    ? nothing_yet("signal") + "; net creates signals"
-                                                        : "";
+    std::string help = model_.find_pin(name.text)
+                           ? quoted(name.text) + " is a pin; getp, setp and unlinkp take pins"
+                       : model_.signal.empty() ? nothing_yet("signal") + "; net creates signals"
+                                               : "";
     unknown_name("no-such-signal", name, "signal", NameGroup::signals, std::move(help));
     return nullptr;
 }
@@ -78,8 +96,12 @@ LoadedFunction* Edit::function(Word name) {
     std::string help;
     if (const Instance* const instance = model_.find_instance(name.text)) {
         std::vector<std::string> own;
-        for (const LoadedFunction* function : instance->functions) own.push_back(function->name);
-        if (!own.empty()) help = "functions of " + instance->name + ": " + listed(own);
+        for (const LoadedFunction* function : instance->functions) {
+            own.push_back(function->name);
+        }
+        if (!own.empty()) {
+            help = "functions of " + instance->name + ": " + listed(own);
+        }
     }
     unknown_name("no-such-function", name, "function", NameGroup::functions, std::move(help));
     return nullptr;
@@ -88,22 +110,31 @@ LoadedFunction* Edit::function(Word name) {
 Thread* Edit::thread(Word name) {
     if (Thread* const found = model_.find_thread(name.text)) return found;
     if (is_absent(name.text, Absences::Kind::thread)) return nullptr;
-    const std::string help = model_.threads.empty() ? "create one first: loadrt threads name1=servo-thread period1=1000000"
-                                                     : "threads: " + listed(names(model_.thread));
-    fail("no-such-thread", name.span, "unknown thread " + quoted(name.text), did_you_mean(name.text, names(model_.thread)), help);
+    const std::string help =
+        model_.threads.empty()
+            ? "create one first: loadrt threads name1=servo-thread period1=1000000"
+            : "threads: " + listed(names(model_.thread));
+    fail("no-such-thread", name.span, "unknown thread " + quoted(name.text),
+         did_you_mean(name.text, names(model_.thread)), help);
     return nullptr;
 }
 
 Signal* Edit::add_signal(Word name, hal_type type, Span typed_at) {
     if (const Signal* const there = model_.find_signal(name.text)) {
-        Diagnostic d{
-            Severity::error, "name-taken", "signal " + quoted(name.text) + " already exists", {{name.span, "second time"}}, {}};
-        if (there->made.known()) d.labels.push_back({there->made, "created here"});
+        Diagnostic d{Severity::error,
+                     "name-taken",
+                     "signal " + quoted(name.text) + " already exists",
+                     {{name.span, "second time"}},
+                     {}};
+        if (there->made.known()) {
+            d.labels.push_back({there->made, "created here"});
+        }
         diagnostics->add(std::move(d));
         return nullptr;
     }
     if (model_.find_pin(name.text)) {
-        fail("signal-named-like-pin", name.span, "signal name " + quoted(name.text) + " is the name of a pin", "a pin",
+        fail("signal-named-like-pin", name.span,
+             "signal name " + quoted(name.text) + " is the name of a pin", "a pin",
              "write the signal's name first: net SIGNAL " + std::string(name.text));
         return nullptr;
     }
@@ -121,7 +152,8 @@ Signal* Edit::add_signal(Word name, hal_type type, Span typed_at) {
         model_.signal.erase(made->name);
         std::swap(model_.signals[made->index], model_.signals.back());
         model_.signals[made->index]->index = made->index;
-        removed_.signals.push_back(std::move(model_.signals.back()));  // a thread may know its buffer
+        // a thread may know its buffer
+        removed_.signals.push_back(std::move(model_.signals.back()));
         model_.signals.pop_back();
     });
     model_.signals.push_back(std::move(owned));
@@ -132,10 +164,13 @@ Signal* Edit::add_signal(Word name, hal_type type, Span typed_at) {
 bool Edit::remove_signal(Word name) {
     Signal* const leaving = signal(name);
     if (!leaving) return false;
-    while (!leaving->pins.empty()) unlink(*leaving->pins.back());
+    while (!leaving->pins.empty()) {
+        unlink(*leaving->pins.back());
+    }
     make_room(removed_.signals);
     on_undo([this, leaving] {
-        auto at = std::find_if(removed_.signals.begin(), removed_.signals.end(), [&](const auto& s) { return s.get() == leaving; });
+        auto at = std::find_if(removed_.signals.begin(), removed_.signals.end(),
+                               [&](const auto& s) { return s.get() == leaving; });
         leaving->index = model_.signals.size();
         model_.signals.push_back(std::move(*at));
         removed_.signals.erase(at);
@@ -153,76 +188,118 @@ bool Edit::remove_signal(Word name) {
 }
 
 bool Edit::remove_all_signals() {
-    while (!model_.signals.empty()) remove_signal({model_.signals.back()->name, {}});
+    while (!model_.signals.empty()) {
+        remove_signal({model_.signals.back()->name, {}});
+    }
     return true;
 }
 
 bool Edit::link(Pin& pin, Signal& signal, Word word, Arrow arrow) {
     if (pin.signal == &signal) return true;
-    const auto refuse = [&](Code code, std::string message, std::string here, Span other, std::string there, std::string help) {
+    const auto refuse = [&](Code code, std::string message, std::string here, Span other,
+                            std::string there, std::string help) {
         Diagnostic d{Severity::error, code, std::move(message), {{word.span, std::move(here)}}, {}};
-        if (other.known()) d.labels.push_back({other, std::move(there)});
-        if (!help.empty()) d.help.push_back(std::move(help));
+        if (other.known()) {
+            d.labels.push_back({other, std::move(there)});
+        }
+        if (!help.empty()) {
+            d.help.push_back(std::move(help));
+        }
         diagnostics->add(std::move(d));
         return false;
     };
-    if (pin.dir == HAL_DIR_PARAM)
-        return refuse("parameter-link", quoted(word.text) + " is a parameter and cannot be linked", "parameter", {}, "",
-                      "set it: setp " + std::string(word.text) + " VALUE");
-    if (pin.signal)
-        return refuse("pin-linked", "pin " + quoted(word.text) + " is already linked to signal " + quoted(pin.signal->name),
-                      "second signal", pin.linked_at, "first signal", "unlink it first: unlinkp " + std::string(word.text));
+    if (pin.dir == HAL_DIR_PARAM) {
+        return refuse("parameter-link", quoted(word.text) + " is a parameter and cannot be linked",
+                      "parameter", {}, "", "set it: setp " + std::string(word.text) + " VALUE");
+    }
+    if (pin.signal) {
+        return refuse(
+            "pin-linked",
+            "pin " + quoted(word.text) + " is already linked to signal " + quoted(pin.signal->name),
+            "second signal", pin.linked_at, "first signal",
+            "unlink it first: unlinkp " + std::string(word.text));
+    }
     if (pin.type != signal.type) {
         const bool writes = pin.dir == HAL_DIR_OUT;
-        const std::string convert = writes ? conversion(pin.type, signal.type) : conversion(signal.type, pin.type);
-        return refuse(
-            "type-mismatch",
-            "signal " + quoted(signal.name) + " carries " + name(signal.type) + ", pin " + quoted(word.text) + " is " + name(pin.type),
-            name(pin.type), signal.typed, "the signal became " + std::string(name(signal.type)) + " here",
-            convert.empty() ? "" : "convert with " + convert + ": loadrt " + convert + " names=" + signal.name + "-conv");
+        const std::string convert =
+            writes ? conversion(pin.type, signal.type) : conversion(signal.type, pin.type);
+        return refuse("type-mismatch",
+                      "signal " + quoted(signal.name) + " carries " + name(signal.type) + ", pin " +
+                          quoted(word.text) + " is " + name(pin.type),
+                      name(pin.type), signal.typed,
+                      "the signal became " + std::string(name(signal.type)) + " here",
+                      convert.empty() ? ""
+                                      : "convert with " + convert + ": loadrt " + convert +
+                                            " names=" + signal.name + "-conv");
     }
-    if (pin.dir == HAL_DIR_OUT && signal.writer)
-        return refuse("two-writers", "signal " + quoted(signal.name) + " already has a writer", "second output", signal.writer->linked_at,
-                      "first output", "a signal has one output pin; join two sources with sum2, or2 or mux2");
+    if (pin.dir == HAL_DIR_OUT && signal.writer) {
+        return refuse("two-writers", "signal " + quoted(signal.name) + " already has a writer",
+                      "second output", signal.writer->linked_at, "first output",
+                      "a signal has one output pin; join two sources with sum2, or2 or mux2");
+    }
     if (pin.dir == HAL_DIR_OUT && signal.ios != 0) {
-        const auto io = std::find_if(signal.pins.begin(), signal.pins.end(), [](const Pin* p) { return p->dir == HAL_DIR_IO; });
-        return refuse("two-writers", "signal " + quoted(signal.name) + " already has I/O pins, so it cannot have an output", "output",
-                      (*io)->linked_at, "I/O pin", "I/O pins can share a signal only with other I/O pins and inputs");
+        const auto io = std::find_if(signal.pins.begin(), signal.pins.end(),
+                                     [](const Pin* p) { return p->dir == HAL_DIR_IO; });
+        return refuse(
+            "two-writers",
+            "signal " + quoted(signal.name) + " already has I/O pins, so it cannot have an output",
+            "output", (*io)->linked_at, "I/O pin",
+            "I/O pins can share a signal only with other I/O pins and inputs");
     }
-    if (pin.dir == HAL_DIR_IO && signal.writer)
-        return refuse("two-writers", "signal " + quoted(signal.name) + " already has a writer, so it cannot have an I/O pin", "I/O pin",
-                      signal.writer->linked_at, "output", "I/O pins can share a signal only with other I/O pins and inputs");
+    if (pin.dir == HAL_DIR_IO && signal.writer) {
+        return refuse(
+            "two-writers",
+            "signal " + quoted(signal.name) + " already has a writer, so it cannot have an I/O pin",
+            "I/O pin", signal.writer->linked_at, "output",
+            "I/O pins can share a signal only with other I/O pins and inputs");
+    }
     if (pin.type == HAL_TYPE_PORT && pin.dir == HAL_DIR_IN && signal.readers != 0) {
-        const auto reader = std::find_if(signal.pins.begin(), signal.pins.end(), [](const Pin* p) { return p->dir == HAL_DIR_IN; });
-        return refuse("two-readers", "port signal " + quoted(signal.name) + " already has a reader", "second reader", (*reader)->linked_at,
-                      "first reader", "a byte stream has one writer and one reader");
+        const auto reader = std::find_if(signal.pins.begin(), signal.pins.end(),
+                                         [](const Pin* p) { return p->dir == HAL_DIR_IN; });
+        return refuse("two-readers", "port signal " + quoted(signal.name) + " already has a reader",
+                      "second reader", (*reader)->linked_at, "first reader",
+                      "a byte stream has one writer and one reader");
     }
 
-    // LinuxCNC: the first reader, or a writer while there is none, hands its own value to the signal.
+    // LinuxCNC: the first reader, or a writer while there is none, hands its own value to the
+    // signal.
     const bool unwritten = !signal.writer && signal.ios == 0;
     if (pin.type != HAL_TYPE_PORT && unwritten && (pin.dir != HAL_DIR_IN || signal.readers == 0)) {
         signal_values.erase(&signal);
         inherited[&signal] = &pin;
     }
     make_room(signal.pins);
-    on_undo([&pin, &signal, linked_before = pin.linked_at, in_before = pin.arrow_in, out_before = pin.arrow_out] {
+    on_undo([&pin, &signal, linked_before = pin.linked_at, in_before = pin.arrow_in,
+             out_before = pin.arrow_out] {
         signal.pins.erase(std::find(signal.pins.rbegin(), signal.pins.rend(), &pin).base() - 1);
         pin.signal = nullptr;
         pin.linked_at = linked_before;
         pin.arrow_in = in_before;
         pin.arrow_out = out_before;
-        if (pin.dir == HAL_DIR_OUT) signal.writer = nullptr;
-        if (pin.dir == HAL_DIR_IN) --signal.readers;
-        if (pin.dir == HAL_DIR_IO) --signal.ios;
+        if (pin.dir == HAL_DIR_OUT) {
+            signal.writer = nullptr;
+        }
+        if (pin.dir == HAL_DIR_IN) {
+            --signal.readers;
+        }
+        if (pin.dir == HAL_DIR_IO) {
+            --signal.ios;
+        }
     });
     signal.pins.push_back(&pin);
     pin.signal = &signal;
     pin.linked_at = word.span;
     pin.arrow_in = arrow == Arrow::to_pin;
     pin.arrow_out = arrow == Arrow::from_pin;
-    if (pin.dir == HAL_DIR_OUT) signal.writer = &pin;
-    if (pin.dir == HAL_DIR_IN) ++signal.readers;
-    if (pin.dir == HAL_DIR_IO) ++signal.ios;
+    if (pin.dir == HAL_DIR_OUT) {
+        signal.writer = &pin;
+    }
+    if (pin.dir == HAL_DIR_IN) {
+        ++signal.readers;
+    }
+    if (pin.dir == HAL_DIR_IO) {
+        ++signal.ios;
+    }
     structural_ = true;
     return true;
 }
@@ -231,33 +308,55 @@ void Edit::unlink(Pin& pin) {
     Signal* const signal = pin.signal;
     if (!signal) return;
     // a signal with many pins loses them from either end
-    const auto at = signal->pins.back() == &pin ? signal->pins.end() - 1 : std::find(signal->pins.begin(), signal->pins.end(), &pin);
-    // it keeps the signal's value, which may be one that this very transaction set or let it inherit
+    const auto at = signal->pins.back() == &pin
+                        ? signal->pins.end() - 1
+                        : std::find(signal->pins.begin(), signal->pins.end(), &pin);
+    // it keeps the signal's value, which may be one that this very transaction set or let it
+    // inherit
     if (pin.type != HAL_TYPE_PORT) {
         if (const auto set = signal_values.find(signal); set != signal_values.end()) {
             pin_values[&pin] = set->second;
-        } else if (const auto given = inherited.find(signal); given != inherited.end() && given->second != &pin) {
+        } else if (const auto given = inherited.find(signal);
+                   given != inherited.end() && given->second != &pin) {
             Pin& giver = *given->second;
             const auto own = pin_values.find(&giver);
             const hal_value value =
-                own != pin_values.end() ? own->second : hal_value{.raw = __atomic_load_n(&present(giver).slot->raw, __ATOMIC_RELAXED)};
+                own != pin_values.end()
+                    ? own->second
+                    : hal_value{.raw =
+                                    __atomic_load_n(&present(giver).slot->raw, __ATOMIC_RELAXED)};
             pin_values[&pin] = value;
-        } else if (!pin.home && (signal->home || signal->cell)) {  // of no thread: it has no slot where the value is
-            pin_values[&pin] = hal_value{.raw = __atomic_load_n(&signal->slot->raw, __ATOMIC_RELAXED)};
+        } else if (!pin.home &&
+                   (signal->home ||
+                    signal->cell)) {  // of no thread: it has no slot where the value is
+            pin_values[&pin] =
+                hal_value{.raw = __atomic_load_n(&signal->slot->raw, __ATOMIC_RELAXED)};
         }
     }
     on_undo([signal, &pin, position = at - signal->pins.begin()] {
         signal->pins.insert(signal->pins.begin() + position, &pin);
         pin.signal = signal;
-        if (pin.dir == HAL_DIR_OUT) signal->writer = &pin;
-        if (pin.dir == HAL_DIR_IN) ++signal->readers;
-        if (pin.dir == HAL_DIR_IO) ++signal->ios;
+        if (pin.dir == HAL_DIR_OUT) {
+            signal->writer = &pin;
+        }
+        if (pin.dir == HAL_DIR_IN) {
+            ++signal->readers;
+        }
+        if (pin.dir == HAL_DIR_IO) {
+            ++signal->ios;
+        }
     });
     signal->pins.erase(at);
     pin.signal = nullptr;
-    if (pin.dir == HAL_DIR_OUT) signal->writer = nullptr;
-    if (pin.dir == HAL_DIR_IN) --signal->readers;
-    if (pin.dir == HAL_DIR_IO) --signal->ios;
+    if (pin.dir == HAL_DIR_OUT) {
+        signal->writer = nullptr;
+    }
+    if (pin.dir == HAL_DIR_IN) {
+        --signal->readers;
+    }
+    if (pin.dir == HAL_DIR_IO) {
+        --signal->ios;
+    }
     structural_ = true;
 }
 
@@ -269,37 +368,55 @@ void Edit::keep_value(Pin& pin) {
 void Edit::warn_of_wrap(Word value, hal_type type, const Parsed& parsed) {
     if (parsed.warning.empty()) return;
     const std::string result = format_value(type, parsed.value);
-    diagnostics->add({Severity::warning, "value-wraps", parsed.warning + ": " + result + " is set", {{value.span, "keeps its low 32 bits"}},
-                      {"LinuxCNC 2.9 does the same, 2.10 rejects it; write " + result + " if that is meant"}});
+    diagnostics->add(
+        {Severity::warning,
+         "value-wraps",
+         parsed.warning + ": " + result + " is set",
+         {{value.span, "keeps its low 32 bits"}},
+         {"LinuxCNC 2.9 does the same, 2.10 rejects it; write " + result + " if that is meant"}});
 }
 
 bool Edit::set_pin(Word name, Word value) {
     Pin* const target = pin(name);
     if (!target) return false;
     const char* const kind = target->dir == HAL_DIR_PARAM ? "parameter " : "pin ";
-    if (target->dir == HAL_DIR_OUT)
-        return fail("output-set", name.span, "pin " + quoted(name.text) + " is an output: only its component writes it", "output");
-    if (target->read_only())
-        return fail("output-set", name.span, "parameter " + quoted(name.text) + " is read-only: only its component sets it", "read-only");
+    if (target->dir == HAL_DIR_OUT) {
+        return fail("output-set", name.span,
+                    "pin " + quoted(name.text) + " is an output: only its component writes it",
+                    "output");
+    }
+    if (target->read_only()) {
+        return fail("output-set", name.span,
+                    "parameter " + quoted(name.text) + " is read-only: only its component sets it",
+                    "read-only");
+    }
     if (target->signal) {
         Diagnostic d{Severity::error,
                      "linked-set",
-                     "pin " + quoted(name.text) + " takes its value from signal " + quoted(target->signal->name),
+                     "pin " + quoted(name.text) + " takes its value from signal " +
+                         quoted(target->signal->name),
                      {{name.span, "linked"}},
                      {}};
-        if (target->linked_at.known()) d.labels.push_back({target->linked_at, "linked here"});
-        d.help.push_back(target->signal->writer ? "the value comes from '" + target->signal->writer->name +
-                                                      "'; to set it by hand: unlinkp " + std::string(name.text)
-                                                : "set the signal: sets " + target->signal->name + " " + std::string(value.text));
+        if (target->linked_at.known()) {
+            d.labels.push_back({target->linked_at, "linked here"});
+        }
+        d.help.push_back(target->signal->writer
+                             ? "the value comes from '" + target->signal->writer->name +
+                                   "'; to set it by hand: unlinkp " + std::string(name.text)
+                             : "set the signal: sets " + target->signal->name + " " +
+                                   std::string(value.text));
         diagnostics->add(std::move(d));
         return false;
     }
-    if (target->type == HAL_TYPE_PORT)
+    if (target->type == HAL_TYPE_PORT) {
         return fail("bad-value", value.span, "a port pin has no value to set", "",
                     "link it and allocate the buffer of the signal: sets SIGNAL BYTES");
+    }
     const Parsed parsed = parse_wrapping(target->type, value.text);
-    if (!parsed.problem.empty())
-        return fail("bad-value", value.span, parsed.problem, kind + quoted(name.text) + " is " + hal::name(target->type));
+    if (!parsed.problem.empty()) {
+        return fail("bad-value", value.span, parsed.problem,
+                    kind + quoted(name.text) + " is " + hal::name(target->type));
+    }
     warn_of_wrap(value, target->type, parsed);
     if (target->home) {
         pin_values[target] = parsed.value;
@@ -316,11 +433,16 @@ bool Edit::set_signal(Word name, Word value) {
     if (!target) return false;
     if (target->type == HAL_TYPE_PORT) {
         const Parsed bytes = parse_value(HAL_TYPE_U32, value.text);
-        if (!bytes.problem.empty() || bytes.value.u32 == 0 || bytes.value.u32 > (1u << 30))
-            return fail("bad-value", value.span, quoted(value.text) + " is not a buffer size in bytes (1 to 1073741824)", "port signal");
-        if (target->port)
-            return fail("port-sized", name.span, "port signal " + quoted(name.text) + " already has a buffer", "",
+        if (!bytes.problem.empty() || bytes.value.u32 == 0 || bytes.value.u32 > (1u << 30)) {
+            return fail("bad-value", value.span,
+                        quoted(value.text) + " is not a buffer size in bytes (1 to 1073741824)",
+                        "port signal");
+        }
+        if (target->port) {
+            return fail("port-sized", name.span,
+                        "port signal " + quoted(name.text) + " already has a buffer", "",
                         "its size is fixed once set");
+        }
         auto room = std::make_unique<std::uint8_t[]>(bytes.value.u32);
         auto made = std::make_unique<hal_port>(hal_port{bytes.value.u32, 0, 0, 0, room.get()});
         signal_values[target] = hal_value{.port = made.get()};
@@ -329,25 +451,34 @@ bool Edit::set_signal(Word name, Word value) {
             target->value.port = nullptr;
         });
         room.release();
-        target->port = {made.release(), [](hal_port* p) { delete[] p->data; delete p; }};
+        target->port = {made.release(), [](hal_port* p) {
+            delete[] p->data;
+            delete p;
+        }};
         target->value.port = target->port.get();
         structural_ = true;
         return true;
     }
     if (target->writer) {
-        Diagnostic d{Severity::error,
-                     "writer-set",
-                     "signal " + quoted(name.text) + " is written by " + quoted(target->writer->name),
-                     {{name.span, "has a writer"}},
-                     {}};
-        if (target->writer->linked_at.known()) d.labels.push_back({target->writer->linked_at, "linked here"});
-        d.help.push_back("to set it by hand, unlink the writer first: unlinkp " + target->writer->name);
+        Diagnostic d{
+            Severity::error,
+            "writer-set",
+            "signal " + quoted(name.text) + " is written by " + quoted(target->writer->name),
+            {{name.span, "has a writer"}},
+            {}};
+        if (target->writer->linked_at.known()) {
+            d.labels.push_back({target->writer->linked_at, "linked here"});
+        }
+        d.help.push_back("to set it by hand, unlink the writer first: unlinkp " +
+                         target->writer->name);
         diagnostics->add(std::move(d));
         return false;
     }
     const Parsed parsed = parse_wrapping(target->type, value.text);
-    if (!parsed.problem.empty())
-        return fail("bad-value", value.span, parsed.problem, "signal " + quoted(name.text) + " is " + hal::name(target->type));
+    if (!parsed.problem.empty()) {
+        return fail("bad-value", value.span, parsed.problem,
+                    "signal " + quoted(name.text) + " is " + hal::name(target->type));
+    }
     warn_of_wrap(value, target->type, parsed);
     signal_values[target] = parsed.value;
     inherited.erase(target);
@@ -357,21 +488,34 @@ bool Edit::set_signal(Word name, Word value) {
 /// Sets or clears the alias of a pin, and the index with it.
 void Edit::change_alias(Pin& pin, std::string alias) {
     on_undo([this, &pin, before = pin.alias] {
-        if (!pin.alias.empty()) model_.pin.erase(pin.alias);
+        if (!pin.alias.empty()) {
+            model_.pin.erase(pin.alias);
+        }
         pin.alias = before;
-        if (!pin.alias.empty()) model_.pin.emplace(pin.alias, &pin);
+        if (!pin.alias.empty()) {
+            model_.pin.emplace(pin.alias, &pin);
+        }
     });
-    if (!pin.alias.empty()) model_.pin.erase(pin.alias);
+    if (!pin.alias.empty()) {
+        model_.pin.erase(pin.alias);
+    }
     pin.alias = std::move(alias);
-    if (!pin.alias.empty()) model_.pin.emplace(pin.alias, &pin);
+    if (!pin.alias.empty()) {
+        model_.pin.emplace(pin.alias, &pin);
+    }
     ++model_.next_id;  // similar names are looked up among those that existed
 }
 
 bool Edit::alias(Word name, Word second) {
     Pin* const target = pin(name);
     if (!target) return false;
-    if (model_.find_pin(second.text)) return fail("name-taken", second.span, "pin or alias " + quoted(second.text) + " already exists");
-    if (model_.find_signal(second.text)) return fail("name-taken", second.span, "signal " + quoted(second.text) + " already exists");
+    if (model_.find_pin(second.text)) {
+        return fail("name-taken", second.span,
+                    "pin or alias " + quoted(second.text) + " already exists");
+    }
+    if (model_.find_signal(second.text)) {
+        return fail("name-taken", second.span, "signal " + quoted(second.text) + " already exists");
+    }
     change_alias(*target, std::string(second.text));
     return true;
 }
@@ -379,7 +523,9 @@ bool Edit::alias(Word name, Word second) {
 bool Edit::unalias(Word name) {
     Pin* const target = pin(name);
     if (!target) return false;
-    if (!target->alias.empty()) change_alias(*target, {});
+    if (!target->alias.empty()) {
+        change_alias(*target, {});
+    }
     return true;
 }
 

@@ -33,53 +33,74 @@ Instance* Model::find_instance(std::string_view name) const { return find(instan
 
 LoadedComponent* Model::find_component(std::string_view name) const {
     if (LoadedComponent* const exact = find(component, name)) return exact;
-    const auto same = [](char a, char b) { return a == b || (a == '-' && b == '_') || (a == '_' && b == '-'); };
-    for (const auto& candidate : components)
-        if (std::equal(name.begin(), name.end(), candidate->name.begin(), candidate->name.end(), same)) return candidate.get();
+    const auto same = [](char a, char b) {
+        return a == b || (a == '-' && b == '_') || (a == '_' && b == '-');
+    };
+    for (const auto& candidate : components) {
+        if (std::equal(name.begin(), name.end(), candidate->name.begin(), candidate->name.end(),
+                       same)) {
+            return candidate.get();
+        }
+    }
     return nullptr;
 }
 
 void Model::enter(Pin& entering) {
     pin.emplace(entering.name, &entering);
-    if (!entering.alias.empty()) pin.emplace(entering.alias, &entering);
+    if (!entering.alias.empty()) {
+        pin.emplace(entering.alias, &entering);
+    }
 }
 
 void Model::leave(const Pin& leaving) {
     pin.erase(leaving.name);
-    if (!leaving.alias.empty()) pin.erase(leaving.alias);
+    if (!leaving.alias.empty()) {
+        pin.erase(leaving.alias);
+    }
 }
 
 std::vector<const Pin*> Model::sorted_pins() const {
     std::vector<const Pin*> all;
     all.reserve(pin.size());
-    for (const auto& [name, p] : pin)
-        if (name == p->name) all.push_back(p);
+    for (const auto& [name, p] : pin) {
+        if (name == p->name) {
+            all.push_back(p);
+        }
+    }
     return sorted(std::move(all));
 }
 
 std::vector<const Signal*> Model::sorted_signals() const {
     std::vector<const Signal*> all;
     all.reserve(signals.size());
-    for (const auto& s : signals) all.push_back(s.get());
+    for (const auto& s : signals) {
+        all.push_back(s.get());
+    }
     return sorted(std::move(all));
 }
 
 std::vector<const LoadedFunction*> Model::sorted_functions() const {
     std::vector<const LoadedFunction*> all;
     all.reserve(function.size());
-    for (const auto& [name, f] : function) all.push_back(f);
+    for (const auto& [name, f] : function) {
+        all.push_back(f);
+    }
     return sorted(std::move(all));
 }
 
 const char* Model::keep(std::string_view text) {
-    if (!texts_) texts_ = std::make_shared<Texts>();
+    if (!texts_) {
+        texts_ = std::make_shared<Texts>();
+    }
     return texts_->all.emplace(text).first->c_str();
 }
 
 void Model::sweep(std::vector<bool>& in_use) {
     std::unordered_set<const char*> used;
     const auto mark = [&](Span span) {
-        if (span.source >= in_use.size()) in_use.resize(span.source + 1);
+        if (span.source >= in_use.size()) {
+            in_use.resize(span.source + 1);
+        }
         in_use[span.source] = true;
     };
     for (const auto& [name, one] : pin) {
@@ -95,12 +116,19 @@ void Model::sweep(std::vector<bool>& in_use) {
         mark(one->added);
         used.insert(one->doc);
     }
-    for (const auto& one : threads) mark(one->made);
+    for (const auto& one : threads) {
+        mark(one->made);
+    }
     for (const auto& loaded : components) {
         mark(loaded->loaded);
-        for (const auto& one : loaded->instances) mark(one->loaded);
+        for (const auto& one : loaded->instances) {
+            mark(one->loaded);
+        }
     }
-    if (texts_) std::erase_if(texts_->all, [&](const std::string& text) { return !used.contains(text.c_str()); });
+    if (texts_) {
+        std::erase_if(texts_->all,
+                      [&](const std::string& text) { return !used.contains(text.c_str()); });
+    }
 }
 
 Model Model::beside() {
@@ -114,14 +142,17 @@ Model Model::beside() {
 Thread* thread_of(const Pin& pin) {
     if (pin.of_thread) return pin.of_thread;
     if (pin.function) return pin.function->thread;
-    if (pin.instance)
-        for (const LoadedFunction* function : pin.instance->functions)
+    if (pin.instance) {
+        for (const LoadedFunction* function : pin.instance->functions) {
             if (function->thread) return function->thread;
+        }
+    }
     return nullptr;
 }
 
 bool is_loose(const Pin& pin) {
-    return pin.instance && pin.instance->component->plugin && (pin.instance->component->plugin->flags & HAL_COMPONENT_LOOSE_PINS);
+    return pin.instance && pin.instance->component->plugin &&
+           (pin.instance->component->plugin->flags & HAL_COMPONENT_LOOSE_PINS);
 }
 
 }  // namespace hal

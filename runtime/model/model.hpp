@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The graph as data: components, instances, pins, signals, functions, threads, aliases, each with the span that made
-// it. Edited by model/edit, checked by model/check, compiled by model/compile. Not synchronised: the session owns it.
+// The graph as data: components, instances, pins, signals, functions, threads, aliases, each with
+// the span that made it. Edited by model/edit, checked by model/check, compiled by model/compile.
+// Not synchronised: the session owns it.
 #pragma once
 
 #include <cstdint>
@@ -12,9 +13,9 @@
 #include <unordered_map>
 #include <vector>
 
-#include "text/source.hpp"
 #include "base/types.hpp"
 #include "plan/plan.hpp"
+#include "text/source.hpp"
 
 namespace hal {
 
@@ -32,17 +33,22 @@ struct Pin {
     std::uint32_t flags = 0;         ///< HAL_PIN_…
     const char* doc = "";            ///< these three live in the model's pool of texts
     const char* unit = "";
-    hal_value initial{}, safe{};
+    hal_value initial{};
+    hal_value safe{};
     hal_pin* memory = nullptr;       ///< in the instance
-    hal_value** pointer = nullptr;   ///< a second pointer to the slot, in the plugin's own memory
-    Instance* instance = nullptr;    ///< nullptr: a pin of a thread or of a function's times
-    LoadedFunction* function = nullptr;  ///< the one function that uses it, or nullptr: all of the instance
-    Thread* of_thread = nullptr;     ///< pins of a thread itself
+    hal_value** pointer = nullptr;  ///< a second pointer to the slot, in the plugin's own memory
+    Instance* instance = nullptr;  ///< nullptr: a pin of a thread or of a function's times
+    /// the one function that uses it, or nullptr: all of the instance
+    LoadedFunction* function = nullptr;
+    Thread* of_thread = nullptr;  ///< pins of a thread itself
     Signal* signal = nullptr;
     Span linked_at;
-    bool arrow_in = false, arrow_out = false;  ///< the arrow before it marks it as a reader / writer
+    /// the arrow before it marks it as a reader / writer
+    bool arrow_in = false;
+    bool arrow_out = false;
     std::uint32_t id = 0;
-    // Where it is now (set by the compiler when a plan has been taken; nullptr home: the session owns it).
+    // Where it is now (set by the compiler when a plan has been taken; nullptr home: the session
+    // owns it).
     Thread* home = nullptr;
 
     /// A parameter that only its component sets.
@@ -52,33 +58,42 @@ struct Pin {
 struct Signal {
     std::string name;
     hal_type type = HAL_TYPE_BIT;
-    std::vector<Pin*> pins;          ///< in order of linking
-    Pin* writer = nullptr;           ///< the OUT pin
-    std::uint32_t readers = 0, ios = 0;
-    hal_value value{};               ///< kept here while no thread writes it (sets, inherited values)
+    std::vector<Pin*> pins;  ///< in order of linking
+    Pin* writer = nullptr;  ///< the OUT pin
+    std::uint32_t readers = 0;
+    std::uint32_t ios = 0;
+    /// kept here while no thread writes it (sets, inherited values)
+    hal_value value{};
     std::unique_ptr<hal_port, void (*)(hal_port*)> port{nullptr, [](hal_port*) {}};
-    Span made, typed;                ///< who made it; what gave it its type
-    std::size_t index = 0;           ///< in Model::signals
+    Span made, typed;  ///< who made it; what gave it its type
+    std::size_t index = 0;  ///< in Model::signals
     std::uint32_t id = 0;
     // Where it is now.
-    Thread* home = nullptr;          ///< the writing thread, or nullptr
-    hal_value* slot = nullptr;       ///< in home's image, a shared cell, or the session's own (&value)
+    Thread* home = nullptr;  ///< the writing thread, or nullptr
+    /// in home's image, a shared cell, or the session's own (&value)
+    hal_value* slot = nullptr;
     std::vector<std::pair<Thread*, hal_value*>> copies;  ///< reading threads' slots
-    std::shared_ptr<hal_value> cell; ///< when I/O pins of several threads share it
+    std::shared_ptr<hal_value> cell;  ///< when I/O pins of several threads share it
 };
 
-/// A function of a loaded component, which `addf` can put into a thread. (hal::Function is what a component's author declares it by.)
+/// A function of a loaded component, which `addf` can put into a thread. (hal::Function is what a
+/// component's author declares it by.)
 struct LoadedFunction {
     std::string name;
     const char* doc = "";
-    std::vector<plan::Step> steps;   ///< one, or one per instance of a shared function
-    struct { hal_row run = nullptr; hal_step step = nullptr; } row;  ///< runs many calls of that step
-    std::vector<Instance*> instances;///< whose steps these are, in the same order
+    std::vector<plan::Step> steps;  ///< one, or one per instance of a shared function
+    /// runs many calls of that step
+    struct {
+        hal_row run = nullptr;
+        hal_step step = nullptr;
+    } row;
+    std::vector<Instance*> instances;  ///< whose steps these are, in the same order
     LoadedComponent* component = nullptr;
     bool shared = false;
     Thread* thread = nullptr;
-    bool init = false;               ///< placed by initf rather than addf
-    bool halted = false;             ///< not run: a reload failed and the old instance did not start again
+    bool init = false;  ///< placed by initf rather than addf
+    /// not run: a reload failed and the old instance did not start again
+    bool halted = false;
     Span added;
     std::vector<std::unique_ptr<Pin>> pins;  ///< its .time, .tmax, .tmax-increased
     std::unique_ptr<plan::FunctionTimes> times = std::make_unique<plan::FunctionTimes>();
@@ -89,7 +104,8 @@ struct LoadedFunction {
 struct PathDelay {
     const Pin* pin = nullptr;
     std::string far;
-    std::uint32_t cycles = 0, round_trip = 0;
+    std::uint32_t cycles = 0;
+    std::uint32_t round_trip = 0;
     std::int64_t worst_ns = 0;
 };
 
@@ -97,24 +113,28 @@ struct Instance {
     std::string name;
     LoadedComponent* component = nullptr;
     void* memory = nullptr;
-    std::shared_ptr<void> storage;   ///< the block several instances of one loadrt share
+    std::shared_ptr<void> storage;  ///< the block several instances of one loadrt share
     struct Block {
         std::unique_ptr<char[]> memory;
-        std::size_t bytes = 0, used = 0;
+        std::size_t bytes = 0;
+        std::size_t used = 0;
     };
-    std::vector<Block> blocks;       ///< what its constructor has allocated
+    std::vector<Block> blocks;  ///< what its constructor has allocated
     std::vector<plan::Memory> further;  ///< memory of others that its functions use
     std::vector<std::unique_ptr<Pin>> pins;
     std::vector<LoadedFunction*> functions;
     std::vector<plan::Step> emergency;
     std::vector<std::pair<std::string, hal_stream*>> streams;
-    std::vector<Pin*> finite;        ///< its declared-finite outputs
-    bool constructed = false, started = false;
-    bool own_threads = false;        ///< uses its pins in threads of its own, at any moment
-    bool leads_clock = false;        ///< it disciplines the threads to an external clock reference
+    std::vector<Pin*> finite;  ///< its declared-finite outputs
+    bool constructed = false;
+    bool started = false;
+    bool own_threads = false;  ///< uses its pins in threads of its own, at any moment
+    bool leads_clock = false;  ///< it disciplines the threads to an external clock reference
     Span loaded;
-    std::size_t load = 0, number = 0;  ///< which of the component's loads made it, as which of that load's instances
-    std::vector<PathDelay> path_delays;           ///< while it is started
+    /// which of the component's loads made it, as which of that load's instances
+    std::size_t load = 0;
+    std::size_t number = 0;
+    std::vector<PathDelay> path_delays;  ///< while it is started
 };
 
 /// What one loadrt gave its instances beside their names.
@@ -123,19 +143,21 @@ struct Load {
     std::vector<std::string> personalities;
 };
 
-/// A component that is loaded: a plugin, one the runtime provides itself (`threads`), or a program's.
+/// A component that is loaded: a plugin, one the runtime provides itself (`threads`), or a
+/// program's.
 struct LoadedComponent {
-    std::string name;                ///< as loadrt was given it
+    std::string name;  ///< as loadrt was given it
     const hal_component* plugin = nullptr;  ///< nullptr: built in
     std::shared_ptr<void> library;
     std::string path;
-    std::vector<std::string> arguments;     ///< one text per loadrt, for `save`
-    std::vector<Load> loads;                ///< the same, taken apart, for `reload`
+    std::vector<std::string> arguments;  ///< one text per loadrt, for `save`
+    std::vector<Load> loads;  ///< the same, taken apart, for `reload`
     std::vector<std::unique_ptr<Instance>> instances;
     std::vector<std::unique_ptr<LoadedFunction>> functions;
-    std::uint32_t next_number = 0;   ///< of the next unnamed instance
+    std::uint32_t next_number = 0;  ///< of the next unnamed instance
     std::uint32_t id = 0;
-    std::int64_t process = 0;        ///< of a program's component: its process. Its instance, if any, has pins only
+    /// of a program's component: its process. Its instance, if any, has pins only
+    std::int64_t process = 0;
     Span loaded;
 };
 
@@ -143,19 +165,21 @@ enum class Policy { fifo, deadline, other };
 
 struct ThreadOptions {
     std::int64_t period_ns = 0;
-    int cpu = -1;                    ///< -1: the runtime chooses
+    int cpu = -1;  ///< -1: the runtime chooses
     Policy policy = Policy::fifo;
-    int priority = 0;                ///< 0: by rate
-    std::int64_t spin_ns = -1;       ///< hybrid wait: spin this long before the deadline; -1: the default
-    std::int64_t budget_ns = 0;      ///< execution time that counts as a fault; 0: none
-    std::int64_t supervise_ns = -1;  ///< longest time without a finished cycle; 0: not supervised; -1: the default
+    int priority = 0;  ///< 0: by rate
+    /// hybrid wait: spin this long before the deadline; -1: the default
+    std::int64_t spin_ns = -1;
+    std::int64_t budget_ns = 0;  ///< execution time that counts as a fault; 0: none
+    /// longest time without a finished cycle; 0: not supervised; -1: the default
+    std::int64_t supervise_ns = -1;
 
     /// The limit that takes effect: 10 periods or 100 ms, whichever is longer, when none was given.
     std::int64_t supervision_limit_ns() const {
         constexpr std::int64_t least = 100'000'000;
         return supervise_ns >= 0 ? supervise_ns : period_ns * 10 > least ? period_ns * 10 : least;
     }
-    bool profile_every = false;      ///< time every function in every cycle
+    bool profile_every = false;  ///< time every function in every cycle
 };
 
 struct Thread {
@@ -163,10 +187,16 @@ struct Thread {
     ThreadOptions options;
     std::vector<LoadedFunction*> functions, init;
     bool init_done = false;
-    LoadedComponent* component = nullptr;  ///< `threads`, when loadrt made it; nullptr: newthread did
+    /// `threads`, when loadrt made it; nullptr: newthread did
+    LoadedComponent* component = nullptr;
     std::vector<std::unique_ptr<Pin>> pins;
-    hal_pin time{}, tmax{}, tmax_increased{}, beat{}, missed{}, wakeup{};  ///< memory of `pins`
-    std::uint32_t id = 0;            ///< the executor's number; 0 until it runs
+    hal_pin time{};
+    hal_pin tmax{};
+    hal_pin tmax_increased{};
+    hal_pin beat{};
+    hal_pin missed{};
+    hal_pin wakeup{};  ///< memory of `pins`
+    std::uint32_t id = 0;  ///< the executor's number; 0 until it runs
     Span made;
 };
 
@@ -174,21 +204,24 @@ struct Thread {
 template <class T>
 using Index = std::unordered_map<std::string_view, T*>;
 
-/// What an edit notes about objects of the model. Who reads the model looks it up by a pointer to const.
+/// What an edit notes about objects of the model. Who reads the model looks it up by a pointer to
+/// const.
 struct AddressHash {
     using is_transparent = void;
-    std::size_t operator()(const void* object) const noexcept { return std::hash<const void*>{}(object); }
+    std::size_t operator()(const void* object) const noexcept {
+        return std::hash<const void*>{}(object);
+    }
 };
 template <class Object, class Note>
 using Notes = std::unordered_map<Object*, Note, AddressHash, std::equal_to<>>;
 
 struct Model {
     std::vector<std::unique_ptr<LoadedComponent>> components;
-    std::vector<std::unique_ptr<Signal>> signals;   ///< unordered: erased by swapping with the last
-    std::vector<std::unique_ptr<Thread>> threads;   ///< fastest first
+    std::vector<std::unique_ptr<Signal>> signals;  ///< unordered: erased by swapping with the last
+    std::vector<std::unique_ptr<Thread>> threads;  ///< fastest first
     Index<LoadedComponent> component;
     Index<Instance> instance;
-    Index<Pin> pin;                                  ///< by name and by alias
+    Index<Pin> pin;  ///< by name and by alias
     Index<Signal> signal;
     Index<LoadedFunction> function;
     Index<Thread> thread;
@@ -198,33 +231,39 @@ struct Model {
     LoadedFunction* find_function(std::string_view name) const;
     Thread* find_thread(std::string_view name) const;
     Instance* find_instance(std::string_view name) const;
-    LoadedComponent* find_component(std::string_view name) const;  ///< `-` and `_` are the same here
+    /// `-` and `_` are the same here
+    LoadedComponent* find_component(std::string_view name) const;
 
     /// Enters a pin into the index by its name and alias.
     void enter(Pin& pin);
     /// Removes a pin from the index.
     void leave(const Pin& pin);
 
-    std::vector<const Pin*> sorted_pins() const;             ///< by name; aliases not repeated
+    std::vector<const Pin*> sorted_pins() const;  ///< by name; aliases not repeated
     std::vector<const Signal*> sorted_signals() const;
     std::vector<const LoadedFunction*> sorted_functions() const;
 
     /// Keeps a text for as long as the model lives; equal texts share.
     const char* keep(std::string_view text);
-    /// Forgets the texts of keep() that no object uses any more, and marks in `in_use` the numbers of the sources of all spans.
+    /// Forgets the texts of keep() that no object uses any more, and marks in `in_use` the numbers
+    /// of the sources of all spans.
     void sweep(std::vector<bool>& in_use);
-    /// An empty model that shares the pool of texts and goes on with the numbers: what is made in it can move here.
+    /// An empty model that shares the pool of texts and goes on with the numbers: what is made in
+    /// it can move here.
     Model beside();
 
-    std::uint32_t next_id = 1;            ///< of pins and functions, for fault records, and of signals; also increased by new aliases
-    std::uint32_t next_component_id = 7;  ///< `show comp` numbers them as LinuxCNC does: real-time modules take every third
+    /// of pins and functions, for fault records, and of signals; also increased by new aliases
+    std::uint32_t next_id = 1;
+    /// `show comp` numbers them as LinuxCNC does: real-time modules take every third
+    std::uint32_t next_component_id = 7;
 
 private:
     struct Texts;
     std::shared_ptr<Texts> texts_;
 };
 
-/// The thread whose functions use this pin now, or nullptr. Follows Pin::function, else the instance's functions.
+/// The thread whose functions use this pin now, or nullptr. Follows Pin::function, else the
+/// instance's functions.
 Thread* thread_of(const Pin& pin);
 
 /// The pin's component declared loose pins: any of its functions may use it, in whichever thread.

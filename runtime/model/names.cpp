@@ -9,7 +9,9 @@ namespace {
 template <class T>
 std::shared_ptr<const NameIndex> indexed(const Index<T>& names) {
     auto index = std::make_shared<NameIndex>();
-    for (const auto& [name, object] : names) index->add(name, object->id);
+    for (const auto& [name, object] : names) {
+        index->add(name, object->id);
+    }
     return index;
 }
 
@@ -36,7 +38,10 @@ std::shared_ptr<const NameIndex> indexed(const Model& model, NameGroup group) {
 std::shared_ptr<const NameIndex> ModelNames::get(const Model& model, NameGroup group) {
     Taken& taken = taken_[static_cast<std::size_t>(group)];
     const std::size_t size = size_of(model, group);
-    if (auto index = taken.index.lock(); index && taken.size == size && taken.next_id == model.next_id) return index;
+    if (auto index = taken.index.lock();
+        index && taken.size == size && taken.next_id == model.next_id) {
+        return index;
+    }
     auto index = indexed(model, group);
     taken = {index, size, model.next_id};
     return index;

@@ -15,7 +15,8 @@ struct Model;
 /// Which names: UnknownName::group of diagnostics about a model.
 enum class NameGroup : std::uint32_t { pins, signals, functions };
 
-/// Indexes the names of a model once, for as long as the index is in use and no name is added or removed. [setup]
+/// Indexes the names of a model once, for as long as the index is in use and no name is added or
+/// removed. [setup]
 class ModelNames {
 public:
     std::shared_ptr<const NameIndex> get(const Model& model, NameGroup group);
@@ -23,7 +24,7 @@ public:
 private:
     struct Taken {
         std::weak_ptr<const NameIndex> index;
-        std::size_t size = 0;       // of the names, and the model's next number, when it was made
+        std::size_t size = 0;  // of the names, and the model's next number, when it was made
         std::uint32_t next_id = 0;
     };
     std::array<Taken, 3> taken_;

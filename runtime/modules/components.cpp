@@ -11,7 +11,8 @@
 
 char* hal_shmem_base = nullptr;
 
-extern "C" [[gnu::weak, gnu::visibility("default")]] void halcyon_guard_module_function(bool runs);  // guard/module_calls.cpp
+// guard/module_calls.cpp
+extern "C" [[gnu::weak, gnu::visibility("default")]] void halcyon_guard_module_function(bool runs);
 
 namespace hal::modules {
 namespace {
@@ -27,7 +28,8 @@ std::map<int, Component> components;
 int last_id = 0;
 std::uint64_t clock_period = 0;  // that a module has set before there was a thread
 
-/// Memory of hal_malloc(): cleared, never moved, and kept until no module is left, because modules keep pointers into each other's.
+/// Memory of hal_malloc(): cleared, never moved, and kept until no module is left, because modules
+/// keep pointers into each other's.
 struct Chunk {
     char* memory;
     std::size_t bytes, used;
@@ -39,7 +41,8 @@ std::map<std::uintptr_t, std::size_t> blocks;  // what hal_malloc() gave: addres
 bool add_chunk(std::size_t least) {
     const std::size_t bytes = (least + chunk_bytes - 1) / chunk_bytes * chunk_bytes;
     chunks.reserve(chunks.size() + 1);
-    void* const memory = mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    void* const memory =
+        mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
     if (memory == MAP_FAILED) return false;
     chunks.push_back({static_cast<char*>(memory), bytes, 0});
     return true;
@@ -58,7 +61,10 @@ void call(const Function& function, const hal_cycle& cycle) {
 }
 [[gnu::noinline]] void call_with_more(Function& function, const hal_cycle& cycle) {
     Module& module = *function.module;
-    if (module.accesses_ports) permit_ports();  // without the permission the access is a crash, which names the function
+    // without the permission the access is a crash, which names the function
+    if (module.accesses_ports) {
+        permit_ports();
+    }
     module.take_parameters(function);
     adjust_clock(module, cycle);
     call(function, cycle);
@@ -66,8 +72,11 @@ void call(const Function& function, const hal_cycle& cycle) {
 }
 void call_function(void* self, const hal_cycle* cycle) {
     Function& function = *static_cast<Function*>(self);
-    if (function.module->plain()) [[likely]] call(function, *cycle);
-    else call_with_more(function, *cycle);
+    if (function.module->plain()) [[likely]] {
+        call(function, *cycle);
+    } else {
+        call_with_more(function, *cycle);
+    }
 }
 // In a program with the real-time guard; a weak symbol, so that nothing depends on it.
 void call_under_guard(void* self, const hal_cycle* cycle) {
@@ -93,7 +102,9 @@ void release_components(Module& module) noexcept {
     }
     module.components.clear();
     if (!Module::all_running().empty() || Module::current() || memory_kept) return;
-    for (const Chunk& chunk : chunks) munmap(chunk.memory, chunk.bytes);
+    for (const Chunk& chunk : chunks) {
+        munmap(chunk.memory, chunk.bytes);
+    }
     chunks.clear();
     blocks.clear();
     clock_period = 0;
@@ -120,7 +131,10 @@ std::uintptr_t end_of_block(const volatile void* address) noexcept {
 }
 
 int declaring(const char* function, const char* name, int comp) {
-    if (!Module::current()) return fail(function, name, "only while a module is loaded"), -EPERM;
+    if (!Module::current()) {
+        fail(function, name, "only while a module is loaded");
+        return -EPERM;
+    }
     const auto component = components.find(comp);
     if (component == components.end()) return fail(function, name, "unknown component");
     if (component->second.ready) return fail(function, name, "the component is ready already");
@@ -132,7 +146,9 @@ std::size_t longest_name() noexcept {
     const Module* const module = Module::current();
     return module && module->interface() == Interface::v2_10 ? 55 : 47;
 }
-std::string too_long() { return "the name is longer than " + std::to_string(longest_name()) + " characters"; }
+std::string too_long() {
+    return "the name is longer than " + std::to_string(longest_name()) + " characters";
+}
 
 }  // namespace hal::modules
 
@@ -146,8 +162,9 @@ int hal_init(const char* name) {
         if (!module) return fail("hal_init", name, "only while a module is loaded");
         if (!name || !*name) return fail("hal_init", name, "the name is empty");
         if (std::strlen(name) > longest_name()) return fail("hal_init", name, too_long().c_str());
-        for (const auto& [id, component] : components)
+        for (const auto& [id, component] : components) {
             if (component.name == name) return fail("hal_init", name, "duplicate component name");
+        }
         const int id = new_id();
         components[id] = {name, module, false};
         module->components.insert(id);
@@ -164,17 +181,23 @@ int hal_ready(int comp) {
 
 int hal_set_unready(int comp) {
     const auto component = components.find(comp);
-    if (component == components.end() || !component->second.ready || !Module::current()) return -EINVAL;
+    if (component == components.end() || !component->second.ready || !Module::current()) {
+        return -EINVAL;
+    }
     component->second.ready = false;
     return 0;
 }
 
 int hal_unready(int comp) { return hal_set_unready(comp); }
 
-// LinuxCNC keeps the function for a command of its host that its halcmd does not have; so it is never called.
+// LinuxCNC keeps the function for a command of its host that its halcmd does not have; so it is
+// never called.
 int hal_set_constructor(int comp, int (*make)(char*, char*)) {
     const auto component = components.find(comp);
-    if (component == components.end() || !make) return fail("hal_set_constructor", hal_comp_name(comp), "unknown component, or no function");
+    if (component == components.end() || !make) {
+        return fail("hal_set_constructor", hal_comp_name(comp),
+                    "unknown component, or no function");
+    }
     return 0;
 }
 
@@ -190,14 +213,18 @@ void* hal_malloc(long bytes) {
     const auto wanted = static_cast<std::size_t>(bytes);
     void* result = nullptr;
     guarded([&] {
-        if (chunks.empty() || chunks.back().bytes - chunks.back().used < wanted + 16)
+        if (chunks.empty() || chunks.back().bytes - chunks.back().used < wanted + 16) {
             if (!add_chunk(wanted + 16)) return -ENOMEM;
+        }
         Chunk& chunk = chunks.back();
         chunk.used = (chunk.used + 15) / 16 * 16;
-        result = std::memset(chunk.memory + chunk.used, 0, wanted);  // touched now: no page fault in a cycle
+        // touched now: no page fault in a cycle
+        result = std::memset(chunk.memory + chunk.used, 0, wanted);
         chunk.used += wanted;
         blocks[reinterpret_cast<std::uintptr_t>(result)] = wanted;
-        if (const Module* const module = Module::current()) module->extension().memory(module->host(), result, wanted);
+        if (const Module* const module = Module::current()) {
+            module->extension().memory(module->host(), result, wanted);
+        }
         return 0;
     });
     return result;
@@ -213,14 +240,23 @@ int hal_export_funct(const char* name, void (*code)(void*, long), void* arg, int
         if (const int wrong = declaring("hal_export_funct", name, comp); wrong != 0) return wrong;
         if (!code) return fail("hal_export_funct", name, "no code");
         Module& module = *Module::current();
-        if (!module.functions.insert(name).second) return fail("hal_export_funct", name, "duplicate function name");
+        if (!module.functions.insert(name).second) {
+            return fail("hal_export_funct", name, "duplicate function name");
+        }
         const hal_host* const host = module.host();
         void* const memory = host->allocate(host, sizeof(Function), alignof(Function));
         if (!memory) return -ENOMEM;
         Function* const function = new (memory) Function{code, arg, &module};
         module.declared.push_back(function);
-        const hal_function_decl decl{sizeof decl, 0,        name,   "", halcyon_guard_module_function ? call_under_guard : call_function,
-                                     function,    function, nullptr};
+        const hal_function_decl decl{
+            sizeof decl,
+            0,
+            name,
+            "",
+            halcyon_guard_module_function ? call_under_guard : call_function,
+            function,
+            function,
+            nullptr};
         return host->function(host, &decl) ? 0 : -EINVAL;
     });
 }
@@ -230,10 +266,14 @@ int hal_create_thread(const char* name, unsigned long period_ns, int) {
         Module* const module = Module::current();
         if (!module) return fail("hal_create_thread", name, "only while a module is loaded");
         if (!name || !*name) return fail("hal_create_thread", name, "the name is empty");
-        if (std::strlen(name) > longest_name()) return fail("hal_create_thread", name, too_long().c_str());
+        if (std::strlen(name) > longest_name()) {
+            return fail("hal_create_thread", name, too_long().c_str());
+        }
         if (period_ns == 0) return fail("hal_create_thread", name, "the period is 0");
-        if (!module->extension().thread(module->host(), name, static_cast<std::int64_t>(clock_multiple(period_ns))))
+        if (!module->extension().thread(module->host(), name,
+                                        static_cast<std::int64_t>(clock_multiple(period_ns)))) {
             return fail("hal_create_thread", name, "the name is invalid or taken");
+        }
         return new_id();  // LinuxCNC has a component per thread; nothing refers to it
     });
 }
@@ -243,8 +283,14 @@ long rtapi_clock_set_period(long ns) {
     const auto base = module ? module->calls().base_period(module->host()) : 0;
     const long now = base > 0 ? static_cast<long>(base) : static_cast<long>(clock_period);
     if (ns == 0 && module) return now;
-    if (!module) return fail("rtapi_clock_set_period", "clock", "only while a module is loaded"), -EPERM;
-    if (ns < 0 || now != 0) return fail("rtapi_clock_set_period", "clock", now != 0 ? "it runs already" : "the period is negative");
+    if (!module) {
+        fail("rtapi_clock_set_period", "clock", "only while a module is loaded");
+        return -EPERM;
+    }
+    if (ns < 0 || now != 0) {
+        return fail("rtapi_clock_set_period", "clock",
+                    now != 0 ? "it runs already" : "the period is negative");
+    }
     clock_period = static_cast<std::uint64_t>(ns);
     return ns;
 }

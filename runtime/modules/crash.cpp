@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A crash in a module's set-up code is an error of that command. One in a cycle is the runtime's (machine/crash.cpp).
+// A crash in a module's set-up code is an error of that command. One in a cycle is the runtime's
+// (machine/crash.cpp).
 #include <csetjmp>
 #include <csignal>
 #include <cstdlib>
@@ -29,14 +30,18 @@ int run_guarded_from_crashes(void (*action)(void*), void* argument) noexcept {
     struct sigaction guard{};
     guard.sa_handler = on_crash;
     guard.sa_flags = SA_NODEFER | SA_ONSTACK;
-    for (const int signal : signals) sigaction(signal, &guard, &before[signal]);
+    for (const int signal : signals) {
+        sigaction(signal, &guard, &before[signal]);
+    }
     const int crashed = sigsetjmp(here, 1);
     if (crashed == 0) {
         jump = &here;
         action(argument);
     }
     jump = nullptr;
-    for (const int signal : signals) sigaction(signal, &before[signal], nullptr);
+    for (const int signal : signals) {
+        sigaction(signal, &before[signal], nullptr);
+    }
     return crashed;
 }
 

@@ -31,7 +31,9 @@ constexpr unsigned this_machine = EM_NONE;
 constexpr bool is_64_bit = sizeof(void*) == 8;
 
 std::string text_at(std::string_view table, std::uint64_t offset) {
-    if (offset >= table.size()) return {};
+    if (offset >= table.size()) {
+        return {};
+    }
     return std::string(table.substr(offset, table.find('\0', offset) - offset));
 }
 
@@ -70,28 +72,32 @@ void ElfFile::read() {
     const auto machine = at<std::uint16_t>(content_, 18);
     if (!header || !machine || content_[EI_CLASS] != (is_64_bit ? ELFCLASS64 : ELFCLASS32) ||
         (this_machine != EM_NONE && *machine != this_machine)) {
-        problem_ = "it is built for " + (machine ? machine_name(*machine) : "an unknown machine") + ", this program for " +
-                   machine_name(this_machine);
+        problem_ = "it is built for " + (machine ? machine_name(*machine) : "an unknown machine") +
+                   ", this program for " + machine_name(this_machine);
         return;
     }
     std::vector<ElfW(Shdr)> all;
     for (unsigned i = 0; i < header->e_shnum; ++i) {
-        const auto section = at<ElfW(Shdr)>(content_, header->e_shoff + std::uint64_t{i} * sizeof(ElfW(Shdr)));
+        const auto section =
+            at<ElfW(Shdr)>(content_, header->e_shoff + std::uint64_t{i} * sizeof(ElfW(Shdr)));
         const bool whole = section && (section->sh_type == SHT_NOBITS ||
-                                       (section->sh_offset <= content_.size() && section->sh_size <= content_.size() - section->sh_offset));
+                                       (section->sh_offset <= content_.size() &&
+                                        section->sh_size <= content_.size() - section->sh_offset));
         if (!whole) {
             problem_ = "the file is cut short";
             return;
         }
         all.push_back(*section);
-        if ((section->sh_flags & SHF_ALLOC) && section->sh_type != SHT_NOBITS)
+        if ((section->sh_flags & SHF_ALLOC) && section->sh_type != SHT_NOBITS) {
             sections_[section->sh_addr] = {section->sh_addr, section->sh_offset, section->sh_size};
+        }
     }
     std::vector<ElfW(Sym)> symbols;
     for (const auto& section : all) {
         if (section.sh_type != SHT_DYNSYM || section.sh_link >= all.size()) continue;
         const auto& names = all[section.sh_link];
-        const std::string_view table = std::string_view(content_).substr(names.sh_offset, names.sh_type == SHT_NOBITS ? 0 : names.sh_size);
+        const std::string_view table = std::string_view(content_).substr(
+            names.sh_offset, names.sh_type == SHT_NOBITS ? 0 : names.sh_size);
         for (std::uint64_t i = 0; i < section.sh_size / sizeof(ElfW(Sym)); ++i) {
             const auto symbol = at<ElfW(Sym)>(content_, section.sh_offset + i * sizeof(ElfW(Sym)));
             if (!symbol) break;
@@ -100,7 +106,9 @@ void ElfFile::read() {
             const bool weak = ELF64_ST_BIND(symbol->st_info) == STB_WEAK;
             if (name.empty()) continue;
             if (symbol->st_shndx == SHN_UNDEF) {
-                if (!weak) undefined_.insert(name);
+                if (!weak) {
+                    undefined_.insert(name);
+                }
             } else {
                 defined_.emplace(name, symbol->st_value);
             }
@@ -119,12 +127,17 @@ void ElfFile::read() {
             if (!entry) break;
             std::uint64_t target = 0;
             if (with_addend) {
-                target = static_cast<std::uint64_t>(at<ElfW(Rela)>(content_, section.sh_offset + i * size).value_or(ElfW(Rela){}).r_addend);
+                target = static_cast<std::uint64_t>(
+                    at<ElfW(Rela)>(content_, section.sh_offset + i * size)
+                        .value_or(ElfW(Rela){})
+                        .r_addend);
             } else if (const auto there = at<ElfW(Addr)>(at_address(entry->r_offset), 0)) {
                 target = *there;
             }
             const std::uint64_t index = symbol_of(entry->r_info);
-            if (index < symbols.size()) target += symbols[index].st_value;
+            if (index < symbols.size()) {
+                target += symbols[index].st_value;
+            }
             pointers_.emplace(entry->r_offset, target);
         }
     }
@@ -132,15 +145,22 @@ void ElfFile::read() {
 
 std::string_view ElfFile::at_address(std::uint64_t address) const {
     auto section = sections_.upper_bound(address);
-    if (section == sections_.begin()) return {};
+    if (section == sections_.begin()) {
+        return {};
+    }
     const Section& of = std::prev(section)->second;
-    if (address - of.address >= of.size) return {};
-    return std::string_view(content_).substr(of.offset + (address - of.address), of.size - (address - of.address));
+    if (address - of.address >= of.size) {
+        return {};
+    }
+    return std::string_view(content_).substr(of.offset + (address - of.address),
+                                             of.size - (address - of.address));
 }
 
 std::string ElfFile::text_of(const std::string& symbol) const {
     const auto variable = defined_.find(symbol);
-    if (variable == defined_.end()) return {};
+    if (variable == defined_.end()) {
+        return {};
+    }
     const auto pointer = pointers_.find(variable->second);
     return pointer == pointers_.end() ? std::string() : text_at(at_address(pointer->second), 0);
 }

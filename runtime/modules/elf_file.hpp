@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A shared object as a file: its symbols and the texts that its data refers to, without mapping or running it.
+// A shared object as a file: its symbols and the texts that its data refers to, without mapping or
+// running it.
 #pragma once
 
 #include <cstdint>
@@ -22,9 +23,11 @@ public:
     /// Names and addresses of all symbols that the file exports.
     const std::map<std::string, std::uint64_t>& defined() const { return defined_; }
 
-    /// Returns the text that the exported variable `symbol`, a `const char *`, points to; an empty string if the file does not export it.
+    /// Returns the text that the exported variable `symbol`, a `const char *`, points to; an empty
+    /// string if the file does not export it.
     std::string text_of(const std::string& symbol) const;
-    /// Returns the value of the exported `int` variable; `otherwise` if the file does not export it.
+    /// Returns the value of the exported `int` variable; `otherwise` if the file does not export
+    /// it.
     std::int32_t number_of(const std::string& symbol, std::int32_t otherwise) const;
 
 private:

@@ -13,7 +13,9 @@ namespace hal {
 template <class T>
 std::optional<T> at(std::string_view content, std::uint64_t offset) {
     T value;
-    if (offset > content.size() || content.size() - offset < sizeof value) return {};
+    if (offset > content.size() || content.size() - offset < sizeof value) {
+        return {};
+    }
     std::memcpy(&value, content.data() + offset, sizeof value);
     return value;
 }

@@ -13,7 +13,8 @@
 namespace hal::modules {
 namespace {
 
-// The longest double: 309 digits, a point, and 1074 digits that may differ from 0. More precision adds zeros.
+// The longest double: 309 digits, a point, and 1074 digits that may differ from 0. More precision
+// adds zeros.
 constexpr int most_exact = 1074;
 constexpr std::size_t number_length = 1500;
 
@@ -22,25 +23,36 @@ struct Output {
     std::size_t size, length = 0;
 
     void put(std::string_view text) noexcept {
-        if (length < size && !text.empty()) std::memcpy(to + length, text.data(), std::min(text.size(), size - length));
+        if (length < size && !text.empty()) {
+            std::memcpy(to + length, text.data(), std::min(text.size(), size - length));
+        }
         length += text.size();
     }
     void fill(char c, std::ptrdiff_t count) noexcept {
         if (count <= 0) return;
         const auto wanted = static_cast<std::size_t>(count);
-        if (length < size) std::memset(to + length, c, std::min(wanted, size - length));
+        if (length < size) {
+            std::memset(to + length, c, std::min(wanted, size - length));
+        }
         length += wanted;
     }
 };
 
 struct Spec {
-    bool left = false, plus = false, blank = false, zero = false, alternate = false;
-    int width = 0, precision = -1;  // -1: none
+    bool left = false;
+    bool plus = false;
+    bool blank = false;
+    bool zero = false;
+    bool alternate = false;
+    int width = 0;
+    int precision = -1;  // -1: none
     int longs = 0;                  // -2 hh, -1 h, 1 l, 2 ll, j, z and t, 3 L
     char conversion = 0;
 
     bool upper() const noexcept { return conversion >= 'A' && conversion <= 'Z'; }
-    std::string_view sign(bool negative) const noexcept { return negative ? "-" : plus ? "+" : blank ? " " : ""; }
+    std::string_view sign(bool negative) const noexcept {
+        return negative ? "-" : plus ? "+" : blank ? " " : "";
+    }
 };
 
 struct Arguments {
@@ -50,40 +62,60 @@ struct Arguments {
 /// PREFIX ZEROS BODY ZEROS TAIL, padded to the width on one side.
 struct Number {
     std::string_view prefix, body, tail = {};
-    std::ptrdiff_t zeros = 0, zeros_after = 0;
+    std::ptrdiff_t zeros = 0;
+    std::ptrdiff_t zeros_after = 0;
 };
 
 void put(Output& out, const Spec& spec, const Number& n, bool pad_with_zeros) noexcept {
-    const auto own = static_cast<std::ptrdiff_t>(n.prefix.size() + n.body.size() + n.tail.size()) + n.zeros + n.zeros_after;
+    const auto own = static_cast<std::ptrdiff_t>(n.prefix.size() + n.body.size() + n.tail.size()) +
+                     n.zeros + n.zeros_after;
     const std::ptrdiff_t padding = spec.width - own;
     const bool zeros = pad_with_zeros && spec.zero && !spec.left;
-    if (!spec.left && !zeros) out.fill(' ', padding);
+    if (!spec.left && !zeros) {
+        out.fill(' ', padding);
+    }
     out.put(n.prefix);
     out.fill('0', n.zeros + (zeros ? std::max<std::ptrdiff_t>(padding, 0) : 0));
     out.put(n.body);
     out.fill('0', n.zeros_after);
     out.put(n.tail);
-    if (spec.left) out.fill(' ', padding);
+    if (spec.left) {
+        out.fill(' ', padding);
+    }
 }
 
-void put_text(Output& out, const Spec& spec, std::string_view text) noexcept { put(out, spec, {{}, text}, false); }
+void put_text(Output& out, const Spec& spec, std::string_view text) noexcept {
+    put(out, spec, {{}, text}, false);
+}
 
 void raise_case(char* from, char* to) noexcept {
-    for (; from != to; ++from)
-        if (*from >= 'a' && *from <= 'z') *from = static_cast<char>(*from - 'a' + 'A');
+    for (; from != to; ++from) {
+        if (*from >= 'a' && *from <= 'z') {
+            *from = static_cast<char>(*from - 'a' + 'A');
+        }
+    }
 }
 
-void put_integer(Output& out, const Spec& spec, std::uint64_t value, std::string_view prefix) noexcept {
+void put_integer(Output& out, const Spec& spec, std::uint64_t value,
+                 std::string_view prefix) noexcept {
     char digits[32];
     const char c = spec.conversion;
     const int base = c == 'o' ? 8 : c == 'x' || c == 'X' || c == 'p' ? 16 : 10;
     char* const end = std::to_chars(digits, std::end(digits), value, base).ptr;
-    if (spec.upper()) raise_case(digits, end);
+    if (spec.upper()) {
+        raise_case(digits, end);
+    }
     std::string_view body(digits, static_cast<std::size_t>(end - digits));
-    if (value == 0 && spec.precision == 0) body = {};
-    if (base == 16 && value != 0 && spec.alternate) prefix = spec.upper() ? "0X" : "0x";
+    if (value == 0 && spec.precision == 0) {
+        body = {};
+    }
+    if (base == 16 && value != 0 && spec.alternate) {
+        prefix = spec.upper() ? "0X" : "0x";
+    }
     std::ptrdiff_t zeros = spec.precision - static_cast<std::ptrdiff_t>(body.size());
-    if (base == 8 && spec.alternate && zeros <= 0 && !body.starts_with('0')) zeros = 1;
+    if (base == 8 && spec.alternate && zeros <= 0 && !body.starts_with('0')) {
+        zeros = 1;
+    }
     put(out, spec, {prefix, body, {}, std::max<std::ptrdiff_t>(zeros, 0)}, spec.precision < 0);
 }
 
@@ -91,20 +123,27 @@ std::int64_t signed_argument(const Spec& spec, Arguments& arguments) noexcept {
     if (spec.longs >= 2) return va_arg(arguments.list, long long);
     if (spec.longs == 1) return va_arg(arguments.list, long);
     const int value = va_arg(arguments.list, int);
-    return spec.longs == -1 ? static_cast<short>(value) : spec.longs == -2 ? static_cast<signed char>(value) : value;
+    return spec.longs == -1   ? static_cast<short>(value)
+           : spec.longs == -2 ? static_cast<signed char>(value)
+                              : value;
 }
 std::uint64_t unsigned_argument(const Spec& spec, Arguments& arguments) noexcept {
     if (spec.longs >= 2) return va_arg(arguments.list, unsigned long long);
     if (spec.longs == 1) return va_arg(arguments.list, unsigned long);
     const unsigned value = va_arg(arguments.list, unsigned);
-    return spec.longs == -1 ? static_cast<unsigned short>(value) : spec.longs == -2 ? static_cast<unsigned char>(value) : value;
+    return spec.longs == -1   ? static_cast<unsigned short>(value)
+           : spec.longs == -2 ? static_cast<unsigned char>(value)
+                              : value;
 }
 
-/// %g with the alternate form keeps its zeros, so it is written as %e or %f with the digits that are left.
+/// %g with the alternate form keeps its zeros, so it is written as %e or %f with the digits that
+/// are left.
 void resolve_general(Spec& spec, double value) noexcept {
     const int digits = std::max(spec.precision, 1);
     char text[number_length];
-    char* const end = std::to_chars(text, std::end(text), value, std::chars_format::scientific, std::min(digits - 1, most_exact)).ptr;
+    char* const end = std::to_chars(text, std::end(text), value, std::chars_format::scientific,
+                                    std::min(digits - 1, most_exact))
+                          .ptr;
     const std::string_view all(text, static_cast<std::size_t>(end - text));
     const auto e = all.rfind('e');
     int exponent = 0;
@@ -118,11 +157,14 @@ void put_real(Output& out, Spec spec, double value) noexcept {
     const std::string_view sign = spec.sign(std::signbit(value));
     value = std::fabs(value);
     if (!std::isfinite(value)) {
-        const std::string_view text = std::isnan(value) ? (spec.upper() ? "NAN" : "nan") : (spec.upper() ? "INF" : "inf");
+        const std::string_view text =
+            std::isnan(value) ? (spec.upper() ? "NAN" : "nan") : (spec.upper() ? "INF" : "inf");
         return put(out, spec, {sign, text}, false);
     }
     char kind = static_cast<char>(spec.conversion | 0x20);
-    if (spec.precision < 0 && kind != 'a') spec.precision = 6;
+    if (spec.precision < 0 && kind != 'a') {
+        spec.precision = 6;
+    }
     if (kind == 'g' && spec.alternate) {
         resolve_general(spec, value);
         kind = static_cast<char>(spec.conversion | 0x20);
@@ -133,37 +175,55 @@ void put_real(Output& out, Spec spec, double value) noexcept {
                                       : std::chars_format::hex;
     char digits[number_length];
     const int precision = std::min(spec.precision, most_exact);
-    char* const end = spec.precision < 0 ? std::to_chars(digits, std::end(digits), value, format).ptr
-                                         : std::to_chars(digits, std::end(digits), value, format, precision).ptr;
-    if (spec.upper()) raise_case(digits, end);
+    char* const end = spec.precision < 0
+                          ? std::to_chars(digits, std::end(digits), value, format).ptr
+                          : std::to_chars(digits, std::end(digits), value, format, precision).ptr;
+    if (spec.upper()) {
+        raise_case(digits, end);
+    }
     const std::string_view all(digits, static_cast<std::size_t>(end - digits));
     auto mark = kind == 'f' || kind == 'g' ? all.npos : all.find_last_of(kind == 'e' ? "eE" : "pP");
-    if (mark == all.npos) mark = all.size();
+    if (mark == all.npos) {
+        mark = all.size();
+    }
     char prefix[4];
     std::size_t prefixed = sign.copy(prefix, 1);
-    if (kind == 'a') prefixed += std::string_view(spec.upper() ? "0X" : "0x").copy(prefix + prefixed, 2);
+    if (kind == 'a') {
+        prefixed += std::string_view(spec.upper() ? "0X" : "0x").copy(prefix + prefixed, 2);
+    }
     char body[number_length + 1];
     std::size_t length = all.substr(0, mark).copy(body, number_length);
-    if (spec.alternate && std::string_view(body, length).find('.') == std::string_view::npos) body[length++] = '.';
+    if (spec.alternate && std::string_view(body, length).find('.') == std::string_view::npos) {
+        body[length++] = '.';
+    }
     const std::ptrdiff_t more = kind == 'g' ? 0 : std::max(spec.precision - precision, 0);
     put(out, spec, {{prefix, prefixed}, {body, length}, all.substr(mark), 0, more}, true);
 }
 
 int number(const char*& at) noexcept {
     std::int64_t value = 0;
-    for (; *at >= '0' && *at <= '9'; ++at) value = std::min<std::int64_t>(value * 10 + (*at - '0'), INT_MAX);
+    for (; *at >= '0' && *at <= '9'; ++at) {
+        value = std::min<std::int64_t>(value * 10 + (*at - '0'), INT_MAX);
+    }
     return static_cast<int>(value);
 }
 
 /// Reads what follows the %. Returns false for an argument with a position.
 bool read_spec(const char*& at, Spec& spec, Arguments& arguments) noexcept {
     for (;; ++at) {
-        if (*at == '-') spec.left = true;
-        else if (*at == '+') spec.plus = true;
-        else if (*at == ' ') spec.blank = true;
-        else if (*at == '0') spec.zero = true;
-        else if (*at == '#') spec.alternate = true;
-        else if (*at != '\'' && *at != 'I') break;
+        if (*at == '-') {
+            spec.left = true;
+        } else if (*at == '+') {
+            spec.plus = true;
+        } else if (*at == ' ') {
+            spec.blank = true;
+        } else if (*at == '0') {
+            spec.zero = true;
+        } else if (*at == '#') {
+            spec.alternate = true;
+        } else if (*at != '\'' && *at != 'I') {
+            break;
+        }
     }
     if (*at == '*') {
         ++at;
@@ -176,15 +236,25 @@ bool read_spec(const char*& at, Spec& spec, Arguments& arguments) noexcept {
     }
     if (*at == '.') {
         ++at;
-        if (*at == '*') spec.precision = std::max(va_arg(arguments.list, int), -1), ++at;
-        else spec.precision = number(at);
+        if (*at == '*') {
+            spec.precision = std::max(va_arg(arguments.list, int), -1);
+            ++at;
+        } else {
+            spec.precision = number(at);
+        }
     }
     for (;; ++at) {
-        if (*at == 'h') --spec.longs;
-        else if (*at == 'l') ++spec.longs;
-        else if (*at == 'j' || *at == 'z' || *at == 't' || *at == 'q') spec.longs = *at == 'q' || *at == 'j' ? 2 : 1;
-        else if (*at == 'L') spec.longs = 3;
-        else break;
+        if (*at == 'h') {
+            --spec.longs;
+        } else if (*at == 'l') {
+            ++spec.longs;
+        } else if (*at == 'j' || *at == 'z' || *at == 't' || *at == 'q') {
+            spec.longs = *at == 'q' || *at == 'j' ? 2 : 1;
+        } else if (*at == 'L') {
+            spec.longs = 3;
+        } else {
+            break;
+        }
     }
     spec.conversion = *at;
     return true;
@@ -196,13 +266,15 @@ bool convert(Output& out, const Spec& spec, Arguments& arguments, int error) noe
     case 'd':
     case 'i': {
         const std::int64_t value = signed_argument(spec, arguments);
-        const auto size = value < 0 ? 0 - static_cast<std::uint64_t>(value) : static_cast<std::uint64_t>(value);
-        return put_integer(out, spec, size, spec.sign(value < 0)), true;
+        const auto size =
+            value < 0 ? 0 - static_cast<std::uint64_t>(value) : static_cast<std::uint64_t>(value);
+        put_integer(out, spec, size, spec.sign(value < 0));
+        return true;
     }
     case 'u':
     case 'o':
     case 'x':
-    case 'X': return put_integer(out, spec, unsigned_argument(spec, arguments), ""), true;
+    case 'X': put_integer(out, spec, unsigned_argument(spec, arguments), ""); return true;
     case 'f':
     case 'F':
     case 'e':
@@ -211,34 +283,49 @@ bool convert(Output& out, const Spec& spec, Arguments& arguments, int error) noe
     case 'G':
     case 'a':
     case 'A': {
-        const double value = spec.longs == 3 ? static_cast<double>(va_arg(arguments.list, long double)) : va_arg(arguments.list, double);
-        return put_real(out, spec, value), true;
+        const double value = spec.longs == 3
+                                 ? static_cast<double>(va_arg(arguments.list, long double))
+                                 : va_arg(arguments.list, double);
+        put_real(out, spec, value);
+        return true;
     }
     case 'c': {
         const char c = static_cast<char>(va_arg(arguments.list, int));
-        return put_text(out, spec, {spec.longs > 0 ? "?" : &c, 1}), true;
+        put_text(out, spec, {spec.longs > 0 ? "?" : &c, 1});
+        return true;
     }
     case 's': {
         const char* text = va_arg(arguments.list, const char*);
-        if (!text) text = spec.precision >= 0 && spec.precision < 6 ? "" : "(null)";
-        else if (spec.longs > 0) text = "?";
-        return put_text(out, spec,
-                        {text, spec.precision < 0 ? std::strlen(text) : strnlen(text, static_cast<std::size_t>(spec.precision))}),
-               true;
+        if (!text) {
+            text = spec.precision >= 0 && spec.precision < 6 ? "" : "(null)";
+        } else if (spec.longs > 0) {
+            text = "?";
+        }
+        put_text(
+            out, spec,
+            {text, spec.precision < 0 ? std::strlen(text)
+                                      : strnlen(text, static_cast<std::size_t>(spec.precision))});
+
+        return true;
     }
     case 'p': {
         const void* const pointer = va_arg(arguments.list, const void*);
         Spec hex = spec;
         hex.alternate = true;
-        return pointer ? put_integer(out, hex, reinterpret_cast<std::uintptr_t>(pointer), "") : put_text(out, spec, "(nil)"), true;
+        return pointer ? put_integer(out, hex, reinterpret_cast<std::uintptr_t>(pointer), "")
+                       : put_text(out, spec, "(nil)"),
+               true;
     }
-    case 'n': return (void)va_arg(arguments.list, void*), true;
+    case 'n': (void)va_arg(arguments.list, void*); return true;
     case 'm': {
         Spec decimal = spec;
         decimal.conversion = 'd';
-        return out.put("error "), put_integer(out, decimal, static_cast<std::uint64_t>(error), ""), true;
+        out.put("error ");
+        put_integer(out, decimal, static_cast<std::uint64_t>(error), "");
+
+        return true;
     }
-    case '%': return out.put("%"), true;
+    case '%': out.put("%"); return true;
     default: return false;
     }
 }
@@ -261,12 +348,16 @@ int format_text(char* to, std::size_t size, const char* format, va_list given) n
             break;
         }
         ++at;
-        if (!convert(out, spec, arguments, error)) out.put({percent, static_cast<std::size_t>(at - percent)});
+        if (!convert(out, spec, arguments, error)) {
+            out.put({percent, static_cast<std::size_t>(at - percent)});
+        }
         format = at;
     }
     out.put(format);
     va_end(arguments.list);
-    if (size > 0) to[std::min(out.length, size - 1)] = '\0';
+    if (size > 0) {
+        to[std::min(out.length, size - 1)] = '\0';
+    }
     return out.length > INT_MAX ? -1 : static_cast<int>(out.length);
 }
 

@@ -18,24 +18,37 @@ const halcyon_module* open(const char* folder, const char* name, halcyon_module_
     };
     try {
         ElfFile file(std::string(folder) + "/" + name + ".so");
-        if (!file.problem().empty()) return fail(file.problem().c_str(), "install the package linuxcnc-uspace for this machine");
-        for (const char* const entry : {"rtapi_app_main", "rtapi_app_exit"})
-            if (!file.defines(entry))
-                return fail((std::string("it is not a LinuxCNC module: it does not export ") + entry).c_str(),
-                            "a component for LinuxCNC is built by halcompile; one for Halcyon by hal compile");
+        if (!file.problem().empty()) {
+            return fail(file.problem().c_str(),
+                        "install the package linuxcnc-uspace for this machine");
+        }
+        for (const char* const entry : {"rtapi_app_main", "rtapi_app_exit"}) {
+            if (!file.defines(entry)) {
+                return fail(
+                    (std::string("it is not a LinuxCNC module: it does not export ") + entry)
+                        .c_str(),
+                    "a component for LinuxCNC is built by halcompile; one for Halcyon by hal "
+                    "compile");
+            }
+        }
         return &(new Module(folder, name, std::move(file)))->description();
-    } catch (const std::exception& error) { return fail(error.what(), ""); }
+    } catch (const std::exception& error) {
+        return fail(error.what(), "");
+    }
 }
 
 void close(const halcyon_module* module) {
     const Module& of = Module::of(*module);
-    if (!of.broken()) delete &of;  // else a task of it may still run
+    if (!of.broken()) {
+        delete &of;  // else a task of it may still run
+    }
 }
 
 const char* user(const halcyon_module* module, std::size_t index) {
     const Module& used = Module::of(*module);
-    for (const Module* const other : Module::all_running())
+    for (const Module* const other : Module::all_running()) {
         if (other != &used && other->uses(used) && index-- == 0) return other->name().c_str();
+    }
     return nullptr;
 }
 
@@ -43,6 +56,7 @@ const char* user(const halcyon_module* module, std::size_t index) {
 }  // namespace hal::modules
 
 extern "C" const halcyon_modules* halcyon_module_host() {
-    static constexpr halcyon_modules host{sizeof host, hal::modules::open, hal::modules::close, hal::modules::user, hal::modules::module_of_task};
+    static constexpr halcyon_modules host{sizeof host, hal::modules::open, hal::modules::close,
+                                          hal::modules::user, hal::modules::module_of_task};
     return &host;
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// I/O ports of the PC. Modules access them by machine code, which the kernel permits thread by thread, to those with CAP_SYS_RAWIO.
+// I/O ports of the PC. Modules access them by machine code, which the kernel permits thread by
+// thread, to those with CAP_SYS_RAWIO.
 #include <cerrno>
 #include <cstdio>
 #include <cstdlib>
@@ -35,15 +36,20 @@ int permit_all() noexcept {
 
 std::string explanation(int why) {
     if (why == ENODEV) return "this processor has no I/O ports";
-    if (why == ENOSYS) return "this kernel permits no program to access I/O ports (it is built without CONFIG_X86_IOPL_IOPERM)";
+    if (why == ENOSYS) {
+        return "this kernel permits no program to access I/O ports (it is built without "
+               "CONFIG_X86_IOPL_IOPERM)";
+    }
     const std::string command = hal::grant_command(hal::privilege::raw_io);
-    return "access to I/O ports needs the capability CAP_SYS_RAWIO; " + std::string(hal::privilege::withheld() ? "" : "type: ") + command;
+    return "access to I/O ports needs the capability CAP_SYS_RAWIO; " +
+           std::string(hal::privilege::withheld() ? "" : "type: ") + command;
 }
 
 /// The kernel's parallel port: `name` is parport0 …
 struct KernelPort {
     std::string name;
-    unsigned short base = 0, base_hi = 0;
+    unsigned short base = 0;
+    unsigned short base_hi = 0;
 };
 
 /// Finds the kernel's port of this number, or at this address.
@@ -51,7 +57,8 @@ bool find(unsigned short base, KernelPort& port) {
     for (int number = 0; number < 16; ++number) {
         const std::string name = "parport" + std::to_string(number);
         std::ifstream text("/proc/sys/dev/parport/" + name + "/base-addr");
-        unsigned long low = 0, high = 0;
+        unsigned long low = 0;
+        unsigned long high = 0;
         if (!(text >> low)) continue;
         text >> high;
         if (base == number || base == low) {
@@ -87,19 +94,28 @@ void release_claims(const Module& module) noexcept {
 
 extern "C" {
 
-int rtapi_parport_get(const char* name, halcyon_parport* port, unsigned short base, unsigned short base_hi, unsigned modes) {
+int rtapi_parport_get(const char* name, halcyon_parport* port, unsigned short base,
+                      unsigned short base_hi, unsigned modes) {
     return guarded([&] {
         const char* const who = name ? name : "";
         *port = {base, base_hi, -1};
         if (const int why = permit_ports()) {
-            rtapi_print_msg(1, "%s: parallel port at 0x%x: %s\n", who, base, explanation(why).c_str());
+            rtapi_print_msg(1, "%s: parallel port at 0x%x: %s\n", who, base,
+                            explanation(why).c_str());
             return -why;
         }
-        if (Module* const module = Module::current()) module->accesses_ports = true;
+        if (Module* const module = Module::current()) {
+            module->accesses_ports = true;
+        }
         KernelPort known;
         if (!find(base, known)) {
-            if (base >= 16) return 0;  // a card that the kernel does not know
-            rtapi_print_msg(1, "%s: the kernel has no parallel port %u; give the address, as in cfg=\"0x378\"\n", who, base);
+            if (base >= 16) {
+                return 0;  // a card that the kernel does not know
+            }
+            rtapi_print_msg(
+                1,
+                "%s: the kernel has no parallel port %u; give the address, as in cfg=\"0x378\"\n",
+                who, base);
             return -ENOENT;
         }
         const std::string file = "/dev/" + known.name;
@@ -115,8 +131,10 @@ int rtapi_parport_get(const char* name, halcyon_parport* port, unsigned short ba
         }
         claims[port->fd] = Module::current();
         unsigned possible = ~0U;
-        if (ioctl(port->fd, PPGETMODES, &possible) == 0 && (possible & modes) != modes)
-            rtapi_print_msg(2, "%s: %s does not have all of the modes 0x%x\n", who, file.c_str(), modes);
+        if (ioctl(port->fd, PPGETMODES, &possible) == 0 && (possible & modes) != modes) {
+            rtapi_print_msg(2, "%s: %s does not have all of the modes 0x%x\n", who, file.c_str(),
+                            modes);
+        }
         port->base = known.base;
         port->base_hi = known.base_hi;
         return 0;
@@ -131,9 +149,13 @@ void rtapi_parport_release(halcyon_parport* port) {
     port->fd = -1;
 }
 
-// Without the permission the access is a crash, which names the function; the message has the reason.
+// Without the permission the access is a crash, which names the function; the message has the
+// reason.
 void rtapi_outb([[maybe_unused]] unsigned char byte, unsigned number) {
-    if (const int why = permit_ports(); why != 0) rtapi_print_msg(1, "rtapi_outb: port 0x%x: %s\n", number, in_cycle ? std::strerror(why) : explanation(why).c_str());
+    if (const int why = permit_ports(); why != 0) {
+        rtapi_print_msg(1, "rtapi_outb: port 0x%x: %s\n", number,
+                        in_cycle ? std::strerror(why) : explanation(why).c_str());
+    }
 #if defined(__x86_64__) || defined(__i386__)
     outb(byte, static_cast<unsigned short>(number));
 #else
@@ -141,7 +163,10 @@ void rtapi_outb([[maybe_unused]] unsigned char byte, unsigned number) {
 #endif
 }
 unsigned char rtapi_inb(unsigned number) {
-    if (const int why = permit_ports(); why != 0) rtapi_print_msg(1, "rtapi_inb: port 0x%x: %s\n", number, in_cycle ? std::strerror(why) : explanation(why).c_str());
+    if (const int why = permit_ports(); why != 0) {
+        rtapi_print_msg(1, "rtapi_inb: port 0x%x: %s\n", number,
+                        in_cycle ? std::strerror(why) : explanation(why).c_str());
+    }
 #if defined(__x86_64__) || defined(__i386__)
     return inb(static_cast<unsigned short>(number));
 #else

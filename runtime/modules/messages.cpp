@@ -17,11 +17,14 @@
 namespace hal::modules {
 namespace {
 
-constexpr std::size_t line_length = 1024, lines_in_flight = 128;
-constexpr int errors = 1, all = 5;  // levels
+constexpr std::size_t line_length = 1024;
+constexpr std::size_t lines_in_flight = 128;
+constexpr int errors = 1;
+constexpr int all = 5;  // levels
 
-// Any cycle fills a line, the printer empties it. `turn` is the owner: n for the writer of message n, n + 1 for the printer of message
-// n; then it is n + lines_in_flight for the next writer. A full queue loses the new message and counts it.
+// Any cycle fills a line, the printer empties it. `turn` is the owner: n for the writer of message
+// n, n + 1 for the printer of message n; then it is n + lines_in_flight for the next writer. A full
+// queue loses the new message and counts it.
 //   1. writer A: next_line 7 -> 8       2. writer B: next_line 8 -> 9, writes line 8, turn 8 -> 9
 //   3. printer: line 7 has turn 7: waits, although line 8 is complete        4. writer A: writes line 7, turn 7 -> 8; the printer goes on
 struct Line {
@@ -30,11 +33,13 @@ struct Line {
     char text[line_length];
 };
 Line lines[lines_in_flight];
-std::atomic<std::uint64_t> next_line{0}, lost_lines{0};
-std::uint64_t printed_line = 0;    // the printer's
+std::atomic<std::uint64_t> next_line{0};
+std::atomic<std::uint64_t> lost_lines{0};
+std::uint64_t printed_line = 0;  // the printer's
 pthread_t printer;
 std::atomic<bool> printing{false};
-bool printer_made = false, lines_ready = false;
+bool printer_made = false;
+bool lines_ready = false;
 
 std::atomic<int> message_level{errors};
 std::atomic<halcyon_message_handler> message_handler{nullptr};
@@ -66,8 +71,10 @@ void report_withheld() noexcept {
     rate.withheld += lost_lines.exchange(0, std::memory_order_relaxed);
     if (rate.withheld == 0) return;
     char text[128];
-    const int length = std::snprintf(text, sizeof text, "hal: %llu messages of LinuxCNC modules not printed (limit %u per second)\n",
-                                     static_cast<unsigned long long>(rate.withheld), most_per_second);
+    const int length =
+        std::snprintf(text, sizeof text,
+                      "hal: %llu messages of LinuxCNC modules not printed (limit %u per second)\n",
+                      static_cast<unsigned long long>(rate.withheld), most_per_second);
     write_text(errors, text, static_cast<std::size_t>(length));
     rate.withheld = 0;
 }
@@ -121,10 +128,14 @@ void print_by_default(int level, const char* format, va_list arguments) {
     if (in_cycle) return queue_message(level, format, arguments);
     char text[line_length];
     const int wanted = std::vsnprintf(text, sizeof text, format, arguments);
-    const std::size_t length = wanted < 0 ? 0 : std::min<std::size_t>(static_cast<std::size_t>(wanted), sizeof text - 1);
+    const std::size_t length =
+        wanted < 0 ? 0 : std::min<std::size_t>(static_cast<std::size_t>(wanted), sizeof text - 1);
     if (!captures) return write_text(level, text, length);
-    const bool announces = std::strstr(text, ": loading ") != nullptr;  // as drivers do at this level, to be seen
-    if (level == errors && !*first_error && !announces) std::memcpy(first_error, text, length + 1);
+    // as drivers do at this level, to be seen
+    const bool announces = std::strstr(text, ": loading ") != nullptr;
+    if (level == errors && !*first_error && !announces) {
+        std::memcpy(first_error, text, length + 1);
+    }
     if (length > sizeof capture - 1 - capture_length) {  // then it prints earlier
         write_text(errors, capture, capture_length);
         capture_length = 0;
@@ -146,29 +157,38 @@ void begin_capture() noexcept {
     *capture = *first_error = '\0';
     capturing = captures = true;
 }
-std::string captured_cause() { return *first_error ? first_error : std::string(capture, capture_length); }
+std::string captured_cause() {
+    return *first_error ? first_error : std::string(capture, capture_length);
+}
 void end_capture() noexcept {
     capture_length = 0;
     capturing = captures = false;
 }
 void print_captured() noexcept {
-    if (capturing) write_text(errors, capture, capture_length);
+    if (capturing) {
+        write_text(errors, capture, capture_length);
+    }
     end_capture();
 }
 
 void start_printer() noexcept {
     if (printer_made) return;
-    if (!lines_ready)
-        for (std::size_t i = 0; i < lines_in_flight; ++i) lines[i].turn = i;
+    if (!lines_ready) {
+        for (std::size_t i = 0; i < lines_in_flight; ++i) {
+            lines[i].turn = i;
+        }
+    }
     lines_ready = true;
     printing = true;
-    printer_made =
-        pthread_create(&printer, nullptr, print_until_stopped, nullptr) == 0;  // without it the last lines are printed at the end
+    printer_made = pthread_create(&printer, nullptr, print_until_stopped, nullptr) ==
+                   0;  // without it the last lines are printed at the end
 }
 
 void stop_printer() noexcept {
     printing = false;
-    if (printer_made) pthread_join(printer, nullptr);
+    if (printer_made) {
+        pthread_join(printer, nullptr);
+    }
     printer_made = false;
     print_lines();
     report_withheld();
@@ -196,7 +216,8 @@ void rtapi_print_msg(int level, const char* format, ...) {
 }
 
 int rtapi_vsnprintf(char* to, unsigned long size, const char* format, va_list arguments) {
-    return in_cycle ? format_text(to, size, format, arguments) : std::vsnprintf(to, size, format, arguments);
+    return in_cycle ? format_text(to, size, format, arguments)
+                    : std::vsnprintf(to, size, format, arguments);
 }
 int rtapi_snprintf(char* to, unsigned long size, const char* format, ...) {
     va_list arguments;

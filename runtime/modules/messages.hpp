@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// What modules print. While a module is loaded or unloaded it is collected; in a cycle it goes through a bounded queue to a thread
-// that prints it, at most `most_per_second` lines; otherwise it is printed at once.
+// What modules print. While a module is loaded or unloaded it is collected; in a cycle it goes
+// through a bounded queue to a thread that prints it, at most `most_per_second` lines; otherwise it
+// is printed at once.
 #pragma once
 
 #include <string>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Pins and parameters. A pin's slot, a pointer in the module's memory, follows the pin when it is linked (hal_pin_decl.pointer).
+// Pins and parameters. A pin's slot, a pointer in the module's memory, follows the pin when it is
+// linked (hal_pin_decl.pointer).
 #include <cerrno>
 #include <cstdarg>
 #include <cstdio>
@@ -16,12 +17,30 @@ enum Direction { in = 16, out = 32, io = 48, read_only = 64, read_write = 192 };
 
 bool type_of(int type, hal_type& to, std::uint32_t& width) {
     switch (type) {
-    case bit: to = HAL_TYPE_BIT, width = 1; return true;
-    case real: to = HAL_TYPE_FLOAT, width = 8; return true;
-    case s32: to = HAL_TYPE_S32, width = 4; return true;
-    case u32: to = HAL_TYPE_U32, width = 4; return true;
-    case s64: to = HAL_TYPE_S64, width = 8; return true;
-    case u64: to = HAL_TYPE_U64, width = 8; return true;
+    case bit:
+        to = HAL_TYPE_BIT;
+        width = 1;
+        return true;
+    case real:
+        to = HAL_TYPE_FLOAT;
+        width = 8;
+        return true;
+    case s32:
+        to = HAL_TYPE_S32;
+        width = 4;
+        return true;
+    case u32:
+        to = HAL_TYPE_U32;
+        width = 4;
+        return true;
+    case s64:
+        to = HAL_TYPE_S64;
+        width = 8;
+        return true;
+    case u64:
+        to = HAL_TYPE_U64;
+        width = 8;
+        return true;
     default: return false;
     }
 }
@@ -44,8 +63,12 @@ int new_parameter(const char* name, int type, int dir, void* value, int comp) {
     std::uint32_t width = 0;
     if (!value) return fail("hal_param_new", name, "no variable");
     if (!type_of(type, decl.type, width)) return fail("hal_param_new", name, "unsupported type");
-    if (dir != read_only && dir != read_write) return fail("hal_param_new", name, "invalid direction");
-    if (!module.take_name(true, name)) return fail("hal_param_new", name, "duplicate parameter name");
+    if (dir != read_only && dir != read_write) {
+        return fail("hal_param_new", name, "invalid direction");
+    }
+    if (!module.take_name(true, name)) {
+        return fail("hal_param_new", name, "duplicate parameter name");
+    }
     const hal_host* const host = module.host();
     void* const memory = host->allocate(host, sizeof(Parameter), alignof(Parameter));
     if (!memory) return -ENOMEM;
@@ -64,7 +87,8 @@ int new_parameter(const char* name, int type, int dir, void* value, int comp) {
 
 }  // namespace
 
-int new_slot(const char* function, bool parameter, const char* name, int type, int dir, void** slot, hal_value initial, int comp) {
+int new_slot(const char* function, bool parameter, const char* name, int type, int dir, void** slot,
+             hal_value initial, int comp) {
     if (const int wrong = declaring(function, name, comp); wrong != 0) return wrong;
     Module& module = *Module::current();
     hal_pin_decl decl{};
@@ -72,13 +96,20 @@ int new_slot(const char* function, bool parameter, const char* name, int type, i
     std::uint32_t width = 0;
     if (!slot) return fail(function, name, "no pointer");
     if (!type_of(type, decl.type, width)) return fail(function, name, "unsupported type");
-    if (parameter ? dir != read_only && dir != read_write : dir != in && dir != out && dir != io)
+    if (parameter ? dir != read_only && dir != read_write : dir != in && dir != out && dir != io) {
         return fail(function, name, "invalid direction");
-    if (!module.take_name(parameter, name)) return fail(function, name, parameter ? "duplicate parameter name" : "duplicate pin name");
+    }
+    if (!module.take_name(parameter, name)) {
+        return fail(function, name, parameter ? "duplicate parameter name" : "duplicate pin name");
+    }
     const hal_host* const host = module.host();
-    hal_pin* const pin = static_cast<hal_pin*>(host->allocate(host, sizeof(hal_pin), alignof(hal_pin)));
+    hal_pin* const pin =
+        static_cast<hal_pin*>(host->allocate(host, sizeof(hal_pin), alignof(hal_pin)));
     if (!pin) return -ENOMEM;
-    decl.dir = parameter ? HAL_DIR_PARAM : dir == in ? HAL_DIR_IN : dir == out ? HAL_DIR_OUT : HAL_DIR_IO;
+    decl.dir = parameter    ? HAL_DIR_PARAM
+               : dir == in  ? HAL_DIR_IN
+               : dir == out ? HAL_DIR_OUT
+                            : HAL_DIR_IO;
     decl.flags = dir == read_only ? HAL_PIN_READ_ONLY : 0;
     decl.name = name;
     decl.doc = decl.unit = "";
@@ -102,7 +133,11 @@ namespace {
 template <class Action>
 int formatted(const char* format, va_list arguments, Action action) {
     char name[256];
-    if (const int wrong = guarded([&] { return format_name(name, "hal_pin_newf", format, arguments); }); wrong != 0) return wrong;
+    if (const int wrong =
+            guarded([&] { return format_name(name, "hal_pin_newf", format, arguments); });
+        wrong != 0) {
+        return wrong;
+    }
     return guarded([&] { return action(name); });
 }
 
@@ -120,22 +155,30 @@ int hal_param_new(const char* name, int type, int dir, void* value, int comp) {
     return guarded([&] { return new_parameter(name, type, dir, value, comp); });
 }
 
-#define HALCYON_DEFINE(suffix, type)                                                                                                       \
-    int hal_pin_##suffix##_new(const char* name, int dir, void** slot, int comp) { return hal_pin_new(name, type, dir, slot, comp); }      \
-    int hal_param_##suffix##_new(const char* name, int dir, void* value, int comp) { return hal_param_new(name, type, dir, value, comp); } \
-    int hal_pin_##suffix##_newf(int dir, void** slot, int comp, const char* format, ...) {                                                 \
-        va_list arguments;                                                                                                                 \
-        va_start(arguments, format);                                                                                                       \
-        const int result = formatted(format, arguments, [&](const char* name) { return new_pin(name, type, dir, slot, comp); });           \
-        va_end(arguments);                                                                                                                 \
-        return result;                                                                                                                     \
-    }                                                                                                                                      \
-    int hal_param_##suffix##_newf(int dir, void* value, int comp, const char* format, ...) {                                               \
-        va_list arguments;                                                                                                                 \
-        va_start(arguments, format);                                                                                                       \
-        const int result = formatted(format, arguments, [&](const char* name) { return new_parameter(name, type, dir, value, comp); });    \
-        va_end(arguments);                                                                                                                 \
-        return result;                                                                                                                     \
+#define HALCYON_DEFINE(suffix, type)                                                         \
+    int hal_pin_##suffix##_new(const char* name, int dir, void** slot, int comp) {           \
+        return hal_pin_new(name, type, dir, slot, comp);                                     \
+    }                                                                                        \
+    int hal_param_##suffix##_new(const char* name, int dir, void* value, int comp) {         \
+        return hal_param_new(name, type, dir, value, comp);                                  \
+    }                                                                                        \
+    int hal_pin_##suffix##_newf(int dir, void** slot, int comp, const char* format, ...) {   \
+        va_list arguments;                                                                   \
+        va_start(arguments, format);                                                         \
+        const int result = formatted(format, arguments, [&](const char* name) {              \
+            return new_pin(name, type, dir, slot, comp);                                     \
+        });                                                                                  \
+        va_end(arguments);                                                                   \
+        return result;                                                                       \
+    }                                                                                        \
+    int hal_param_##suffix##_newf(int dir, void* value, int comp, const char* format, ...) { \
+        va_list arguments;                                                                   \
+        va_start(arguments, format);                                                         \
+        const int result = formatted(format, arguments, [&](const char* name) {              \
+            return new_parameter(name, type, dir, value, comp);                              \
+        });                                                                                  \
+        va_end(arguments);                                                                   \
+        return result;                                                                       \
     }
 HALCYON_DEFINE(bit, bit)
 HALCYON_DEFINE(float, real)

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The functions that LinuxCNC's compiled modules (2.9; those of 2.10 only are in handles.hpp) may call, declared from the documented interface: names, types and sizes. Own text;
-// nothing here comes from LinuxCNC's headers. exports.map makes exactly these visible.
+// The functions that LinuxCNC's compiled modules (2.9; those of 2.10 only are in handles.hpp) may
+// call, declared from the documented interface: names, types and sizes. Own text; nothing here
+// comes from LinuxCNC's headers. exports.map makes exactly these visible.
 #pragma once
 
 #include <cstdarg>
@@ -21,16 +22,19 @@ int hal_set_constructor(int comp, int (*make)(char* prefix, char* argument));
 int hal_exit(int comp);
 void* hal_malloc(long bytes);
 char* hal_comp_name(int comp);
-int hal_export_funct(const char* name, void (*code)(void*, long), void* arg, int uses_fp, int reentrant, int comp);
+int hal_export_funct(const char* name, void (*code)(void*, long), void* arg, int uses_fp,
+                     int reentrant, int comp);
 int hal_create_thread(const char* name, unsigned long period_ns, int uses_fp);
 int hal_add_funct_to_thread(const char* function, const char* thread, int position);
 // In rtapi_app_exit() the caller's functions are in no thread: then 0 for these.
 int hal_del_funct_from_thread(const char* function, const char* thread);
 int hal_start_threads();
-// In rtapi_app_exit() 0 without an effect: the caller's functions are in no thread then; other functions go on.
+// In rtapi_app_exit() 0 without an effect: the caller's functions are in no thread then; other
+// functions go on.
 int hal_stop_threads();
 
-// signals, links, values and locks by name: [setup], in rtapi_app_main(); delete and unlink in rtapi_app_exit() as well
+// signals, links, values and locks by name: [setup], in rtapi_app_main(); delete and unlink in
+// rtapi_app_exit() as well
 int hal_signal_new(const char* name, int type);
 int hal_signal_delete(const char* name);
 int hal_link(const char* pin, const char* signal);
@@ -47,7 +51,8 @@ int hal_get_param_value_by_name(const char* name, int* type, void** data);
 int hal_set_lock(unsigned char lock);
 unsigned char hal_get_lock();
 
-// pins and parameters: [setup]. Types: bit 1, float 2, s32 3, u32 4, port 5, s64 6, u64 7. Directions: in 16, out 32, io 48, ro 64, rw 192
+// pins and parameters: [setup]. Types: bit 1, float 2, s32 3, u32 4, port 5, s64 6, u64 7.
+// Directions: in 16, out 32, io 48, ro 64, rw 192
 int hal_pin_new(const char* name, int type, int dir, void** slot, int comp);
 int hal_param_new(const char* name, int type, int dir, void* value, int comp);
 int hal_param_alias(const char* name, const char* alias);
@@ -64,8 +69,9 @@ HALCYON_BOTH_FORMS(s64)
 HALCYON_BOTH_FORMS(u64)
 #undef HALCYON_BOTH_FORMS
 
-// ports, by the number that a port pin's pointer points to, or by that pointer (take_ports_by_pointer()): pins are [setup], the rest [any]; one thread reads, one writes. A port without a
-// signal, or whose signal has no size yet, holds nothing.
+// ports, by the number that a port pin's pointer points to, or by that pointer
+// (take_ports_by_pointer()): pins are [setup], the rest [any]; one thread reads, one writes. A port
+// without a signal, or whose signal has no size yet, holds nothing.
 int hal_pin_port_new(const char* name, int dir, void** slot, int comp);
 int hal_pin_port_newf(int dir, void** slot, int comp, const char* format, ...);
 unsigned hal_port_buffer_size(std::intptr_t port);
@@ -77,8 +83,10 @@ bool hal_port_read(std::intptr_t port, char* to, unsigned count);
 bool hal_port_write(std::intptr_t port, const char* from, unsigned count);
 void hal_port_clear(std::intptr_t port);
 int hal_port_alloc(unsigned size);  // [setup] a buffer of the module's own
-void hal_port_wait_readable(volatile int** port, unsigned count, const volatile int* stop);  // of programs
-void hal_port_wait_writable(volatile int** port, unsigned count, const volatile int* stop);  // of programs
+// of programs
+void hal_port_wait_readable(volatile int** port, unsigned count, const volatile int* stop);
+// of programs
+void hal_port_wait_writable(volatile int** port, unsigned count, const volatile int* stop);
 
 // streams: create, attach, detach and destroy are [setup], the rest [any]
 struct halcyon_stream {
@@ -113,7 +121,8 @@ int hal_stream_write(halcyon_stream* stream, halcyon_stream_value* from);
 typedef void (*halcyon_message_handler)(int level, const char* format, va_list arguments);
 void rtapi_print(const char* format, ...) __attribute__((format(printf, 1, 2)));
 void rtapi_print_msg(int level, const char* format, ...) __attribute__((format(printf, 2, 3)));
-int rtapi_snprintf(char* to, unsigned long size, const char* format, ...) __attribute__((format(printf, 3, 4)));
+int rtapi_snprintf(char* to, unsigned long size, const char* format, ...)
+    __attribute__((format(printf, 3, 4)));
 int rtapi_vsnprintf(char* to, unsigned long size, const char* format, va_list arguments);
 int rtapi_set_msg_level(int level);
 int rtapi_get_msg_level();
@@ -128,7 +137,7 @@ long rtapi_delay_max();
 long rtapi_clock_set_period(long ns);  // [setup]
 int rtapi_is_realtime();  // [setup]
 int rtapi_is_kernelspace();
-long long rtapi_task_pll_get_reference();       // [realtime]
+long long rtapi_task_pll_get_reference();  // [realtime]
 int rtapi_task_pll_set_correction(long value);  // [realtime]
 
 // tasks of a module's own: new, start and delete are [setup]; the id is positive
@@ -136,13 +145,14 @@ int rtapi_prio_highest();
 int rtapi_prio_lowest();
 int rtapi_prio_next_higher(int priority);
 int rtapi_prio_next_lower(int priority);
-int rtapi_task_new(void (*code)(void*), void* argument, int priority, int owner, unsigned long stack_bytes, int uses_fp);
+int rtapi_task_new(void (*code)(void*), void* argument, int priority, int owner,
+                   unsigned long stack_bytes, int uses_fp);
 int rtapi_task_start(int task, unsigned long period_ns);
 int rtapi_task_delete(int task);
-int rtapi_task_pause(int task);   // [any]
+int rtapi_task_pause(int task);  // [any]
 int rtapi_task_resume(int task);  // [any]
-int rtapi_task_self();            // [any] in a thread of the machine's 0; -EINVAL: in none
-void rtapi_wait();                // in a task
+int rtapi_task_self();  // [any] in a thread of the machine's 0; -EINVAL: in none
+void rtapi_wait();  // in a task
 
 // [setup]
 int rtapi_init(const char* name);
@@ -184,7 +194,8 @@ struct halcyon_firmware {
     std::size_t size;
     const unsigned char* data;
 };
-int rtapi_parport_get(const char* name, halcyon_parport* port, unsigned short base, unsigned short base_hi, unsigned modes);
+int rtapi_parport_get(const char* name, halcyon_parport* port, unsigned short base,
+                      unsigned short base_hi, unsigned modes);
 void rtapi_parport_release(halcyon_parport* port);
 int rtapi_pci_register_driver(halcyon_pci_driver* driver);
 void rtapi_pci_unregister_driver(halcyon_pci_driver* driver);
@@ -194,16 +205,16 @@ void* rtapi_pci_ioremap_bar(halcyon_pci_device* device, int bar);
 void rtapi_iounmap(void* address);
 int rtapi_request_firmware(const halcyon_firmware** result, const char* name, void* device);
 void rtapi_release_firmware(const halcyon_firmware* firmware);
-int rtapi_spawn_as_root(pid_t* process, const char* path, const void* actions, const void* attributes, char* const argv[],
-                        char* const envp[]);
-int rtapi_spawnp_as_root(pid_t* process, const char* file, const void* actions, const void* attributes, char* const argv[],
-                         char* const envp[]);
+int rtapi_spawn_as_root(pid_t* process, const char* path, const void* actions,
+                        const void* attributes, char* const argv[], char* const envp[]);
+int rtapi_spawnp_as_root(pid_t* process, const char* file, const void* actions,
+                         const void* attributes, char* const argv[], char* const envp[]);
 int rtapi_open_as_root(const char* path, int flags);
 char** rtapi_argv_split(int flags, const char* text, int* count);
 void rtapi_argv_free(char** words);
 char* rtapi_kstrndup(const char* text, std::size_t most, int flags);
 void rtapi_outb(unsigned char byte, unsigned port);  // [any]
-unsigned char rtapi_inb(unsigned port);              // [any]
+unsigned char rtapi_inb(unsigned port);  // [any]
 long simple_strtol(const char* text, char** end, unsigned base);
 
 }  // extern "C"

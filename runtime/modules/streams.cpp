@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Streams: FIFOs of records in shared memory by key, in the layout that LinuxCNC's halsampler and halstreamer use.
+// Streams: FIFOs of records in shared memory by key, in the layout that LinuxCNC's halsampler and
+// halstreamer use.
 #include <atomic>
 #include <cerrno>
 #include <cstring>
@@ -23,18 +24,21 @@ struct Header {
     std::int32_t types[most_pins];
 };
 constexpr std::size_t data_offset = 128;
-static_assert(offsetof(Header, depth) == 16 && offsetof(Header, overruns) == 24 && offsetof(Header, types) == 40 &&
-              sizeof(Header) <= data_offset);
+static_assert(offsetof(Header, depth) == 16 && offsetof(Header, overruns) == 24 &&
+              offsetof(Header, types) == 40 && sizeof(Header) <= data_offset);
 
 Header& header(const halcyon_stream* stream) { return *static_cast<Header*>(stream->fifo); }
 
 // One value more than pins: the number of the record.
 halcyon_stream_value* record(const halcyon_stream* stream, std::uint32_t index) {
-    auto* const data = reinterpret_cast<halcyon_stream_value*>(static_cast<char*>(stream->fifo) + data_offset);
+    auto* const data =
+        reinterpret_cast<halcyon_stream_value*>(static_cast<char*>(stream->fifo) + data_offset);
     return data + std::size_t{index} * (static_cast<std::size_t>(header(stream).pins) + 1);
 }
 
-std::uint32_t next(const Header& of, std::uint32_t index) { return index + 1 == static_cast<std::uint32_t>(of.depth) ? 0 : index + 1; }
+std::uint32_t next(const Header& of, std::uint32_t index) {
+    return index + 1 == static_cast<std::uint32_t>(of.depth) ? 0 : index + 1;
+}
 
 int type_of(char letter) {
     switch (letter) {
@@ -63,10 +67,12 @@ extern "C" {
 int hal_stream_create(halcyon_stream* stream, int comp, int key, int depth, const char* types) {
     const std::size_t pins = types ? std::strlen(types) : 0;
     if (!stream || pins == 0 || pins > most_pins || depth < 1 || depth > most_depth) return -EINVAL;
-    for (std::size_t i = 0; i < pins; ++i)
+    for (std::size_t i = 0; i < pins; ++i) {
         if (type_of(types[i]) == 0) return -EINVAL;
-    const int segment =
-        rtapi_shmem_new(key, comp, data_offset + sizeof(halcyon_stream_value) * static_cast<std::size_t>(depth) * (pins + 1));
+    }
+    const int segment = rtapi_shmem_new(
+        key, comp,
+        data_offset + sizeof(halcyon_stream_value) * static_cast<std::size_t>(depth) * (pins + 1));
     if (segment < 0) return segment;
     *stream = {comp, segment, nullptr};
     rtapi_shmem_getptr(segment, &stream->fifo);
@@ -74,7 +80,9 @@ int hal_stream_create(halcyon_stream* stream, int comp, int key, int depth, cons
     std::memset(stream->fifo, 0, data_offset);
     made.depth = depth;
     made.pins = static_cast<std::int32_t>(pins);
-    for (std::size_t i = 0; i < pins; ++i) made.types[i] = type_of(types[i]);
+    for (std::size_t i = 0; i < pins; ++i) {
+        made.types[i] = type_of(types[i]);
+    }
     std::atomic_thread_fence(std::memory_order_release);
     made.magic = magic;  // last: a program that finds it finds the rest
     return 0;
@@ -91,15 +99,22 @@ int hal_stream_detach(halcyon_stream* stream) {
 
 int hal_stream_attach(halcyon_stream* stream, int comp, int key, const char* types) {
     if (!stream) return -EINVAL;
-    if (shmget(key, 0, 0) < 0) return -errno;  // the writer creates it
+    if (shmget(key, 0, 0) < 0) {
+        return -errno;  // the writer creates it
+    }
     const int segment = rtapi_shmem_new(key, comp, data_offset);
     if (segment < 0) return segment;
     *stream = {comp, segment, nullptr};
     rtapi_shmem_getptr(segment, &stream->fifo);
     const Header& found = header(stream);
-    bool good = found.magic == magic && (!types || std::strlen(types) == static_cast<std::size_t>(found.pins));
-    for (int i = 0; good && types && i < found.pins; ++i) good = type_of(types[i]) == found.types[i];
-    if (!good) hal_stream_detach(stream);
+    bool good = found.magic == magic &&
+                (!types || std::strlen(types) == static_cast<std::size_t>(found.pins));
+    for (int i = 0; good && types && i < found.pins; ++i) {
+        good = type_of(types[i]) == found.types[i];
+    }
+    if (!good) {
+        hal_stream_detach(stream);
+    }
     return good ? 0 : -EINVAL;
 }
 
@@ -110,19 +125,25 @@ int hal_stream_element_type(halcyon_stream* stream, int index) {
 int hal_stream_maxdepth(halcyon_stream* stream) { return header(stream).depth; }
 int hal_stream_depth(halcyon_stream* stream) {
     const Header& of = header(stream);
-    const int difference =
-        static_cast<int>(of.in.load(std::memory_order_acquire)) - static_cast<int>(of.out.load(std::memory_order_acquire));
+    const int difference = static_cast<int>(of.in.load(std::memory_order_acquire)) -
+                           static_cast<int>(of.out.load(std::memory_order_acquire));
     return difference < 0 ? difference + of.depth : difference;
 }
 bool hal_stream_readable(halcyon_stream* stream) {
-    return header(stream).in.load(std::memory_order_acquire) != header(stream).out.load(std::memory_order_relaxed);
+    return header(stream).in.load(std::memory_order_acquire) !=
+           header(stream).out.load(std::memory_order_relaxed);
 }
 bool hal_stream_writable(halcyon_stream* stream) {
     const Header& of = header(stream);
-    return next(of, of.in.load(std::memory_order_relaxed)) != of.out.load(std::memory_order_acquire);
+    return next(of, of.in.load(std::memory_order_relaxed)) !=
+           of.out.load(std::memory_order_acquire);
 }
-int hal_stream_num_overruns(halcyon_stream* stream) { return static_cast<int>(header(stream).overruns.load(std::memory_order_relaxed)); }
-int hal_stream_num_underruns(halcyon_stream* stream) { return static_cast<int>(header(stream).underruns.load(std::memory_order_relaxed)); }
+int hal_stream_num_overruns(halcyon_stream* stream) {
+    return static_cast<int>(header(stream).overruns.load(std::memory_order_relaxed));
+}
+int hal_stream_num_underruns(halcyon_stream* stream) {
+    return static_cast<int>(header(stream).underruns.load(std::memory_order_relaxed));
+}
 
 int hal_stream_read(halcyon_stream* stream, halcyon_stream_value* to, unsigned* number) {
     Header& of = header(stream);
@@ -133,7 +154,9 @@ int hal_stream_read(halcyon_stream* stream, halcyon_stream_value* to, unsigned* 
     const std::uint32_t index = of.out.load(std::memory_order_relaxed);
     const halcyon_stream_value* const from = record(stream, index);
     std::memcpy(to, from, static_cast<std::size_t>(of.pins) * sizeof *from);
-    if (number) *number = from[of.pins].u32;
+    if (number) {
+        *number = from[of.pins].u32;
+    }
     of.out.store(next(of, index), std::memory_order_release);
     return 0;
 }
@@ -147,7 +170,8 @@ int hal_stream_write(halcyon_stream* stream, halcyon_stream_value* from) {
     const std::uint32_t index = of.in.load(std::memory_order_relaxed);
     halcyon_stream_value* const to = record(stream, index);
     std::memcpy(to, from, static_cast<std::size_t>(of.pins) * sizeof *to);
-    to[of.pins].raw = ++of.number;  // 1 for the first record, as halsampler expects; lost records have no number
+    // 1 for the first record, as halsampler expects; lost records have no number
+    to[of.pins].raw = ++of.number;
     of.in.store(next(of, index), std::memory_order_release);
     return 0;
 }

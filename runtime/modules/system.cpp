@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Time, texts and files. The process has its user's rights and no more: what LinuxCNC's set-uid host does as root, it tries
-// as that user or declines.
+// Time, texts and files. The process has its user's rights and no more: what LinuxCNC's set-uid
+// host does as root, it tries as that user or declines.
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
@@ -52,46 +52,66 @@ long long rtapi_get_clocks() {
 long rtapi_delay_max() { return longest_delay_ns; }
 void rtapi_delay(long ns) {
     const long long end = rtapi_get_time() + std::min(ns, longest_delay_ns);
-    while (rtapi_get_time() < end) {}
+    while (rtapi_get_time() < end) {
+    }
 }
-int rtapi_is_realtime() {  // whether threads may have a real-time priority: CAP_SYS_NICE, bit 23, or a limit that allows it
+// whether threads may have a real-time priority: CAP_SYS_NICE, bit 23, or a limit that allows it
+int rtapi_is_realtime() {
     static const bool known = [] {
         rlimit limit{};
         if (getrlimit(RLIMIT_RTPRIO, &limit) == 0 && limit.rlim_cur > 0) return true;
         std::ifstream file("/proc/self/status");
-        for (std::string line; std::getline(file, line);)
-            if (line.starts_with("CapEff:")) return (std::strtoull(line.c_str() + 7, nullptr, 16) >> 23 & 1) != 0;
+        for (std::string line; std::getline(file, line);) {
+            if (line.starts_with("CapEff:")) {
+                return (std::strtoull(line.c_str() + 7, nullptr, 16) >> 23 & 1) != 0;
+            }
+        }
         return false;
     }();
     return known;
 }
 int rtapi_is_kernelspace() { return 0; }
 
-long simple_strtol(const char* text, char** end, unsigned base) { return std::strtol(text, end, static_cast<int>(base)); }
+long simple_strtol(const char* text, char** end, unsigned base) {
+    return std::strtol(text, end, static_cast<int>(base));
+}
 
 char** rtapi_argv_split(int, const char* text, int* count) {
-    if (count) *count = 0;
+    if (count) {
+        *count = 0;
+    }
     if (!text) return nullptr;
-    const std::size_t length = std::strlen(text), most = length / 2 + 2;
+    const std::size_t length = std::strlen(text);
+    const std::size_t most = length / 2 + 2;
     char** const words = static_cast<char**>(std::malloc(most * sizeof *words + length + 1));
     if (!words) return nullptr;
     char* const copy = reinterpret_cast<char*>(words + most);
     std::memcpy(copy, text, length + 1);
     int found = 0;
     char* rest = nullptr;
-    for (char* word = strtok_r(copy, " \t\n", &rest); word; word = strtok_r(nullptr, " \t\n", &rest)) words[found++] = word;
+    for (char* word = strtok_r(copy, " \t\n", &rest); word;
+         word = strtok_r(nullptr, " \t\n", &rest)) {
+        words[found++] = word;
+    }
     words[found] = nullptr;
-    if (count) *count = found;
+    if (count) {
+        *count = found;
+    }
     return words;
 }
 void rtapi_argv_free(char** words) { std::free(words); }
-char* rtapi_kstrndup(const char* text, std::size_t most, int) { return text ? strndup(text, most) : nullptr; }
+char* rtapi_kstrndup(const char* text, std::size_t most, int) {
+    return text ? strndup(text, most) : nullptr;
+}
 
 // LinuxCNC's needs neither before other calls; what an id holds is given back with it.
 int rtapi_init(const char*) {
     return guarded([] {
         Module* const module = Module::current();
-        if (!module) return rtapi_print_msg(1, "rtapi_init: only while a module is loaded\n"), -EPERM;
+        if (!module) {
+            rtapi_print_msg(1, "rtapi_init: only while a module is loaded\n");
+            return -EPERM;
+        }
         return *module->components.insert(new_id()).first;
     });
 }
@@ -103,20 +123,27 @@ int rtapi_exit(int id) {
     return 0;
 }
 
-// Modules wait for the process they were given, whatever the result, so "no" is a process that fails.
-int rtapi_spawn_as_root(pid_t* process, const char* path, const void*, const void*, char* const argv[], char* const[]) {
+// Modules wait for the process they were given, whatever the result, so "no" is a process that
+// fails.
+int rtapi_spawn_as_root(pid_t* process, const char* path, const void*, const void*,
+                        char* const argv[], char* const[]) {
     std::string command = path ? path : "";
-    for (int i = 1; path && argv && argv[i]; ++i) command += std::string(" ") + argv[i];
+    for (int i = 1; path && argv && argv[i]; ++i) {
+        command += std::string(" ") + argv[i];
+    }
     rtapi_print_msg(2, "not run as root: %s\n", command.c_str());
     char name[] = "false";
     char* const words[] = {name, nullptr};
     pid_t made = -1;
     const int problem = posix_spawnp(&made, name, nullptr, nullptr, words, environ);
-    if (process) *process = made;
+    if (process) {
+        *process = made;
+    }
     return -problem;
 }
 
-int rtapi_spawnp_as_root(pid_t* process, const char* file, const void* actions, const void* attributes, char* const argv[], char* const envp[]) {
+int rtapi_spawnp_as_root(pid_t* process, const char* file, const void* actions,
+                         const void* attributes, char* const argv[], char* const envp[]) {
     return rtapi_spawn_as_root(process, file, actions, attributes, argv, envp);
 }
 
@@ -134,18 +161,21 @@ int rtapi_request_firmware(const halcyon_firmware** result, const char* name, vo
         utsname kernel{};
         uname(&kernel);
         if (!name || std::strstr(name, "..")) return -EINVAL;
-        for (const std::string& folder : {std::string("/lib/firmware/") + kernel.release + "/", std::string("/lib/firmware/")}) {
+        for (const std::string& folder : {std::string("/lib/firmware/") + kernel.release + "/",
+                                          std::string("/lib/firmware/")}) {
             std::ifstream file(folder + name, std::ios::binary);
             if (!file) continue;
             auto made = std::make_unique<Firmware>();
             made->content.assign(std::istreambuf_iterator<char>(file), {});
-            made->shown = {made->content.size(), reinterpret_cast<const unsigned char*>(made->content.data())};
+            made->shown = {made->content.size(),
+                           reinterpret_cast<const unsigned char*>(made->content.data())};
             *result = &made.release()->shown;
             return 0;
         }
         return -ENOENT;
     });
 }
-void rtapi_release_firmware(const halcyon_firmware* firmware) { delete reinterpret_cast<const Firmware*>(firmware); }
-
+void rtapi_release_firmware(const halcyon_firmware* firmware) {
+    delete reinterpret_cast<const Firmware*>(firmware);
+}
 }

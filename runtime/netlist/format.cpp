@@ -11,7 +11,8 @@ namespace hal {
 namespace {
 
 constexpr std::size_t line_width = 100;   // up to which continuation lines are joined
-constexpr std::size_t widest_cell = 60;   // a longer word does not push the columns of its neighbours
+// a longer word does not push the columns of its neighbours
+constexpr std::size_t widest_cell = 60;
 constexpr std::size_t most_blank_lines = 2;
 
 /// What fills a column when lines are aligned: words with a blank between them.
@@ -24,7 +25,8 @@ struct Row {
 };
 
 std::size_t width(std::string_view text) {
-    return static_cast<std::size_t>(std::count_if(text.begin(), text.end(), [](char c) { return (c & 0xC0) != 0x80; }));
+    return static_cast<std::size_t>(
+        std::count_if(text.begin(), text.end(), [](char c) { return (c & 0xC0) != 0x80; }));
 }
 
 class Formatter {
@@ -42,10 +44,15 @@ public:
 
         out_.reserve(text.size() + text.size() / 8);
         LineReader reader(sources_, source_);
-        while (reader.next(line_)) line(reader.continued());
+        while (reader.next(line_)) {
+            line(reader.continued());
+        }
         flush();
-        // A word that begins with a byte-order mark must not lose it by becoming the first of the file.
-        if (out_.starts_with("\xEF\xBB\xBF")) out_.insert(0, "\n");
+        // A word that begins with a byte-order mark must not lose it by becoming the first of the
+        // file.
+        if (out_.starts_with("\xEF\xBB\xBF")) {
+            out_.insert(0, "\n");
+        }
         return std::move(out_);
     }
 
@@ -67,14 +74,19 @@ private:
             after_comment_ = true;
             return;
         }
-        if (words[0] == "node" && (words.size() < 2 || words[1] != "=")) {  // a new part: its title stands apart
+        // a new part: its title stands apart
+        if (words[0] == "node" && (words.size() < 2 || words[1] != "=")) {
             flush();
-            if (!after_comment_) blank_lines_ = std::max<std::size_t>(blank_lines_, 1);
+            if (!after_comment_) {
+                blank_lines_ = std::max<std::size_t>(blank_lines_, 1);
+            }
         }
         after_comment_ = false;
         if (continued && long_command(words, remark)) return;
         const std::string kind(words.size() > 1 && words[1] == "=" ? words[1] : words[0]);
-        if (kind != kind_) flush();
+        if (kind != kind_) {
+            flush();
+        }
         kind_ = kind;
         rows_.push_back({cells(words), remark});
     }
@@ -83,27 +95,40 @@ private:
     std::string comment_text(std::size_t comment) const {
         std::string_view raw = sources_.text(line_.span(comment, line_.text().size()));
         std::string text;
-        for (const char c : raw)
-            if (c != '\r') text += c;
-        while (!text.empty() && (is_blank(text.back()) || text.back() == '\n')) text.pop_back();
+        for (const char c : raw) {
+            if (c != '\r') {
+                text += c;
+            }
+        }
+        while (!text.empty() && (is_blank(text.back()) || text.back() == '\n')) {
+            text.pop_back();
+        }
         return text;
     }
 
     static std::vector<std::string_view> words_of(std::string_view text) {
-        while (!text.empty() && is_blank(text.back())) text.remove_suffix(1);
+        while (!text.empty() && is_blank(text.back())) {
+            text.remove_suffix(1);
+        }
         std::vector<std::string_view> words;
         for (std::size_t at = 0;;) {
-            while (at < text.size() && is_blank(text[at])) ++at;
+            while (at < text.size() && is_blank(text[at])) {
+                ++at;
+            }
             if (at == text.size()) return words;
             const std::size_t stop = word_end(text, at);
             words.push_back(text.substr(at, stop - at));
-            // Whether a `[` in these belongs to a pattern depends on the INI file: they stay as they are.
-            if (words[0] == "show" || words[0] == "list") return {text.substr(at)};
+            // Whether a `[` in these belongs to a pattern depends on the INI file: they stay as
+            // they are.
+            if (words[0] == "show" || words[0] == "list") {
+                return {text.substr(at)};
+            }
             at = stop;
         }
     }
 
-    /// The end of the word at `at`: blanks between quotes and in the names of references do not end it.
+    /// The end of the word at `at`: blanks between quotes and in the names of references do not end
+    /// it.
     static std::size_t word_end(std::string_view text, std::size_t at) {
         char quote = 0;
         while (at < text.size() && (quote != 0 || !is_blank(text[at]))) {
@@ -112,17 +137,23 @@ private:
                 at += reference_at(text, at).length;
                 continue;
             }
-            if (quote == 0 && (c == '"' || c == '\'')) quote = c;
-            else if (c == quote) quote = 0;
+            if (quote == 0 && (c == '"' || c == '\'')) {
+                quote = c;
+            } else if (c == quote) {
+                quote = 0;
+            }
             ++at;
         }
         return at;
     }
 
-    /// A command that would be too long on one line keeps the line breaks its user gave it. False: it fits, or has none.
+    /// A command that would be too long on one line keeps the line breaks its user gave it. False:
+    /// it fits, or has none.
     bool long_command(const std::vector<std::string_view>& words, const std::string& remark) {
         std::size_t total = 0;
-        for (const std::string_view word : words) total += width(word) + 1;
+        for (const std::string_view word : words) {
+            total += width(word) + 1;
+        }
         if (total - 1 <= line_width) return false;
         std::string text;
         std::uint32_t end = 0;
@@ -130,7 +161,8 @@ private:
         for (const std::string_view word : words) {
             const auto at = static_cast<std::size_t>(word.data() - line_.text().data());
             const Span span = line_.span(at, at + word.size());
-            const std::string_view between = text.empty() ? "" : sources_.text({source_, end, span.begin});
+            const std::string_view between =
+                text.empty() ? "" : sources_.text({source_, end, span.begin});
             const bool here = between.find('\n') != between.npos;
             text += here ? " \\\n    " : text.empty() ? "" : " ";
             text += word;
@@ -141,24 +173,33 @@ private:
         flush();
         begin_line();
         out_ += text;
-        if (!remark.empty()) out_ += "  ";
+        if (!remark.empty()) {
+            out_ += "  ";
+        }
         end_line(remark);
         return true;
     }
 
     /// Words grouped into columns. The first column is the command, the last one is never padded.
     static Cells cells(const std::vector<std::string_view>& words) {
-        static constexpr std::array<std::string_view, 10> tables{"setp",   "sets",   "addf",   "delf",  "initf",
-                                                                 "newsig", "linkps", "linksp", "alias", "newthread"};
+        static constexpr std::array<std::string_view, 10> tables{
+            "setp",   "sets",   "addf",   "delf",  "initf",
+            "newsig", "linkps", "linksp", "alias", "newthread"};
         Cells cells{std::string(words[0])};
-        const bool table = std::find(tables.begin(), tables.end(), words[0]) != tables.end() || (words.size() > 1 && words[1] == "=");
+        const bool table = std::find(tables.begin(), tables.end(), words[0]) != tables.end() ||
+                           (words.size() > 1 && words[1] == "=");
         const bool net = words[0] == "net";
-        // net: the signal, the pins in front of the first arrow, the rest. loadrt: the component, the rest.
+        // net: the signal, the pins in front of the first arrow, the rest. loadrt: the component,
+        // the rest.
         const std::size_t columns = table ? 6 : net ? 4 : words[0] == "loadrt" ? 3 : 2;
         for (std::size_t i = 1; i < words.size(); ++i) {
-            const bool next = net ? i <= 2 || (cells.size() == 3 && is_arrow(words[i])) : cells.size() < columns;
-            if (next) cells.emplace_back(words[i]);
-            else cells.back().append(" ").append(words[i]);
+            const bool next =
+                net ? i <= 2 || (cells.size() == 3 && is_arrow(words[i])) : cells.size() < columns;
+            if (next) {
+                cells.emplace_back(words[i]);
+            } else {
+                cells.back().append(" ").append(words[i]);
+            }
         }
         return cells;
     }
@@ -167,11 +208,16 @@ private:
     void flush() {
         std::vector<std::size_t> widths;
         std::size_t before_comment = 0;
-        for (const Row& row : rows_)
+        for (const Row& row : rows_) {
             for (std::size_t i = 0; i + 1 < row.cells.size(); ++i) {
-                if (widths.size() <= i) widths.push_back(0);
-                if (const std::size_t cell = width(row.cells[i]); cell <= widest_cell) widths[i] = std::max(widths[i], cell);
+                if (widths.size() <= i) {
+                    widths.push_back(0);
+                }
+                if (const std::size_t cell = width(row.cells[i]); cell <= widest_cell) {
+                    widths[i] = std::max(widths[i], cell);
+                }
             }
+        }
         std::vector<std::string> lines;
         for (const Row& row : rows_) {
             std::string text;
@@ -182,8 +228,10 @@ private:
                 text.append(cell < widths[i] ? widths[i] - cell : 0, ' ');
                 text += ' ';
             }
-            if (const std::size_t whole = width(text); !row.comment.empty() && whole <= line_width)
+            if (const std::size_t whole = width(text);
+                !row.comment.empty() && whole <= line_width) {
                 before_comment = std::max(before_comment, whole);
+            }
             lines.push_back(std::move(text));
         }
         for (std::size_t i = 0; i < rows_.size(); ++i) {
@@ -200,14 +248,18 @@ private:
 
     /// Blank lines that stood here: none at the start of the text, at most two in a row.
     void begin_line() {
-        if (!out_.empty()) out_.append(std::min(blank_lines_, most_blank_lines), '\n');
+        if (!out_.empty()) {
+            out_.append(std::min(blank_lines_, most_blank_lines), '\n');
+        }
         blank_lines_ = 0;
     }
 
     void end_line(const std::string& comment) {
         out_ += comment;
         // A backslash that had blanks behind it must not become one that joins lines.
-        if (out_.ends_with('\\')) out_ += ' ';
+        if (out_.ends_with('\\')) {
+            out_ += ' ';
+        }
         out_ += '\n';
     }
 

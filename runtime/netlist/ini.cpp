@@ -11,11 +11,13 @@ namespace hal {
 namespace {
 
 constexpr std::size_t largest_file = std::size_t{1} << 30;  // spans count bytes in 32 bits
-constexpr int deepest_include = 16, most_includes = 1000;
+constexpr int deepest_include = 16;
+constexpr int most_includes = 1000;
 
 }  // namespace
 
-std::optional<std::uint32_t> read_source(Sources& sources, const std::string& path, Span asked, Diagnostics& diagnostics) {
+std::optional<std::uint32_t> read_source(Sources& sources, const std::string& path, Span asked,
+                                         Diagnostics& diagnostics) {
     std::string text;
     if (read_regular_file(path, largest_file, text)) {
         const std::uint32_t source = sources.add(path, std::move(text));
@@ -29,17 +31,21 @@ std::optional<std::uint32_t> read_source(Sources& sources, const std::string& pa
 /// Reads one file into an Ini, and the files it includes where they are named.
 class IniReader {
 public:
-    IniReader(Ini& ini, Sources& sources, Diagnostics& diagnostics) : ini_(ini), sources_(sources), diagnostics_(diagnostics) {}
+    IniReader(Ini& ini, Sources& sources, Diagnostics& diagnostics)
+        : ini_(ini), sources_(sources), diagnostics_(diagnostics) {}
 
     void read(const std::string& path, Span asked, int depth) {
-        const std::optional<std::uint32_t> source = read_source(sources_, path, asked, diagnostics_);
+        const std::optional<std::uint32_t> source =
+            read_source(sources_, path, asked, diagnostics_);
         if (!source) return;
         LineReader reader(sources_, *source);
         Line line;
         while (reader.next(line)) {
-            if (const auto at = reader.control(); at && line.text()[*at] == '\0')
-                return diagnostics_.error("binary-text", line.span(*at, *at + 1), "this is not a text file", "a control character",
+            if (const auto at = reader.control(); at && line.text()[*at] == '\0') {
+                return diagnostics_.error("binary-text", line.span(*at, *at + 1),
+                                          "this is not a text file", "a control character",
                                           "an INI file is plain text in UTF-8");
+            }
             entry(line, path, depth);
         }
     }
@@ -56,8 +62,11 @@ private:
         case Kind::comment: return include(ini.whole, span, path, depth);
         case Kind::section: section_ = ini.name; return;
         case Kind::open_section: return warn(span, "section name without ']'");
-        case Kind::entry: return ini_.add({section_, std::string(ini.name), std::string(ini.value), value_span(line, ini.value)});
-        case Kind::other: return warn(span, "invalid line, ignored: neither [SECTION] nor KEY = value");
+        case Kind::entry:
+            return ini_.add({section_, std::string(ini.name), std::string(ini.value),
+                             value_span(line, ini.value)});
+        case Kind::other:
+            return warn(span, "invalid line, ignored: neither [SECTION] nor KEY = value");
         }
     }
 
@@ -69,16 +78,25 @@ private:
     /// Reads the file that the comment `#INCLUDE FILE` names.
     void include(std::string_view comment, Span span, const std::string& path, int depth) {
         constexpr std::string_view word = "#INCLUDE";
-        if (!comment.starts_with(word) || comment.size() == word.size() || !is_blank(comment[word.size()])) return;
-        if (depth == deepest_include || ++includes_ > most_includes)
-            return diagnostics_.error("bad-ini-line", span, "INI files include each other more than 16 deep or 1000 times", "",
-                                      "does a file include itself?");
+        if (!comment.starts_with(word) || comment.size() == word.size() ||
+            !is_blank(comment[word.size()])) {
+            return;
+        }
+        if (depth == deepest_include || ++includes_ > most_includes) {
+            return diagnostics_.error(
+                "bad-ini-line", span,
+                "INI files include each other more than 16 deep or 1000 times", "",
+                "does a file include itself?");
+        }
         const std::filesystem::path named{trimmed(comment.substr(word.size()))};
-        read(named.is_absolute() ? named : std::filesystem::path(path).parent_path() / named, span, depth + 1);
+        read(named.is_absolute() ? named : std::filesystem::path(path).parent_path() / named, span,
+             depth + 1);
     }
 
     void warn(Span at, std::string message) {
-        if (++warned_ <= text::most_errors + 1) diagnostics_.warning("bad-ini-line", at, std::move(message));
+        if (++warned_ <= text::most_errors + 1) {
+            diagnostics_.warning("bad-ini-line", at, std::move(message));
+        }
     }
 
     Ini& ini_;
@@ -97,7 +115,9 @@ Ini Ini::read(Sources& sources, const std::string& path, Diagnostics& diagnostic
 
 namespace {
 
-std::string bracketed(std::string_view section, std::string_view key) { return "[" + std::string(section) + "]" + std::string(key); }
+std::string bracketed(std::string_view section, std::string_view key) {
+    return "[" + std::string(section) + "]" + std::string(key);
+}
 
 }  // namespace
 
@@ -119,15 +139,20 @@ std::optional<std::string> Ini::get(std::string_view section, std::string_view k
 
 std::vector<std::string> Ini::all(std::string_view section, std::string_view key) const {
     std::vector<std::string> values;
-    for (const Entry& entry : entries_)
-        if (entry.key == key && (section.empty() || entry.section == section)) values.push_back(entry.value);
+    for (const Entry& entry : entries_) {
+        if (entry.key == key && (section.empty() || entry.section == section)) {
+            values.push_back(entry.value);
+        }
+    }
     return values;
 }
 
 std::vector<std::string> Ini::names() const {
     std::vector<std::string> names;
     names.reserve(entries_.size());
-    for (const Entry& entry : entries_) names.push_back(bracketed(entry.section, entry.key));
+    for (const Entry& entry : entries_) {
+        names.push_back(bracketed(entry.section, entry.key));
+    }
     return names;
 }
 

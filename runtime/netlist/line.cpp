@@ -6,25 +6,36 @@
 namespace hal {
 
 std::size_t Line::piece_of(std::size_t at) const {
-    const auto holds = [&](std::size_t i) { return pieces_[i].at <= at && (i + 1 == pieces_.size() || at < pieces_[i + 1].at); };
+    const auto holds = [&](std::size_t i) {
+        return pieces_[i].at <= at && (i + 1 == pieces_.size() || at < pieces_[i + 1].at);
+    };
     if (last_piece_ < pieces_.size() && holds(last_piece_)) return last_piece_;
     const auto after =
-        std::upper_bound(pieces_.begin(), pieces_.end(), at, [](std::size_t place, const Piece& piece) { return place < piece.at; });
-    return last_piece_ = after == pieces_.begin() ? 0 : static_cast<std::size_t>(after - pieces_.begin()) - 1;
+        std::upper_bound(pieces_.begin(), pieces_.end(), at,
+                         [](std::size_t place, const Piece& piece) { return place < piece.at; });
+    return last_piece_ =
+               after == pieces_.begin() ? 0 : static_cast<std::size_t>(after - pieces_.begin()) - 1;
 }
 
 Span Line::span(std::size_t begin, std::size_t end) const {
-    if (pieces_.empty()) return {source_, 0, 0};
+    if (pieces_.empty()) {
+        return {source_, 0, 0};
+    }
     const Piece& first = pieces_[piece_of(begin)];
-    const auto from = first.value ? first.begin : static_cast<std::uint32_t>(first.begin + (begin - first.at));
-    if (end <= begin) return {source_, from, from};
+    const auto from =
+        first.value ? first.begin : static_cast<std::uint32_t>(first.begin + (begin - first.at));
+    if (end <= begin) {
+        return {source_, from, from};
+    }
     const Piece& last = pieces_[piece_of(end - 1)];
-    return {source_, from, last.value ? last.end : static_cast<std::uint32_t>(last.begin + (end - last.at))};
+    return {source_, from,
+            last.value ? last.end : static_cast<std::uint32_t>(last.begin + (end - last.at))};
 }
 
 bool Line::verbatim(std::size_t begin, std::size_t end) const {
     const std::size_t piece = piece_of(begin);
-    return !pieces_.empty() && !pieces_[piece].value && (piece + 1 == pieces_.size() || end <= pieces_[piece + 1].at);
+    return !pieces_.empty() && !pieces_[piece].value &&
+           (piece + 1 == pieces_.size() || end <= pieces_[piece + 1].at);
 }
 
 void Line::clear(std::uint32_t source) {
@@ -43,7 +54,9 @@ void Line::append(std::string_view stretch, std::uint32_t source_begin) {
         return;
     }
     if (stretch.empty()) return;
-    if (pieces_.size() == 1) buffer_ = text_;
+    if (pieces_.size() == 1) {
+        buffer_ = text_;
+    }
     pieces_.push_back({buffer_.size(), source_begin, source_end, false});
     buffer_ += stretch;
     text_ = buffer_;
@@ -52,7 +65,8 @@ void Line::append(std::string_view stretch, std::uint32_t source_begin) {
 void Line::append(const Line& line, std::size_t begin, std::size_t end) {
     while (begin < end) {
         const std::size_t piece = line.piece_of(begin);
-        const std::size_t stop = piece + 1 == line.pieces_.size() ? end : std::min(end, line.pieces_[piece + 1].at);
+        const std::size_t stop =
+            piece + 1 == line.pieces_.size() ? end : std::min(end, line.pieces_[piece + 1].at);
         append(line.text_.substr(begin, stop - begin), line.span(begin, stop).begin);
         begin = stop;
     }
@@ -60,14 +74,19 @@ void Line::append(const Line& line, std::size_t begin, std::size_t end) {
 
 void Line::append_value(std::string_view value, Span reference) {
     if (value.empty()) return;
-    if (pieces_.size() == 1) buffer_ = text_;
+    if (pieces_.size() == 1) {
+        buffer_ = text_;
+    }
     pieces_.push_back({buffer_.size(), reference.begin, reference.end, true});
     buffer_ += value;
     text_ = buffer_;
 }
 
-LineReader::LineReader(const Sources& sources, std::uint32_t source) : source_(source), text_(sources.get(source).text) {
-    if (text_.starts_with("\xEF\xBB\xBF")) at_ = 3;  // ignores a byte-order mark
+LineReader::LineReader(const Sources& sources, std::uint32_t source)
+    : source_(source), text_(sources.get(source).text) {
+    if (text_.starts_with("\xEF\xBB\xBF")) {
+        at_ = 3;  // ignores a byte-order mark
+    }
 }
 
 bool LineReader::next(Line& line) {
@@ -82,18 +101,31 @@ bool LineReader::next(Line& line) {
         const bool last = newline == text_.size();
         if (!last && row.ends_with('\r')) {
             row.remove_suffix(1);
-            if (!dos_ending_) dos_ending_ = Span{source_, static_cast<std::uint32_t>(newline - 1), static_cast<std::uint32_t>(newline)};
+            if (!dos_ending_) {
+                dos_ending_ = Span{source_, static_cast<std::uint32_t>(newline - 1),
+                                   static_cast<std::uint32_t>(newline)};
+            }
         }
         const bool goes_on = row.ends_with('\\');
-        if (goes_on) row.remove_suffix(1);
+        if (goes_on) {
+            row.remove_suffix(1);
+        }
 
         // Tested without a branch per character: nearly all lines have none.
         bool odd = false;
-        for (const char c : row) odd |= (static_cast<unsigned char>(c) < 0x20 && c != '\t') || c == 0x7F;
+        for (const char c : row) {
+            odd |= (static_cast<unsigned char>(c) < 0x20 && c != '\t') || c == 0x7F;
+        }
         for (std::size_t i = 0; odd && i < row.size(); ++i) {
-            if (row[i] == '\r' && !carriage_return_) carriage_return_ = joined + i;
-            const bool control = (static_cast<unsigned char>(row[i]) < 0x20 && !is_blank(row[i]) && row[i] != '\r') || row[i] == 0x7F;
-            if (control && (!control_ || row[i] == '\0')) control_ = joined + i;
+            if (row[i] == '\r' && !carriage_return_) {
+                carriage_return_ = joined + i;
+            }
+            const bool control = (static_cast<unsigned char>(row[i]) < 0x20 && !is_blank(row[i]) &&
+                                  row[i] != '\r') ||
+                                 row[i] == 0x7F;
+            if (control && (!control_ || row[i] == '\0')) {
+                control_ = joined + i;
+            }
             if (row[i] == '\0') break;
         }
         line.append(row, static_cast<std::uint32_t>(at_));
@@ -106,10 +138,14 @@ bool LineReader::next(Line& line) {
 
 QuoteScan scan_quotes(std::string_view text) {
     for (std::size_t at = 0; at < text.size(); ++at) {
-        if (text[at] == '#') return {at, {}};
+        if (text[at] == '#') {
+            return {at, {}};
+        }
         if (text[at] != '\'' && text[at] != '"') continue;
         const std::size_t close = text.find(text[at], at + 1);
-        if (close == text.npos) return {text.size(), at};
+        if (close == text.npos) {
+            return {text.size(), at};
+        }
         at = close;
     }
     return {text.size(), {}};
@@ -118,11 +154,13 @@ QuoteScan scan_quotes(std::string_view text) {
 namespace {
 
 bool is_name_character(char c) {
-    return (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || c == '.' || c == '_' || c == '-';
+    return (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || c == '.' ||
+           c == '_' || c == '-';
 }
 
 /// NAME or (NAME) at `at`, into `reference`, which starts at `start`.
-void name_at(std::string_view text, std::size_t start, std::size_t at, Reference::Kind kind, Reference& reference) {
+void name_at(std::string_view text, std::size_t start, std::size_t at, Reference::Kind kind,
+             Reference& reference) {
     std::size_t stop = at;
     const bool enclosed = at < text.size() && text[at] == '(';
     if (enclosed) {
@@ -130,12 +168,15 @@ void name_at(std::string_view text, std::size_t start, std::size_t at, Reference
         stop = std::min(text.find_first_of(")($[", at + 1), text.size());
         reference.name = text.substr(at + 1, stop - at - 1);
     } else {
-        while (stop < text.size() && is_name_character(text[stop])) ++stop;
+        while (stop < text.size() && is_name_character(text[stop])) {
+            ++stop;
+        }
         reference.name = text.substr(at, stop - at);
     }
     const bool closed = !enclosed || (stop < text.size() && text[stop] == ')');
     reference.kind = reference.name.empty() || !closed ? Reference::broken : kind;
-    reference.length = std::max<std::size_t>(1, std::min(stop + (enclosed && closed), text.size()) - start);
+    reference.length =
+        std::max<std::size_t>(1, std::min(stop + (enclosed && closed), text.size()) - start);
 }
 
 }  // namespace

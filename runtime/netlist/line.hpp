@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Logical lines: physical lines joined at `\`, with the way back from each character to its place in the source.
+// Logical lines: physical lines joined at `\`, with the way back from each character to its place
+// in the source.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +19,8 @@ namespace hal {
 class Line {
 public:
     std::string_view text() const { return text_; }
-    /// Where the characters [begin, end) of the text stand in the source; a value stands where its reference does.
+    /// Where the characters [begin, end) of the text stand in the source; a value stands where its
+    /// reference does.
     Span span(std::size_t begin, std::size_t end) const;
     /// True when the characters [begin, end) are one verbatim segment of the source.
     bool verbatim(std::size_t begin, std::size_t end) const;
@@ -26,7 +28,8 @@ public:
     void clear(std::uint32_t source);
     /// Appends a verbatim segment of the source.
     void append(std::string_view stretch, std::uint32_t source_begin);
-    /// Appends [begin, end) of another line; calls come in rising order of place, which makes all of them linear.
+    /// Appends [begin, end) of another line; calls come in rising order of place, which makes all
+    /// of them linear.
     void append(const Line& line, std::size_t begin, std::size_t end);
     /// Appends a value that stands for the source text `reference`.
     void append_value(std::string_view value, Span reference);
@@ -53,8 +56,8 @@ public:
     /// The next logical line, without its end of line; false at the end of the text.
     bool next(Line& line);
 
-    /// Of the line that next() gave: the first carriage return that ends no line; the first other control character
-    /// (except tabs), as positions in the line.
+    /// Of the line that next() gave: the first carriage return that ends no line; the first other
+    /// control character (except tabs), as positions in the line.
     std::optional<std::size_t> carriage_return() const { return carriage_return_; }
     std::optional<std::size_t> control() const { return control_; }
     bool continued() const { return continued_; }
@@ -70,8 +73,8 @@ private:
     std::optional<Span> dos_ending_;
 };
 
-/// What quotes and `#` do to a line: where its comment starts (its size when there is none), and the quote that is
-/// never closed.
+/// What quotes and `#` do to a line: where its comment starts (its size when there is none), and
+/// the quote that is never closed.
 struct QuoteScan {
     std::size_t comment = 0;
     std::optional<std::size_t> open_quote;
@@ -80,7 +83,8 @@ QuoteScan scan_quotes(std::string_view text);
 
 /// `$NAME`, `$(NAME)`, `[SECTION]KEY` or `[SECTION](KEY)` at a `$` or `[`.
 struct Reference {
-    enum Kind { none, variable, key, broken } kind = none;  ///< none: plain text, as the range `[0..5]`
+    /// none: plain text, as the range `[0..5]`
+    enum Kind { none, variable, key, broken } kind = none;
     std::size_t length = 1;
     std::string_view section, name;
 };

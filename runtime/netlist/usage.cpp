@@ -12,8 +12,10 @@ constexpr std::string_view between_forms = " | ";
 
 std::vector<std::string_view> forms_of(std::string_view arguments) {
     std::vector<std::string_view> forms;
-    for (std::size_t at; (at = arguments.find(between_forms)) != arguments.npos; arguments.remove_prefix(at + between_forms.size()))
+    for (std::size_t at; (at = arguments.find(between_forms)) != arguments.npos;
+         arguments.remove_prefix(at + between_forms.size())) {
         forms.push_back(arguments.substr(0, at));
+    }
     forms.push_back(arguments);
     return forms;
 }
@@ -29,9 +31,14 @@ std::vector<UsageWord> words_of(std::string_view text) {
         // A bracket may hold a blank: "[-t TYPE]" is one optional group of two words.
         const bool optional = text[at] == '[';
         auto end = optional ? text.find(']', at) : text.find(' ', at);
-        if (end == text.npos) end = text.size();
-        std::string_view inner = text.substr(at + (optional ? 1 : 0), end - at - (optional ? 1 : 0));
-        if (optional) ++end;
+        if (end == text.npos) {
+            end = text.size();
+        }
+        std::string_view inner =
+            text.substr(at + (optional ? 1 : 0), end - at - (optional ? 1 : 0));
+        if (optional) {
+            ++end;
+        }
         bool repeats = false;
         if (text.substr(end).starts_with("...")) {
             repeats = true;
@@ -56,32 +63,43 @@ std::vector<UsageWord> words_of(std::string_view text) {
 std::string to_string(const Usage& usage) {
     std::string text;
     for (const std::string_view form : forms_of(usage.arguments)) {
-        if (!text.empty()) text += ", or ";
+        if (!text.empty()) {
+            text += ", or ";
+        }
         text += usage.name;
-        if (!form.empty()) (text += ' ') += form;
+        if (!form.empty()) {
+            (text += ' ') += form;
+        }
     }
     return text;
 }
 
 const std::vector<std::vector<UsageWord>>& usage_forms(std::string_view arguments) {
-    thread_local std::unordered_map<std::string_view, std::vector<std::vector<UsageWord>>> known;  // each command of a file asks
+    // each command of a file asks
+    thread_local std::unordered_map<std::string_view, std::vector<std::vector<UsageWord>>> known;
     auto at = known.find(arguments);
     if (at == known.end()) {
         std::vector<std::vector<UsageWord>> forms;  // whole before it is known: memory may run out
-        for (const std::string_view form : forms_of(arguments)) forms.push_back(words_of(form));
+        for (const std::string_view form : forms_of(arguments)) {
+            forms.push_back(words_of(form));
+        }
         at = known.emplace(arguments, std::move(forms)).first;
     }
     return at->second;
 }
 
-bool check_arity(const Usage& usage, const Token& name, std::span<const Token> args, Diagnostics& diagnostics) {
+bool check_arity(const Usage& usage, const Token& name, std::span<const Token> args,
+                 Diagnostics& diagnostics) {
     const auto& forms = usage_forms(usage.arguments);
     const auto by_option = std::find_if(forms.begin() + 1, forms.end(), [&](const auto& form) {
         return !form.empty() && !args.empty() && form.front().text == args.front().text;
     });
-    std::size_t least = 0, most = 0;
+    std::size_t least = 0;
+    std::size_t most = 0;
     for (const UsageWord& word : by_option == forms.end() ? forms.front() : *by_option) {
-        if (!word.optional) ++least;
+        if (!word.optional) {
+            ++least;
+        }
         most = word.repeats || most == SIZE_MAX ? SIZE_MAX : most + 1;
     }
     const std::size_t given = args.size();
@@ -91,11 +109,18 @@ bool check_arity(const Usage& usage, const Token& name, std::span<const Token> a
     Span at = name.span;
     if (!few) {
         at = args[most].span;
-        if (const Span last = args.back().span; last.source == at.source && last.end > at.end) at.end = last.end;
+        if (const Span last = args.back().span; last.source == at.source && last.end > at.end) {
+            at.end = last.end;
+        }
     }
     diagnostics.error("wrong-arguments", at,
-                      std::string(usage.name) + " takes " + (least == most ? "" : few ? "at least " : "at most ") + std::to_string(bound) +
-                          (bound == 1 ? " argument, not " : " arguments, not ") + std::to_string(given),
+                      std::string(usage.name) + " takes " +
+                          (least == most ? ""
+                           : few         ? "at least "
+                                         : "at most ") +
+                          std::to_string(bound) +
+                          (bound == 1 ? " argument, not " : " arguments, not ") +
+                          std::to_string(given),
                       "", to_string(usage));
     return false;
 }

@@ -33,21 +33,28 @@ std::string written(std::string_view word) {
 }
 
 std::string_view without_quotes(std::string_view word) {
-    const bool enclosed = word.size() >= 2 && (word[0] == '"' || word[0] == '\'') && word.find(word[0], 1) == word.size() - 1;
+    const bool enclosed = word.size() >= 2 && (word[0] == '"' || word[0] == '\'') &&
+                          word.find(word[0], 1) == word.size() - 1;
     return enclosed ? word.substr(1, word.size() - 2) : word;
 }
 
 Command command_of(const std::vector<std::string>& words, std::uint32_t source, std::string& text) {
     Command command;
     for (const std::string& word : words) {
-        if (!text.empty()) text += &word == words.data() ? '\n' : ' ';
+        if (!text.empty()) {
+            text += &word == words.data() ? '\n' : ' ';
+        }
         std::string shown = written(word);
-        std::replace_if(shown.begin(), shown.end(), [](char c) { return static_cast<unsigned char>(c) < 0x20; }, ' ');
+        std::replace_if(shown.begin(), shown.end(),
+                        [](char c) { return static_cast<unsigned char>(c) < 0x20; }, ' ');
         const auto begin = static_cast<std::uint32_t>(text.size());
         text += shown;
         Token token{word, {source, begin, static_cast<std::uint32_t>(text.size())}};
-        if (&word == words.data()) command.name = std::move(token);
-        else command.args.push_back(std::move(token));
+        if (&word == words.data()) {
+            command.name = std::move(token);
+        } else {
+            command.args.push_back(std::move(token));
+        }
     }
     command.span = {source, command.name.span.begin, static_cast<std::uint32_t>(text.size())};
     return command;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The execution plan: what one real-time thread runs, as plain data. Made by the compiler (model/compile), taken by
-// a thread (execute) at a cycle boundary, immutable after that but for the values in its image. No names, no strings.
+// The execution plan: what one real-time thread runs, as plain data. Made by the compiler
+// (model/compile), taken by a thread (execute) at a cycle boundary, immutable after that but for
+// the values in its image. No names, no strings.
 #pragma once
 
 #include <atomic>
@@ -16,54 +17,62 @@ namespace hal::plan {
 /// The one call of the cycle's inner loop.
 using Step = hal_call;
 
-/// Steps that are run by one call of their plugin, or (`run` is nullptr) one by one. Rows cover all of Plan::steps, in order.
+/// Steps that are run by one call of their plugin, or (`run` is nullptr) one by one. Rows cover all
+/// of Plan::steps, in order.
 struct Row {
     hal_row run;
     std::uint32_t end;  ///< in Plan::steps
     static constexpr std::uint32_t worth = 4;  ///< fewer steps are not worth a row of their own
 };
 
-/// Times of one HAL function. The pins are linkable like any other; written by the function's thread when it samples.
+/// Times of one HAL function. The pins are linkable like any other; written by the function's
+/// thread when it samples.
 struct FunctionTimes {
-    hal_pin time{};            ///< s32 out: last duration, ns
-    hal_pin tmax{};            ///< s32 param: longest duration, ns; setp 0 restarts it
+    hal_pin time{};  ///< s32 out: last duration, ns
+    hal_pin tmax{};  ///< s32 param: longest duration, ns; setp 0 restarts it
     hal_pin tmax_increased{};  ///< bit out: the last sample raised tmax
-    std::atomic<std::uint64_t> samples{0}, total_ns{0};  ///< written by the thread, read by the session
+    /// written by the thread, read by the session
+    std::atomic<std::uint64_t> samples{0};
+    std::atomic<std::uint64_t> total_ns{0};
     FunctionTimes() = default;
 };
 
-/// One HAL function of a thread: its row of steps (a shared function has one per instance, a finite check adds one).
+/// One HAL function of a thread: its row of steps (a shared function has one per instance, a finite
+/// check adds one).
 struct Function {
     std::uint32_t begin, end;  ///< in Plan::steps
-    std::uint32_t id;          ///< the model's number of the function, for fault records
+    std::uint32_t id;  ///< the model's number of the function, for fault records
     FunctionTimes* times;
 };
 
 /// `self` of the step that follows a function with a declared-finite output.
 struct FiniteCheck {
     hal_pin* pin;
-    hal_value instead;       ///< written when the value is NaN or infinite
-    std::uint32_t pin_id;    ///< the model's number of the pin
-    void* sink;              ///< the core of the thread
-    bool bad = false;        ///< a row of bad values is one fault
+    hal_value instead;  ///< written when the value is NaN or infinite
+    std::uint32_t pin_id;  ///< the model's number of the pin
+    void* sink;  ///< the core of the thread
+    bool bad = false;  ///< a row of bad values is one fault
 };
 
-/// A triple buffer of values from one thread to another. Written at the end of the writer's cycle, taken at the start
-/// of the reader's; the reader sees whole finished cycles only.
+/// A triple buffer of values from one thread to another. Written at the end of the writer's cycle,
+/// taken at the start of the reader's; the reader sees whole finished cycles only.
 ///
 /// `middle` holds the index of the buffer that is nobody's, plus `fresh` when the writer has put a newer one there.
 ///   1. writer fills back       2. writer swaps back <-> middle|fresh       (release)
 ///   3. reader sees fresh       4. reader swaps front <-> middle            (acquire)
-/// If 2 happens again between 3 and 4, the reader gets the newer buffer; writer and reader never hold the same one.
+/// If 2 happens again between 3 and 4, the reader gets the newer buffer; writer and reader never
+/// hold the same one.
 struct Channel {
     static constexpr std::uint32_t fresh = 4;
     explicit Channel(std::size_t values) : size(values) {
-        for (auto& buffer : buffers) buffer = std::make_unique<hal_value[]>(values);
+        for (auto& buffer : buffers) {
+            buffer = std::make_unique<hal_value[]>(values);
+        }
     }
     std::size_t size;
     std::unique_ptr<hal_value[]> buffers[3];
-    std::uint32_t back = 0;                ///< writer only
-    std::uint32_t front = 1;               ///< reader only
+    std::uint32_t back = 0;  ///< writer only
+    std::uint32_t front = 1;  ///< reader only
     std::atomic<std::uint32_t> middle{2};
 };
 
@@ -77,13 +86,15 @@ struct Import {
     std::vector<hal_value*> to;
 };
 
-/// A value copied from a cell that several threads write (I/O pins across threads) into a reader's slot.
+/// A value copied from a cell that several threads write (I/O pins across threads) into a reader's
+/// slot.
 struct CellImport {
     hal_value* to;
     const hal_value* cell;
 };
 
-/// Done once, when the plan is taken: `*to = from ? *from : value`. All reads happen before all writes.
+/// Done once, when the plan is taken: `*to = from ? *from : value`. All reads happen before all
+/// writes.
 struct Carry {
     hal_value* to;
     const hal_value* from;
@@ -118,7 +129,8 @@ struct Plan {
     std::vector<Step> steps;
     std::vector<Row> rows;
     std::vector<Function> functions;
-    std::vector<Function> init;              ///< run once, in a cycle of their own, before the first cyclic pass
+    /// run once, in a cycle of their own, before the first cyclic pass
+    std::vector<Function> init;
     std::vector<Step> init_steps;
     std::vector<Import> imports;
     std::vector<CellImport> cell_imports;
@@ -127,14 +139,20 @@ struct Plan {
     std::vector<Rebind> rebinds;
     std::vector<Pointer> pointers;
     std::vector<Safe> safe;
-    std::vector<Step> emergency;             ///< made safe by a call: instances of this thread with a hal::Emergency
+    /// made safe by a call: instances of this thread with a hal::Emergency
+    std::vector<Step> emergency;
     std::unique_ptr<FiniteCheck[]> finite_checks;
-    std::unique_ptr<hal_value[]> image;      ///< the slots of this thread's signals, in order of first use
+    /// the slots of this thread's signals, in order of first use
+    std::unique_ptr<hal_value[]> image;
     std::size_t image_size = 0;
-    std::vector<Memory> working_set;         ///< steps, image, code, instances in the order of their steps: see Core::warm
-    std::vector<std::shared_ptr<void>> keep; ///< what must outlive the plan: cells shared between threads
-    std::unique_ptr<ProbeSet> probes;        ///< nullptr: nothing is probed. The session replaces it when a newer one has been taken
-    std::vector<std::uint64_t> scratch;      ///< buffer for the values carried over, so that taking the plan allocates nothing
+    /// steps, image, code, instances in the order of their steps: see Core::warm
+    std::vector<Memory> working_set;
+    /// what must outlive the plan: cells shared between threads
+    std::vector<std::shared_ptr<void>> keep;
+    /// nullptr: nothing is probed. The session replaces it when a newer one has been taken
+    std::unique_ptr<ProbeSet> probes;
+    /// buffer for the values carried over, so that taking the plan allocates nothing
+    std::vector<std::uint64_t> scratch;
 };
 
 }  // namespace hal::plan

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What a thread samples for observers: which values, and the ring of rows it puts them in. Attached and detached while the thread runs.
+// What a thread samples for observers: which values, and the ring of rows it puts them in. Attached
+// and detached while the thread runs.
 #pragma once
 
 #include <atomic>
@@ -12,8 +13,9 @@
 
 namespace hal::plan {
 
-/// Rows of one probe in one thread: the number of the cycle, the time it was due, and a value per column. The thread writes, one reader reads;
-/// neither waits. A row that does not fit is counted and dropped.
+/// Rows of one probe in one thread: the number of the cycle, the time it was due, and a value per
+/// column. The thread writes, one reader reads; neither waits. A row that does not fit is counted
+/// and dropped.
 ///   1. writer stores the row at head     2. writer publishes head + 1 (release)
 ///   3. reader sees head (acquire), copies   4. reader publishes tail + 1 (release)
 class ProbeRing {
@@ -31,20 +33,25 @@ public:
     /// Adds a row when the cycle is one of those to be sampled. [realtime] writer
     void sample(std::uint64_t cycle, std::int64_t time_ns, const hal_value* const* from) noexcept {
         if (cycle >= next_) {
-            next_ = every == 1 ? cycle + 1 : (cycle / every + 1) * every;  // of a grid: a skipped cycle shifts nothing
+            // of a grid: a skipped cycle shifts nothing
+            next_ = every == 1 ? cycle + 1 : (cycle / every + 1) * every;
             put(cycle, time_ns, from);
         }
         reached_.store(time_ns + 1, std::memory_order_release);
     }
 
     /// Returns the number of rows that can be read. [any] reader
-    std::size_t size() const noexcept { return head_.load(std::memory_order_acquire) - tail_.load(std::memory_order_relaxed); }
+    std::size_t size() const noexcept {
+        return head_.load(std::memory_order_acquire) - tail_.load(std::memory_order_relaxed);
+    }
     /// Returns the row `n` after the oldest; n < size(). [any] reader
     const std::uint64_t* row(std::size_t n) const noexcept {
         return &words_[((tail_.load(std::memory_order_relaxed) + n) & mask_) * width];
     }
     /// Removes the oldest rows. [any] reader
-    void drop(std::size_t count) noexcept { tail_.store(tail_.load(std::memory_order_relaxed) + count, std::memory_order_release); }
+    void drop(std::size_t count) noexcept {
+        tail_.store(tail_.load(std::memory_order_relaxed) + count, std::memory_order_release);
+    }
     /// Returns how many rows did not fit since the ring was made. [any]
     std::uint64_t lost() const noexcept { return lost_.load(std::memory_order_acquire); }
     /// All rows of cycles due before this time are in the ring; 0 before the first cycle. [any]
@@ -64,7 +71,9 @@ private:
         row[0] = cycle;
         row[1] = static_cast<std::uint64_t>(time_ns);
         // a value in a cell may be written by another thread meanwhile
-        for (std::size_t i = 2; i < width; ++i) row[i] = __atomic_load_n(&from[i - 2]->raw, __ATOMIC_RELAXED);
+        for (std::size_t i = 2; i < width; ++i) {
+            row[i] = __atomic_load_n(&from[i - 2]->raw, __ATOMIC_RELAXED);
+        }
         head_.store(head + 1, std::memory_order_release);
     }
 

@@ -7,8 +7,8 @@
 
 /* Runs one command, given as its words up to NULL. 0, or a negative errno after printing why. Sets number, if there is one, to that behind `key` in what the
  * command prints. */
-int halcyon_run(const char *const *words, const char *key, unsigned *number);
-#define RUN(...) halcyon_run((const char *const[]){__VA_ARGS__, NULL}, NULL, NULL)
+int halcyon_run(const char* const* words, const char* key, unsigned* number);
+#define RUN(...) halcyon_run((const char* const[]){__VA_ARGS__, NULL}, NULL, NULL)
 
 union halcyon_data {
     bool bit;
@@ -19,15 +19,15 @@ union halcyon_data {
     uint64_t raw;
 };
 struct halcyon_object {
-    int type;                 /* a hal_type_t */
+    int type; /* a hal_type_t */
     union halcyon_data value; /* of 32 bit: extended to all 8 bytes */
-    int dir;                  /* a hal_pdir_t; 0: a signal */
+    int dir; /* a hal_pdir_t; 0: a signal */
     char signal[256], component[256];
-    bool has_writer;          /* a signal */
-    int pins;                 /* linked to the signal */
+    bool has_writer; /* a signal */
+    int pins; /* linked to the signal */
 };
-bool halcyon_component_exists(const char *name);
+bool halcyon_component_exists(const char* name);
 /* Looks one up by its whole name; the kind is "pin", "param" or "sig". 0, or -ENOENT. */
-int halcyon_look_up(const char *kind, const char *name, struct halcyon_object *to);
+int halcyon_look_up(const char* kind, const char* name, struct halcyon_object* to);
 
 #endif

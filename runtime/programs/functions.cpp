@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What a program needs beside streams.cpp and shared_memory.cpp of runtime/modules: ports, and waiting for a port or a stream. It has no cycles.
+// What a program needs beside streams.cpp and shared_memory.cpp of runtime/modules: ports, and
+// waiting for a port or a stream. It has no cycles.
 #include <cstdint>
 #include <ctime>
 #include <vector>
@@ -21,7 +22,9 @@ namespace {
 template <class Ready>
 void wait_until(const volatile int* stop, Ready ready) {
     const timespec pause{0, 10'000'000};
-    while (!(stop && *stop) && !ready()) nanosleep(&pause, nullptr);
+    while (!(stop && *stop) && !ready()) {
+        nanosleep(&pause, nullptr);
+    }
 }
 
 /// The handle of a port is a number; what lies above it in the register is undefined.
@@ -48,17 +51,20 @@ unsigned hal_port_buffer_size(std::intptr_t port) { return number_of(port, "\"si
 unsigned hal_port_readable(std::intptr_t port) { return number_of(port, "\"readable\":"); }
 unsigned hal_port_writable(std::intptr_t port) { return number_of(port, "\"writable\":"); }
 bool hal_port_peek(std::intptr_t port, char* to, unsigned count) {
-    return count > 0 && halcyon_use_port_number(handle_of(port), "peek", to, nullptr, count, nullptr, nullptr);
+    return count > 0 &&
+           halcyon_use_port_number(handle_of(port), "peek", to, nullptr, count, nullptr, nullptr);
 }
 bool hal_port_read(std::intptr_t port, char* to, unsigned count) {
-    return count > 0 && halcyon_use_port_number(handle_of(port), "read", to, nullptr, count, nullptr, nullptr);
+    return count > 0 &&
+           halcyon_use_port_number(handle_of(port), "read", to, nullptr, count, nullptr, nullptr);
 }
 bool hal_port_peek_commit(std::intptr_t port, unsigned count) {
     std::vector<char> nowhere(count);
     return hal_port_read(port, nowhere.data(), count);
 }
 bool hal_port_write(std::intptr_t port, const char* from, unsigned count) {
-    return count > 0 && halcyon_use_port_number(handle_of(port), "", nullptr, from, count, nullptr, nullptr);
+    return count > 0 &&
+           halcyon_use_port_number(handle_of(port), "", nullptr, from, count, nullptr, nullptr);
 }
 void hal_port_clear(std::intptr_t port) { hal_port_peek_commit(port, hal_port_readable(port)); }
 void hal_port_wait_readable(volatile int** port, unsigned count, const volatile int* stop) {

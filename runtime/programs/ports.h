@@ -10,7 +10,8 @@ extern "C" {
 
 /* Reads, peeks (verb) or writes count bytes, or asks for the state. Returns true when all were transferred; sets number to the value of the
  * reply's key, or to 0. An unknown number transfers nothing. [setup] */
-bool halcyon_use_port_number(int port, const char *verb, char *to, const char *from, unsigned count, const char *key, unsigned *number);
+bool halcyon_use_port_number(int port, const char* verb, char* to, const char* from, unsigned count,
+                             const char* key, unsigned* number);
 
 #ifdef __cplusplus
 }

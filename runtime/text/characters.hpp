@@ -24,32 +24,44 @@ inline std::string lower(std::string_view text) {
 
 /// Compares two texts without regard to the case of ASCII letters.
 inline bool same_word(std::string_view a, std::string_view b) {
-    return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](char x, char y) { return lower(x) == lower(y); });
+    return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                      [](char x, char y) { return lower(x) == lower(y); });
 }
 
 /// Removes blanks and line ends at both ends.
 constexpr std::string_view trimmed(std::string_view text) {
     const auto gap = [](char c) { return is_blank(c) || c == '\r' || c == '\n'; };
-    while (!text.empty() && gap(text.front())) text.remove_prefix(1);
-    while (!text.empty() && gap(text.back())) text.remove_suffix(1);
+    while (!text.empty() && gap(text.front())) {
+        text.remove_prefix(1);
+    }
+    while (!text.empty() && gap(text.back())) {
+        text.remove_suffix(1);
+    }
     return text;
 }
 
-/// Makes a HAL name: lower case, and one dash for each run of other characters than letters and digits.
+/// Makes a HAL name: lower case, and one dash for each run of other characters than letters and
+/// digits.
 inline std::string dashed(std::string_view name) {
     std::string out;
     for (const char c : name) {
         const char s = lower(c);
-        if ((s >= 'a' && s <= 'z') || (s >= '0' && s <= '9')) out += s;
-        else if (!out.empty() && out.back() != '-') out += '-';
+        if ((s >= 'a' && s <= 'z') || (s >= '0' && s <= '9')) {
+            out += s;
+        } else if (!out.empty() && out.back() != '-') {
+            out += '-';
+        }
     }
-    while (!out.empty() && out.back() == '-') out.pop_back();
+    while (!out.empty() && out.back() == '-') {
+        out.pop_back();
+    }
     return out;
 }
 
 /// Counts the characters of a UTF-8 text.
 inline std::uint32_t characters(std::string_view text) {
-    return static_cast<std::uint32_t>(std::count_if(text.begin(), text.end(), [](char c) { return (c & 0xC0) != 0x80; }));
+    return static_cast<std::uint32_t>(
+        std::count_if(text.begin(), text.end(), [](char c) { return (c & 0xC0) != 0x80; }));
 }
 
 }  // namespace hal

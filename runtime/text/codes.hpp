@@ -16,8 +16,9 @@ public:
     consteval Code(const char* name) : index_(find(name)) {}
     /// A code that is known only when the program runs.
     static std::optional<Code> named(std::string_view name) {
-        for (std::size_t i = 0; i < std::size(code_pages); ++i)
+        for (std::size_t i = 0; i < std::size(code_pages); ++i) {
             if (name == code_pages[i].name) return Code(i);
+        }
         return std::nullopt;
     }
     constexpr std::string_view name() const { return code_pages[index_].name; }
@@ -27,8 +28,9 @@ public:
 private:
     constexpr explicit Code(std::size_t index) : index_(index) {}
     static consteval std::size_t find(std::string_view name) {
-        for (std::size_t i = 0; i < std::size(code_pages); ++i)
+        for (std::size_t i = 0; i < std::size(code_pages); ++i) {
             if (name == code_pages[i].name) return i;
+        }
         throw "this code is not in code_pages.hpp";
     }
     std::size_t index_;

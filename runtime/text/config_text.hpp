@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// What all readers of configuration files share: spans, messages with a limit, lines without comments, words, sections and keys.
-// A reader turns each line into words and reports what is wrong at the word:
+// What all readers of configuration files share: spans, messages with a limit, lines without
+// comments, words, sections and keys. A reader turns each line into words and reports what is wrong
+// at the word:
 //
 //     for (text::Lines lines(file); auto line = lines.next();) {
 //         const auto words = text::words_of(*line);
@@ -21,9 +22,13 @@
 
 namespace hal::text {
 
-/// A segment of a file. Line and column count from 1, columns in characters; offset and length are in bytes.
+/// A segment of a file. Line and column count from 1, columns in characters; offset and length are
+/// in bytes.
 struct Span {
-    std::uint32_t line = 0, column = 0, offset = 0, length = 0;
+    std::uint32_t line = 0;
+    std::uint32_t column = 0;
+    std::uint32_t offset = 0;
+    std::uint32_t length = 0;
     /// Where a value was read is not part of the value: all spans are equal.
     friend constexpr bool operator==(const Span&, const Span&) { return true; }
 };
@@ -35,8 +40,8 @@ struct Message {
     Topic topic{};
     Span at;
     std::string sentence;  ///< no final stop; names quoted '…'
-    std::string help{};    ///< what to type; may be empty
-    std::string label{};   ///< shown at the caret; may be empty
+    std::string help{};  ///< what to type; may be empty
+    std::string label{};  ///< shown at the caret; may be empty
     std::string argument{};  ///< the load argument it is about, if no file was read
 };
 
@@ -47,17 +52,22 @@ inline constexpr std::size_t most_errors = 100;
 template <class Topic>
 class Messages {
 public:
-    void add(Severity severity, Topic topic, Span at, std::string sentence, std::string help = {}, std::string label = {}) {
+    void add(Severity severity, Topic topic, Span at, std::string sentence, std::string help = {},
+             std::string label = {}) {
         if (severity == Severity::error && ++errors_ > most_errors + 1) return;
-        all.push_back({severity, topic, at, std::move(sentence), std::move(help), std::move(label)});
+        all.push_back(
+            {severity, topic, at, std::move(sentence), std::move(help), std::move(label)});
     }
-    void error(Topic topic, Span at, std::string sentence, std::string help = {}, std::string label = {}) {
+    void error(Topic topic, Span at, std::string sentence, std::string help = {},
+               std::string label = {}) {
         add(Severity::error, topic, at, std::move(sentence), std::move(help), std::move(label));
     }
-    void warning(Topic topic, Span at, std::string sentence, std::string help = {}, std::string label = {}) {
+    void warning(Topic topic, Span at, std::string sentence, std::string help = {},
+                 std::string label = {}) {
         add(Severity::warning, topic, at, std::move(sentence), std::move(help), std::move(label));
     }
-    void note(Topic topic, Span at, std::string sentence, std::string help = {}, std::string label = {}) {
+    void note(Topic topic, Span at, std::string sentence, std::string help = {},
+              std::string label = {}) {
         add(Severity::note, topic, at, std::move(sentence), std::move(help), std::move(label));
     }
     /// Reports an invalid load argument.
@@ -76,13 +86,18 @@ private:
 /// Orders messages by their place in the file and drops repeated ones.
 template <class Topic>
 void sort(std::vector<Message<Topic>>& messages) {
-    std::stable_sort(messages.begin(), messages.end(), [](const auto& a, const auto& b) { return a.at.offset < b.at.offset; });
+    std::stable_sort(messages.begin(), messages.end(),
+                     [](const auto& a, const auto& b) { return a.at.offset < b.at.offset; });
     std::size_t kept = 0;
     for (auto& message : messages) {
         bool repeated = false;
-        for (std::size_t i = kept; i-- > 0 && messages[i].at.offset == message.at.offset;) repeated = repeated || messages[i].sentence == message.sentence;
+        for (std::size_t i = kept; i-- > 0 && messages[i].at.offset == message.at.offset;) {
+            repeated = repeated || messages[i].sentence == message.sentence;
+        }
         if (repeated) continue;
-        if (&messages[kept] != &message) messages[kept] = std::move(message);
+        if (&messages[kept] != &message) {
+            messages[kept] = std::move(message);
+        }
         ++kept;
     }
     messages.resize(kept);
@@ -91,18 +106,24 @@ void sort(std::vector<Message<Topic>>& messages) {
 /// Returns whether there is no error among the messages.
 template <class Topic>
 bool good(const std::vector<Message<Topic>>& messages) {
-    return std::none_of(messages.begin(), messages.end(), [](const auto& m) { return m.severity == Severity::error; });
+    return std::none_of(messages.begin(), messages.end(),
+                        [](const auto& m) { return m.severity == Severity::error; });
 }
 
 /// Formats a message as "file:12:7: error: sentence; help", for logs and hosts without a renderer.
-std::string message_text(const std::string& file, Severity severity, Span at, const std::string& sentence, const std::string& help);
+std::string message_text(const std::string& file, Severity severity, Span at,
+                         const std::string& sentence, const std::string& help);
 
 /// Formats each error on a line of its own.
 template <class Topic>
 std::string errors_text(const std::vector<Message<Topic>>& messages, const std::string& file) {
     std::string out;
-    for (const auto& m : messages)
-        if (m.severity == Severity::error) out += (out.empty() ? "" : "\n") + message_text(file, m.severity, m.at, m.sentence, m.help);
+    for (const auto& m : messages) {
+        if (m.severity == Severity::error) {
+            out += (out.empty() ? "" : "\n") +
+                   message_text(file, m.severity, m.at, m.sentence, m.help);
+        }
+    }
     return out;
 }
 
@@ -113,7 +134,8 @@ struct Word {
     bool empty() const { return text.empty(); }
 };
 
-/// The lines of a file that are not empty, without their comments and the blanks at both ends. A comment begins with one of the characters
+/// The lines of a file that are not empty, without their comments and the blanks at both ends. A
+/// comment begins with one of the characters
 /// `comment` at the beginning of a line or after a blank.
 class Lines {
 public:
@@ -136,9 +158,10 @@ std::vector<Word> words_of(const Word& value, std::string_view more = {});
 /// A line of a file of sections and keys, as parts of the line itself without blanks at both ends.
 struct IniLine {
     enum class Kind : std::uint8_t { empty, comment, section, open_section, entry, other };
-    Kind kind = Kind::empty;      ///< open_section: its `]` is missing; other: neither a section nor KEY = value
+    /// open_section: its `]` is missing; other: neither a section nor KEY = value
+    Kind kind = Kind::empty;
     std::string_view whole;
-    std::string_view name;        ///< of the section, or the key
+    std::string_view name;  ///< of the section, or the key
     std::string_view value = {};  ///< of the key; text after the `]` of a section
 };
 /// Splits a line of an INI file: `[SECTION]`, `KEY = value`, whole-line comments with `#` and `;`.
@@ -146,16 +169,21 @@ IniLine ini_line(std::string_view line);
 
 /// A problem in a text of which only byte offsets are known.
 struct Problem {
-    std::uint32_t begin = 0, end = 0;
+    std::uint32_t begin = 0;
+    std::uint32_t end = 0;
     std::string sentence, help;
 };
 
 /// Adds a problem, as long as there are not more than errors of a file.
 inline void add(std::vector<Problem>& problems, Problem problem) {
-    if (problems.size() <= most_errors) problems.push_back(std::move(problem));
+    if (problems.size() <= most_errors) {
+        problems.push_back(std::move(problem));
+    }
 }
-inline void add(std::vector<Problem>& problems, std::size_t begin, std::size_t end, std::string sentence, std::string help) {
-    add(problems, {static_cast<std::uint32_t>(begin), static_cast<std::uint32_t>(end), std::move(sentence), std::move(help)});
+inline void add(std::vector<Problem>& problems, std::size_t begin, std::size_t end,
+                std::string sentence, std::string help) {
+    add(problems, {static_cast<std::uint32_t>(begin), static_cast<std::uint32_t>(end),
+                   std::move(sentence), std::move(help)});
 }
 
 }  // namespace hal::text

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What went wrong, where, and what to type (docs/design.md, Errors). Formatted where it arises, rendered in one place.
+// What went wrong, where, and what to type (docs/design.md, Errors). Formatted where it arises,
+// rendered in one place.
 #pragma once
 
 #include <cstdint>
@@ -17,17 +18,20 @@
 
 namespace hal {
 
-/// A place with a word about it. The first label of a diagnostic is its main place (`^^^^`), others are `----`.
+/// A place with a word about it. The first label of a diagnostic is its main place (`^^^^`), others
+/// are `----`.
 struct Label {
     Span span;
     std::string text;
 };
 
-/// An unknown name, for which a diagnostic offers similar ones: they are looked up when it is rendered and stand beside the main place.
+/// An unknown name, for which a diagnostic offers similar ones: they are looked up when it is
+/// rendered and stand beside the main place.
 struct UnknownName {
     std::string name;
-    std::uint32_t group = 0;                   ///< which names it may be one of: a number that means something to who offers them
-    std::uint32_t before = NameIndex::all;     ///< only names with a number below this one existed
+    /// which names it may be one of: a number that means something to who offers them
+    std::uint32_t group = 0;
+    std::uint32_t before = NameIndex::all;  ///< only names with a number below this one existed
     std::shared_ptr<const NameIndex> among = {};  ///< nullptr: not offered yet
 };
 
@@ -44,14 +48,19 @@ struct Diagnostic {
 class Diagnostics {
 public:
     void add(Diagnostic diagnostic);
-    void error(Code code, Span at, std::string message, std::string label = "", std::string help = "");
-    void warning(Code code, Span at, std::string message, std::string label = "", std::string help = "");
-    void note(Code code, Span at, std::string message, std::string label = "", std::string help = "");
+    void error(Code code, Span at, std::string message, std::string label = "",
+               std::string help = "");
+    void warning(Code code, Span at, std::string message, std::string label = "",
+                 std::string help = "");
+    void note(Code code, Span at, std::string message, std::string label = "",
+              std::string help = "");
     /// An error about a name for which similar ones are looked up later.
     void error(Code code, Span at, std::string message, UnknownName unknown, std::string help = "");
-    /// Offers names to the diagnostics whose unknown name has none yet; `names` is called once for each group among them.
+    /// Offers names to the diagnostics whose unknown name has none yet; `names` is called once for
+    /// each group among them.
     void offer(const std::function<std::shared_ptr<const NameIndex>(std::uint32_t group)>& names);
-    /// Looks up similar names for what render() prints. Takes time, but uses nothing but this object and the names that were offered.
+    /// Looks up similar names for what render() prints. Takes time, but uses nothing but this
+    /// object and the names that were offered.
     void look_up();
     std::size_t errors() const { return errors_; }
     std::size_t warnings() const { return warnings_; }
@@ -64,7 +73,8 @@ public:
 
 private:
     std::vector<Diagnostic> all_;
-    std::size_t errors_ = 0, warnings_ = 0;
+    std::size_t errors_ = 0;
+    std::size_t warnings_ = 0;
 };
 
 /// One diagnostic as text, ending with a newline: the form that docs/design.md describes.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Codes of faults of a running machine that no command reports, and their pages for `hal explain`, as in code_pages.hpp: sorted by name,
-// which never changes. tests/errors/<name>.sh provokes them.
+// Codes of faults of a running machine that no command reports, and their pages for `hal explain`,
+// as in code_pages.hpp: sorted by name, which never changes. tests/errors/<name>.sh provokes them.
 #pragma once
 
 #include <algorithm>
@@ -14,39 +14,58 @@ namespace hal {
 
 inline constexpr CodePage fault_pages[] = {
     {"budget",
-     "A fault: a cycle took longer than the budget of its thread (`newthread ... budget=TIME`). It is recorded when the cycle ends and names "
-     "the function in which the cycle was last seen; the thread continues. `show timing` counts such cycles as over budget.\n\n"
-     "`show timing THREAD` and the parameters FUNCTION.tmax show which functions take long. A budget is a warning before a deadline is "
+     "A fault: a cycle took longer than the budget of its thread (`newthread ... budget=TIME`). It "
+     "is recorded when the cycle ends and names "
+     "the function in which the cycle was last seen; the thread continues. `show timing` counts "
+     "such cycles as over budget.\n\n"
+     "`show timing THREAD` and the parameters FUNCTION.tmax show which functions take long. A "
+     "budget is a warning before a deadline is "
      "missed; a cycle of 10 periods or more is an `overrun`, whatever the budget."},
     {"component",
-     "A fault that a component raised: a lost node, a sensor out of range, a rejected value. The message names the instance, the cause and "
+     "A fault that a component raised: a lost node, a sensor out of range, a rejected value. The "
+     "message names the instance, the cause and "
      "the reaction; the thread continues. `hal doc COMPONENT` describes how to reset the fault.\n\n"
-     "`show fault` lists all faults, `fault clear` acknowledges those that are over. The component `faults` has pins for the safety chain (`ok`, `last-code`)."},
+     "`show fault` lists all faults, `fault clear` acknowledges those that are over. The component "
+     "`faults` has pins for the safety chain (`ok`, `last-code`)."},
     {"exception",
-     "A fault: a function threw an exception in its cycle. No function of its thread runs any more, and the outputs of the thread were "
-     "set to their safe values; other threads continue. `start` lets the thread's functions run again. The exit status is then 1.\n\n"
-     "Functions of a cycle are `noexcept` and must not throw: they set an output or raise a fault of their own instead. "
+     "A fault: a function threw an exception in its cycle. No function of its thread runs any "
+     "more, and the outputs of the thread were "
+     "set to their safe values; other threads continue. `start` lets the thread's functions run "
+     "again. The exit status is then 1.\n\n"
+     "Functions of a cycle are `noexcept` and must not throw: they set an output or raise a fault "
+     "of their own instead. "
      "`hal compile --check-rt` finds such components before they are loaded."},
     {"not-finite",
-     "A fault: an output that its component declares finite became NaN or infinite, for example after a division by zero. The output was "
-     "set to its declared safe value instead (0 if it declares none), and the thread continues. The fault is recorded once until the value "
+     "A fault: an output that its component declares finite became NaN or infinite, for example "
+     "after a division by zero. The output was "
+     "set to its declared safe value instead (0 if it declares none), and the thread continues. "
+     "The fault is recorded once until the value "
      "is finite again.\n\n"
-     "`show pin INSTANCE` shows the component's inputs: one of them is usually 0, NaN or far out of its range."},
+     "`show pin INSTANCE` shows the component's inputs: one of them is usually 0, NaN or far out "
+     "of its range."},
     {"overrun",
-     "A fault: a cycle took at least 10 periods of its thread. It is recorded when the cycle ends and names the function in which the cycle "
-     "was last seen. The periods that passed meanwhile are missed; the thread keeps its phase and continues. A cycle that does not end "
+     "A fault: a cycle took at least 10 periods of its thread. It is recorded when the cycle ends "
+     "and names the function in which the cycle "
+     "was last seen. The periods that passed meanwhile are missed; the thread keeps its phase and "
+     "continues. A cycle that does not end "
      "within the supervision limit of the thread is `hung-thread` instead.\n\n"
-     "Possible causes: a function that blocks, waits or computes for long; a thread without real-time scheduling on a busy host (`hal "
-     "doctor`); a period that is too short. `show timing` and the parameters FUNCTION.tmax show which function it was."},
+     "Possible causes: a function that blocks, waits or computes for long; a thread without "
+     "real-time scheduling on a busy host (`hal "
+     "doctor`); a period that is too short. `show timing` and the parameters FUNCTION.tmax show "
+     "which function it was."},
 };
 
 /// Code of a fault; naming one without a page does not compile.
 class FaultCode {
 public:
     consteval FaultCode(const char* name) : name_(name) {
-        const auto is_it = [name](const CodePage& page) { return std::string_view(page.name) == name; };
-        if (std::none_of(std::begin(fault_pages), std::end(fault_pages), is_it) && std::none_of(std::begin(code_pages), std::end(code_pages), is_it))
+        const auto is_it = [name](const CodePage& page) {
+            return std::string_view(page.name) == name;
+        };
+        if (std::none_of(std::begin(fault_pages), std::end(fault_pages), is_it) &&
+            std::none_of(std::begin(code_pages), std::end(code_pages), is_it)) {
             throw "this code is neither in fault_pages.hpp nor in code_pages.hpp";
+        }
     }
     constexpr const char* name() const { return name_; }
 
@@ -58,7 +77,9 @@ private:
 inline std::vector<CodePage> all_code_pages() {
     std::vector<CodePage> all(std::begin(code_pages), std::end(code_pages));
     all.insert(all.end(), std::begin(fault_pages), std::end(fault_pages));
-    std::sort(all.begin(), all.end(), [](const CodePage& a, const CodePage& b) { return std::string_view(a.name) < b.name; });
+    std::sort(all.begin(), all.end(), [](const CodePage& a, const CodePage& b) {
+        return std::string_view(a.name) < b.name;
+    });
     return all;
 }
 

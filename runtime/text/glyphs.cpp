@@ -12,24 +12,30 @@ struct Range {
     char32_t first, last;
 };
 // The scripts and signs that occur in file names and comments; the rest counts as one column.
-constexpr Range combining[] = {{0x300, 0x36F},   {0x483, 0x489},   {0x591, 0x5BD},   {0x610, 0x61A},   {0x64B, 0x65F},
-                               {0x200B, 0x200D}, {0x20D0, 0x20F0}, {0xFE00, 0xFE0F}, {0xFE20, 0xFE2F}, {0xFEFF, 0xFEFF}};
-constexpr Range wide[] = {{0x1100, 0x115F},   {0x2E80, 0x303E},   {0x3041, 0xA4CF},   {0xAC00, 0xD7A3},
-                          {0xF900, 0xFAFF},   {0xFE30, 0xFE6F},   {0xFF00, 0xFF60},   {0xFFE0, 0xFFE6},
-                          {0x1F300, 0x1F64F}, {0x1F680, 0x1F6FF}, {0x1F900, 0x1F9FF}, {0x20000, 0x3FFFD}};
+constexpr Range combining[] = {
+    {0x300, 0x36F},   {0x483, 0x489},   {0x591, 0x5BD},   {0x610, 0x61A},   {0x64B, 0x65F},
+    {0x200B, 0x200D}, {0x20D0, 0x20F0}, {0xFE00, 0xFE0F}, {0xFE20, 0xFE2F}, {0xFEFF, 0xFEFF}};
+constexpr Range wide[] = {{0x1100, 0x115F},   {0x2E80, 0x303E},   {0x3041, 0xA4CF},
+                          {0xAC00, 0xD7A3},   {0xF900, 0xFAFF},   {0xFE30, 0xFE6F},
+                          {0xFF00, 0xFF60},   {0xFFE0, 0xFFE6},   {0x1F300, 0x1F64F},
+                          {0x1F680, 0x1F6FF}, {0x1F900, 0x1F9FF}, {0x20000, 0x3FFFD}};
 // C1 controls and marks that reorder a line: printed raw they would make it read as something else.
 constexpr Range unsafe[] = {{0x80, 0x9F}, {0x200E, 0x200F}, {0x2028, 0x202E}, {0x2066, 0x2069}};
 
 template <std::size_t n>
 bool in(const Range (&ranges)[n], char32_t code) {
-    return std::any_of(std::begin(ranges), std::end(ranges), [code](Range r) { return r.first <= code && code <= r.last; });
+    return std::any_of(std::begin(ranges), std::end(ranges),
+                       [code](Range r) { return r.first <= code && code <= r.last; });
 }
 
 /// The code point at `at` and its length, or length 0 when the bytes are not valid UTF-8.
 std::size_t decode(std::string_view text, std::size_t at, char32_t& code) {
     const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
     const unsigned char first = byte(at);
-    const std::size_t length = first >= 0xF0 && first < 0xF5 ? 4 : first >= 0xE0 ? 3 : first >= 0xC2 ? 2 : 0;
+    const std::size_t length = first >= 0xF0 && first < 0xF5 ? 4
+                               : first >= 0xE0               ? 3
+                               : first >= 0xC2               ? 2
+                                                             : 0;
     if (first >= 0xF5 || length == 0 || at + length > text.size()) return 0;
     code = first & (0x7Fu >> length);
     for (std::size_t i = 1; i < length; ++i) {
@@ -50,8 +56,12 @@ Glyph glyph_at(std::string_view text, std::size_t at) {
     }
     char32_t code = 0;
     const std::size_t length = decode(text, at, code);
-    if (length == 0) return {1, 4, true};
-    if (in(unsafe, code)) return {length, 4 * length, true};
+    if (length == 0) {
+        return {1, 4, true};
+    }
+    if (in(unsafe, code)) {
+        return {length, 4 * length, true};
+    }
     return {length, in(combining, code) ? 0u : in(wide, code) ? 2u : 1u, false};
 }
 
@@ -99,7 +109,9 @@ std::string printable(std::string_view text, std::size_t longest_word) {
         }
         // Cut between characters: not in front of a continuation byte.
         const auto cut = [&](std::size_t place) {
-            while (place > 0 && place < word.size() && (word[place] & 0xC0) == 0x80) --place;
+            while (place > 0 && place < word.size() && (word[place] & 0xC0) == 0x80) {
+                --place;
+            }
             return place;
         };
         append_printable(out, word.substr(0, cut(longest_word * 2 / 3)));

@@ -22,7 +22,8 @@ struct Quantity {
 };
 std::optional<Quantity> parse_quantity(std::string_view text);
 
-/// Parses a duration of 0 or more, in ns: "10s", "250ms", "50us", "100ns", "2min", "1.5h". A number without a unit counts in units of
+/// Parses a duration of 0 or more, in ns: "10s", "250ms", "50us", "100ns", "2min", "1.5h". A number
+/// without a unit counts in units of
 /// `bare_unit_ns`; with 0 it is rejected, unless it is 0.
 std::optional<std::int64_t> parse_duration_ns(std::string_view text, double bare_unit_ns = 1e9);
 std::optional<std::int64_t> parse_duration_ns(std::string_view text, bool) = delete;

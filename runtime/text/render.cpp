@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Diagnostics as text. Everything printed here may come from a hostile file: it is windowed and escaped.
+// Diagnostics as text. Everything printed here may come from a hostile file: it is windowed and
+// escaped.
 #include <algorithm>
 
 #include "text/diagnostic.hpp"
@@ -18,13 +19,17 @@ constexpr std::string_view ellipsis = "…";
 
 struct Style {
     const char *error = "", *warning = "", *note = "", *gutter = "", *strong = "", *off = "";
-    const char* of(Severity severity) const { return severity == Severity::error ? error : severity == Severity::warning ? warning : note; }
+    const char* of(Severity severity) const {
+        return severity == Severity::error ? error : severity == Severity::warning ? warning : note;
+    }
 };
 constexpr Style plain{};
 constexpr Style colored{"\033[1;31m", "\033[1;33m", "\033[1;36m", "\033[34m", "\033[1m", "\033[0m"};
 
 constexpr const char* word(Severity severity) {
-    return severity == Severity::error ? "error" : severity == Severity::warning ? "warning" : "note";
+    return severity == Severity::error     ? "error"
+           : severity == Severity::warning ? "warning"
+                                           : "note";
 }
 
 /// A label with the columns its span has in the row being drawn.
@@ -32,8 +37,10 @@ struct Mark {
     const Label* label = nullptr;
     bool main = false;
     std::uint32_t line = 0;
-    std::size_t begin = 0, end = 0;  ///< bytes from the start of the line
-    std::size_t column = 0, column_end = std::string::npos;
+    std::size_t begin = 0;
+    std::size_t end = 0;  ///< bytes from the start of the line
+    std::size_t column = 0;
+    std::size_t column_end = std::string::npos;
     bool visible = false;
 };
 
@@ -49,42 +56,64 @@ public:
     std::string render() {
         header();
         collect();
-        while (!marks_.empty()) row();
-        for (const Label& label : diagnostic_.labels)
-            if (!label.span.known() && !label.text.empty()) line_of("= note: ", label.text);
-        for (const std::string& help : diagnostic_.help) line_of("= help: ", help);
+        while (!marks_.empty()) {
+            row();
+        }
+        for (const Label& label : diagnostic_.labels) {
+            if (!label.span.known() && !label.text.empty()) {
+                line_of("= note: ", label.text);
+            }
+        }
+        for (const std::string& help : diagnostic_.help) {
+            line_of("= help: ", help);
+        }
         return std::move(out_);
     }
 
 private:
     void header() {
         const Span at = diagnostic_.labels.empty() ? Span{} : diagnostic_.labels[0].span;
-        if (at.known()) out_ += printable(sources_.location(at), std::string::npos) + ": ";
-        out_ += style_.of(diagnostic_.severity) + std::string(word(diagnostic_.severity)) + ": " + style_.off;
-        out_ += style_.strong + printable(diagnostic_.message) + style_.off + " [" + std::string(diagnostic_.code.name()) + "]\n";
+        if (at.known()) {
+            out_ += printable(sources_.location(at), std::string::npos) + ": ";
+        }
+        out_ += style_.of(diagnostic_.severity) + std::string(word(diagnostic_.severity)) + ": " +
+                style_.off;
+        out_ += style_.strong + printable(diagnostic_.message) + style_.off + " [" +
+                std::string(diagnostic_.code.name()) + "]\n";
     }
 
     void collect() {
         for (const Label& label : diagnostic_.labels) {
             if (!label.span.known() || sources_.get(label.span.source).text.empty()) continue;
             // Where the line starts: `place` counts characters, carets need bytes.
-            const std::string_view text = sources_.get(label.span.source).text, line = sources_.line(label.span);
-            const std::size_t start = line.data() == nullptr ? text.size() : static_cast<std::size_t>(line.data() - text.data());
-            Mark mark{.label = &label, .main = &label == diagnostic_.labels.data(), .line = sources_.place(label.span).line};
-            mark.begin = std::min<std::size_t>(label.span.begin - std::min<std::size_t>(start, label.span.begin), line.size());
-            mark.end = std::clamp<std::size_t>(label.span.end - std::min<std::size_t>(start, label.span.end), mark.begin, line.size());
+            const std::string_view text = sources_.get(label.span.source).text;
+
+            const std::string_view line = sources_.line(label.span);
+            const std::size_t start = line.data() == nullptr
+                                          ? text.size()
+                                          : static_cast<std::size_t>(line.data() - text.data());
+            Mark mark{.label = &label,
+                      .main = &label == diagnostic_.labels.data(),
+                      .line = sources_.place(label.span).line};
+            mark.begin = std::min<std::size_t>(
+                label.span.begin - std::min<std::size_t>(start, label.span.begin), line.size());
+            mark.end = std::clamp<std::size_t>(
+                label.span.end - std::min<std::size_t>(start, label.span.end), mark.begin,
+                line.size());
             marks_.push_back(mark);
             gutter_ = std::max(gutter_, std::to_string(mark.line).size());
         }
     }
 
-    /// Draws the first mark left, and with it all others that are to be seen in the same piece of the same line.
+    /// Draws the first mark left, and with it all others that are to be seen in the same piece of
+    /// the same line.
     void row() {
         const Mark first = marks_[0];
         const Span span = first.label->span;
-        if (!first.main && span.source != shown_source_)
+        if (!first.main && span.source != shown_source_) {
             out_ += style_.gutter + right_aligned("in", gutter_) + style_.off + " " +
                     printable(sources_.location(span), std::string::npos) + "\n";
+        }
         shown_source_ = span.source;
 
         const std::string text = lay_out(sources_.line(span), first);
@@ -95,37 +124,53 @@ private:
 
         std::vector<Mark> drawn;
         std::erase_if(marks_, [&](const Mark& mark) {
-            if (mark.visible) drawn.push_back(mark);
+            if (mark.visible) {
+                drawn.push_back(mark);
+            }
             return mark.visible;
         });
-        // The text of the place that ends last stands beside its underline, the others below, from right to left.
-        std::stable_sort(drawn.begin(), drawn.end(), [](const Mark& a, const Mark& b) { return a.column_end > b.column_end; });
+        // The text of the place that ends last stands beside its underline, the others below, from
+        // right to left.
+        std::stable_sort(drawn.begin(), drawn.end(),
+                         [](const Mark& a, const Mark& b) { return a.column_end > b.column_end; });
         underline(drawn);
         for (std::size_t i = 1; i < drawn.size(); ++i) {
             if (drawn[i].label->text.empty()) continue;
             gutter(std::string(gutter_, ' '));
-            out_ += std::string(drawn[i].column, ' ') + colored_text(drawn[i], drawn[i].label->text);
+            out_ +=
+                std::string(drawn[i].column, ' ') + colored_text(drawn[i], drawn[i].label->text);
         }
     }
 
     void underline(const std::vector<Mark>& drawn) {
         std::size_t width = 0;
-        for (const Mark& mark : drawn) width = std::max(width, mark.column_end);
+        for (const Mark& mark : drawn) {
+            width = std::max(width, mark.column_end);
+        }
         std::string signs(width, ' ');
-        for (const bool main : {false, true})  // where two places overlap the main one is seen
-            for (const Mark& mark : drawn)
-                if (mark.main == main)
-                    signs.replace(mark.column, mark.column_end - mark.column, mark.column_end - mark.column, main ? '^' : '-');
+        for (const bool main : {false, true}) {  // where two places overlap the main one is seen
+            for (const Mark& mark : drawn) {
+                if (mark.main == main) {
+                    signs.replace(mark.column, mark.column_end - mark.column,
+                                  mark.column_end - mark.column, main ? '^' : '-');
+                }
+            }
+        }
         gutter(std::string(gutter_, ' '));
         for (std::size_t at = 0; at < signs.size();) {
             const std::size_t stop = std::min(signs.find_first_not_of(signs[at], at), signs.size());
-            const char* color = signs[at] == '^' ? style_.of(diagnostic_.severity) : signs[at] == '-' ? style_.gutter : "";
+            const char* color = signs[at] == '^'   ? style_.of(diagnostic_.severity)
+                                : signs[at] == '-' ? style_.gutter
+                                                   : "";
             out_ += color + signs.substr(at, stop - at) + (*color != 0 ? style_.off : "");
             at = stop;
         }
         const std::string& text = drawn[0].label->text;
-        if (!text.empty()) out_ += " " + colored_text(drawn[0], text);
-        else out_ += "\n";
+        if (!text.empty()) {
+            out_ += " " + colored_text(drawn[0], text);
+        } else {
+            out_ += "\n";
+        }
     }
 
     std::string colored_text(const Mark& mark, const std::string& text) const {
@@ -133,40 +178,60 @@ private:
         return color + printable(text) + style_.off + "\n";
     }
 
-    /// The piece of `line` around `first` as it is printed; notes the columns of all marks that lie in it.
+    /// The piece of `line` around `first` as it is printed; notes the columns of all marks that lie
+    /// in it.
     std::string lay_out(std::string_view line, const Mark& first) {
         const bool fits = line.size() <= most_bytes && width_of(line) <= window_columns;
         const std::size_t start = fits ? 0 : window_start(line, first.begin);
         std::string text(start > 0 ? ellipsis : "");
-        std::size_t column = start > 0 ? 1 : 0, at = start;
+        std::size_t column = start > 0 ? 1 : 0;
+        std::size_t at = start;
         std::vector<Mark*> here;
-        for (Mark& mark : marks_)
-            if (mark.label->span.source == first.label->span.source && mark.line == first.line && mark.begin >= start)
+        for (Mark& mark : marks_) {
+            if (mark.label->span.source == first.label->span.source && mark.line == first.line &&
+                mark.begin >= start) {
                 here.push_back(&mark);
+            }
+        }
         const auto note = [&](std::size_t from, std::size_t to, std::size_t width) {
             for (Mark* mark : here) {
-                if (mark->begin >= from && mark->begin < to) mark->column = column, mark->visible = true;
-                if (mark->end > from && mark->end <= to) mark->column_end = column + width;
+                if (mark->begin >= from && mark->begin < to) {
+                    mark->column = column;
+                    mark->visible = true;
+                }
+                if (mark->end > from && mark->end <= to) {
+                    mark->column_end = column + width;
+                }
             }
         };
         while (at < line.size() && at < start + most_bytes && column < window_columns) {
             const Glyph glyph = glyph_in(line, at, column);
             note(at, at + glyph.bytes, glyph.columns);
-            if (line[at] == '\t') text.append(glyph.columns, ' ');
-            else append_glyph(text, line, at, glyph);
+            if (line[at] == '\t') {
+                text.append(glyph.columns, ' ');
+            } else {
+                append_glyph(text, line, at, glyph);
+            }
             column += glyph.columns;
             at += glyph.bytes;
         }
-        if (at < line.size()) text += ellipsis;
-        else note(at, at + 1, 0);  // places behind the last character
-        for (Mark* mark : here)
-            if (mark->visible) mark->column_end = std::max(std::min(mark->column_end, column), mark->column + 1);
+        if (at < line.size()) {
+            text += ellipsis;
+        } else {
+            note(at, at + 1, 0);  // places behind the last character
+        }
+        for (Mark* mark : here) {
+            if (mark->visible) {
+                mark->column_end = std::max(std::min(mark->column_end, column), mark->column + 1);
+            }
+        }
         return text;
     }
 
     /// As glyph_at, with tabs up to their stop.
     static Glyph glyph_in(std::string_view line, std::size_t at, std::size_t column) {
-        return line[at] == '\t' ? Glyph{1, tab_stop - column % tab_stop, false} : glyph_at(line, at);
+        return line[at] == '\t' ? Glyph{1, tab_stop - column % tab_stop, false}
+                                : glyph_at(line, at);
     }
 
     static std::size_t width_of(std::string_view line) {
@@ -181,10 +246,13 @@ private:
 
     /// Where the window on a long line begins, so that `place` is in it.
     static std::size_t window_start(std::string_view line, std::size_t place) {
-        std::size_t at = place, before = 0;
+        std::size_t at = place;
+        std::size_t before = 0;
         while (at > 0 && place - at < most_bytes / 2) {
             std::size_t previous = at - 1;
-            while (previous > 0 && at - previous < 4 && (line[previous] & 0xC0) == 0x80) --previous;
+            while (previous > 0 && at - previous < 4 && (line[previous] & 0xC0) == 0x80) {
+                --previous;
+            }
             before += width_of(line.substr(previous, at - previous));
             if (before > columns_before) return at;
             at = previous;
@@ -198,7 +266,9 @@ private:
         out_ += style_.gutter + std::string(gutter_ + 1, ' ') + std::string(head) + style_.off;
         for (std::size_t at = 0; at <= text.size();) {
             const std::size_t stop = std::min(text.find('\n', at), text.size());
-            if (at != 0) out_ += std::string(gutter_ + 1 + head.size(), ' ');
+            if (at != 0) {
+                out_ += std::string(gutter_ + 1 + head.size(), ' ');
+            }
             out_ += printable(std::string_view(text).substr(at, stop - at)) + "\n";
             at = stop + 1;
         }
@@ -226,7 +296,9 @@ std::string render(const Diagnostic& diagnostic, const Sources& sources, bool co
 }
 
 std::vector<std::size_t> rendered_order(const Diagnostics& diagnostics) {
-    const auto place = [](const Diagnostic& d) { return d.labels.empty() ? Span{} : d.labels[0].span; };
+    const auto place = [](const Diagnostic& d) {
+        return d.labels.empty() ? Span{} : d.labels[0].span;
+    };
     std::vector<std::uint32_t> files;  // in order of first mention
     struct Entry {
         std::size_t file;
@@ -237,13 +309,19 @@ std::vector<std::size_t> rendered_order(const Diagnostics& diagnostics) {
     for (std::size_t i = 0; i < diagnostics.all().size(); ++i) {
         const Span at = place(diagnostics.all()[i]);
         auto file = std::find(files.begin(), files.end(), at.source);
-        if (file == files.end()) file = files.insert(files.end(), at.source);
-        entries.push_back({static_cast<std::size_t>(file - files.begin()), at.known() ? at.begin : 0, i});
+        if (file == files.end()) {
+            file = files.insert(files.end(), at.source);
+        }
+        entries.push_back(
+            {static_cast<std::size_t>(file - files.begin()), at.known() ? at.begin : 0, i});
     }
-    std::stable_sort(entries.begin(), entries.end(),
-                     [](const Entry& a, const Entry& b) { return a.file != b.file ? a.file < b.file : a.begin < b.begin; });
+    std::stable_sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) {
+        return a.file != b.file ? a.file < b.file : a.begin < b.begin;
+    });
     std::vector<std::size_t> order;
-    for (std::size_t i = 0; i < std::min(entries.size(), max_rendered); ++i) order.push_back(entries[i].index);
+    for (std::size_t i = 0; i < std::min(entries.size(), max_rendered); ++i) {
+        order.push_back(entries[i].index);
+    }
     return order;
 }
 
@@ -251,8 +329,12 @@ std::string render(const Diagnostics& diagnostics, const Sources& sources, bool 
     std::string out;
     const std::size_t all = diagnostics.all().size();
     const std::vector<std::size_t> order = rendered_order(diagnostics);
-    for (const std::size_t i : order) out += (out.empty() ? "" : "\n") + render(diagnostics.all()[i], sources, color);
-    if (all > order.size()) out += "\nand " + std::to_string(all - order.size()) + " more not shown; fix these first\n";
+    for (const std::size_t i : order) {
+        out += (out.empty() ? "" : "\n") + render(diagnostics.all()[i], sources, color);
+    }
+    if (all > order.size()) {
+        out += "\nand " + std::to_string(all - order.size()) + " more not shown; fix these first\n";
+    }
     return out;
 }
 

@@ -11,7 +11,8 @@ class Diagnostics;
 
 inline constexpr std::size_t max_rendered = 100;
 
-/// Returns the indices of the diagnostics that are rendered, at most max_rendered: in order of place, files in order of first mention.
+/// Returns the indices of the diagnostics that are rendered, at most max_rendered: in order of
+/// place, files in order of first mention.
 std::vector<std::size_t> rendered_order(const Diagnostics& diagnostics);
 
 }  // namespace hal

@@ -12,10 +12,13 @@
 
 namespace hal {
 
-/// Returns the names of `candidates` close to `name` (edit distance, prefixes, swapped separators), best first, at most `most`.
-std::vector<std::string> similar(std::string_view name, const std::vector<std::string>& candidates, std::size_t most = 3);
+/// Returns the names of `candidates` close to `name` (edit distance, prefixes, swapped separators),
+/// best first, at most `most`.
+std::vector<std::string> similar(std::string_view name, const std::vector<std::string>& candidates,
+                                 std::size_t most = 3);
 
-/// Many names, indexed for many searches. Once all are added, any thread may search; the first search sorts them.
+/// Many names, indexed for many searches. Once all are added, any thread may search; the first
+/// search sorts them.
 class NameIndex {
 public:
     static constexpr std::uint32_t all = 0xFFFF'FFFF;
@@ -24,8 +27,10 @@ public:
     void add(std::string_view name, std::uint32_t number = 0);
     std::size_t size() const { return names_.size(); }
     /// Returns what the function similar() returns for the names with a number below `before`.
-    std::vector<std::string> similar(std::string_view name, std::size_t max_count = 3, std::uint32_t before = all) const;
-    /// The number of names and parts of names that all searches so far have compared: what a search costs, for tests. [any]
+    std::vector<std::string> similar(std::string_view name, std::size_t max_count = 3,
+                                     std::uint32_t before = all) const;
+    /// The number of names and parts of names that all searches so far have compared: what a search
+    /// costs, for tests. [any]
     std::uint64_t steps() const;
 
 private:
@@ -38,26 +43,35 @@ private:
         std::uint32_t name;
     };
     void sort() const;
-    std::string_view text(std::uint32_t i) const { return std::string_view(texts_).substr(names_[i].begin, names_[i].size); }
-    std::string_view folded(std::uint32_t i) const { return std::string_view(folded_).substr(names_[i].begin, names_[i].size); }
+    std::string_view text(std::uint32_t i) const {
+        return std::string_view(texts_).substr(names_[i].begin, names_[i].size);
+    }
+    std::string_view folded(std::uint32_t i) const {
+        return std::string_view(folded_).substr(names_[i].begin, names_[i].size);
+    }
     std::vector<Found> within(std::string_view folded_name, int limit, std::uint32_t before) const;
-    void add_longer(std::string_view folded_name, std::uint32_t before, std::vector<Found>& found) const;
+    void add_longer(std::string_view folded_name, std::uint32_t before,
+                    std::vector<Found>& found) const;
 
-    std::string texts_, folded_;                  // the names one after the other; the same without the differences that are ignored
-    mutable std::vector<Name> names_;             // sorted by their folded texts after sort()
-    mutable std::vector<std::uint32_t> common_;   // how many characters a name shares with the one before it
+    // the names one after the other; the same without the differences that are ignored
+    std::string texts_, folded_;
+    mutable std::vector<Name> names_;  // sorted by their folded texts after sort()
+    // how many characters a name shares with the one before it
+    mutable std::vector<std::uint32_t> common_;
     mutable std::once_flag sorted_;
     mutable std::atomic<std::uint64_t> steps_{0};
 };
 
 /// Returns "did you mean 'x'?" or "did you mean 'x' or 'y'?", or nothing if no candidate is close.
 std::string did_you_mean(std::string_view name, const std::vector<std::string>& candidates);
-std::string did_you_mean(std::string_view name, const NameIndex& candidates, std::uint32_t before = NameIndex::all);
+std::string did_you_mean(std::string_view name, const NameIndex& candidates,
+                         std::uint32_t before = NameIndex::all);
 
 /// Joins names with commas, cut to the width of a line: "a, b, c, … (17 more)".
 std::string listed(const std::vector<std::string>& names, std::size_t most = 12);
 
 /// The same, but offers all names if none is close: "did you mean 'x'?" or "KINDS: a, b, c".
-std::string suggestion(std::string_view name, const std::vector<std::string>& candidates, std::string_view kinds);
+std::string suggestion(std::string_view name, const std::vector<std::string>& candidates,
+                       std::string_view kinds);
 
 }  // namespace hal

@@ -12,27 +12,35 @@ struct Options {
     bool quick = false;       ///< shorter runs, wider spread
     bool full = false;        ///< what takes minutes as well: a cold build, a million edits
     std::string programs;     ///< folder of the built `hal`
-    int cpu = 0;              ///< of the real-time thread; everything else of the bench stays off it
+    /// of the real-time thread; everything else of the bench stays off it
+    int cpu = 0;
 };
 
-/// What a ratio has to be. `at_most`: ours / theirs. `not_above`: the same with 1, where a tenth is the spread of the
-/// measurement. `times_less`: theirs / ours. `limit`: ours against a figure; `at_least`: where more is better.
+/// What a ratio has to be. `at_most`: ours / theirs. `not_above`: the same with 1, where a tenth is
+/// the spread of the measurement. `times_less`: theirs / ours. `limit`: ours against a figure;
+/// `at_least`: where more is better.
 struct Goal {
     enum class Kind { none, at_most, not_above, times_less, limit, at_least } kind = Kind::none;
     double value = 0.0;
-    double beside = 0.0;  ///< of `limit` and `at_least`: on a machine where the peer misses the limit, the ratio of times to the peer counts
+    /// of `limit` and `at_least`: on a machine where the peer misses the limit, the ratio of times
+    /// to the peer counts
+    double beside = 0.0;
 };
 inline Goal not_above() { return {Goal::Kind::not_above, 1.1}; }
 inline Goal at_most(double ratio) { return {Goal::Kind::at_most, ratio}; }
 inline Goal times_less(double ratio) { return {Goal::Kind::times_less, ratio}; }
-inline Goal limit(double figure, double beside = 0.0) { return {Goal::Kind::limit, figure, beside}; }
-inline Goal at_least(double figure, double beside = 0.0) { return {Goal::Kind::at_least, figure, beside}; }
+inline Goal limit(double figure, double beside = 0.0) {
+    return {Goal::Kind::limit, figure, beside};
+}
+inline Goal at_least(double figure, double beside = 0.0) {
+    return {Goal::Kind::at_least, figure, beside};
+}
 
 struct Row {
     std::string what;
-    std::string unit;                       ///< of ours and theirs
+    std::string unit;  ///< of ours and theirs
     std::optional<double> ours = {};
-    std::string peer = {};                  ///< what theirs is of, or why there is no figure of it
+    std::string peer = {};  ///< what theirs is of, or why there is no figure of it
     std::optional<double> theirs = {};
     Goal goal = {};
 };
@@ -48,7 +56,8 @@ public:
 private:
     struct Line {
         enum class Kind { section, row, note } kind;
-        std::string cells[6];  ///< of a row: what, ours, peer, ratio, target, verdict; else the text in the first
+        /// of a row: what, ours, peer, ratio, target, verdict; else the text in the first
+        std::string cells[6];
     };
     std::vector<Line> lines_;
 };
@@ -70,7 +79,8 @@ void vision(const Options&, Report&);
 void size(const Options&, Report&);
 void canopen_boot(const Options&, Report&);
 
-/// What `canopen-boot` starts where there is a vcan0: `hal-bench` with this word prints seconds and what went wrong.
+/// What `canopen-boot` starts where there is a vcan0: `hal-bench` with this word prints seconds and
+/// what went wrong.
 inline constexpr const char* canopen_boot_inside_word = "canopen-boot-inside";
 int canopen_boot_inside();
 

@@ -29,28 +29,37 @@ static int64_t now_ns(clockid_t clock) {
 }
 static void until(int64_t ns) {
     const struct timespec t = {ns / 1000000000, ns % 1000000000};
-    while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &t, NULL) == EINTR) {}
+    while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &t, NULL) == EINTR) {
+    }
 }
 static void put(uint32_t id, const uint8_t* data, uint8_t length) {
     struct can_frame f;
     memset(&f, 0, sizeof f);
-    f.can_id = id, f.can_dlc = length;
+    f.can_id = id;
+    f.can_dlc = length;
     memcpy(f.data, data, length);
-    while (write(fd, &f, sizeof f) < 0 && (errno == ENOBUFS || errno == EAGAIN || errno == EINTR)) usleep(50);
+    while (write(fd, &f, sizeof f) < 0 && (errno == ENOBUFS || errno == EAGAIN || errno == EINTR)) {
+        usleep(50);
+    }
 }
 /* 0: nothing came in time. */
 static int get(struct can_frame* f) { return read(fd, f, sizeof *f) == sizeof *f; }
 
 static uint16_t crc_of(const uint8_t* data, uint32_t size) {
     static uint16_t table[256];
-    if (!table[1])
+    if (!table[1]) {
         for (unsigned n = 0; n < 256; ++n) {
             uint16_t c = (uint16_t)(n << 8);
-            for (int bit = 0; bit < 8; ++bit) c = (uint16_t)(c & 0x8000 ? c << 1 ^ 0x1021 : c << 1);
+            for (int bit = 0; bit < 8; ++bit) {
+                c = (uint16_t)(c & 0x8000 ? c << 1 ^ 0x1021 : c << 1);
+            }
             table[n] = c;
         }
+    }
     uint16_t crc = 0;
-    while (size--) crc = (uint16_t)(crc << 8 ^ table[(crc >> 8 ^ *data++) & 0xff]);
+    while (size--) {
+        crc = (uint16_t)(crc << 8 ^ table[(crc >> 8 ^ *data++) & 0xff]);
+    }
     return crc;
 }
 static void put_block(uint32_t id, uint32_t from, uint32_t size, unsigned count, unsigned* sent) {
@@ -68,7 +77,8 @@ static uint8_t unused(uint32_t size) { return (uint8_t)((7 - size % 7) % 7); }
 static void slave(void) {
     enum { idle, down, up, block_down, block_up } mode = idle;
     uint32_t at = 0;
-    unsigned sequence = 0, size = blocks;
+    unsigned sequence = 0;
+    unsigned size = blocks;
     uint8_t tpdo[8] = {0};
     struct can_frame f;
     for (;;) {
@@ -82,10 +92,14 @@ static void slave(void) {
         } else if (f.can_id == 0x600 + node) {
             const int is_domain = d[1] == 1;
             memcpy(a + 1, d + 1, 3);
-            if (mode == block_down && d[0] != 0x80 && !(d[0] >> 5 == 6 && sequence == 0 && at >= domain_size)) {
+            if (mode == block_down && d[0] != 0x80 &&
+                !(d[0] >> 5 == 6 && sequence == 0 && at >= domain_size)) {
                 if ((d[0] & 0x7f) == sequence + 1) {
-                    if (at + 7 <= most) memcpy(domain + at, d + 1, 7);
-                    at += 7, ++sequence;
+                    if (at + 7 <= most) {
+                        memcpy(domain + at, d + 1, 7);
+                    }
+                    at += 7;
+                    ++sequence;
                 }
                 if ((d[0] & 0x80) || (d[0] & 0x7f) == blocks) {
                     const uint8_t acknowledge[8] = {0xa2, (uint8_t)sequence, blocks};
@@ -96,45 +110,73 @@ static void slave(void) {
             }
             if (d[0] >> 5 == 1) {
                 a[0] = 0x60;
-                if (d[0] & 2) memcpy(&value, d + 4, 4);
-                else mode = down, at = 0;
+                if (d[0] & 2) {
+                    memcpy(&value, d + 4, 4);
+                } else {
+                    mode = down;
+                    at = 0;
+                }
             } else if (d[0] == 0x40 && !is_domain) {
                 a[0] = 0x43;
                 memcpy(a + 4, &value, 4);
             } else if (d[0] == 0x40) {
-                a[0] = 0x41, mode = up, at = 0;
+                a[0] = 0x41;
+                mode = up;
+                at = 0;
                 memcpy(a + 4, &domain_size, 4);
             } else if (mode == down && d[0] >> 5 == 0) {
                 const uint32_t n = 7 - (d[0] >> 1 & 7);
-                if (at + 7 <= most) memcpy(domain + at, d + 1, n);
+                if (at + 7 <= most) {
+                    memcpy(domain + at, d + 1, n);
+                }
                 at += n;
-                if (d[0] & 1) domain_size = at, mode = idle;
-                memset(a, 0, 8), a[0] = (uint8_t)(0x20 | (d[0] & 0x10));
+                if (d[0] & 1) {
+                    domain_size = at;
+                    mode = idle;
+                }
+                memset(a, 0, 8);
+                a[0] = (uint8_t)(0x20 | (d[0] & 0x10));
             } else if (mode == up && d[0] >> 5 == 3) {
                 const uint32_t n = domain_size - at < 7 ? domain_size - at : 7;
                 memcpy(a + 1, domain + at, n);
                 at += n;
                 a[0] = (uint8_t)((d[0] & 0x10) | (7 - n) << 1 | (at == domain_size));
             } else if ((d[0] & 0xe1) == 0xc0) {
-                a[0] = 0xa4, a[4] = blocks, mode = block_down, at = sequence = 0;
+                a[0] = 0xa4;
+                a[4] = blocks;
+                mode = block_down;
+                at = sequence = 0;
                 memcpy(&domain_size, d + 4, 4);
             } else if ((d[0] & 0xe1) == 0xc1) {
-                memset(a, 0, 8), a[0] = 0xa1, mode = idle;
-                if (crc_of(domain, domain_size) != (d[1] | d[2] << 8)) memset(a, 0xff, 8), a[0] = 0x80;
+                memset(a, 0, 8);
+                a[0] = 0xa1;
+                mode = idle;
+                if (crc_of(domain, domain_size) != (d[1] | d[2] << 8)) {
+                    memset(a, 0xff, 8);
+                    a[0] = 0x80;
+                }
             } else if ((d[0] & 0xe3) == 0xa0) {
-                a[0] = 0xc6, size = d[4], mode = block_up, at = 0;
+                a[0] = 0xc6;
+                size = d[4];
+                mode = block_up;
+                at = 0;
                 memcpy(a + 4, &domain_size, 4);
             } else if (mode == block_up && d[0] == 0xa3) {
                 put_block(0x580 + node, 0, domain_size, size, &sequence);
                 continue;
             } else if (mode == block_up && d[0] == 0xa2) {
-                at += d[1] * 7u, size = d[2];
+                at += d[1] * 7u;
+                size = d[2];
                 if (at < domain_size) {
                     put_block(0x580 + node, at, domain_size, size, &sequence);
                     continue;
                 }
                 const uint16_t crc = crc_of(domain, domain_size);
-                memset(a, 0, 8), a[0] = (uint8_t)(0xc1 | unused(domain_size) << 2), a[1] = (uint8_t)crc, a[2] = (uint8_t)(crc >> 8);
+                memset(a, 0, 8);
+                a[0] = (uint8_t)(0xc1 | unused(domain_size) << 2);
+
+                a[1] = (uint8_t)crc;
+                a[2] = (uint8_t)(crc >> 8);
             } else {
                 mode = idle;
                 continue;
@@ -151,18 +193,26 @@ static void fail(const char* what) {
 }
 static void ask(const uint8_t* request, struct can_frame* answer) {
     put(0x600 + node, request, 8);
-    do
-        if (!get(answer)) fail("no answer to SDO");
-    while (answer->can_id != 0x580 + node);
-    if (answer->data[0] == 0x80) fail("SDO aborted");
+    do {
+        if (!get(answer)) {
+            fail("no answer to SDO");
+        }
+    } while (answer->can_id != 0x580 + node);
+    if (answer->data[0] == 0x80) {
+        fail("SDO aborted");
+    }
 }
 static void expedited(int upload, unsigned count) {
     const uint8_t request[8] = {upload ? 0x40 : 0x23, 0x00, 0x20, 0, 1, 2, 3, 4};
     struct can_frame f;
-    const int64_t began = now_ns(CLOCK_MONOTONIC), cpu = now_ns(CLOCK_PROCESS_CPUTIME_ID);
-    for (unsigned n = 0; n < count; ++n) ask(request, &f);
-    printf("exp_%s %.0f\nexp_%s_cpu %.3f\n", upload ? "up" : "down", count * 1e9 / (double)(now_ns(CLOCK_MONOTONIC) - began),
-           upload ? "up" : "down", (double)(now_ns(CLOCK_PROCESS_CPUTIME_ID) - cpu) / count / 1000);
+    const int64_t began = now_ns(CLOCK_MONOTONIC);
+    const int64_t cpu = now_ns(CLOCK_PROCESS_CPUTIME_ID);
+    for (unsigned n = 0; n < count; ++n) {
+        ask(request, &f);
+    }
+    printf("exp_%s %.0f\nexp_%s_cpu %.3f\n", upload ? "up" : "down",
+           count * 1e9 / (double)(now_ns(CLOCK_MONOTONIC) - began), upload ? "up" : "down",
+           (double)(now_ns(CLOCK_PROCESS_CPUTIME_ID) - cpu) / count / 1000);
 }
 static void download(uint32_t size, int block) {
     uint8_t b[8] = {block ? 0xc6 : 0x21, 0x01, 0x20, 0};
@@ -181,13 +231,20 @@ static void download(uint32_t size, int block) {
     unsigned sent, blksize = f.data[4];
     for (uint32_t at = 0; at < size;) {
         put_block(0x600 + node, at, size, blksize, &sent);
-        do
-            if (!get(&f)) fail("no acknowledgement");
-        while (f.can_id != 0x580 + node || f.data[0] != 0xa2);
-        at += f.data[1] * 7u, blksize = f.data[2];
+        do {
+            if (!get(&f)) {
+                fail("no acknowledgement");
+            }
+        } while (f.can_id != 0x580 + node || f.data[0] != 0xa2);
+        at += f.data[1] * 7u;
+        blksize = f.data[2];
     }
     const uint16_t crc = crc_of(domain, size);
-    memset(b, 0, 8), b[0] = (uint8_t)(0xc1 | unused(size) << 2), b[1] = (uint8_t)crc, b[2] = (uint8_t)(crc >> 8);
+    memset(b, 0, 8);
+    b[0] = (uint8_t)(0xc1 | unused(size) << 2);
+    b[1] = (uint8_t)crc;
+
+    b[2] = (uint8_t)(crc >> 8);
     ask(b, &f);
 }
 static void upload(uint32_t size, int block, uint8_t* to) {
@@ -209,20 +266,27 @@ static void upload(uint32_t size, int block, uint8_t* to) {
     put(0x600 + node, b, 8);
     unsigned sequence = 0;
     for (uint32_t at = 0;;) {
-        if (!get(&f)) fail("a segment is missing");
+        if (!get(&f)) {
+            fail("a segment is missing");
+        }
         if (f.can_id != 0x580 + node || (f.data[0] & 0x7f) != sequence + 1) continue;
         memcpy(to + at, f.data + 1, 7);
-        at += 7, ++sequence;
+        at += 7;
+        ++sequence;
         const int last = f.data[0] & 0x80;
         if (sequence < blocks && !last) continue;
         const uint8_t acknowledge[8] = {0xa2, (uint8_t)sequence, blocks};
         sequence = 0;
         put(0x600 + node, acknowledge, 8);
         if (!last) continue;
-        do
-            if (!get(&f)) fail("the end of the upload is missing");
-        while (f.can_id != 0x580 + node || (f.data[0] & 0xe3) != 0xc1);
-        if (crc_of(to, size) != (f.data[1] | f.data[2] << 8)) fail("CRC of the upload");
+        do {
+            if (!get(&f)) {
+                fail("the end of the upload is missing");
+            }
+        } while (f.can_id != 0x580 + node || (f.data[0] & 0xe3) != 0xc1);
+        if (crc_of(to, size) != (f.data[1] | f.data[2] << 8)) {
+            fail("CRC of the upload");
+        }
         const uint8_t done[8] = {0xa1};
         put(0x600 + node, done, 8);
         return;
@@ -230,14 +294,18 @@ static void upload(uint32_t size, int block, uint8_t* to) {
 }
 static void transfers(const char* name, uint32_t size, int block) {
     static uint8_t back[most + 8];
-    for (uint32_t n = 0; n < size; ++n) domain[n] = (uint8_t)(n * 7 + n / 251);
+    for (uint32_t n = 0; n < size; ++n) {
+        domain[n] = (uint8_t)(n * 7 + n / 251);
+    }
     int64_t began = now_ns(CLOCK_MONOTONIC);
     download(size, block);
     printf("%s_down %.1f\n", name, size * 1e6 / (double)(now_ns(CLOCK_MONOTONIC) - began));
     began = now_ns(CLOCK_MONOTONIC);
     upload(size, block, back);
     printf("%s_up %.1f\n", name, size * 1e6 / (double)(now_ns(CLOCK_MONOTONIC) - began));
-    if (memcmp(domain, back, size) != 0) fail("the bytes read differ from those written");
+    if (memcmp(domain, back, size) != 0) {
+        fail("the bytes read differ from those written");
+    }
 }
 static int by_size(const void* a, const void* b) {
     return *(const int64_t*)a < *(const int64_t*)b ? -1 : *(const int64_t*)a > *(const int64_t*)b;
@@ -251,34 +319,53 @@ static void synchronous(unsigned count) {
         until(next);
         const int64_t began = now_ns(CLOCK_MONOTONIC);
         put(0x80, NULL, 0);
-        do
-            if (!get(&f)) fail("no TPDO after a SYNC");
-        while (f.can_id != 0x180 + node);
+        do {
+            if (!get(&f)) {
+                fail("no TPDO after a SYNC");
+            }
+        } while (f.can_id != 0x180 + node);
         took[n] = now_ns(CLOCK_MONOTONIC) - began;
     }
     const double cpu_us = (double)(now_ns(CLOCK_PROCESS_CPUTIME_ID) - cpu) / count / 1000;
     qsort(took, count, sizeof *took, by_size);
-    printf("sync_p50 %.1f\nsync_p99 %.1f\nsync_cpu %.2f\n", (double)took[count / 2] / 1000, (double)took[count - count / 100 - 1] / 1000,
-           cpu_us);
+    printf("sync_p50 %.1f\nsync_p99 %.1f\nsync_cpu %.2f\n", (double)took[count / 2] / 1000,
+           (double)took[count - count / 100 - 1] / 1000, cpu_us);
 }
 
 int main(int argc, char** argv) {
-    if (argc < 3) return fputs("can_neutral IFACE slave|master [FACTOR]|generate COUNT NS|receive COUNT\n", stderr), 2;
+    if (argc < 3) {
+        fputs("can_neutral IFACE slave|master [FACTOR]|generate COUNT NS|receive COUNT\n", stderr);
+
+        return 2;
+    }
     struct sockaddr_can at = {.can_family = AF_CAN, .can_ifindex = (int)if_nametoindex(argv[1])};
     const struct timeval timeout = {2, 0};
     const int room = 4 << 20;
-    const int master = strcmp(argv[2], "master") == 0, answered = master || strcmp(argv[2], "receive") == 0;
-    const struct can_filter heard[] = {{0x080, CAN_SFF_MASK}, {0x200 + node, CAN_SFF_MASK}, {0x600 + node, CAN_SFF_MASK}};
-    const struct can_filter answers[] = {{0x180 + node, CAN_SFF_MASK}, {0x580 + node, CAN_SFF_MASK}};
+    const int master = strcmp(argv[2], "master") == 0;
+
+    const int answered = master || strcmp(argv[2], "receive") == 0;
+    const struct can_filter heard[] = {
+        {0x080, CAN_SFF_MASK}, {0x200 + node, CAN_SFF_MASK}, {0x600 + node, CAN_SFF_MASK}};
+    const struct can_filter answers[] = {{0x180 + node, CAN_SFF_MASK},
+                                         {0x580 + node, CAN_SFF_MASK}};
     fd = socket(PF_CAN, SOCK_RAW, CAN_RAW);
-    if (fd < 0) return perror("can_neutral"), 1;
-    setsockopt(fd, SOL_CAN_RAW, CAN_RAW_FILTER, answered ? answers : heard, answered ? sizeof answers : sizeof heard);
+    if (fd < 0) {
+        perror("can_neutral");
+        return 1;
+    }
+    setsockopt(fd, SOL_CAN_RAW, CAN_RAW_FILTER, answered ? answers : heard,
+               answered ? sizeof answers : sizeof heard);
     setsockopt(fd, SOL_SOCKET, SO_RCVBUFFORCE, &room, sizeof room);
     setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &timeout, sizeof timeout);
-    if (bind(fd, (struct sockaddr*)&at, sizeof at) < 0) return perror("can_neutral"), 1;
+    if (bind(fd, (struct sockaddr*)&at, sizeof at) < 0) {
+        perror("can_neutral");
+        return 1;
+    }
     puts("ready");
     fflush(stdout);
-    if (strcmp(argv[2], "slave") == 0) slave();
+    if (strcmp(argv[2], "slave") == 0) {
+        slave();
+    }
     if (strcmp(argv[2], "generate") == 0 && argc == 5) {
         uint8_t data[8] = {0};
         int64_t next = now_ns(CLOCK_MONOTONIC);
@@ -294,8 +381,11 @@ int main(int argc, char** argv) {
         struct can_frame f;
         long got = 0, count = argc > 3 ? atol(argv[3]) : 1;
         const int64_t cpu = now_ns(CLOCK_PROCESS_CPUTIME_ID);
-        while (got < count && get(&f)) ++got;
-        printf("received %ld\nreceive_cpu %.3f\n", got, (double)(now_ns(CLOCK_PROCESS_CPUTIME_ID) - cpu) / (double)(got ? got : 1) / 1000);
+        while (got < count && get(&f)) {
+            ++got;
+        }
+        printf("received %ld\nreceive_cpu %.3f\n", got,
+               (double)(now_ns(CLOCK_PROCESS_CPUTIME_ID) - cpu) / (double)(got ? got : 1) / 1000);
         return 0;
     }
     const unsigned part = argc > 3 ? (unsigned)atoi(argv[3]) : 1; /* 4: a quarter of everything */

@@ -40,12 +40,16 @@ static struct can_socket {
         real_;                                                          \
     }))
 
-static struct can_socket* can_of(int fd) { return fd >= 0 && fd < sockets && table[fd].there ? &table[fd] : NULL; }
+static struct can_socket* can_of(int fd) {
+    return fd >= 0 && fd < sockets && table[fd].there ? &table[fd] : NULL;
+}
 
 static unsigned index_of(const char* name) {
     if (strncmp(name, "shim", 4) != 0) return 0;
     unsigned hash = 2166136261u;
-    for (; *name; ++name) hash = (hash ^ (unsigned char)*name) * 16777619u;
+    for (; *name; ++name) {
+        hash = (hash ^ (unsigned char)*name) * 16777619u;
+    }
     return first_index + (hash & 0xffff);
 }
 
@@ -68,11 +72,16 @@ static void attach(int fd) {
     }
     for (i = 0; i < (unsigned)s->filter_count; ++i) {
         code[n++] = (struct sock_filter)BPF_STMT(BPF_LD | BPF_W | BPF_ABS, 8);
-        code[n++] = (struct sock_filter)BPF_STMT(BPF_ALU | BPF_AND | BPF_K, ntohl(s->filters[i].can_mask));
-        code[n] = (struct sock_filter)BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, ntohl(s->filters[i].can_id & s->filters[i].can_mask), 0, 0);
-        code[n++].jt = (unsigned char)(3 * (s->filter_count - 1 - (int)i) + 1); /* to the accepting end */
+        code[n++] =
+            (struct sock_filter)BPF_STMT(BPF_ALU | BPF_AND | BPF_K, ntohl(s->filters[i].can_mask));
+        code[n] = (struct sock_filter)BPF_JUMP(
+            BPF_JMP | BPF_JEQ | BPF_K, ntohl(s->filters[i].can_id & s->filters[i].can_mask), 0, 0);
+        code[n++].jt =
+            (unsigned char)(3 * (s->filter_count - 1 - (int)i) + 1); /* to the accepting end */
     }
-    if (s->filter_count > 0) code[n++] = (struct sock_filter)BPF_STMT(BPF_RET | BPF_K, 0);
+    if (s->filter_count > 0) {
+        code[n++] = (struct sock_filter)BPF_STMT(BPF_RET | BPF_K, 0);
+    }
     code[n++] = (struct sock_filter)BPF_STMT(BPF_RET | BPF_K, 0xffff);
     const struct sock_fprog program = {(unsigned short)n, code};
     REAL(setsockopt)(fd, SOL_SOCKET, SO_ATTACH_FILTER, &program, sizeof program);
@@ -80,7 +89,10 @@ static void attach(int fd) {
 
 int socket(int domain, int type, int protocol) {
     if (domain != AF_CAN) return REAL(socket)(domain, type, protocol);
-    if (protocol != CAN_RAW) return errno = EPROTONOSUPPORT, -1;
+    if (protocol != CAN_RAW) {
+        errno = EPROTONOSUPPORT;
+        return -1;
+    }
     const int fd = REAL(socket)(AF_INET, SOCK_DGRAM | (type & (SOCK_NONBLOCK | SOCK_CLOEXEC)), 0);
     if (fd < 0 || fd >= sockets) return fd;
     memset(&table[fd], 0, sizeof table[fd]);
@@ -92,7 +104,9 @@ int socket(int domain, int type, int protocol) {
 }
 
 int close(int fd) {
-    if (can_of(fd)) table[fd].there = 0;
+    if (can_of(fd)) {
+        table[fd].there = 0;
+    }
     return REAL(close)(fd);
 }
 
@@ -100,7 +114,10 @@ int bind(int fd, const struct sockaddr* address, socklen_t size) {
     struct can_socket* s = can_of(fd);
     if (!s || address->sa_family != AF_CAN) return REAL(bind)(fd, address, size);
     const unsigned index = (unsigned)((const struct sockaddr_can*)address)->can_ifindex;
-    if (index < first_index) return errno = ENODEV, -1;
+    if (index < first_index) {
+        errno = ENODEV;
+        return -1;
+    }
     s->group.sin_family = AF_INET;
     s->group.sin_port = htons(port);
     s->group.sin_addr.s_addr = htonl(0xef4d0000u | (index & 0xffff)); /* 239.77.… */
@@ -115,10 +132,14 @@ int bind(int fd, const struct sockaddr* address, socklen_t size) {
 int setsockopt(int fd, int level, int name, const void* value, socklen_t size) {
     struct can_socket* s = can_of(fd);
     if (!s || level != SOL_CAN_RAW) return REAL(setsockopt)(fd, level, name, value, size);
-    if (name == CAN_RAW_RECV_OWN_MSGS) s->hears_itself = *(const int*)value;
+    if (name == CAN_RAW_RECV_OWN_MSGS) {
+        s->hears_itself = *(const int*)value;
+    }
     if (name == CAN_RAW_FILTER) {
         s->filter_count = (int)(size / sizeof(struct can_filter));
-        if (s->filter_count > most_filters) s->filter_count = most_filters;
+        if (s->filter_count > most_filters) {
+            s->filter_count = most_filters;
+        }
         memcpy(s->filters, value, (size_t)s->filter_count * sizeof(struct can_filter));
     }
     attach(fd);
@@ -136,14 +157,20 @@ int ioctl(int fd, unsigned long request, ...) {
     void* const argument = va_arg(arguments, void*);
     va_end(arguments);
     struct ifreq* const about = argument;
-    if (request == SIOCGIFINDEX && index_of(about->ifr_name)) return about->ifr_ifindex = (int)index_of(about->ifr_name), 0;
+    if (request == SIOCGIFINDEX && index_of(about->ifr_name)) {
+        about->ifr_ifindex = (int)index_of(about->ifr_name);
+        return 0;
+    }
     return REAL(ioctl)(fd, request, argument);
 }
 
 /* A question for one of our interfaces over rtnetlink: the socket becomes one that holds the answer. */
 static int answered(int fd, const void* data, size_t size) {
     const struct nlmsghdr* ask = data;
-    if (size < NLMSG_LENGTH(sizeof(struct ifinfomsg)) + sizeof(struct rtattr) || ask->nlmsg_type != RTM_GETLINK) return 0;
+    if (size < NLMSG_LENGTH(sizeof(struct ifinfomsg)) + sizeof(struct rtattr) ||
+        ask->nlmsg_type != RTM_GETLINK) {
+        return 0;
+    }
     const struct ifinfomsg* info = NLMSG_DATA(ask);
     const struct rtattr* a = IFLA_RTA(info);
     if (a->rta_type != IFLA_IFNAME || !index_of(RTA_DATA(a))) return 0;
@@ -152,7 +179,8 @@ static int answered(int fd, const void* data, size_t size) {
         struct ifinfomsg info;
         struct rtattr mtu;
         uint32_t mtu_value;
-    } out = {{sizeof out, RTM_NEWLINK, 0, ask->nlmsg_seq, 0}, {0}, {RTA_LENGTH(4), IFLA_MTU}, CANFD_MTU};
+    } out = {
+        {sizeof out, RTM_NEWLINK, 0, ask->nlmsg_seq, 0}, {0}, {RTA_LENGTH(4), IFLA_MTU}, CANFD_MTU};
     out.info.ifi_type = ARPHRD_CAN;
     out.info.ifi_index = (int)index_of(RTA_DATA(a));
     out.info.ifi_flags = IFF_UP | IFF_RUNNING;
@@ -192,29 +220,37 @@ int sendmmsg(int fd, struct mmsghdr* messages, unsigned count, int flags) {
     if (!s) return REAL(sendmmsg)(fd, messages, count, flags);
     struct mmsghdr all[batch];
     struct iovec parts[batch][2];
-    if (count > batch) count = batch;
+    if (count > batch) {
+        count = batch;
+    }
     for (unsigned n = 0; n < count; ++n) {
         parts[n][0] = messages[n].msg_hdr.msg_iov[0];
         parts[n][1] = (struct iovec){&s->cookie, 8};
         all[n] = (struct mmsghdr){{&s->group, sizeof s->group, parts[n], 2, NULL, 0, 0}, 0};
     }
     const int sent = REAL(sendmmsg)(fd, all, count, flags);
-    for (int n = 0; n < sent; ++n) messages[n].msg_len = all[n].msg_len - 8;
+    for (int n = 0; n < sent; ++n) {
+        messages[n].msg_len = all[n].msg_len - 8;
+    }
     return sent;
 }
 
 /* Of what was received into `buffer`: the frame's size; the cookie, where space allows, names the sender. */
 static size_t frame_size(const struct can_socket* s, size_t got, const void* buffer, int* flags) {
     const size_t frame = got >= CANFD_MTU ? CANFD_MTU : got >= CAN_MTU ? CAN_MTU : got;
-    if (s->hears_itself && got == frame + 8 && memcmp((const char*)buffer + frame, &s->cookie, 8) == 0)
+    if (s->hears_itself && got == frame + 8 &&
+        memcmp((const char*)buffer + frame, &s->cookie, 8) == 0) {
         *flags |= MSG_CONFIRM | MSG_DONTROUTE;
+    }
     *flags &= ~MSG_TRUNC;
     return frame;
 }
 ssize_t recvmsg(int fd, struct msghdr* message, int flags) {
     const struct can_socket* s = can_of(fd);
     const ssize_t got = REAL(recvmsg)(fd, message, flags);
-    return s && got > 0 ? (ssize_t)frame_size(s, (size_t)got, message->msg_iov[0].iov_base, &message->msg_flags) : got;
+    return s && got > 0 ? (ssize_t)frame_size(s, (size_t)got, message->msg_iov[0].iov_base,
+                                              &message->msg_flags)
+                        : got;
 }
 ssize_t recv(int fd, void* data, size_t size, int flags) {
     const struct can_socket* s = can_of(fd);
@@ -222,12 +258,16 @@ ssize_t recv(int fd, void* data, size_t size, int flags) {
     int ignored = 0;
     return s && got > 0 ? (ssize_t)frame_size(s, (size_t)got, data, &ignored) : got;
 }
-ssize_t read(int fd, void* data, size_t size) { return can_of(fd) ? recv(fd, data, size, 0) : REAL(read)(fd, data, size); }
+ssize_t read(int fd, void* data, size_t size) {
+    return can_of(fd) ? recv(fd, data, size, 0) : REAL(read)(fd, data, size);
+}
 int recvmmsg(int fd, struct mmsghdr* messages, unsigned count, int flags, struct timespec* limit) {
     const struct can_socket* s = can_of(fd);
     const int got = REAL(recvmmsg)(fd, messages, count, flags, limit);
-    for (int n = 0; s && n < got; ++n)
+    for (int n = 0; s && n < got; ++n) {
         messages[n].msg_len =
-            (unsigned)frame_size(s, messages[n].msg_len, messages[n].msg_hdr.msg_iov[0].iov_base, &messages[n].msg_hdr.msg_flags);
+            (unsigned)frame_size(s, messages[n].msg_len, messages[n].msg_hdr.msg_iov[0].iov_base,
+                                 &messages[n].msg_hdr.msg_flags);
+    }
     return got;
 }

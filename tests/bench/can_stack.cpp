@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Our side of the CAN figures, over any link: `can_stack ADDRESS slave`, `… master [FACTOR]`, `… receive COUNT`, as can_neutral.c has
-// them, and `can_stack memory [FACTOR]`: SDO from queue to queue. Results are lines "name value".
+// Our side of the CAN figures, over any link: `can_stack ADDRESS slave`, `… master [FACTOR]`, `…
+// receive COUNT`, as can_neutral.c has them, and `can_stack memory [FACTOR]`: SDO from queue to
+// queue. Results are lines "name value".
 #include <algorithm>
 #include <array>
 #include <cstdio>
@@ -60,26 +61,41 @@ struct Arrivals : Events {
 
 class Port {
 public:
-    Port(const char* address, std::initializer_list<can::Filter> filters) : opened_(can::open(address, {.receive_capacity = 4096})) {
-        if (!opened_) fail(opened_.problem.c_str());
+    Port(const char* address, std::initializer_list<can::Filter> filters)
+        : opened_(can::open(address, {.receive_capacity = 4096})) {
+        if (!opened_) {
+            fail(opened_.problem.c_str());
+        }
         const std::vector<can::Filter> all(filters);
-        if (!opened_.link->set_filters(all)) fail("filters");
+        if (!opened_.link->set_filters(all)) {
+            fail("filters");
+        }
         std::puts("ready");
         std::fflush(stdout);
     }
     void send(FrameQueue& out, Time t) {
         if (out.size() == 0) return;
-        for (const Frame* f; (f = out.front()) != nullptr && opened_.link->send(*f, t) == can::Sent::queued;) out.drop();
+        for (const Frame* f;
+             (f = out.front()) != nullptr && opened_.link->send(*f, t) == can::Sent::queued;) {
+            out.drop();
+        }
         opened_.link->flush(t);
     }
     /// Waits, and hands over what has come.
     template <class Take>
     bool take(Time at_most, Take&& each) {
-        if (!opened_.link->wait(at_most)) return last_ = now(), false;
+        if (!opened_.link->wait(at_most)) {
+            last_ = now();
+            return false;
+        }
         for (std::size_t count = room_.size(); count == room_.size();) {
             count = opened_.link->receive(room_, can::unclocked);
-            if (count != 0) last_ = room_[0].time_ns;  // the driver has read the clock
-            for (std::size_t n = 0; n < count; ++n) each(room_[n], last_);
+            if (count != 0) {
+                last_ = room_[0].time_ns;  // the driver has read the clock
+            }
+            for (std::size_t n = 0; n < count; ++n) {
+                each(room_[n], last_);
+            }
         }
         return true;
     }
@@ -93,15 +109,20 @@ private:
 
 [[noreturn]] void slave(const char* address) {
     Events events;
-    Device device(served(), {.node_id = node, .auto_start = true, .sdo = {.timeout = 5 * second}}, events);
-    Port port(address, {{0x080, 0x7ff, false}, {0x200U + node, 0x7ff, false}, {0x600U + node, 0x7ff, false}, {0x000, 0x7ff, false}});
+    Device device(served(), {.node_id = node, .auto_start = true, .sdo = {.timeout = 5 * second}},
+                  events);
+    Port port(address, {{0x080, 0x7ff, false},
+                        {0x200U + node, 0x7ff, false},
+                        {0x600U + node, 0x7ff, false},
+                        {0x000, 0x7ff, false}});
     device.start(now());
     for (;;) {
         const Time t = port.last();
         device.poll(t);
         port.send(device.out(), t);
         // Frames that the bus had no space for are sent soon, independent of received frames.
-        port.take(device.out().size() > 0 ? millisecond : second, [&](const Frame& f, Time at) { device.handle(f, at); });
+        port.take(device.out().size() > 0 ? millisecond : second,
+                  [&](const Frame& f, Time at) { device.handle(f, at); });
     }
 }
 
@@ -119,35 +140,50 @@ struct Master {
             const Time t = port.last();
             network.poll(t);
             port.send(out, t);
-            if (!r.done()) port.take(second, [&](const Frame& f, Time at) { network.handle(f, at); });
+            if (!r.done()) {
+                port.take(second, [&](const Frame& f, Time at) { network.handle(f, at); });
+            }
         }
         port.send(out, now());
-        if (!r.ok()) fail(to_string(r.abort));
+        if (!r.ok()) {
+            fail(to_string(r.abort));
+        }
     }
     void expedited(bool upload, unsigned count) {
         std::uint8_t bytes[4] = {1, 2, 3, 4};
-        const Time began = now(), used = cpu();
+        const Time began = now();
+        const Time used = cpu();
         for (unsigned n = 0; n < count; ++n) {
             SdoRequest r{.index = 0x2000, .upload = upload};
-            if (upload) r.buffer = bytes;
-            else r.data = bytes;
+            if (upload) {
+                r.buffer = bytes;
+            } else {
+                r.data = bytes;
+            }
             run(r);
         }
-        std::printf("exp_%s %.0f\nexp_%s_cpu %.3f\n", upload ? "up" : "down", count * 1e9 / static_cast<double>(now() - began),
-                    upload ? "up" : "down", static_cast<double>(cpu() - used) / count / 1000);
+        std::printf("exp_%s %.0f\nexp_%s_cpu %.3f\n", upload ? "up" : "down",
+                    count * 1e9 / static_cast<double>(now() - began), upload ? "up" : "down",
+                    static_cast<double>(cpu() - used) / count / 1000);
     }
     void transfers(const char* name, std::size_t size, SdoMode mode) {
         std::vector<std::uint8_t> data(size), back(size);
-        for (std::size_t n = 0; n < size; ++n) data[n] = static_cast<std::uint8_t>(n * 7 + n / 251);
+        for (std::size_t n = 0; n < size; ++n) {
+            data[n] = static_cast<std::uint8_t>(n * 7 + n / 251);
+        }
         Time began = now();
         SdoRequest down{.index = 0x2001, .mode = mode, .data = data};
         run(down);
-        std::printf("%s_down %.1f\n", name, static_cast<double>(size) * 1e6 / static_cast<double>(now() - began));
+        std::printf("%s_down %.1f\n", name,
+                    static_cast<double>(size) * 1e6 / static_cast<double>(now() - began));
         began = now();
         SdoRequest up{.index = 0x2001, .upload = true, .mode = mode, .buffer = back};
         run(up);
-        std::printf("%s_up %.1f\n", name, static_cast<double>(size) * 1e6 / static_cast<double>(now() - began));
-        if (data != back) fail("the bytes read differ from those written");
+        std::printf("%s_up %.1f\n", name,
+                    static_cast<double>(size) * 1e6 / static_cast<double>(now() - began));
+        if (data != back) {
+            fail("the bytes read differ from those written");
+        }
     }
 };
 
@@ -167,15 +203,21 @@ void synchronous(const char* address, unsigned count) {
         const auto before = events.count;
         const Time began = now();
         device.poll(began);
-        if (!device.produce_sync(began)) fail("no SYNC");
+        if (!device.produce_sync(began)) {
+            fail("no SYNC");
+        }
         port.send(device.out(), began);
-        while (events.count == before)
-            if (!port.take(second, [&](const Frame& f, Time at) { device.handle(f, at); })) fail("no TPDO after a SYNC");
+        while (events.count == before) {
+            if (!port.take(second, [&](const Frame& f, Time at) { device.handle(f, at); })) {
+                fail("no TPDO after a SYNC");
+            }
+        }
         took.push_back(now() - began);
     }
     const double cpu_us = static_cast<double>(cpu() - used) / count / 1000;
     std::sort(took.begin(), took.end());
-    std::printf("sync_p50 %.1f\nsync_p99 %.1f\nsync_cpu %.2f\n", static_cast<double>(took[count / 2]) / 1000,
+    std::printf("sync_p50 %.1f\nsync_p99 %.1f\nsync_cpu %.2f\n",
+                static_cast<double>(took[count / 2]) / 1000,
                 static_cast<double>(took[count - count / 100 - 1]) / 1000, cpu_us);
 }
 
@@ -185,13 +227,17 @@ void receive(const char* address, std::uint64_t count) {
     Port port(address, {{0x180U + node, 0x7ff, false}});
     device.start(now());
     const Time used = cpu();
-    while (events.count < count && port.take(second, [&](const Frame& f, Time at) { device.handle(f, at); }))
+    while (events.count < count &&
+           port.take(second, [&](const Frame& f, Time at) { device.handle(f, at); })) {
         device.poll(now());
+    }
     std::printf("received %llu\nreceive_cpu %.3f\n", static_cast<unsigned long long>(events.count),
-                static_cast<double>(cpu() - used) / static_cast<double>(std::max<std::uint64_t>(events.count, 1)) / 1000);
+                static_cast<double>(cpu() - used) /
+                    static_cast<double>(std::max<std::uint64_t>(events.count, 1)) / 1000);
 }
 
-/// Client and server in one thread: what the protocol costs with queues for a bus, and what it costs with the bus in memory between them.
+/// Client and server in one thread: what the protocol costs with queues for a bus, and what it
+/// costs with the bus in memory between them.
 void memory(unsigned part, bool on_bus) {
     Events events;
     Device device(served(), {.node_id = node}, events);
@@ -200,20 +246,31 @@ void memory(unsigned part, bool on_bus) {
     SdoClient& client = network.add(node).sdo();
     device.start(0);
     Time t = 0;
-    const can::Opened here = can::open("sim:bench?bitrate=unlimited"), there = can::open("sim:bench?bitrate=unlimited");
-    if (!here || !there) fail("the bus in memory");
+    const can::Opened here = can::open("sim:bench?bitrate=unlimited");
+
+    const can::Opened there = can::open("sim:bench?bitrate=unlimited");
+    if (!here || !there) {
+        fail("the bus in memory");
+    }
     std::array<Frame, 64> room;
     /// What is in a queue to the other side.
     const auto carry = [&](FrameQueue& from, can::Link& sender, can::Link& receiver, auto&& take) {
         const Frame* f;
         if (!on_bus) {
-            for (; (f = from.front()) != nullptr; from.drop()) take(*f);
+            for (; (f = from.front()) != nullptr; from.drop()) {
+                take(*f);
+            }
             return;
         }
-        while ((f = from.front()) != nullptr && sender.send(*f, t) == can::Sent::queued) from.drop();
+        while ((f = from.front()) != nullptr && sender.send(*f, t) == can::Sent::queued) {
+            from.drop();
+        }
         sender.flush(t);
-        for (std::size_t count; (count = receiver.receive(room, t)) > 0;)
-            for (std::size_t n = 0; n < count; ++n) take(room[n]);
+        for (std::size_t count; (count = receiver.receive(room, t)) > 0;) {
+            for (std::size_t n = 0; n < count; ++n) {
+                take(room[n]);
+            }
+        }
     };
     const auto run = [&](SdoRequest& r) {
         client.submit(r);
@@ -222,22 +279,33 @@ void memory(unsigned part, bool on_bus) {
             network.poll(t);
             carry(out, *here.link, *there.link, [&](const Frame& f) { device.handle(f, t); });
             device.poll(t);
-            carry(device.out(), *there.link, *here.link, [&](const Frame& f) { network.handle(f, t); });
+            carry(device.out(), *there.link, *here.link,
+                  [&](const Frame& f) { network.handle(f, t); });
         }
-        if (!r.ok()) fail(to_string(r.abort));
+        if (!r.ok()) {
+            fail(to_string(r.abort));
+        }
     };
     const std::string kind = on_bus ? "sim_" : "memory_";
-    const auto rate = [&](const char* name, std::size_t size, bool upload, SdoMode mode, unsigned count) {
+    const auto rate = [&](const char* name, std::size_t size, bool upload, SdoMode mode,
+                          unsigned count) {
         std::vector<std::uint8_t> bytes(size, 7);
         const Time began = cpu();
         for (unsigned n = 0; n < count; ++n) {
-            SdoRequest r{.index = static_cast<std::uint16_t>(size <= 4 ? 0x2000 : 0x2001), .upload = upload, .mode = mode};
-            if (upload) r.buffer = bytes;
-            else r.data = bytes;
+            SdoRequest r{.index = static_cast<std::uint16_t>(size <= 4 ? 0x2000 : 0x2001),
+                         .upload = upload,
+                         .mode = mode};
+            if (upload) {
+                r.buffer = bytes;
+            } else {
+                r.data = bytes;
+            }
             run(r);
         }
         const double seconds = static_cast<double>(cpu() - began) / 1e9;
-        std::printf("%s%s %.1f\n", kind.c_str(), name, size <= 4 ? count / seconds : static_cast<double>(size) * count / seconds / 1000);
+        std::printf(
+            "%s%s %.1f\n", kind.c_str(), name,
+            size <= 4 ? count / seconds : static_cast<double>(size) * count / seconds / 1000);
     };
     rate("exp_up", 4, true, SdoMode::automatic, 200'000 / part);
     rate("exp_down", 4, false, SdoMode::automatic, 200'000 / part);
@@ -252,13 +320,25 @@ void memory(unsigned part, bool on_bus) {
 int main(int argc, char** argv) {
     const std::string_view what = argc > 2 ? argv[2] : argc > 1 ? argv[1] : "";
     const unsigned part = argc > 3 ? static_cast<unsigned>(std::max(1, std::atoi(argv[3]))) : 1;
-    if (argc < 2) return std::fputs("can_stack ADDRESS slave|master [FACTOR]|receive COUNT, or can_stack memory\n", stderr), 2;
+    if (argc < 2) {
+        std::fputs("can_stack ADDRESS slave|master [FACTOR]|receive COUNT, or can_stack memory\n",
+                   stderr);
+
+        return 2;
+    }
     if (std::string_view(argv[1]) == "memory") {
-        for (const bool on_bus : {false, true}) memory(argc > 2 ? static_cast<unsigned>(std::max(1, std::atoi(argv[2]))) : 1, on_bus);
+        for (const bool on_bus : {false, true}) {
+            memory(argc > 2 ? static_cast<unsigned>(std::max(1, std::atoi(argv[2]))) : 1, on_bus);
+        }
         return 0;
     }
-    if (what == "slave") slave(argv[1]);
-    if (what == "receive" && argc > 3) return receive(argv[1], std::strtoull(argv[3], nullptr, 10)), 0;
+    if (what == "slave") {
+        slave(argv[1]);
+    }
+    if (what == "receive" && argc > 3) {
+        receive(argv[1], std::strtoull(argv[3], nullptr, 10));
+        return 0;
+    }
     if (what != "master") return 2;
     {
         Master master(argv[1]);

@@ -3,8 +3,9 @@
 //   dds_peer write COUNT DOMAIN         a bare Fast DDS writer, 1 kHz, SCHED_FIFO
 //   dds_peer read COUNT DOMAIN          a bare Fast DDS reader
 //   dds_peer halcyon-read COUNT DOMAIN  what dds_subscribe does: decoded and in the mailbox
-// Readers print "ready", and at the end: samples, lost, p50, p99 and greatest time in us from when the sample's cycle was due by the writer's
-// clock. Both writers stamp the time at which their cycle was due.
+// Readers print "ready", and at the end: samples, lost, p50, p99 and greatest time in us from when
+// the sample's cycle was due by the writer's clock. Both writers stamp the time at which their
+// cycle was due.
 #include <sched.h>
 #include <time.h>
 #include <unistd.h>
@@ -84,10 +85,14 @@ public:
 /// Times of samples, and the line at the end.
 class Figures {
 public:
-    explicit Figures(long wanted) : wanted_(wanted) { us_.reserve(static_cast<std::size_t>(wanted)); }
+    explicit Figures(long wanted) : wanted_(wanted) {
+        us_.reserve(static_cast<std::size_t>(wanted));
+    }
     void add(std::uint64_t sequence, std::int64_t source_ns, std::int64_t here_ns) {
         if (count_.load(std::memory_order_relaxed) >= wanted_ || ++seen_ <= settling) return;
-        if (last_ != 0) lost_ += sequence - last_ - 1;
+        if (last_ != 0) {
+            lost_ += sequence - last_ - 1;
+        }
         last_ = sequence;
         us_.push_back(static_cast<double>(here_ns - source_ns) / 1000);
         count_.fetch_add(1, std::memory_order_release);
@@ -104,9 +109,12 @@ public:
     void print() {
         std::sort(us_.begin(), us_.end());
         const auto at = [this](double share) {
-            return us_.empty() ? 0 : us_[static_cast<std::size_t>(share * static_cast<double>(us_.size() - 1))];
+            return us_.empty()
+                       ? 0
+                       : us_[static_cast<std::size_t>(share * static_cast<double>(us_.size() - 1))];
         };
-        std::printf("%zu %llu %.1f %.1f %.1f\n", us_.size(), static_cast<unsigned long long>(lost_), at(0.5), at(0.99), at(1));
+        std::printf("%zu %llu %.1f %.1f %.1f\n", us_.size(), static_cast<unsigned long long>(lost_),
+                    at(0.5), at(0.99), at(1));
         std::fflush(stdout);
     }
 
@@ -116,7 +124,8 @@ private:
     const long wanted_;
     long seen_ = 0;
     std::vector<double> us_;
-    std::uint64_t last_ = 0, lost_ = 0;
+    std::uint64_t last_ = 0;
+    std::uint64_t lost_ = 0;
     std::atomic<long> count_{0};
 };
 
@@ -128,7 +137,8 @@ public:
         udp->interfaceWhiteList.emplace_back("127.0.0.1");
         qos.transport().use_builtin_transports = false;
         qos.transport().user_transports.push_back(udp);
-        participant_ = fd::DomainParticipantFactory::get_instance()->create_participant(domain, qos);
+        participant_ =
+            fd::DomainParticipantFactory::get_instance()->create_participant(domain, qos);
         fd::TypeSupport(new Type64).register_type(participant_);
         topic_ = participant_->create_topic(topic_name, type_name, fd::TOPIC_QOS_DEFAULT);
     }
@@ -141,7 +151,8 @@ public:
         qos.reliability().kind = fd::RELIABLE_RELIABILITY_QOS;
         qos.history().depth = 16;
         qos.data_sharing().off();
-        auto* writer = participant_->create_publisher(fd::PUBLISHER_QOS_DEFAULT)->create_datawriter(topic_, qos);
+        auto* writer = participant_->create_publisher(fd::PUBLISHER_QOS_DEFAULT)
+                           ->create_datawriter(topic_, qos);
         fd::PublicationMatchedStatus matched;
         do {
             usleep(10'000);
@@ -157,8 +168,9 @@ public:
             clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &at, nullptr);
             sample.values[0] = static_cast<double>(i);
             const std::int64_t stamp = now(CLOCK_REALTIME) - (now(CLOCK_MONOTONIC) - due);
-            const eprosima::fastrtps::Time_t source(static_cast<std::int32_t>(stamp / 1'000'000'000),
-                                                    static_cast<std::uint32_t>(stamp % 1'000'000'000));
+            const eprosima::fastrtps::Time_t source(
+                static_cast<std::int32_t>(stamp / 1'000'000'000),
+                static_cast<std::uint32_t>(stamp % 1'000'000'000));
             writer->write_w_timestamp(&sample, fd::HANDLE_NIL, source);
         }
         writer->wait_for_acknowledgments({2, 0});
@@ -169,16 +181,20 @@ public:
         qos.reliability().kind = fd::RELIABLE_RELIABILITY_QOS;
         qos.history().depth = 16;
         qos.data_sharing().off();
-        participant_->create_subscriber(fd::SUBSCRIBER_QOS_DEFAULT)->create_datareader(topic_, qos, this);
+        participant_->create_subscriber(fd::SUBSCRIBER_QOS_DEFAULT)
+            ->create_datareader(topic_, qos, this);
     }
 
 private:
     void on_data_available(fd::DataReader* reader) override {
         fd::SampleInfo info;
         Sample64 sample;
-        while (reader->take_next_sample(&sample, &info) == ReturnCode_t::RETCODE_OK)
-            if (info.valid_data)
-                figures_->add(info.sample_identity.sequence_number().to64long(), info.source_timestamp.to_ns(), now(CLOCK_REALTIME));
+        while (reader->take_next_sample(&sample, &info) == ReturnCode_t::RETCODE_OK) {
+            if (info.valid_data) {
+                figures_->add(info.sample_identity.sequence_number().to64long(),
+                              info.source_timestamp.to_ns(), now(CLOCK_REALTIME));
+            }
+        }
     }
     fd::DomainParticipant* participant_;
     fd::Topic* topic_;
@@ -192,7 +208,10 @@ struct Message {
 class Subscribed final : public hal::dds::Listener {
 public:
     Subscribed(const hal::dds::Schema& schema, Figures& figures)
-        : schema_(schema), figures_(figures), message_{std::vector<hal_value>(pins)}, mailbox_(message_) {}
+        : schema_(schema),
+          figures_(figures),
+          message_{std::vector<hal_value>(pins)},
+          mailbox_(message_) {}
     void on_sample(const hal::dds::Sample& s) noexcept override {
         if (!hal::dds::decode(schema_, s.bytes, message_.values)) return;
         mailbox_.put(message_);
@@ -234,7 +253,8 @@ int main(int argc, char** argv) {
         Subscribed subscribed(schema, figures);
         hal::dds::Settings settings;
         settings.domain = static_cast<int>(domain);
-        const auto reader = hal::dds::open(settings)->reader({topic_name, type_name, schema.sample.size()}, {.depth = 16}, &subscribed);
+        const auto reader = hal::dds::open(settings)->reader(
+            {topic_name, type_name, schema.sample.size()}, {.depth = 16}, &subscribed);
         measure();
     }
     return 0;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The components' own sources, compiled into the bench with the flags of a plugin, so that the loops run the same code
-// on the same structs; only the call through the plan is missing.
+// The components' own sources, compiled into the bench with the flags of a plugin, so that the
+// loops run the same code on the same structs; only the call through the plan is missing.
 #include <numbers>
 #include <stdexcept>
 
@@ -32,7 +32,9 @@ namespace {
 
 template <class C, auto Step>
 void loop(void* const* instances, std::size_t count, const hal_cycle* cycle) {
-    for (void* const* at = instances; at != instances + count; ++at) (static_cast<C*>(*at)->*Step)(Cycle{cycle});
+    for (void* const* at = instances; at != instances + count; ++at) {
+        (static_cast<C*>(*at)->*Step)(Cycle{cycle});
+    }
 }
 
 void loop_mixed(void* const* instances, std::size_t count, const hal_cycle* cycle) {

@@ -13,13 +13,20 @@ namespace {
 
 std::string gates(std::size_t count) {
     std::string text = fmt::format("loadrt and2 count={}\n", count);
-    for (std::size_t i = 0; i < count; ++i) text += fmt::format("addf and2.{} t\n", i);
+    for (std::size_t i = 0; i < count; ++i) {
+        text += fmt::format("addf and2.{} t\n", i);
+    }
     return text;
 }
 
 /// Every kind of live edit, each reverted by the next.
 constexpr const char* edits[] = {
-    "net live and2.10.out => and2.20.in0\n", "delsig live\n", "delf and2.500 t\n", "addf and2.500 t 500\n", "setp and2.7.in1 1\n", "setp and2.7.in1 0\n",
+    "net live and2.10.out => and2.20.in0\n",
+    "delsig live\n",
+    "delf and2.500 t\n",
+    "addf and2.500 t 500\n",
+    "setp and2.7.in1 1\n",
+    "setp and2.7.in1 0\n",
 };
 
 struct Counts {
@@ -53,18 +60,30 @@ void live(const Options& options, Report& report) {
             cost.push_back(edit.ms());
             visible.push_back(static_cast<double>(counts(runtime).cycles - from));
         }
-        (editing ? missed_edited : missed_idle).push_back(static_cast<double>(counts(runtime).missed - before.missed));
+        (editing ? missed_edited : missed_idle)
+            .push_back(static_cast<double>(counts(runtime).missed - before.missed));
     }
     const auto sum = [](const std::vector<double>& v) {
         double total = 0;
-        for (const double x : v) total += x;
+        for (const double x : v) {
+            total += x;
+        }
         return total;
     };
-    report.row({.what = fmt::format("1000 functions at 1 kHz, {} edits: missed periods", done), .unit = "", .ours = sum(missed_edited),
-                .peer = "no edits, as long:", .theirs = sum(missed_idle), .goal = at_most(1)});
-    report.row({.what = "an edit (net delsig delf addf setp): cycles until it is there, p50", .unit = "", .ours = median(visible), .goal = limit(2)});
-    report.row({.what = "the same, p99", .unit = "", .ours = quantile(visible, 0.99), .goal = limit(2)});
-    report.row({.what = "the same, time of the whole edit, p50", .unit = "ms", .ours = median(cost)});
+    report.row({.what = fmt::format("1000 functions at 1 kHz, {} edits: missed periods", done),
+                .unit = "",
+                .ours = sum(missed_edited),
+                .peer = "no edits, as long:",
+                .theirs = sum(missed_idle),
+                .goal = at_most(1)});
+    report.row({.what = "an edit (net delsig delf addf setp): cycles until it is there, p50",
+                .unit = "",
+                .ours = median(visible),
+                .goal = limit(2)});
+    report.row(
+        {.what = "the same, p99", .unit = "", .ours = quantile(visible, 0.99), .goal = limit(2)});
+    report.row(
+        {.what = "the same, time of the whole edit, p50", .unit = "ms", .ours = median(cost)});
 }
 
 void churn(const Options& options, Report& report) {
@@ -83,12 +102,26 @@ void churn(const Options& options, Report& report) {
     }
     const double seconds = watch.ms() / 1000;
     const Counts after = counts(runtime);
-    report.row({.what = fmt::format("{} delf/addf on a running 100 us thread: faults", done), .unit = "",
-                .ours = static_cast<double>(runtime.session.reports().fault_count()), .goal = limit(0)});
-    const auto missed = [](const Counts& from, const Counts& to) { return 100.0 * static_cast<double>(to.missed - from.missed) / static_cast<double>(to.cycles - from.cycles); };
-    report.row({.what = "the same: periods missed meanwhile", .unit = "%", .ours = missed(before, after), .peer = "no edits, 2 s:", .theirs = missed(idle, before)});
-    report.note(fmt::format("{:.0f} edits per second over {:.0f} s. LinuxCNC 2.9 and 2.10 under the same edits, in an earlier measurement: the", static_cast<double>(done) / seconds, seconds));
-    report.note("real-time process died by SIGSEGV within 1.4 s in 12 of 12 trials. It is not repeated here.");
+    report.row({.what = fmt::format("{} delf/addf on a running 100 us thread: faults", done),
+                .unit = "",
+                .ours = static_cast<double>(runtime.session.reports().fault_count()),
+                .goal = limit(0)});
+    const auto missed = [](const Counts& from, const Counts& to) {
+        return 100.0 * static_cast<double>(to.missed - from.missed) /
+               static_cast<double>(to.cycles - from.cycles);
+    };
+    report.row({.what = "the same: periods missed meanwhile",
+                .unit = "%",
+                .ours = missed(before, after),
+                .peer = "no edits, 2 s:",
+                .theirs = missed(idle, before)});
+    report.note(
+        fmt::format("{:.0f} edits per second over {:.0f} s. LinuxCNC 2.9 and 2.10 under the same "
+                    "edits, in an earlier measurement: the",
+                    static_cast<double>(done) / seconds, seconds));
+    report.note(
+        "real-time process died by SIGSEGV within 1.4 s in 12 of 12 trials. It is not repeated "
+        "here.");
 }
 
 }  // namespace

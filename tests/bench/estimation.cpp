@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What a Kalman filter costs in a cycle: a thread on the virtual clock with it, less the same thread without.
+// What a Kalman filter costs in a cycle: a thread on the virtual clock with it, less the same
+// thread without.
 #include <algorithm>
 #include <fmt/core.h>
 #include <stdexcept>
@@ -15,13 +16,26 @@ namespace {
 std::string filter(const char* age) {
     std::string a, c, q;
     for (int i = 0; i < 6; ++i) {
-        for (int j = 0; j < 6; ++j) a += fmt::format("{}{}", j ? "," : i ? ";" : "", i == j ? 1.0 : j == i + 1 ? 0.001 : 0.0);
+        for (int j = 0; j < 6; ++j) {
+            a += fmt::format("{}{}",
+                             j   ? ","
+                             : i ? ";"
+                                 : "",
+                             i == j       ? 1.0
+                             : j == i + 1 ? 0.001
+                                          : 0.0);
+        }
         q += " 1e-4";
     }
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 6; ++j) c += fmt::format("{}{}", j ? "," : i ? ";" : "", j == 2 * i ? 1 : 0);
-    return fmt::format("loadrt kalman names=f a={} c={} qn=\"diag{}\" rn=\"diag 0.1 0.1 0.1\"\nsetp f.age-[0..2] {}\naddf f.update t\n", a,
-                       c, q, age);
+    for (int i = 0; i < 3; ++i) {
+        for (int j = 0; j < 6; ++j) {
+            c += fmt::format("{}{}", j ? "," : i ? ";" : "", j == 2 * i ? 1 : 0);
+        }
+    }
+    return fmt::format(
+        "loadrt kalman names=f a={} c={} qn=\"diag{}\" rn=\"diag 0.1 0.1 0.1\"\nsetp f.age-[0..2] "
+        "{}\naddf f.update t\n",
+        a, c, q, age);
 }
 
 /// ns of a cycle, the best of some runs.
@@ -34,7 +48,8 @@ double cycle_ns(const std::string& text, std::uint64_t cycles) {
     for (int run = 0; run < 7; ++run) {
         const std::int64_t begin = monotonic_ns();
         runtime.session.threads().advance_cycles(cycles);
-        best = std::min(best, static_cast<double>(monotonic_ns() - begin) / static_cast<double>(cycles));
+        best = std::min(best,
+                        static_cast<double>(monotonic_ns() - begin) / static_cast<double>(cycles));
     }
     return best;
 }

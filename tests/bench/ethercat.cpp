@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The EtherCAT master on a veth pair, with 50 drives as other masters were measured: 11 bytes out and 11 in for each drive, one frame of 1150
-// bytes of process data and the time of the reference clock. The floor is a program that sends the same frame with a plain socket.
+// The EtherCAT master on a veth pair, with 50 drives as other masters were measured: 11 bytes out
+// and 11 in for each drive, one frame of 1150 bytes of process data and the time of the reference
+// clock. The floor is a program that sends the same frame with a plain socket.
 #include "ethercat.hpp"
 
 #include <cstdlib>
@@ -29,15 +30,20 @@ constexpr std::int64_t period_ns = 1'000'000;
 /// Returns `count` devices of a kind, as a line description.
 std::string line_of(int count, const std::string& device) {
     std::string text;
-    for (int i = 0; i < count; ++i) text += device + "\n";
+    for (int i = 0; i < count; ++i) {
+        text += device + "\n";
+    }
     return text;
 }
 
-std::string configuration(int count, const std::string& link, const std::string& cycle, const std::string& more = "") {
-    std::string text =
-        "[bus]\nlink = " + link + "\ncycle = " + cycle + "\n" + more +
-        "[type drive]\ndevice = cia402\nvendor = 0xFFFFFF\noutputs = 6040 6060 607A 60FF\ninputs = 6041 6061 6064 606C\ndc = sync0\n";
-    for (int i = 0; i < count; ++i) text += fmt::format("[slave {} d{}]\ntype = drive\n", i, i);
+std::string configuration(int count, const std::string& link, const std::string& cycle,
+                          const std::string& more = "") {
+    std::string text = "[bus]\nlink = " + link + "\ncycle = " + cycle + "\n" + more +
+                       "[type drive]\ndevice = cia402\nvendor = 0xFFFFFF\noutputs = 6040 6060 607A "
+                       "60FF\ninputs = 6041 6061 6064 606C\ndc = sync0\n";
+    for (int i = 0; i < count; ++i) {
+        text += fmt::format("[slave {} d{}]\ntype = drive\n", i, i);
+    }
     return text;
 }
 
@@ -49,7 +55,8 @@ struct NoEvents final : master::Events {
 class OurMaster {
 public:
     OurMaster(const std::string& interface, int drives) {
-        const config::Reading reading = config::read(configuration(drives, "eth:" + interface, "1ms"), "bench.ethercat");
+        const config::Reading reading =
+            config::read(configuration(drives, "eth:" + interface, "1ms"), "bench.ethercat");
         if (!reading.good()) throw std::runtime_error(config::to_string(reading, "bench.ethercat"));
         ethernet::Options options;
         options.types = {ethertype};
@@ -63,25 +70,34 @@ public:
         master_ = std::make_unique<master::Master>(setup, port_->address(), events_, *client_);
         master_->attach(*port_);
     }
-    /// Cycles of 1 ms until all slaves are operational. Returns the time it took in ms, 0: not within 20 s.
+    /// Cycles of 1 ms until all slaves are operational. Returns the time it took in ms, 0: not
+    /// within 20 s.
     double bring_up() {
         const std::int64_t began = link::monotonic_ns();
         for (std::int64_t due = began; due < began + 20'000 * period_ns; due += period_ns) {
-            if (due > link::monotonic_ns()) sleep_until(due);
+            if (due > link::monotonic_ns()) {
+                sleep_until(due);
+            }
             now_ = due;
             master_->receive(now_);
-            if (master_->status().operational) return static_cast<double>(link::monotonic_ns() - began) / 1e6;
+            if (master_->status().operational) {
+                return static_cast<double>(link::monotonic_ns() - began) / 1e6;
+            }
             master_->transmit(now_);
         }
         return 0;
     }
     /// More cycles of 1 ms, for the responder to remember what a settled bus answers.
     void settle(int cycles) {
-        for (; cycles-- > 0; master_->transmit(now_)) sleep_until(now_ += period_ns), master_->receive(now_);
+        for (; cycles-- > 0; master_->transmit(now_)) {
+            sleep_until(now_ += period_ns);
+            master_->receive(now_);
+        }
         sleep_until(now_ + period_ns);
         master_->receive(now_ += period_ns);
     }
-    /// One cycle: process data out, the answer in. Time passes for the master as in a cycle of 1 ms.
+    /// One cycle: process data out, the answer in. Time passes for the master as in a cycle of 1
+    /// ms.
     bool exchange() {
         master_->transmit(now_);
         const bool came = port_->wait(link::monotonic_ns() + 20 * period_ns);
@@ -115,20 +131,27 @@ template <class Exchange>
 void measure(Times& times, int count, bool paced, Exchange exchange) {
     std::int64_t due = link::monotonic_ns() + period_ns;
     for (int i = 0; i < count; ++i, due += period_ns) {
-        if (paced) sleep_until(due);
+        if (paced) {
+            sleep_until(due);
+        }
         const double cpu = thread_cpu_us();
         const std::int64_t began = link::monotonic_ns();
-        if (!exchange()) ++times.missed;
+        if (!exchange()) {
+            ++times.missed;
+        }
         times.wall.push_back(static_cast<double>(link::monotonic_ns() - began) / 1000);
         times.cpu.push_back(thread_cpu_us() - cpu);
     }
 }
 
-/// Cycle times beside the floor, with a responder that blocks on the same CPU, and the start of the bus.
-void cycles(const Options& options, Report& report, const std::string& here, const std::string& there) {
+/// Cycle times beside the floor, with a responder that blocks on the same CPU, and the start of the
+/// bus.
+void cycles(const Options& options, Report& report, const std::string& here,
+            const std::string& there) {
     constexpr int drives = 50;
     Slaves slaves(there, line_of(drives, "servo"));
-    const int last = options.cpu, other = last > 0 ? last - 1 : last, rounds = options.quick ? 2 : 5;
+    const int last = options.cpu, other = last > 0 ? last - 1 : last,
+              rounds = options.quick ? 2 : 5;
     std::vector<double> starts;
     Times ours[2], floor[2];
     master::DomainStatus domain;
@@ -137,12 +160,17 @@ void cycles(const Options& options, Report& report, const std::string& here, con
         slaves.start(Slaves::Mode::emulated, other);
         run_real_time(last, [&] {
             OurMaster master(here, drives);
-            if (const double ms = master.bring_up(); ms > 0) starts.push_back(ms);
-            else return;
+            if (const double ms = master.bring_up(); ms > 0) {
+                starts.push_back(ms);
+            } else {
+                return;
+            }
             master.settle(1500);
             slaves.start(Slaves::Mode::null, last);
-            for (const bool paced : {false, true})
-                measure(ours[paced], paced ? (options.quick ? 500 : 3000) : 5000, paced, [&] { return master.exchange(); });
+            for (const bool paced : {false, true}) {
+                measure(ours[paced], paced ? (options.quick ? 500 : 3000) : 5000, paced,
+                        [&] { return master.exchange(); });
+            }
             domain = master.master().domain(0);
             RawSocket raw(here);
             const std::vector<std::uint8_t> frame = slaves.cyclic_frame();
@@ -152,54 +180,73 @@ void cycles(const Options& options, Report& report, const std::string& here, con
                 raw.send(frame);
                 return raw.receive(answer) != 0;
             };
-            for (const bool paced : {false, true}) measure(floor[paced], paced ? (options.quick ? 500 : 3000) : 5000, paced, plain);
+            for (const bool paced : {false, true}) {
+                measure(floor[paced], paced ? (options.quick ? 500 : 3000) : 5000, paced, plain);
+            }
         });
         slaves.stop();
-        if (round + 1 < rounds)
+        if (round + 1 < rounds) {
             for (std::size_t n = 0; n < slaves.line().size(); ++n) {
                 slaves.line().set_power(n, false, link::monotonic_ns());
                 slaves.line().set_power(n, true, link::monotonic_ns());
             }
+        }
     }
     if (starts.empty()) return report.note("the 50 drives did not become operational within 20 s");
     const char* const raw = "send and recv of the same frame";
-    const auto share = [](std::vector<double>& samples, double at) { return std::optional(quantile(samples, at)); };
+    const auto share = [](std::vector<double>& samples, double at) {
+        return std::optional(quantile(samples, at));
+    };
     const Soem peer = soem(options, here, there, line_of(drives, "servo"));
     const std::string by = peer.wall ? "SOEM by pysoem" : "SOEM: " + peer.why;
-    report.row({"50 drives, cycle back to back, p50", "us", share(ours[0].wall, 0.5), raw, share(floor[0].wall, 0.5), at_most(1.25)});
-    report.row({"  CPU, p50", "us", share(ours[0].cpu, 0.5), raw, share(floor[0].cpu, 0.5), at_most(1.25)});
+    report.row({"50 drives, cycle back to back, p50", "us", share(ours[0].wall, 0.5), raw,
+                share(floor[0].wall, 0.5), at_most(1.25)});
+    report.row({"  CPU, p50", "us", share(ours[0].cpu, 0.5), raw, share(floor[0].cpu, 0.5),
+                at_most(1.25)});
     report.row({"  p99", "us", share(ours[0].wall, 0.99), raw, share(floor[0].wall, 0.99), {}});
-    report.row({"  back to back beside SOEM, p50", "us", share(ours[0].wall, 0.5), by, peer.wall, {}});
-    report.row({"  CPU beside SOEM, p50", "us", share(ours[0].cpu, 0.5), by, peer.cpu, {}});
     report.row(
-        {"50 drives, a cycle in each millisecond, p50", "us", share(ours[1].wall, 0.5), raw, share(floor[1].wall, 0.5), at_most(1.25)});
+        {"  back to back beside SOEM, p50", "us", share(ours[0].wall, 0.5), by, peer.wall, {}});
+    report.row({"  CPU beside SOEM, p50", "us", share(ours[0].cpu, 0.5), by, peer.cpu, {}});
+    report.row({"50 drives, a cycle in each millisecond, p50", "us", share(ours[1].wall, 0.5), raw,
+                share(floor[1].wall, 0.5), at_most(1.25)});
     report.row({"  p99", "us", share(ours[1].wall, 0.99), raw, share(floor[1].wall, 0.99), {}});
     report.row({"  beside SOEM, p50", "us", share(ours[1].wall, 0.5), by, peer.paced, {}});
-    report.row({"50 drives, scan to OP with mapping and clocks", "ms", median(starts), by, peer.start_ms, limit(300)});
-    report.note(fmt::format(
-        "frame of {} bytes; {} exchanges, {} incomplete, {} without an answer in time; {} rounds, SCHED_FIFO {}, the responder has "
-        "the same CPU and a higher priority",
-        frame_bytes, domain.exchanges, domain.incomplete, ours[0].missed + ours[1].missed, rounds, priority));
+    report.row({"50 drives, scan to OP with mapping and clocks", "ms", median(starts), by,
+                peer.start_ms, limit(300)});
+    report.note(
+        fmt::format("frame of {} bytes; {} exchanges, {} incomplete, {} without an answer in time; "
+                    "{} rounds, SCHED_FIFO {}, the responder has "
+                    "the same CPU and a higher priority",
+                    frame_bytes, domain.exchanges, domain.incomplete,
+                    ours[0].missed + ours[1].missed, rounds, priority));
 }
 
-/// How far the thread of the runtime is from the grid of the reference clock, which runs 100 ppm fast.
-void reference_clock(const Options& options, Report& report, const std::string& here, const std::string& there) {
+/// How far the thread of the runtime is from the grid of the reference clock, which runs 100 ppm
+/// fast.
+void reference_clock(const Options& options, Report& report, const std::string& here,
+                     const std::string& there) {
     constexpr int drives = 5;
     const int last = options.cpu, other = last > 0 ? last - 1 : last;
     Slaves slaves(there, line_of(drives, "servo"));
     slaves.line().controller(0).set_drift(100, link::monotonic_ns());
     slaves.start(Slaves::Mode::emulated, other);
     const TemporaryFolder folder;
-    const std::string file = folder.file("bench.ethercat", configuration(drives, "eth:" + here, "1ms"));
+    const std::string file =
+        folder.file("bench.ethercat", configuration(drives, "eth:" + here, "1ms"));
     Runtime runtime;
     runtime.apply(new_thread("servo", period_ns, last) + "loadrt ethercat config=" + file +
                   "\naddf ethercat.0.receive servo\naddf ethercat.0.transmit servo\n");
     runtime.session.threads().start();
-    const auto value = [&](const char* name) { return runtime.session.values().read({name}).at(0).value().value; };
+    const auto value = [&](const char* name) {
+        return runtime.session.values().read({name}).at(0).value().value;
+    };
     const std::int64_t began = link::monotonic_ns();
-    while (!value("ethercat.0.all-op").bit && link::monotonic_ns() < began + 20'000 * period_ns)
+    while (!value("ethercat.0.all-op").bit && link::monotonic_ns() < began + 20'000 * period_ns) {
         sleep_until(link::monotonic_ns() + 10 * period_ns);
-    if (!value("ethercat.0.all-op").bit) return report.note("the 5 drives did not become operational within 20 s");
+    }
+    if (!value("ethercat.0.all-op").bit) {
+        return report.note("the 5 drives did not become operational within 20 s");
+    }
     sleep_until(link::monotonic_ns() + 3000 * period_ns);
     const auto before = runtime.session.reports().threads()[0];
     const std::uint64_t incomplete = value("ethercat.0.cycles-incomplete").u64;
@@ -213,13 +260,17 @@ void reference_clock(const Options& options, Report& report, const std::string& 
                 .unit = "us",
                 .ours = trimmed_rms(phases),
                 .goal = limit(2)});
-    report.note(fmt::format("{} cycles, {} missed, {} in which a drive got no data before its SYNC0", after.cycles - before.cycles,
-                            after.missed - before.missed, value("ethercat.0.cycles-incomplete").u64 - incomplete));
+    report.note(
+        fmt::format("{} cycles, {} missed, {} in which a drive got no data before its SYNC0",
+                    after.cycles - before.cycles, after.missed - before.missed,
+                    value("ethercat.0.cycles-incomplete").u64 - incomplete));
 }
 
 void on_veth(const Options& options, Report& report) {
-    if (std::system("ip link add bench0 type veth peer name bench1 2>/dev/null && ip link set bench0 up && ip link set bench1 up") != 0)
+    if (std::system("ip link add bench0 type veth peer name bench1 2>/dev/null && ip link set "
+                    "bench0 up && ip link set bench1 up") != 0) {
         return report.note("no veth pair can be made here (`ip` of iproute2)");
+    }
     cycles(options, report, "bench0", "bench1");
     reference_clock(options, report, "bench0", "bench1");
 }
@@ -228,7 +279,9 @@ void on_veth(const Options& options, Report& report) {
 
 void ethercat(const Options& options, Report& report) {
     report.section("EtherCAT");
-    if (!in_own_network([&] { on_veth(options, report); })) report.note("no network namespace may be made here: run as root");
+    if (!in_own_network([&] { on_veth(options, report); })) {
+        report.note("no network namespace may be made here: run as root");
+    }
     ethercat_machines(options, report);
 }
 

@@ -10,7 +10,8 @@
 namespace hal::bench {
 namespace {
 
-/// A program of SOEM by its Python package: the same drives with the PDOs they have by default, the time of the reference clock in each frame.
+/// A program of SOEM by its Python package: the same drives with the PDOs they have by default, the
+/// time of the reference clock in each frame.
 constexpr const char* soem_program = R"(import json, sys, time
 try:
     import pysoem
@@ -61,31 +62,49 @@ Soem without(const char* why) {
 
 }  // namespace
 
-Soem soem(const Options& options, const std::string& here, const std::string& there, const std::string& line) {
+Soem soem(const Options& options, const std::string& here, const std::string& there,
+          const std::string& line) {
     const int last = options.cpu, other = last > 0 ? last - 1 : last;
-    const std::string python = find_program("python3"), chrt = find_program("chrt"), taskset = find_program("taskset");
-    if (python.empty() || chrt.empty() || taskset.empty()) return without("python3, chrt or taskset is missing");
+    const std::string python = find_program("python3");
+    const std::string chrt = find_program("chrt");
+
+    const std::string taskset = find_program("taskset");
+    if (python.empty() || chrt.empty() || taskset.empty()) {
+        return without("python3, chrt or taskset is missing");
+    }
     Slaves slaves(there, line);
     slaves.start(Slaves::Mode::emulated, other);
     const TemporaryFolder folder;
-    Child child(
-        {{taskset, "-c", std::to_string(last), chrt, "-f", std::to_string(priority), python, folder.file("soem.py", soem_program), here},
-         {},
-         static_cast<uid_t>(-1),
-         true},
-        true);
+    Child child({{taskset, "-c", std::to_string(last), chrt, "-f", std::to_string(priority), python,
+                  folder.file("soem.py", soem_program), here},
+                 {},
+                 static_cast<uid_t>(-1),
+                 true},
+                true);
     const auto first = child.line(60'000);
-    if (!first || *first == "missing")
-        return without(first ? "pysoem is not installed (pip install pysoem)" : "it did not bring them to OP");
+    if (!first || *first == "missing") {
+        return without(first ? "pysoem is not installed (pip install pysoem)"
+                             : "it did not bring them to OP");
+    }
     Soem result;
-    if (double ms = 0; std::sscanf(first->c_str(), "ready %lf", &ms) == 1) result.start_ms = ms;
+    if (double ms = 0; std::sscanf(first->c_str(), "ready %lf", &ms) == 1) {
+        result.start_ms = ms;
+    }
     slaves.start(Slaves::Mode::null, last);
     child.write("\n");
-    double wall = 0, cpu = 0, paced = 0, ignored = 0;
+    double wall = 0;
+    double cpu = 0;
+    double paced = 0;
+    double ignored = 0;
     const auto second = child.line(60'000);
-    if (second && std::sscanf(second->c_str(), "%lf %lf %lf %lf", &wall, &cpu, &paced, &ignored) == 4)
-        result.wall = wall, result.cpu = cpu, result.paced = paced;
-    else result.why = "it ended early";
+    if (second &&
+        std::sscanf(second->c_str(), "%lf %lf %lf %lf", &wall, &cpu, &paced, &ignored) == 4) {
+        result.wall = wall;
+        result.cpu = cpu;
+        result.paced = paced;
+    } else {
+        result.why = "it ended early";
+    }
     return result;
 }
 

@@ -15,7 +15,9 @@ struct Soem {
     std::string why;  ///< there is no figure
 };
 
-/// SOEM as master at the interface `here`, with the slaves `line` at `there`, on the CPU and with the priority of our own master.
-Soem soem(const Options&, const std::string& here, const std::string& there, const std::string& line);
+/// SOEM as master at the interface `here`, with the slaves `line` at `there`, on the CPU and with
+/// the priority of our own master.
+Soem soem(const Options&, const std::string& here, const std::string& there,
+          const std::string& line);
 
 }  // namespace hal::bench

@@ -16,20 +16,24 @@ namespace hal::bench {
 
 using namespace hal::ethercat;
 
-RawSocket::RawSocket(const std::string& interface) : socket_(::socket(AF_PACKET, SOCK_RAW, htons(ethertype))) {
+RawSocket::RawSocket(const std::string& interface)
+    : socket_(::socket(AF_PACKET, SOCK_RAW, htons(ethertype))) {
     sockaddr_ll place{};
     place.sll_family = AF_PACKET;
     place.sll_protocol = htons(ethertype);
     place.sll_ifindex = static_cast<int>(if_nametoindex(interface.c_str()));
     packet_mreq everything{};
-    everything.mr_ifindex = place.sll_ifindex, everything.mr_type = PACKET_MR_PROMISC;
+    everything.mr_ifindex = place.sll_ifindex;
+    everything.mr_type = PACKET_MR_PROMISC;
     const int one = 1;
     const timeval wait{0, 20'000};
     setsockopt(socket_.get(), SOL_PACKET, PACKET_QDISC_BYPASS, &one, sizeof one);
     setsockopt(socket_.get(), SOL_PACKET, PACKET_IGNORE_OUTGOING, &one, sizeof one);
     setsockopt(socket_.get(), SOL_PACKET, PACKET_ADD_MEMBERSHIP, &everything, sizeof everything);
     setsockopt(socket_.get(), SOL_SOCKET, SO_RCVTIMEO, &wait, sizeof wait);
-    if (::bind(socket_.get(), reinterpret_cast<const sockaddr*>(&place), sizeof place) != 0) throw std::runtime_error("no raw socket");
+    if (::bind(socket_.get(), reinterpret_cast<const sockaddr*>(&place), sizeof place) != 0) {
+        throw std::runtime_error("no raw socket");
+    }
 }
 
 std::size_t RawSocket::receive(std::span<std::uint8_t> frame) noexcept {
@@ -37,11 +41,15 @@ std::size_t RawSocket::receive(std::span<std::uint8_t> frame) noexcept {
     return n > 0 ? static_cast<std::size_t>(n) : 0;
 }
 
-void RawSocket::send(std::span<const std::uint8_t> frame) noexcept { (void)!::send(socket_.get(), frame.data(), frame.size(), 0); }
+void RawSocket::send(std::span<const std::uint8_t> frame) noexcept {
+    (void)!::send(socket_.get(), frame.data(), frame.size(), 0);
+}
 
 Slaves::Slaves(const std::string& interface, const std::string& line)
     : interface_(interface), devices_(devices::make_line(devices::read_line(line))) {
-    for (devices::Device& d : devices_) line_.add({.controller = {.dc = d.dc}, .sii = d.sii, .application = d.firmware.get()});
+    for (devices::Device& d : devices_) {
+        line_.add({.controller = {.dc = d.dc}, .sii = d.sii, .application = d.firmware.get()});
+    }
     line_.power_on(link::monotonic_ns());
 }
 
@@ -51,7 +59,9 @@ void Slaves::start(Mode mode, int cpu) {
     if (mode == Mode::null) {
         socket_ = std::make_unique<RawSocket>(interface_);
     } else {
-        auto opened = ethernet::open("eth:" + interface_, {.types = {ethertype}, .policy = ethernet::Policy::block, .promiscuous = true});
+        auto opened = ethernet::open(
+            "eth:" + interface_,
+            {.types = {ethertype}, .policy = ethernet::Policy::block, .promiscuous = true});
         if (!opened) throw std::runtime_error(opened.problem);
         port_ = std::move(opened.port);
     }
@@ -61,7 +71,8 @@ void Slaves::start(Mode mode, int cpu) {
         CPU_SET(static_cast<std::size_t>(cpu), &set);
         pthread_setaffinity_np(pthread_self(), sizeof set, &set);
         sched_param parameters{};
-        parameters.sched_priority = mode == Mode::null ? 99 : 70;  // a null responder answers before the master looks
+        // a null responder answers before the master looks
+        parameters.sched_priority = mode == Mode::null ? 99 : 70;
         pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameters);
         mode == Mode::null ? return_frames() : emulate();
     });
@@ -69,8 +80,11 @@ void Slaves::start(Mode mode, int cpu) {
 
 void Slaves::stop() {
     stop_ = true;
-    if (thread_.joinable()) thread_.join();
-    port_.reset(), socket_.reset();
+    if (thread_.joinable()) {
+        thread_.join();
+    }
+    port_.reset();
+    socket_.reset();
 }
 
 void Slaves::emulate() noexcept {
@@ -82,7 +96,9 @@ void Slaves::emulate() noexcept {
             const std::span frame(buffer.data(), std::min(arrival->bytes.size(), buffer.size()));
             std::memcpy(frame.data(), arrival->bytes.data(), frame.size());
             const std::int64_t now = link::monotonic_ns();
-            line_.process(frame, esc::End::primary, std::clamp(arrival->time_ns, now - 1'000'000, now));  // the stamp of the kernel
+            // the stamp of the kernel
+            line_.process(frame, esc::End::primary,
+                          std::clamp(arrival->time_ns, now - 1'000'000, now));
             remember(frame);
             port_->send(frame, {}, now);
         }
@@ -95,18 +111,21 @@ void Slaves::emulate() noexcept {
 
 void Slaves::return_frames() noexcept {
     std::array<std::uint8_t, largest_frame_bytes> buffer;
-    while (!stop_.load(std::memory_order_relaxed))
+    while (!stop_.load(std::memory_order_relaxed)) {
         if (const std::size_t length = socket_->receive(buffer); length != 0) {
             const std::span frame(buffer.data(), length);
             answer(frame);
             socket_->send(frame);
         }
+    }
 }
 
 void Slaves::remember(std::span<std::uint8_t> frame) noexcept {
     FrameReader reader(frame);
     while (const auto d = reader.next()) {
-        if (d->command == Command::lrw && frame.size() >= cyclic_.size()) cyclic_.assign(frame.begin(), frame.end());
+        if (d->command == Command::lrw && frame.size() >= cyclic_.size()) {
+            cyclic_.assign(frame.begin(), frame.end());
+        }
         Answer& a = answers_[{static_cast<std::uint8_t>(d->command), d->address, d->length}];
         a.wkc = d->wkc();
         std::memcpy(a.data.data(), d->data, std::min<std::size_t>(d->length, a.data.size()));
@@ -117,12 +136,15 @@ void Slaves::answer(std::span<std::uint8_t> frame) noexcept {
     frame[6] |= 2;  // as the first slave marks a frame
     FrameReader reader(frame);
     while (const auto d = reader.next()) {
-        const auto found = answers_.find({static_cast<std::uint8_t>(d->command), d->address, d->length});
+        const auto found =
+            answers_.find({static_cast<std::uint8_t>(d->command), d->address, d->length});
         if (found == answers_.end() || found->second.wkc == 0) continue;
         d->set_wkc(found->second.wkc);
-        const bool is_read =
-            d->command != Command::apwr && d->command != Command::fpwr && d->command != Command::bwr && d->command != Command::lwr;
-        if (is_read && d->length <= found->second.data.size()) std::memcpy(d->data, found->second.data.data(), d->length);
+        const bool is_read = d->command != Command::apwr && d->command != Command::fpwr &&
+                             d->command != Command::bwr && d->command != Command::lwr;
+        if (is_read && d->length <= found->second.data.size()) {
+            std::memcpy(d->data, found->second.data.data(), d->length);
+        }
     }
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The other side of an EtherCAT cable for the bench: emulated slaves, or a responder that only returns frames with the counters they had.
+// The other side of an EtherCAT cable for the bench: emulated slaves, or a responder that only
+// returns frames with the counters they had.
 #pragma once
 
 #include <array>
@@ -21,7 +22,8 @@
 
 namespace hal::bench {
 
-/// A packet socket for EtherCAT as a program of one's own would open it: blocking, without own frames.
+/// A packet socket for EtherCAT as a program of one's own would open it: blocking, without own
+/// frames.
 class RawSocket {
 public:
     /// Throws std::runtime_error when it cannot be opened.
@@ -43,7 +45,7 @@ public:
 
     enum class Mode {
         emulated,  ///< controller by controller; remembers counters and short answers by datagram
-        null,      ///< returns what it remembers: what a wire without time would do
+        null,  ///< returns what it remembers: what a wire without time would do
     };
     /// Works on that CPU until stop().
     void start(Mode mode, int cpu);
@@ -70,7 +72,7 @@ private:
     std::map<Key, Answer> answers_;
     std::vector<std::uint8_t> cyclic_;
     std::unique_ptr<ethernet::Port> port_;  // emulated
-    std::unique_ptr<RawSocket> socket_;     // null
+    std::unique_ptr<RawSocket> socket_;  // null
     std::atomic<bool> stop_{false};
     std::thread thread_;
 };

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// LinuxCNC gives its threads SCHED_FIFO only on a PREEMPT_RT kernel and with CAP_SYS_RESOURCE. To compare like with like
-// on any machine it is started with LINUXCNC_FORCE_REALTIME and, where we are root without that capability (containers,
-// some virtual machines), with permit_realtime.so before its libraries. As root it needs the name of an ordinary user who
-// then gives the commands.
+// LinuxCNC gives its threads SCHED_FIFO only on a PREEMPT_RT kernel and with CAP_SYS_RESOURCE. To
+// compare like with like on any machine it is started with LINUXCNC_FORCE_REALTIME and, where we
+// are root without that capability (containers, some virtual machines), with permit_realtime.so
+// before its libraries. As root it needs the name of an ordinary user who then gives the commands.
 #include "linuxcnc.hpp"
 
 #include <array>
@@ -27,7 +27,8 @@ constexpr std::array<key_t, 2> shared_memory{0x48414c32, 0x48484c34};  // "HAL2"
 bool as_root() { return geteuid() == 0; }
 
 std::string version() {
-    const std::string text = run({{"dpkg-query", "-W", "-f", "${Version}", "linuxcnc-uspace"}}).out;  // "1:2.9.0~pre1+git…"
+    // "1:2.9.0~pre1+git…"
+    const std::string text = run({{"dpkg-query", "-W", "-f", "${Version}", "linuxcnc-uspace"}}).out;
     const auto from = text.find(':') == std::string::npos ? 0 : text.find(':') + 1;
     return text.substr(from, text.find('.', text.find('.', from) + 1) - from);
 }
@@ -49,15 +50,19 @@ bool clear_shared_memory() {
         shmid_ds about{};
         const int id = shmget(key, 0, 0);
         if (id < 0 || shmctl(id, IPC_STAT, &about) != 0) continue;
-        if (about.shm_nattch != 0) unused = false;
-        else shmctl(id, IPC_RMID, nullptr);
+        if (about.shm_nattch != 0) {
+            unused = false;
+        } else {
+            shmctl(id, IPC_RMID, nullptr);
+        }
     }
     return unused;
 }
 
 std::string why_absent() {
-    for (const char* program : {"rtapi_app", "halcmd"})
+    for (const char* program : {"rtapi_app", "halcmd"}) {
         if (find_program(program).empty()) return "LinuxCNC: not installed (linuxcnc-uspace)";
+    }
     // In an IPC namespace of our own there is no other LinuxCNC, and nothing stays behind.
     static const bool alone = unshare(CLONE_NEWIPC) == 0;
     return alone || (!is_running() && clear_shared_memory()) ? "" : "LinuxCNC: in use, left alone";
@@ -83,8 +88,11 @@ double LinuxCnc::ns_per_time_unit() {
 
 Start LinuxCnc::program(std::vector<std::string> words) const {
     Start start{std::move(words)};
-    start.environment = {"HOME=" + home_.path(), "RTAPI_FIFO_PATH=" + home_.path() + "/.rtapi_fifo", "LINUXCNC_FORCE_REALTIME=1"};
-    if (as_root()) start.user = nobody;
+    start.environment = {"HOME=" + home_.path(), "RTAPI_FIFO_PATH=" + home_.path() + "/.rtapi_fifo",
+                         "LINUXCNC_FORCE_REALTIME=1"};
+    if (as_root()) {
+        start.user = nobody;
+    }
     return start;
 }
 
@@ -101,18 +109,26 @@ std::unique_ptr<LinuxCnc> LinuxCnc::start(const std::string& threads) {
     if (as_root()) {
         master.user = static_cast<uid_t>(-1);
         master.environment.push_back("RTAPI_UID=" + std::to_string(nobody));
-        master.environment.push_back("LD_PRELOAD=" + std::filesystem::read_symlink("/proc/self/exe").parent_path().string() + "/permit_realtime.so");
+        master.environment.push_back(
+            "LD_PRELOAD=" + std::filesystem::read_symlink("/proc/self/exe").parent_path().string() +
+            "/permit_realtime.so");
     }
     peer->master_ = std::make_unique<Child>(master);
-    for (const Stopwatch watch; watch.ms() < 5000; std::this_thread::sleep_for(std::chrono::milliseconds(20)))
-        if (peer->command({"list", "thread"}).out.find_first_not_of(" \n") != std::string::npos) return peer;
+    for (const Stopwatch watch; watch.ms() < 5000;
+         std::this_thread::sleep_for(std::chrono::milliseconds(20))) {
+        if (peer->command({"list", "thread"}).out.find_first_not_of(" \n") != std::string::npos) {
+            return peer;
+        }
+    }
     return nullptr;
 }
 
 LinuxCnc::~LinuxCnc() {
     command({"stop"});
     command({"unload", "all"});
-    for (const Stopwatch watch; master_ && master_->alive() && watch.ms() < 2000; std::this_thread::sleep_for(std::chrono::milliseconds(10))) {}
+    for (const Stopwatch watch; master_ && master_->alive() && watch.ms() < 2000;
+         std::this_thread::sleep_for(std::chrono::milliseconds(10))) {
+    }
     master_.reset();
     clear_shared_memory();
 }
@@ -123,7 +139,9 @@ Finished LinuxCnc::command(const std::vector<std::string>& words) {
     return run(program(std::move(all)), 20'000);
 }
 
-Finished LinuxCnc::file(const std::string& text) { return run(program({"halcmd", "-f", home_.file("bench.hal", text)}), 120'000); }
+Finished LinuxCnc::file(const std::string& text) {
+    return run(program({"halcmd", "-f", home_.file("bench.hal", text)}), 120'000);
+}
 
 std::vector<double> LinuxCnc::sample(const std::string& pin, std::size_t count, int every_us) {
     Child halcmd(program({"halcmd", "-s", "-kf"}), true);

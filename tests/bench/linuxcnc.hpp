@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The peer: an installed LinuxCNC (Debian: linuxcnc-uspace), driven by its own programs. One at a time.
+// The peer: an installed LinuxCNC (Debian: linuxcnc-uspace), driven by its own programs. One at a
+// time.
 #pragma once
 
 #include <memory>
@@ -18,7 +19,8 @@ public:
     /// "LinuxCNC 2.9"
     static const std::string& name();
 
-    /// Starts its real-time side with threads on the last CPU: `name1=t period1=1000000`. nullptr: it did not come up.
+    /// Starts its real-time side with threads on the last CPU: `name1=t period1=1000000`. nullptr:
+    /// it did not come up.
     static std::unique_ptr<LinuxCnc> start(const std::string& threads);
     ~LinuxCnc();  ///< unloads all and takes its shared memory away
 

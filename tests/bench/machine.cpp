@@ -18,7 +18,9 @@ namespace hal::bench {
 namespace {
 
 struct CpuTimes {
-    double busy = 0, all = 0, stolen = 0;  // clock ticks
+    double busy = 0;
+    double all = 0;
+    double stolen = 0;  // clock ticks
 };
 
 CpuTimes cpu_times() {
@@ -26,9 +28,13 @@ CpuTimes cpu_times() {
     std::string cpu;
     file >> cpu;
     double ticks[8] = {};  // user nice system idle iowait irq softirq steal
-    for (double& t : ticks) file >> t;
+    for (double& t : ticks) {
+        file >> t;
+    }
     CpuTimes times;
-    for (const double t : ticks) times.all += t;
+    for (const double t : ticks) {
+        times.all += t;
+    }
     times.busy = times.all - ticks[3] - ticks[4];
     times.stolen = ticks[7];
     return times;
@@ -47,8 +53,12 @@ std::string processor() {
     std::string model;
     for (std::string line; std::getline(file, line);) {
         const auto colon = line.find(": ");
-        if (line.starts_with("model name") && model.empty() && colon != std::string::npos) model = line.substr(colon + 2);
-        if (line.starts_with("flags") && line.find(" hypervisor") != std::string::npos) virtual_machine = true;
+        if (line.starts_with("model name") && model.empty() && colon != std::string::npos) {
+            model = line.substr(colon + 2);
+        }
+        if (line.starts_with("flags") && line.find(" hypervisor") != std::string::npos) {
+            virtual_machine = true;
+        }
     }
     return model + (virtual_machine ? ", virtual machine" : "");
 }
@@ -77,14 +87,19 @@ std::vector<std::string> machine_facts(int cpu) {
     utsname system{};
     uname(&system);
     std::vector<std::string> facts;
-    facts.push_back(fmt::format("{}, {} CPUs; Linux {} {}", processor(), std::thread::hardware_concurrency(), system.release, system.version));
+    facts.push_back(fmt::format("{}, {} CPUs; Linux {} {}", processor(),
+                                std::thread::hardware_concurrency(), system.release,
+                                system.version));
     const bool preempt_rt = first_line("/sys/kernel/realtime") == "1";
     const std::string isolated = first_line("/sys/devices/system/cpu/isolated");
     bool granted = false;
     std::thread([&] { granted = become_real_time(cpu); }).join();
-    facts.push_back(fmt::format("PREEMPT_RT: {}; SCHED_FIFO {}: {}; real-time thread on CPU {}; isolated CPUs: {}; sched_rt_runtime_us: {}",
-                                preempt_rt ? "yes" : "no", priority, granted ? "granted" : "denied, so ordinary threads are measured", cpu,
-                                isolated.empty() ? "none" : isolated, first_line("/proc/sys/kernel/sched_rt_runtime_us")));
+    facts.push_back(fmt::format(
+        "PREEMPT_RT: {}; SCHED_FIFO {}: {}; real-time thread on CPU {}; isolated CPUs: {}; "
+        "sched_rt_runtime_us: {}",
+        preempt_rt ? "yes" : "no", priority,
+        granted ? "granted" : "denied, so ordinary threads are measured", cpu,
+        isolated.empty() ? "none" : isolated, first_line("/proc/sys/kernel/sched_rt_runtime_us")));
     return facts;
 }
 
@@ -92,7 +107,9 @@ void stay_off(int cpu) {
     cpu_set_t set;
     if (sched_getaffinity(0, sizeof set, &set) != 0) return;
     CPU_CLR(static_cast<std::size_t>(cpu), &set);
-    if (CPU_COUNT(&set) > 0) sched_setaffinity(0, sizeof set, &set);
+    if (CPU_COUNT(&set) > 0) {
+        sched_setaffinity(0, sizeof set, &set);
+    }
 }
 
 void wait_for_quiet(double most_s) {
@@ -121,7 +138,9 @@ double tsc_per_ns() {
 #endif
 }
 
-double stolen_ms() { return cpu_times().stolen * 1000.0 / static_cast<double>(sysconf(_SC_CLK_TCK)); }
+double stolen_ms() {
+    return cpu_times().stolen * 1000.0 / static_cast<double>(sysconf(_SC_CLK_TCK));
+}
 
 void run_real_time(int cpu, const std::function<void()>& work) {
     std::thread([&] {
@@ -142,10 +161,13 @@ void run_undisturbed(const std::function<void()>& work) {
             problem = std::current_exception();
         }
     }).join();
-    if (problem) std::rethrow_exception(problem);
+    if (problem) {
+        std::rethrow_exception(problem);
+    }
 }
 
-PeriodicThread::PeriodicThread(int cpu, std::int64_t period_ns, std::function<void(std::uint64_t)> work)
+PeriodicThread::PeriodicThread(int cpu, std::int64_t period_ns,
+                               std::function<void(std::uint64_t)> work)
     : cpu_(cpu), period_ns_(period_ns), work_(std::move(work)) {
     pthread_create(&thread_, nullptr, [](void* self) -> void* {
         auto& t = *static_cast<PeriodicThread*>(self);
@@ -154,10 +176,13 @@ PeriodicThread::PeriodicThread(int cpu, std::int64_t period_ns, std::function<vo
         std::int64_t due = monotonic_ns() + t.period_ns_;
         for (std::uint64_t cycle = 0; !t.quit_.load(std::memory_order_relaxed); ++cycle) {
             wait.sleep(due);
-            if (const std::int64_t now = Wait::spin(due); now > due) due += (now - due) / t.period_ns_ * t.period_ns_;
+            if (const std::int64_t now = Wait::spin(due); now > due) {
+                due += (now - due) / t.period_ns_ * t.period_ns_;
+            }
             const std::int64_t begin = monotonic_ns();
             t.work_(cycle);
-            t.last_ns_.store(static_cast<std::int32_t>(monotonic_ns() - begin), std::memory_order_relaxed);
+            t.last_ns_.store(static_cast<std::int32_t>(monotonic_ns() - begin),
+                             std::memory_order_relaxed);
             due += t.period_ns_;
         }
         return nullptr;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The machine the figures are taken on: what it is, how quiet it is, and a thread of our own that runs like the
-// runtime's.
+// The machine the figures are taken on: what it is, how quiet it is, and a thread of our own that
+// runs like the runtime's.
 #pragma once
 
 #include <atomic>
@@ -17,7 +17,8 @@ inline constexpr int priority = 98;
 
 /// Returns lines that describe this machine: processor, kernel, real-time limits.
 std::vector<std::string> machine_facts(int cpu);
-/// The CPU for the real-time thread: the last isolated one, or the last of all; as the runtime chooses.
+/// The CPU for the real-time thread: the last isolated one, or the last of all; as the runtime
+/// chooses.
 int real_time_cpu();
 /// Keeps this thread, and what it starts, off that CPU (if there is another).
 void stay_off(int cpu);
@@ -28,15 +29,17 @@ double tsc_per_ns();
 /// Time the hypervisor took from all CPUs since the machine started, ms. 0 on a real machine.
 double stolen_ms();
 
-/// Runs `work` once in a SCHED_FIFO thread on that CPU (in an ordinary thread where that is not allowed) and waits for it.
+/// Runs `work` once in a SCHED_FIFO thread on that CPU (in an ordinary thread where that is not
+/// allowed) and waits for it.
 void run_real_time(int cpu, const std::function<void()>& work);
 
-/// Runs `work` in a thread that ordinary programs do not preempt (SCHED_FIFO 1, as are the programs it starts; an ordinary
-/// thread where that is not allowed), waits for it, and passes on what it throws. Other work on the machine does not count.
+/// Runs `work` in a thread that ordinary programs do not preempt (SCHED_FIFO 1, as are the programs
+/// it starts; an ordinary thread where that is not allowed), waits for it, and passes on what it
+/// throws. Other work on the machine does not count.
 void run_undisturbed(const std::function<void()>& work);
 
-/// A loop of one's own as a real-time program would write it: the same wait, priority and CPU as a thread of the runtime,
-/// and its execution time where a sampler can see it.
+/// A loop of one's own as a real-time program would write it: the same wait, priority and CPU as a
+/// thread of the runtime, and its execution time where a sampler can see it.
 class PeriodicThread {
 public:
     PeriodicThread(int cpu, std::int64_t period_ns, std::function<void(std::uint64_t cycle)> work);

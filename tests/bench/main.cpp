@@ -28,7 +28,8 @@ struct Section {
 };
 
 constexpr Section sections[] = {
-    {"dispatch", "cost of a function in a thread of 1000, against a hand-written loop and LinuxCNC", dispatch},
+    {"dispatch", "cost of a function in a thread of 1000, against a hand-written loop and LinuxCNC",
+     dispatch},
     {"modules", "cost of a function of LinuxCNC's compiled modules, here and in LinuxCNC", modules},
     {"wakeup", "how late threads wake, against cyclictest", wakeup},
     {"load", "100 to 100 000 nets, from text to running threads, against LinuxCNC", load, true},
@@ -36,28 +37,51 @@ constexpr Section sections[] = {
     {"edit", "live edits: missed periods, delay, a hundred thousand of them", edit, true},
     {"probe", "sampling values in the cycle: cost, and lost rows at 10 kHz", probe},
     {"trace", "each function of each cycle recorded: cost, and lost events", trace},
-    {"coherence", "whether a slow thread sees one state of a fast one, against LinuxCNC", coherence},
+    {"coherence", "whether a slow thread sees one state of a fast one, against LinuxCNC",
+     coherence},
     {"python", "a component of 100 pins in Python", python, true},
-    {"can", "CANopen over SocketCAN: SDO, SYNC and PDOs, against a plain raw socket program and the Python package", can, true},
-    {"ethernet", "raw Ethernet over a veth pair: round trips and one-way times, against a plain socket program", raw_ethernet},
-    {"tdma", "slot jitter of a station whose clock is 200 ppm off, and a backup master that takes over", time_slots},
-    {"scocan", "time slots on a CAN bus in memory: error of a slot's begin, idle slots used, throughput, speed of the simulation", scocan},
-    {"cnc", "five axes and 64 I/O over TDMA: refresh, round trip, CPU, most axes and shortest cycle", cnc},
+    {"can",
+     "CANopen over SocketCAN: SDO, SYNC and PDOs, against a plain raw socket program and the "
+     "Python package",
+     can, true},
+    {"ethernet",
+     "raw Ethernet over a veth pair: round trips and one-way times, against a plain socket program",
+     raw_ethernet},
+    {"tdma",
+     "slot jitter of a station whose clock is 200 ppm off, and a backup master that takes over",
+     time_slots},
+    {"scocan",
+     "time slots on a CAN bus in memory: error of a slot's begin, idle slots used, throughput, "
+     "speed of the simulation",
+     scocan},
+    {"cnc",
+     "five axes and 64 I/O over TDMA: refresh, round trip, CPU, most axes and shortest cycle", cnc},
 #ifdef HALCYON_ETHERCAT
-    {"ethercat", "50 EtherCAT drives over a veth pair against a plain socket program; start, faults, and how many slaves in memory", ethercat},
+    {"ethercat",
+     "50 EtherCAT drives over a veth pair against a plain socket program; start, faults, and how "
+     "many slaves in memory",
+     ethercat},
 #endif
     {"estimation", "a Kalman filter of 6 states and 3 measurements", estimation, true},
     {"vision", "markers in frames of 640 x 480: error and time", vision, true},
     {"dds", "64 pins from process to process, against a bare Fast DDS writer", dds},
-    {"size", "of the program; with --full from a fresh clone to first motion, complete build, second start", size},
+    {"size",
+     "of the program; with --full from a fresh clone to first motion, complete build, second start",
+     size},
     {"canopen-boot", "a CANopen network of 127 nodes, in memory and on vcan", canopen_boot},
 };
 
 int usage(const char* problem, const char* word) {
-    if (*problem) fmt::print(stderr, "hal-bench: {}'{}'\n", problem, word);
-    fmt::print(stderr, "hal-bench [--quick] [--full] [SECTION...]   prints figures, asserts nothing\n"
-                       "  --quick  shorter runs\n  --full   also what takes minutes: builds of a fresh clone, a million edits\n");
-    for (const Section& section : sections) fmt::print(stderr, "  {:13}{}\n", section.name, section.what);
+    if (*problem) {
+        fmt::print(stderr, "hal-bench: {}'{}'\n", problem, word);
+    }
+    fmt::print(stderr,
+               "hal-bench [--quick] [--full] [SECTION...]   prints figures, asserts nothing\n"
+               "  --quick  shorter runs\n  --full   also what takes minutes: builds of a fresh "
+               "clone, a million edits\n");
+    for (const Section& section : sections) {
+        fmt::print(stderr, "  {:13}{}\n", section.name, section.what);
+    }
     return *problem ? 2 : 0;
 }
 
@@ -66,43 +90,66 @@ void run(const Section& section, const Options& options, Report& report) {
     const Stopwatch watch;
     const double stolen = stolen_ms();
     try {
-        if (section.ordinary) run_undisturbed([&] { section.run(options, report); });
-        else section.run(options, report);
+        if (section.ordinary) {
+            run_undisturbed([&] { section.run(options, report); });
+        } else {
+            section.run(options, report);
+        }
     } catch (const std::exception& problem) {
         report.note(fmt::format("{} ended early: {}", section.name, problem.what()));
     }
-    report.note(fmt::format("took {:.1f} s, of which the hypervisor kept {:.0f} ms of CPU time", watch.ms() / 1000, stolen_ms() - stolen));
+    report.note(fmt::format("took {:.1f} s, of which the hypervisor kept {:.0f} ms of CPU time",
+                            watch.ms() / 1000, stolen_ms() - stolen));
     fmt::print(stderr, "{:.1f} s\n", watch.ms() / 1000);
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-    if (argc == 2 && std::strcmp(argv[1], canopen_boot_inside_word) == 0) return canopen_boot_inside();
+    if (argc == 2 && std::strcmp(argv[1], canopen_boot_inside_word) == 0) {
+        return canopen_boot_inside();
+    }
     Options options;
     std::vector<const Section*> wanted;
     for (int i = 1; i < argc; ++i) {
         const Section* found = nullptr;
-        for (const Section& section : sections)
-            if (std::strcmp(argv[i], section.name) == 0) found = &section;
-        if (found) wanted.push_back(found);
-        else if (std::strcmp(argv[i], "--quick") == 0) options.quick = true;
-        else if (std::strcmp(argv[i], "--full") == 0) options.full = true;
-        else if (std::strcmp(argv[i], "--help") == 0 || std::strcmp(argv[i], "-h") == 0) return usage("", "");
-        else return usage("no section or option ", argv[i]);
+        for (const Section& section : sections) {
+            if (std::strcmp(argv[i], section.name) == 0) {
+                found = &section;
+            }
+        }
+        if (found) {
+            wanted.push_back(found);
+        } else if (std::strcmp(argv[i], "--quick") == 0) {
+            options.quick = true;
+        } else if (std::strcmp(argv[i], "--full") == 0) {
+            options.full = true;
+        } else if (std::strcmp(argv[i], "--help") == 0 || std::strcmp(argv[i], "-h") == 0) {
+            return usage("", "");
+        } else {
+            return usage("no section or option ", argv[i]);
+        }
     }
-    if (wanted.empty())
-        for (const Section& section : sections) wanted.push_back(&section);
+    if (wanted.empty()) {
+        for (const Section& section : sections) {
+            wanted.push_back(&section);
+        }
+    }
     options.programs = std::filesystem::read_symlink("/proc/self/exe").parent_path().string();
     options.cpu = real_time_cpu();
 
     Report report;
     report.section("machine");
-    for (const auto& fact : machine_facts(options.cpu)) report.note(fact);
+    for (const auto& fact : machine_facts(options.cpu)) {
+        report.note(fact);
+    }
     stay_off(options.cpu);
-    LinuxCnc::absent();  // enters the namespace that all threads and programs of the bench are to share
+    // enters the namespace that all threads and programs of the bench are to share
+    LinuxCnc::absent();
     const Stopwatch watch;
-    for (const Section* const section : wanted) run(*section, options, report);
+    for (const Section* const section : wanted) {
+        run(*section, options, report);
+    }
     fmt::print("{}\n{:.0f} s in all\n", report.text(), watch.ms() / 1000);
     return 0;
 }

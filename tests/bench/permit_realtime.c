@@ -5,8 +5,7 @@
 #include <sys/syscall.h>
 #include <unistd.h>
 
-int setrlimit(__rlimit_resource_t resource, const struct rlimit *limits)
-{
+int setrlimit(__rlimit_resource_t resource, const struct rlimit* limits) {
     if (resource == RLIMIT_RTPRIO || resource == RLIMIT_MEMLOCK) return 0;
     return (int)syscall(SYS_setrlimit, resource, limits);
 }

@@ -30,26 +30,42 @@ Ends make_pipe() {
     return ends;
 }
 
-/// vfork, because a parent with locked memory is slow to fork: everything the child needs is made before.
+/// vfork, because a parent with locked memory is slow to fork: everything the child needs is made
+/// before.
 pid_t spawn(const Start& start, int in, int out) {
     std::vector<char*> arguments, environment;
-    for (const auto& a : start.arguments) arguments.push_back(const_cast<char*>(a.c_str()));
+    for (const auto& a : start.arguments) {
+        arguments.push_back(const_cast<char*>(a.c_str()));
+    }
     arguments.push_back(nullptr);
-    for (const auto& e : start.environment) environment.push_back(const_cast<char*>(e.c_str()));
-    for (char** e = environ; *e; ++e) environment.push_back(*e);  // the first of two equal names counts for getenv
+    for (const auto& e : start.environment) {
+        environment.push_back(const_cast<char*>(e.c_str()));
+    }
+    // the first of two equal names counts for getenv
+    for (char** e = environ; *e; ++e) {
+        environment.push_back(*e);
+    }
     environment.push_back(nullptr);
     cpu_set_t all;
     CPU_ZERO(&all);
-    for (std::size_t cpu = 0; cpu < CPU_SETSIZE; ++cpu) CPU_SET(cpu, &all);  // the system takes those that exist
+    // the system takes those that exist
+    for (std::size_t cpu = 0; cpu < CPU_SETSIZE; ++cpu) {
+        CPU_SET(cpu, &all);
+    }
     const int null = open("/dev/null", O_RDWR | O_CLOEXEC);
     const pid_t pid = vfork();
     if (pid == 0) {
         dup2(in >= 0 ? in : null, STDIN_FILENO);
         dup2(out >= 0 ? out : null, STDOUT_FILENO);
         dup2(null, STDERR_FILENO);
-        if (start.everywhere) sched_setaffinity(0, sizeof all, &all);
+        if (start.everywhere) {
+            sched_setaffinity(0, sizeof all, &all);
+        }
         // not setuid(): glibc's notifies all threads, and those are the parent's
-        if (start.user != static_cast<uid_t>(-1) && (syscall(SYS_setgroups, 0, nullptr) != 0 || syscall(SYS_setuid, start.user) != 0)) _exit(126);
+        if (start.user != static_cast<uid_t>(-1) &&
+            (syscall(SYS_setgroups, 0, nullptr) != 0 || syscall(SYS_setuid, start.user) != 0)) {
+            _exit(126);
+        }
         execvpe(arguments[0], arguments.data(), environment.data());
         _exit(127);
     }
@@ -57,15 +73,20 @@ pid_t spawn(const Start& start, int in, int out) {
     return pid;
 }
 
-int status_of(int status) { return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status); }
+int status_of(int status) {
+    return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+}
 
 }  // namespace
 
 std::string find_program(const std::string& name) {
     const char* const path = std::getenv("PATH");
     std::istringstream folders(std::string(path ? path : "/usr/bin:/bin") + ":/usr/sbin");
-    for (std::string folder; std::getline(folders, folder, ':');)
-        if (const std::string file = folder + "/" + name; access(file.c_str(), X_OK) == 0) return file;
+    for (std::string folder; std::getline(folders, folder, ':');) {
+        if (const std::string file = folder + "/" + name; access(file.c_str(), X_OK) == 0) {
+            return file;
+        }
+    }
     return "";
 }
 
@@ -75,7 +96,10 @@ Finished run(const Start& start, double most_ms) {
     const Stopwatch watch;
     const pid_t pid = spawn(start, -1, out[1]);
     close(out[1]);
-    if (pid < 0) return close(out[0]), finished;
+    if (pid < 0) {
+        close(out[0]);
+        return finished;
+    }
     bool open = true;
     std::array<char, 65536> buffer;
     while (open) {
@@ -83,11 +107,16 @@ Finished run(const Start& start, double most_ms) {
         const double left = most_ms - watch.ms();
         if (left <= 0 || poll(&wait, 1, static_cast<int>(left) + 1) == 0) break;
         const ssize_t n = read(out[0], buffer.data(), buffer.size());
-        if (n > 0) finished.out.append(buffer.data(), static_cast<std::size_t>(n));
-        else open = n < 0 && errno == EINTR;
+        if (n > 0) {
+            finished.out.append(buffer.data(), static_cast<std::size_t>(n));
+        } else {
+            open = n < 0 && errno == EINTR;
+        }
     }
     close(out[0]);
-    if (open) kill(pid, SIGKILL);
+    if (open) {
+        kill(pid, SIGKILL);
+    }
     int status = 0;
     waitpid(pid, &status, 0);
     finished.ms = watch.ms();
@@ -100,7 +129,8 @@ Child::Child(const Start& start, bool talk) {
         pid_ = spawn(start, -1, -1);
         return;
     }
-    const Ends in = make_pipe(), out = make_pipe();
+    const Ends in = make_pipe();
+    const Ends out = make_pipe();
     pid_ = spawn(start, in[0], out[1]);
     close(in[0]);
     close(out[1]);
@@ -111,12 +141,16 @@ Child::Child(const Start& start, bool talk) {
 Child::~Child() { end(); }
 
 bool Child::alive() {
-    if (pid_ > 0 && waitpid(pid_, nullptr, WNOHANG) != 0) pid_ = -1;
+    if (pid_ > 0 && waitpid(pid_, nullptr, WNOHANG) != 0) {
+        pid_ = -1;
+    }
     return pid_ > 0;
 }
 
 void Child::write(const std::string& text) {
-    if (::write(in_, text.data(), text.size()) < 0) throw std::runtime_error("a program under measurement has ended");
+    if (::write(in_, text.data(), text.size()) < 0) {
+        throw std::runtime_error("a program under measurement has ended");
+    }
 }
 
 std::optional<std::string> Child::line(int most_ms) {
@@ -136,13 +170,21 @@ std::optional<std::string> Child::line(int most_ms) {
 }
 
 void Child::end() {
-    if (in_ >= 0) close(in_);
-    if (out_ >= 0) close(out_);
+    if (in_ >= 0) {
+        close(in_);
+    }
+    if (out_ >= 0) {
+        close(out_);
+    }
     in_ = out_ = -1;
     if (pid_ <= 0) return;
     kill(pid_, SIGTERM);
-    for (const Stopwatch watch; waitpid(pid_, nullptr, WNOHANG) == 0; std::this_thread::sleep_for(std::chrono::milliseconds(2)))
-        if (watch.ms() > 2000) kill(pid_, SIGKILL);
+    for (const Stopwatch watch; waitpid(pid_, nullptr, WNOHANG) == 0;
+         std::this_thread::sleep_for(std::chrono::milliseconds(2))) {
+        if (watch.ms() > 2000) {
+            kill(pid_, SIGKILL);
+        }
+    }
     pid_ = -1;
 }
 

@@ -18,13 +18,14 @@ struct Start {
     std::vector<std::string> arguments;          ///< the program first
     std::vector<std::string> environment = {};   ///< "NAME=value", in addition to this process's
     uid_t user = static_cast<uid_t>(-1);         ///< run as that user; -1: as this process's
-    bool everywhere = false;                     ///< on all CPUs, also the one the bench stays off
+    bool everywhere = false;  ///< on all CPUs, also the one the bench stays off
 };
 
 struct Finished {
-    int status = -1;   ///< exit status; 128 + signal; -1: it could not be started or was stopped after `most_ms`
-    double ms = 0;     ///< wall time
-    std::string out;   ///< its standard output
+    /// exit status; 128 + signal; -1: it could not be started or was stopped after `most_ms`
+    int status = -1;
+    double ms = 0;  ///< wall time
+    std::string out;  ///< its standard output
 };
 
 /// Runs a program to its end. Its standard error is thrown away.
@@ -46,7 +47,8 @@ public:
 
 private:
     pid_t pid_ = -1;
-    int in_ = -1, out_ = -1;
+    int in_ = -1;
+    int out_ = -1;
     std::string read_;
 };
 

@@ -27,22 +27,30 @@ Applied Runtime::apply(std::string text) {
     const auto source = session.sources.add("bench.hal", std::move(text));
     const CpuStopwatch cpu;
     const Stopwatch parsing;
-    const auto commands = parse(session.sources, source, Environment{&session.ini, {}}, diagnostics);
+    const auto commands =
+        parse(session.sources, source, Environment{&session.ini, {}}, diagnostics);
     cost.parse = parsing.ms();
     const Stopwatch applying;
     Transaction transaction = session.begin();
-    for (const Command& command : commands) apply_edit(transaction, command, diagnostics);
+    for (const Command& command : commands) {
+        apply_edit(transaction, command, diagnostics);
+    }
     cost.apply = applying.ms();
     const Stopwatch committing;
     const bool good = transaction.commit(diagnostics);
     cost.commit = committing.ms();
     cost.cpu = cpu.ms();
-    if (!good) throw std::runtime_error(diagnostics.all().empty() ? "an edit was rejected" : render(diagnostics.all().front(), session.sources));
+    if (!good) {
+        throw std::runtime_error(diagnostics.all().empty()
+                                     ? "an edit was rejected"
+                                     : render(diagnostics.all().front(), session.sources));
+    }
     return cost;
 }
 
 std::string new_thread(std::string_view name, long period_ns, int cpu, std::string_view more) {
-    return fmt::format("newthread {} {} cpu={} priority={} {}\n", name, period_ns, cpu, priority, more);
+    return fmt::format("newthread {} {} cpu={} priority={} {}\n", name, period_ns, cpu, priority,
+                       more);
 }
 
 }  // namespace hal::bench

@@ -11,14 +11,18 @@ namespace hal::bench {
 
 /// What a text cost, ms of wall time; `cpu` is the processor time of all three.
 struct Applied {
-    double parse = 0, apply = 0, commit = 0, cpu = 0;
+    double parse = 0;
+    double apply = 0;
+    double commit = 0;
+    double cpu = 0;
     double all() const { return parse + apply + commit; }
 };
 
 class Runtime {
 public:
     explicit Runtime(bool virtual_clock = false);
-    /// The text as one transaction of edits. Throws std::runtime_error with the first diagnostic when it is rejected.
+    /// The text as one transaction of edits. Throws std::runtime_error with the first diagnostic
+    /// when it is rejected.
     Applied apply(std::string text);
 
     Session session;

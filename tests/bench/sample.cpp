@@ -8,7 +8,8 @@ namespace hal::bench {
 
 double quantile(std::vector<double>& samples, double share) {
     if (samples.empty()) return 0.0;
-    const auto at = static_cast<std::ptrdiff_t>(share * static_cast<double>(samples.size() - 1) + 0.5);
+    const auto at =
+        static_cast<std::ptrdiff_t>(share * static_cast<double>(samples.size() - 1) + 0.5);
     std::nth_element(samples.begin(), samples.begin() + at, samples.end());
     return samples[static_cast<std::size_t>(at)];
 }

@@ -21,22 +21,31 @@ bool in_own_network(const std::function<void()>& work) {
         allowed = true;
         try {
             work();
-        } catch (...) { problem = std::current_exception(); }
+        } catch (...) {
+            problem = std::current_exception();
+        }
     }).join();
-    if (problem) std::rethrow_exception(problem);
+    if (problem) {
+        std::rethrow_exception(problem);
+    }
     return allowed;
 }
 
 std::vector<std::string> make_segment(int stations) {
-    std::string commands = "ip link add bridge0 type bridge stp_state 0 forward_delay 0 mcast_snooping 0 && ip link set bridge0 up";
+    std::string commands =
+        "ip link add bridge0 type bridge stp_state 0 forward_delay 0 mcast_snooping 0 && ip link "
+        "set bridge0 up";
     std::vector<std::string> names;
     for (int i = 0; i < stations; ++i) {
-        const std::string name = "bench" + std::to_string(i), plug = "plug" + std::to_string(i);
-        commands += " && ip link add " + name + " type veth peer name " + plug + " && ip link set " + plug +
-                    " master bridge0 up && ip link set " + name + " up";
+        const std::string name = "bench" + std::to_string(i);
+        const std::string plug = "plug" + std::to_string(i);
+        commands += " && ip link add " + name + " type veth peer name " + plug +
+                    " && ip link set " + plug + " master bridge0 up && ip link set " + name + " up";
         names.push_back(name);
     }
-    return std::system(("( " + commands + " ) 2>/dev/null").c_str()) == 0 ? names : std::vector<std::string>{};
+    return std::system(("( " + commands + " ) 2>/dev/null").c_str()) == 0
+               ? names
+               : std::vector<std::string>{};
 }
 
 void sleep_until(std::int64_t time) {
@@ -45,18 +54,25 @@ void sleep_until(std::int64_t time) {
 }
 
 void wait_until(std::int64_t time, std::int64_t spin_ns) {
-    if (time - link::monotonic_ns() > spin_ns) sleep_until(time - spin_ns);
-    while (link::monotonic_ns() < time) {}
+    if (time - link::monotonic_ns() > spin_ns) {
+        sleep_until(time - spin_ns);
+    }
+    while (link::monotonic_ns() < time) {
+    }
 }
 
 double trimmed_rms(std::vector<double>& samples) {
     if (samples.empty()) return 0.0;
     const double middle = median(samples);
-    for (double& s : samples) s = std::abs(s - middle);
+    for (double& s : samples) {
+        s = std::abs(s - middle);
+    }
     std::sort(samples.begin(), samples.end());
     const std::size_t kept = samples.size() - samples.size() / 100;
     double squares = 0.0;
-    for (std::size_t i = 0; i < kept; ++i) squares += samples[i] * samples[i];
+    for (std::size_t i = 0; i < kept; ++i) {
+        squares += samples[i] * samples[i];
+    }
     return std::sqrt(squares / static_cast<double>(kept));
 }
 

@@ -18,9 +18,13 @@ namespace hal::can::cane::test {
 using Address = ethernet::Address;
 using Bytes = std::vector<std::uint8_t>;
 
-inline Frame message(std::uint32_t id, std::initializer_list<std::uint8_t> data) { return {id, data}; }
+inline Frame message(std::uint32_t id, std::initializer_list<std::uint8_t> data) {
+    return {id, data};
+}
 
-inline constexpr Address a{2, 0, 0, 0, 0, 1}, b{2, 0, 0, 0, 0, 2}, c{2, 0, 0, 0, 0, 3};
+inline constexpr Address a{2, 0, 0, 0, 0, 1};
+inline constexpr Address b{2, 0, 0, 0, 0, 2};
+inline constexpr Address c{2, 0, 0, 0, 0, 3};
 
 inline std::unique_ptr<Link> opened(const std::string& address) {
     auto o = can::open(address);
@@ -30,7 +34,9 @@ inline std::unique_ptr<Link> opened(const std::string& address) {
 
 inline std::vector<Frame> all_of(Link& link, std::int64_t now) {
     std::vector<Frame> frames;
-    for (Frame f; link.receive(f, now);) frames.push_back(f);
+    for (Frame f; link.receive(f, now);) {
+        frames.push_back(f);
+    }
     return frames;
 }
 

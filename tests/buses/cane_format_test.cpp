@@ -14,9 +14,14 @@ namespace {
 Bytes packed(std::initializer_list<Frame> messages, Stamp stamp = {}) {
     Bytes whole(ethernet::largest_frame);
     std::fill_n(whole.begin(), 6, std::uint8_t{0xff});
-    whole[6] = 2, whole[11] = 9, whole[12] = 0x90, whole[13] = 0x23;
+    whole[6] = 2;
+    whole[11] = 9;
+    whole[12] = 0x90;
+    whole[13] = 0x23;
     std::size_t at = ethernet::header_bytes + packed_header;
-    for (const auto& f : messages) at += put_packed(f, std::span(whole).subspan(at));
+    for (const auto& f : messages) {
+        at += put_packed(f, std::span(whole).subspan(at));
+    }
     whole.resize(at);
     close_packed(whole, static_cast<std::uint8_t>(messages.size()), stamp);
     return whole;
@@ -44,18 +49,23 @@ TEST(CaneSingle, refuses_what_is_no_message) {
     EXPECT_EQ(wrong({0, 0, 8, 0, 0}), Wrong::form);        // 0x800 has no 11 bits
     EXPECT_EQ(wrong({0x20, 0, 1, 0x81, 0}), Wrong::form);  // an error frame
     const auto other = packed({message(0x80, {})});
-    EXPECT_EQ(get_single(std::span(other).subspan(ethernet::header_bytes), Order::big, f), Wrong::version);
-    EXPECT_EQ(get_single(std::span(other).subspan(ethernet::header_bytes), Order::little, f), Wrong::version);
+    EXPECT_EQ(get_single(std::span(other).subspan(ethernet::header_bytes), Order::big, f),
+              Wrong::version);
+    EXPECT_EQ(get_single(std::span(other).subspan(ethernet::header_bytes), Order::little, f),
+              Wrong::version);
 }
 
 TEST(CanePacked, is_as_its_description_says) {
-    const auto whole = packed({message(0x080, {}), message(0x201, {0xaa, 0xbb}), Frame::request(0x1abcdef0, 3)}, {0x1234, 0x5678});
+    const auto whole =
+        packed({message(0x080, {}), message(0x201, {0xaa, 0xbb}), Frame::request(0x1abcdef0, 3)},
+               {0x1234, 0x5678});
     const Bytes payload(whole.begin() + 14, whole.end());
     const Bytes head{0xec, 1, 3, 0xec, 0x34, 0x12, 0x78, 0x56};
     EXPECT_EQ(Bytes(payload.begin(), payload.begin() + 8), head);
     EXPECT_EQ(Bytes(payload.begin() + 10, payload.end()),
               (Bytes{0x80, 0x00, 0x01, 0x22, 0xaa, 0xbb, 0x00, 0xf0, 0xf0, 0xde, 0xbc, 0xda, 3}));
-    const std::string known = "123456789";  // the check value of CRC-16 with this polynomial and beginning
+    // the check value of CRC-16 with this polynomial and beginning
+    const std::string known = "123456789";
     EXPECT_EQ(crc16({reinterpret_cast<const std::uint8_t*>(known.data()), known.size()}), 0x29b1);
     Unpacker u;
     ASSERT_EQ(u.open(whole), Wrong::none);
@@ -69,14 +79,17 @@ TEST(CanePacked, is_as_its_description_says) {
 }
 
 TEST(CanePacked, takes_no_frame_with_a_byte_changed_or_cut_off) {
-    const auto whole = packed({message(0x080, {}), message(0x201, {1, 2, 3, 4, 5, 6, 7, 8}), message(0x601, {0x40})});
+    const auto whole = packed(
+        {message(0x080, {}), message(0x201, {1, 2, 3, 4, 5, 6, 7, 8}), message(0x601, {0x40})});
     Unpacker u;
     ASSERT_EQ(u.open(whole), Wrong::none);
     for (std::size_t at = 0; at < whole.size(); ++at) {
         for (unsigned change = 1; change < 256; ++change) {
             auto other = whole;
             other[at] = static_cast<std::uint8_t>(other[at] ^ change);
-            if (at == 12 || at == 13) continue;  // another Ethertype does not come here
+            if (at == 12 || at == 13) {
+                continue;  // another Ethertype does not come here
+            }
             EXPECT_NE(u.open(other), Wrong::none) << "byte " << at << " with " << change;
         }
         EXPECT_NE(u.open(std::span(whole).first(at)), Wrong::none) << "cut to " << at;
@@ -90,13 +103,17 @@ TEST(CanePacked, survives_random_bytes_with_a_right_check_sequence) {
     std::mt19937 random(1);
     for (int n = 0; n < 20000; ++n) {
         Bytes whole(ethernet::header_bytes + packed_header + random() % 64);
-        for (auto& b : whole) b = static_cast<std::uint8_t>(random());
+        for (auto& b : whole) {
+            b = static_cast<std::uint8_t>(random());
+        }
         close_packed(whole, static_cast<std::uint8_t>(random() % 12), {});
         Unpacker u;
         if (u.open(whole) != Wrong::none) continue;
         Frame f;
         unsigned count = 0;
-        for (; u.next(f); ++count) EXPECT_TRUE(f.valid());
+        for (; u.next(f); ++count) {
+            EXPECT_TRUE(f.valid());
+        }
         EXPECT_EQ(count, u.messages());
     }
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// CAN in Ethernet frames: which station has which node, what is lost, and links on a segment in memory.
+// CAN in Ethernet frames: which station has which node, what is lost, and links on a segment in
+// memory.
 #include <gtest/gtest.h>
 
 #include "can/cane/cane_format.hpp"
@@ -66,15 +67,21 @@ TEST(CaneStreams, find_back_when_it_is_the_memory_that_is_wrong) {
     Streams s;
     s.take(a, true, {1, 30000}, 0);
     int refused = 0;
-    for (std::uint16_t n = 0; n < 20; ++n) refused += s.take(a, true, {1, n}, 0).fresh ? 0 : 1;
+    for (std::uint16_t n = 0; n < 20; ++n) {
+        refused += s.take(a, true, {1, n}, 0).fresh ? 0 : 1;
+    }
     EXPECT_EQ(refused, 8);
 }
 
 TEST(CaneLink, carries_many_messages_in_one_frame_to_all_others) {
-    auto x = opened("cane:sim:many"), y = opened("cane:sim:many"), z = opened("cane:sim:many");
+    auto x = opened("cane:sim:many");
+    auto y = opened("cane:sim:many");
+    auto z = opened("cane:sim:many");
     auto listener = ethernet::open("sim:many");
     ASSERT_TRUE(listener);
-    for (std::uint8_t n = 1; n <= 6; ++n) ASSERT_EQ(x->send(message(0x200U + n, {n}), 0), Sent::queued);
+    for (std::uint8_t n = 1; n <= 6; ++n) {
+        ASSERT_EQ(x->send(message(0x200U + n, {n}), 0), Sent::queued);
+    }
     x->send(message(0x080, {}), 0);
     x->flush(0);
     for (auto* link : {y.get(), z.get()}) {
@@ -93,7 +100,8 @@ TEST(CaneLink, carries_many_messages_in_one_frame_to_all_others) {
 }
 
 TEST(CaneLink, process_data_goes_before_the_rest) {
-    auto x = opened("cane:sim:order"), y = opened("cane:sim:order");
+    auto x = opened("cane:sim:order");
+    auto y = opened("cane:sim:order");
     x->send(message(0x605, {0x40}), 0);
     x->send(message(0x080, {}), 0);
     x->flush(0);
@@ -103,7 +111,10 @@ TEST(CaneLink, process_data_goes_before_the_rest) {
 }
 
 TEST(CaneLink, a_message_for_one_node_goes_to_its_station_alone) {
-    auto master = opened("cane:sim:one"), five = opened("cane:sim:one"), six = opened("cane:sim:one");
+    auto master = opened("cane:sim:one");
+    auto five = opened("cane:sim:one");
+
+    auto six = opened("cane:sim:one");
     five->send(message(0x705, {0}), 0);
     five->flush(0);
     ASSERT_EQ(all_of(*master, 1'000'000).size(), 1U);
@@ -119,23 +130,29 @@ TEST(CaneLink, a_message_for_one_node_goes_to_its_station_alone) {
 }
 
 TEST(CaneLink, single_frames_carry_one_message_each_in_the_order_asked_for) {
-    auto x = opened("cane:sim:single?format=single&order=little"), y = opened("cane:sim:single?format=single&order=little");
+    auto x = opened("cane:sim:single?format=single&order=little");
+
+    auto y = opened("cane:sim:single?format=single&order=little");
     auto other = opened("cane:sim:single?format=single");
     auto listener = ethernet::open("sim:single");
     x->send(message(0x181, {1, 2}), 0);
     x->send(message(0x281, {3}), 0);
     x->flush(0);
     EXPECT_EQ(all_of(*y, 1'000'000).size(), 2U);
-    for (const auto& f : all_of(*other, 1'000'000)) EXPECT_TRUE(f.extended) << "read the other way round it is another message";
+    for (const auto& f : all_of(*other, 1'000'000)) {
+        EXPECT_TRUE(f.extended) << "read the other way round it is another message";
+    }
     const auto first = listener.port->receive(1'000'000);
     ASSERT_TRUE(first);
     EXPECT_EQ(first->bytes.size(), 60U);
-    EXPECT_EQ(Bytes(first->bytes.begin() + 14, first->bytes.begin() + 21), (Bytes{0x81, 1, 0, 0, 2, 1, 2}));
+    EXPECT_EQ(Bytes(first->bytes.begin() + 14, first->bytes.begin() + 21),
+              (Bytes{0x81, 1, 0, 0, 2, 1, 2}));
     EXPECT_TRUE(listener.port->receive(1'000'000));
 }
 
 TEST(CaneLink, lost_doubled_and_garbled_frames_are_counted_and_never_passed_on) {
-    auto x = opened("cane:sim:faulty"), y = opened("cane:sim:faulty");
+    auto x = opened("cane:sim:faulty");
+    auto y = opened("cane:sim:faulty");
     auto listener = ethernet::open("sim:faulty");
     auto& segment = *listener.port->segment();
     std::uint64_t now = 0;
@@ -155,13 +172,16 @@ TEST(CaneLink, lost_doubled_and_garbled_frames_are_counted_and_never_passed_on) 
         x->send(message(0x181, {n}), static_cast<std::int64_t>(now));
         x->flush(static_cast<std::int64_t>(now));
         now += 1'000'000;
-        for (const auto& f : all_of(*y, static_cast<std::int64_t>(now))) EXPECT_TRUE(f.same(message(0x181,
-             {n}))) << "only its padding was hit";
+        for (const auto& f : all_of(*y, static_cast<std::int64_t>(now))) {
+            EXPECT_TRUE(f.same(message(0x181, {n}))) << "only its padding was hit";
+        }
     }
     segment.calm();
     segment.disturb({.fault = ethernet::Fault::loss, .every = 2});
     std::size_t came = 0;
-    for (std::uint8_t n = 0; n < 10; ++n) came += send(n);
+    for (std::uint8_t n = 0; n < 10; ++n) {
+        came += send(n);
+    }
     EXPECT_EQ(came, 5U);
     segment.calm();
     EXPECT_EQ(send(9), 1U);
@@ -169,7 +189,8 @@ TEST(CaneLink, lost_doubled_and_garbled_frames_are_counted_and_never_passed_on) 
 }
 
 TEST(CaneLink, is_down_without_a_cable_and_comes_back) {
-    auto x = opened("cane:sim:cable/x"), y = opened("cane:sim:cable");
+    auto x = opened("cane:sim:cable/x");
+    auto y = opened("cane:sim:cable");
     auto port = ethernet::open("sim:cable/x");
     auto& segment = *port.port->segment();
     Frame f;
@@ -192,10 +213,13 @@ struct Slots final : ethernet::Discipline {
     std::vector<std::pair<Bytes, unsigned>> queue;
     std::size_t most = 2;
     bool is_ready = true;
-    ethernet::Sent send(std::span<const std::uint8_t> frame, unsigned, unsigned priority, ethernet::Finisher* finisher) noexcept override {
+    ethernet::Sent send(std::span<const std::uint8_t> frame, unsigned, unsigned priority,
+                        ethernet::Finisher* finisher) noexcept override {
         if (queue.size() == most) return ethernet::Sent::full;
         queue.emplace_back(Bytes(frame.begin(), frame.end()), priority);
-        if (finisher != nullptr) finisher->leaves(queue.back().first);
+        if (finisher != nullptr) {
+            finisher->leaves(queue.back().first);
+        }
         return ethernet::Sent::queued;
     }
     std::size_t room(unsigned slot) const noexcept override { return slot == 2 ? 60 : 0; }
@@ -206,12 +230,15 @@ struct Slots final : ethernet::Discipline {
 TEST(CaneLink, in_a_slot_keeps_what_does_not_fit_for_the_next_cycle) {
     Slots slots;
     const auto line = ethernet::open("sim:slots/x");
-    ASSERT_TRUE(ethernet::offer_discipline(*line.port, &slots, {{2, {{.station = "y", .there_ns = 7}}}}));
+    ASSERT_TRUE(
+        ethernet::offer_discipline(*line.port, &slots, {{2, {{.station = "y", .there_ns = 7}}}}));
     EXPECT_NE(can::open("cane:sim:slots/x?slot=3").problem, "");
     auto x = opened("cane:sim:slots/x?slot=2");
     ASSERT_EQ(x->delivery_times().size(), 1U);
     EXPECT_EQ(x->delivery_times().front().there_ns, 7);
-    for (std::uint8_t n = 1; n <= 20; ++n) x->send(message(0x200U + n, {n, 0, 0, 0, 0, 0, 0, 0}), 0);
+    for (std::uint8_t n = 1; n <= 20; ++n) {
+        x->send(message(0x200U + n, {n, 0, 0, 0, 0, 0, 0, 0}), 0);
+    }
     x->send(message(0x605, {0x40}), 0);
     x->flush(0);
     ASSERT_EQ(slots.queue.size(), 2U);
@@ -226,11 +253,13 @@ TEST(CaneLink, in_a_slot_keeps_what_does_not_fit_for_the_next_cycle) {
     ASSERT_EQ(slots.queue.size(), 3U);
     ASSERT_EQ(u.open(slots.queue[0].first), Wrong::none);
     EXPECT_EQ(u.stamp().sequence, 2);
-    EXPECT_EQ(slots.queue.back().second, 9U);  // ten of process data fill two frames, the request is alone
+    // ten of process data fill two frames, the request is alone
+    EXPECT_EQ(slots.queue.back().second, 9U);
     const auto session = u.stamp().session;
     ASSERT_EQ(u.open(slots.queue.back().first), Wrong::none);
     EXPECT_EQ(u.stamp().session, session ^ 0x8000);
-    EXPECT_EQ(u.stamp().sequence, 0) << "frames of services alone may be overtaken, and have numbers of their own";
+    EXPECT_EQ(u.stamp().sequence, 0)
+        << "frames of services alone may be overtaken, and have numbers of their own";
     slots.is_ready = false;
     Frame f;
     x->receive(f, 2'000'000);
@@ -261,20 +290,28 @@ TEST(CaneLink, that_missed_a_turn_sends_the_newest_in_the_next) {
             x->send(message(0x000, {1, cycle}), 0);  // each NMT command counts
             x->send(message(0x201, {cycle}), 0);
             x->send(message(0x605, {0x40, cycle}), 0);
-            if (cycle == 4) x->send(message(0x202, {cycle}), 0);
+            if (cycle == 4) {
+                x->send(message(0x202, {cycle}), 0);
+            }
             x->flush(0);
         }
         slots.most = 100;
         x->flush(0);
         Bytes sent;  // the cycle that each message is of; SYNC has none
-        const auto note = [&sent](const Frame& f) { sent.push_back(f.id == 0x080 ? 0x80 : f.data[f.length - 1]); };
+        const auto note = [&sent](const Frame& f) {
+            sent.push_back(f.id == 0x080 ? 0x80 : f.data[f.length - 1]);
+        };
         for (auto& [whole, priority] : slots.queue) {
             Frame f;
             Unpacker packed_frame;
-            if (packed_frame.open(whole) == Wrong::none)
-                while (packed_frame.next(f)) note(f);
-            else if (get_single(std::span(whole).subspan(ethernet::header_bytes), Order::big, f) == Wrong::none)
+            if (packed_frame.open(whole) == Wrong::none) {
+                while (packed_frame.next(f)) {
+                    note(f);
+                }
+            } else if (get_single(std::span(whole).subspan(ethernet::header_bytes), Order::big,
+                                  f) == Wrong::none) {
                 note(f);
+            }
         }
         EXPECT_EQ(sent, (Bytes{0x80, 1, 5, 2, 3, 4, 4, 5, 1, 2, 3, 4, 5})) << format;
         EXPECT_EQ(x->statistics().dropped, 8U) << "four SYNCs, four PDOs";
@@ -296,15 +333,22 @@ TEST(CaneDescribe, names_the_segment_without_opening_it) {
 }
 
 TEST(CaneOpen, reports_what_is_wrong_and_what_to_type) {
-    EXPECT_EQ(can::open("cane:").problem, "cane:: missing interface; write cane:enp3s0, or cane:sim:bus0 for a segment in memory");
-    EXPECT_EQ(can::open("cane:sim:x?format=both").problem, "cane:sim:x?format=both: invalid format 'both'; write single or packed");
-    EXPECT_EQ(can::open("cane:sim:x?slot=2").problem,
-              "cane:sim:x?slot=2: no TDMA runs on sim:x; loadrt tdma for it first, or remove slot=");
+    EXPECT_EQ(
+        can::open("cane:").problem,
+        "cane:: missing interface; write cane:enp3s0, or cane:sim:bus0 for a segment in memory");
+    EXPECT_EQ(can::open("cane:sim:x?format=both").problem,
+              "cane:sim:x?format=both: invalid format 'both'; write single or packed");
+    EXPECT_EQ(
+        can::open("cane:sim:x?slot=2").problem,
+        "cane:sim:x?slot=2: no TDMA runs on sim:x; loadrt tdma for it first, or remove slot=");
     EXPECT_EQ(can::open("cane:sim:x?node5=1").problem,
-              "cane:sim:x?node5=1: invalid node5 '1'; write the address of a station, as in 02:00:00:00:00:05");
+              "cane:sim:x?node5=1: invalid node5 '1'; write the address of a station, as in "
+              "02:00:00:00:00:05");
     EXPECT_EQ(can::open("cane:sim:x?node200=02:00:00:00:00:05").problem,
-              "cane:sim:x?node200=02:00:00:00:00:05: invalid node 'node200'; write node5=02:00:00:00:00:05");
-    EXPECT_EQ(can::open("cane:sim:x?fd").problem, "cane:sim:x?fd: 0x9023 frames cannot carry CAN FD; remove fd");
+              "cane:sim:x?node200=02:00:00:00:00:05: invalid node 'node200'; write "
+              "node5=02:00:00:00:00:05");
+    EXPECT_EQ(can::open("cane:sim:x?fd").problem,
+              "cane:sim:x?fd: 0x9023 frames cannot carry CAN FD; remove fd");
 }
 
 }  // namespace

@@ -22,7 +22,8 @@ constexpr std::uint16_t type = 0x88a4;
 link::Descriptor any_socket(std::uint16_t& port) {
     link::Descriptor fd(::socket(AF_INET, SOCK_DGRAM, 0));
     sockaddr_in at{};
-    at.sin_family = AF_INET, at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    at.sin_family = AF_INET;
+    at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
     (void)bind(fd.get(), reinterpret_cast<const sockaddr*>(&at), sizeof at);
     socklen_t size = sizeof at;
     getsockname(fd.get(), reinterpret_cast<sockaddr*>(&at), &size);
@@ -38,8 +39,11 @@ std::string free_place() {
 std::vector<std::uint8_t> frame(std::size_t length, std::uint8_t first = 0) {
     std::vector<std::uint8_t> bytes(length);
     std::memset(bytes.data(), 0xff, 6);
-    bytes[12] = type >> 8, bytes[13] = type & 0xff;
-    for (std::size_t n = header_bytes; n < length; ++n) bytes[n] = static_cast<std::uint8_t>(first + n);
+    bytes[12] = type >> 8;
+    bytes[13] = type & 0xff;
+    for (std::size_t n = header_bytes; n < length; ++n) {
+        bytes[n] = static_cast<std::uint8_t>(first + n);
+    }
     return bytes;
 }
 
@@ -50,13 +54,19 @@ struct UdpEnds : testing::Test {
     std::unique_ptr<Port> other() const { return open(address, {.types = {type}}).port; }
     /// Returns the next frame, or none within a second.
     static std::vector<std::uint8_t> next(Port& port) {
-        if (!port.wait(link::monotonic_ns() + second)) return {};
+        if (!port.wait(link::monotonic_ns() + second)) {
+            return {};
+        }
         const auto arrival = port.receive(unclocked);
-        return arrival ? std::vector<std::uint8_t>(arrival->bytes.begin(), arrival->bytes.end()) : std::vector<std::uint8_t>();
+        return arrival ? std::vector<std::uint8_t>(arrival->bytes.begin(), arrival->bytes.end())
+                       : std::vector<std::uint8_t>();
     }
     /// Takes announcements.
     void settle() const {
-        for (int n = 0; n < 3; ++n) line->wait(link::monotonic_ns() + second / 100), line->receive(unclocked);
+        for (int n = 0; n < 3; ++n) {
+            line->wait(link::monotonic_ns() + second / 100);
+            line->receive(unclocked);
+        }
     }
 };
 
@@ -91,11 +101,14 @@ TEST_F(UdpEnds, Short_datagrams_are_padded_and_long_ones_counted_as_errors) {
     std::uint16_t port = 0;
     const auto stranger = any_socket(port);
     sockaddr_in to{};
-    to.sin_family = AF_INET, to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    to.sin_port = htons(static_cast<std::uint16_t>(std::stoi(address.substr(address.rfind(':') + 1))));
+    to.sin_family = AF_INET;
+    to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    to.sin_port =
+        htons(static_cast<std::uint16_t>(std::stoi(address.substr(address.rfind(':') + 1))));
     const std::array<std::uint8_t, 1501> data{7};
     const auto post = [&](std::size_t length) {
-        return sendto(stranger.get(), data.data(), length, 0, reinterpret_cast<const sockaddr*>(&to), sizeof to) >= 0;
+        return sendto(stranger.get(), data.data(), length, 0,
+                      reinterpret_cast<const sockaddr*>(&to), sizeof to) >= 0;
     };
     ASSERT_TRUE(post(1501) && post(0) && post(1));
     const auto short_one = next(*line);
@@ -107,7 +120,8 @@ TEST_F(UdpEnds, Short_datagrams_are_padded_and_long_ones_counted_as_errors) {
 }
 
 TEST_F(UdpEnds, Every_end_that_announced_itself_receives_what_the_line_sends) {
-    const auto master = other(), listener = other();
+    const auto master = other();
+    const auto listener = other();
     settle();
     ASSERT_EQ(line->send(frame(100, 3), {}, unclocked), Sent::queued);
     EXPECT_EQ(next(*master).size(), 100U);
@@ -140,19 +154,29 @@ TEST_F(UdpEnds, The_link_is_down_while_no_program_listens) {
 
 TEST(UdpAddresses, Problems_name_what_to_write) {
     const Options one{.types = {type}};
-    EXPECT_EQ(open("udp:127.0.0.1").problem, "udp:127.0.0.1: UDP datagrams carry frames of one type only; write eth:enp3s0 or sim:NAME");
-    EXPECT_EQ(open("udp:", one).problem, "udp:: missing host; write udp:127.0.0.1 for this machine");
-    EXPECT_EQ(open("udp:127.0.0.1:0", one).problem, "udp:127.0.0.1:0: invalid port '0'; write udp:127.0.0.1:34980");
-    EXPECT_EQ(open("udp:127.0.0.1:", one).problem, "udp:127.0.0.1:: invalid port ''; write udp:127.0.0.1:34980");
-    EXPECT_EQ(open("udp:127.0.0.1:7x", one).problem, "udp:127.0.0.1:7x: invalid port '7x'; write udp:127.0.0.1:34980");
-    EXPECT_EQ(open("udp:127.0.0.1?pacer", one).problem, "udp:127.0.0.1?pacer: udp does not support the option 'pacer'; remove it");
-    EXPECT_TRUE(open("udp:300.0.0.1", one).problem.starts_with("udp:300.0.0.1: no IPv4 address for host '300.0.0.1': "));
+    EXPECT_EQ(
+        open("udp:127.0.0.1").problem,
+        "udp:127.0.0.1: UDP datagrams carry frames of one type only; write eth:enp3s0 or sim:NAME");
+    EXPECT_EQ(open("udp:", one).problem,
+              "udp:: missing host; write udp:127.0.0.1 for this machine");
+    EXPECT_EQ(open("udp:127.0.0.1:0", one).problem,
+              "udp:127.0.0.1:0: invalid port '0'; write udp:127.0.0.1:34980");
+    EXPECT_EQ(open("udp:127.0.0.1:", one).problem,
+              "udp:127.0.0.1:: invalid port ''; write udp:127.0.0.1:34980");
+    EXPECT_EQ(open("udp:127.0.0.1:7x", one).problem,
+              "udp:127.0.0.1:7x: invalid port '7x'; write udp:127.0.0.1:34980");
+    EXPECT_EQ(open("udp:127.0.0.1?pacer", one).problem,
+              "udp:127.0.0.1?pacer: udp does not support the option 'pacer'; remove it");
+    EXPECT_TRUE(open("udp:300.0.0.1", one)
+                    .problem.starts_with("udp:300.0.0.1: no IPv4 address for host '300.0.0.1': "));
     EXPECT_EQ(open("udp:192.0.2.1", {.types = {type}, .listen = true}).problem,
-              "udp:192.0.2.1: 192.0.2.1 is not an address of this machine; to listen on all of them, write udp:0.0.0.0");
+              "udp:192.0.2.1: 192.0.2.1 is not an address of this machine; to listen on all of "
+              "them, write udp:0.0.0.0");
     const auto address = "udp:" + free_place();
     const auto first = open(address, {.types = {type}, .listen = true});
     EXPECT_EQ(open(address, {.types = {type}, .listen = true}).problem,
-              address + ": cannot listen on " + address.substr(4) + ": Address already in use; to find the program that does: ss -ulpn");
+              address + ": cannot listen on " + address.substr(4) +
+                  ": Address already in use; to find the program that does: ss -ulpn");
     EXPECT_TRUE(describe("udp:127.0.0.1").datagrams);
     EXPECT_TRUE(describe("replay:seen.pcapng").recorded);
 }

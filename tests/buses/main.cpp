@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The tests, or `--echo ADDRESS`: sends every frame back with the lowest bit of its identifier turned over, until it is killed.
+// The tests, or `--echo ADDRESS`: sends every frame back with the lowest bit of its identifier
+// turned over, until it is killed.
 #include <gtest/gtest.h>
 
 #include <cstdio>

@@ -20,7 +20,9 @@ public:
         const std::string text{std::istreambuf_iterator<char>(in), {}};
         copy_ = memfd_create("plugin", MFD_CLOEXEC);
         EXPECT_EQ(write(copy_, text.data(), text.size()), static_cast<ssize_t>(text.size()));
-        library_ = dlopen(("/proc/" + std::to_string(getpid()) + "/fd/" + std::to_string(copy_)).c_str(), RTLD_NOW | RTLD_LOCAL);
+        library_ =
+            dlopen(("/proc/" + std::to_string(getpid()) + "/fd/" + std::to_string(copy_)).c_str(),
+                   RTLD_NOW | RTLD_LOCAL);
         EXPECT_NE(library_, nullptr) << dlerror();
     }
     ~Plugin() {
@@ -49,7 +51,8 @@ TEST(Plugins, meet_on_one_bus_although_they_hide_their_symbols) {
         EXPECT_EQ(a.get<std::uint32_t(std::int64_t)>("bus_user_receive")(2'000'000), 0x123U);
         b.get<void()>("bus_user_close")();
     }
-    a.get<void(std::uint32_t, std::int64_t)>("bus_user_send")(0x124, 3'000'000);  // b's code has gone, the bus has not
+    // b's code has gone, the bus has not
+    a.get<void(std::uint32_t, std::int64_t)>("bus_user_send")(0x124, 3'000'000);
     EXPECT_EQ(a.get<std::uint32_t(std::int64_t)>("bus_user_receive")(4'000'000), 0U);
     a.get<void()>("bus_user_close")();
 }

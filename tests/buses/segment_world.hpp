@@ -11,7 +11,8 @@
 
 namespace hal::ethernet::segment_world {
 
-inline constexpr std::int64_t ms = 1'000'000, us = 1'000;
+inline constexpr std::int64_t ms = 1'000'000;
+inline constexpr std::int64_t us = 1'000;
 inline constexpr std::int64_t minimum_ns = 84 * 80;       // a frame of 60 bytes at 100 Mbit/s
 inline constexpr std::int64_t one_way_ns = 2 * minimum_ns + 2 * us;  // both lines and the switch
 
@@ -29,7 +30,8 @@ inline std::string fresh() {  // a segment of its own for every test
 inline Bytes frame_to(const Address& to, const Port& from, std::uint16_t type, Bytes payload) {
     Bytes f(to.begin(), to.end());
     f.insert(f.end(), from.address().begin(), from.address().end());
-    f.push_back(static_cast<std::uint8_t>(type >> 8)), f.push_back(static_cast<std::uint8_t>(type));
+    f.push_back(static_cast<std::uint8_t>(type >> 8));
+    f.push_back(static_cast<std::uint8_t>(type));
     f.insert(f.end(), payload.begin(), payload.end());
     return f;
 }
@@ -40,12 +42,16 @@ struct Got {
 };
 inline std::vector<Got> all(Port& port, std::int64_t now) {
     std::vector<Got> got;
-    while (const auto a = port.receive(now)) got.push_back({{a->bytes.begin(), a->bytes.end()}, a->time_ns});
+    while (const auto a = port.receive(now)) {
+        got.push_back({{a->bytes.begin(), a->bytes.end()}, a->time_ns});
+    }
     return got;
 }
 inline std::string firsts(const std::vector<Got>& got) {
     std::string s;
-    for (const auto& g : got) s += static_cast<char>('0' + g.first());
+    for (const auto& g : got) {
+        s += static_cast<char>('0' + g.first());
+    }
     return s;
 }
 

@@ -41,7 +41,9 @@ struct Adapter {
         std::filesystem::rename(folder / "next", device);
     }
     void unplug() {
-        if (end >= 0) ::close(end);
+        if (end >= 0) {
+            ::close(end);
+        }
         end = -1;
     }
     /// What came until now, or, when `until` is given, until that came.
@@ -59,7 +61,9 @@ struct Adapter {
         }
         return text;
     }
-    void say(const std::string& text) const { EXPECT_EQ(::write(end, text.data(), text.size()), static_cast<ssize_t>(text.size())); }
+    void say(const std::string& text) const {
+        EXPECT_EQ(::write(end, text.data(), text.size()), static_cast<ssize_t>(text.size()));
+    }
 
     std::filesystem::path folder, device;
     int end = -1;
@@ -68,7 +72,10 @@ struct Adapter {
 TEST(Slcan, a_line_that_is_pulled_out_and_plugged_in_again_goes_on_without_old_frames) {
     Adapter adapter;
     adapter.plug();
-    if (adapter.end < 0) GTEST_SKIP() << "the system gives no pseudo-terminal: " << std::strerror(errno);  // qemu-user in a user namespace
+    // qemu-user in a user namespace
+    if (adapter.end < 0) {
+        GTEST_SKIP() << "the system gives no pseudo-terminal: " << std::strerror(errno);
+    }
     auto opened = open("slcan:" + adapter.device.string() + "?bitrate=500k");
     ASSERT_TRUE(opened) << opened.problem;
     auto& link = *opened.link;
@@ -80,10 +87,12 @@ TEST(Slcan, a_line_that_is_pulled_out_and_plugged_in_again_goes_on_without_old_f
     EXPECT_TRUE(f.same({0x123, {0x11, 0x22}}));
 
     // More than the line takes: some of it is written, some waits behind half a line.
-    while (link.send({0x7ff, {1, 2, 3, 4, 5, 6, 7, 8}}, unclocked) == Sent::queued) {}
+    while (link.send({0x7ff, {1, 2, 3, 4, 5, 6, 7, 8}}, unclocked) == Sent::queued) {
+    }
     EXPECT_GT(link.statistics().queued, 0U);
     adapter.say("t4562");  // and half a line comes
-    while (link.receive(f, unclocked)) {}
+    while (link.receive(f, unclocked)) {
+    }
     adapter.unplug();
     ASSERT_TRUE(link.wait(20 * second));
     EXPECT_FALSE(link.receive(f, unclocked));
@@ -109,18 +118,23 @@ TEST(Slcan, a_line_that_is_pulled_out_and_plugged_in_again_goes_on_without_old_f
     EXPECT_TRUE(f.same({0x321, {0xff}}));
 }
 
-// At 10 kbit/s what is queued needs seconds: the safe values at its end must arrive all the same, and a reader that is gone must not block.
+// At 10 kbit/s what is queued needs seconds: the safe values at its end must arrive all the same,
+// and a reader that is gone must not block.
 TEST(Slcan, a_slow_line_gets_all_that_is_queued_before_it_is_closed) {
     Adapter adapter;
     adapter.plug();
-    if (adapter.end < 0) GTEST_SKIP() << "the system gives no pseudo-terminal: " << std::strerror(errno);
+    if (adapter.end < 0) {
+        GTEST_SKIP() << "the system gives no pseudo-terminal: " << std::strerror(errno);
+    }
     auto opened = open("slcan:" + adapter.device.string() + "?bitrate=10k");
     ASSERT_TRUE(opened) << opened.problem;
     adapter.heard("O\r");
     EXPECT_EQ(opened.link->closing_ns(), 0);
     std::size_t sent = 0;
     const Frame frame(0x123, {1, 2, 3, 4, 5, 6, 7, 8});
-    while (opened.link->send(frame, unclocked) == Sent::queued) ++sent;
+    while (opened.link->send(frame, unclocked) == Sent::queued) {
+        ++sent;
+    }
     EXPECT_GT(opened.link->closing_ns(), 2 * second);
     EXPECT_LE(opened.link->closing_ns(), 60 * second);
     std::string text;
@@ -134,7 +148,8 @@ TEST(Slcan, a_slow_line_gets_all_that_is_queued_before_it_is_closed) {
 TEST(Slcan, a_line_that_is_not_there_is_refused_with_what_to_look_at) {
     const auto opened = open("slcan:/dev/no-such-line");
     ASSERT_FALSE(opened);
-    EXPECT_EQ(opened.problem, "slcan:/dev/no-such-line: no such device; to list adapters: ls /dev/serial/by-id");
+    EXPECT_EQ(opened.problem,
+              "slcan:/dev/no-such-line: no such device; to list adapters: ls /dev/serial/by-id");
 }
 
 }  // namespace

@@ -19,13 +19,17 @@ void put(Schema& s, std::size_t field, T value) {
 }
 std::string names(const Schema& s) {
     std::string all;
-    for (const Field& f : s.fields) all += f.name + " ";
+    for (const Field& f : s.fields) {
+        all += f.name + " ";
+    }
     return all;
 }
 std::string rejection(std::string_view fields) {
     try {
         Schema::of_fields(fields);
-    } catch (const std::invalid_argument& e) { return e.what(); }
+    } catch (const std::invalid_argument& e) {
+        return e.what();
+    }
     return "accepted";
 }
 std::vector<hal_value> decoded(const Schema& s, const Bytes& bytes) {
@@ -69,7 +73,8 @@ TEST(Schema, decode_accepts_big_endian_and_XCDR2) {
     auto v = decoded(s, big);
     EXPECT_EQ(5, v[0].s32);
     EXPECT_EQ(2.5, v[1].real);
-    const Bytes second{0, 7, 0, 0, 5, 0, 0, 0, 0, 0, 0, 0, 0, 0, 4, 0x40};  // no gap before the double
+    // no gap before the double
+    const Bytes second{0, 7, 0, 0, 5, 0, 0, 0, 0, 0, 0, 0, 0, 0, 4, 0x40};
     v = decoded(s, second);
     EXPECT_EQ(5, v[0].s32);
     EXPECT_EQ(2.5, v[1].real);
@@ -93,52 +98,75 @@ TEST(Schema, of_fields_derives_different_type_names_from_different_fields) {
 }
 
 TEST(Schema, of_fields_rejects_invalid_fields_with_the_reason) {
-    EXPECT_EQ("fields: 'angle' has no type; write NAME:TYPE, as in angle:float,ready:bit", rejection("angle"));
-    EXPECT_EQ("fields: 'angle:real': unknown type 'real'; types are bit, float, s32, u32, s64, u64", rejection("angle:real"));
+    EXPECT_EQ("fields: 'angle' has no type; write NAME:TYPE, as in angle:float,ready:bit",
+              rejection("angle"));
+    EXPECT_EQ("fields: 'angle:real': unknown type 'real'; types are bit, float, s32, u32, s64, u64",
+              rejection("angle:real"));
     EXPECT_EQ("fields: 'a:float*0': invalid count after *; write 1..1024", rejection("a:float*0"));
-    EXPECT_EQ("fields: 'a:float*5000': invalid count after *; write 1..1024", rejection("a:float*5000"));
+    EXPECT_EQ("fields: 'a:float*5000': invalid count after *; write 1..1024",
+              rejection("a:float*5000"));
     EXPECT_EQ("fields: 'a:s32=1.5': '1.5' is not a s32", rejection("a:s32=1.5"));
     EXPECT_EQ("fields: duplicate field 'a'", rejection("a:float,b:bit,a:bit"));
-    EXPECT_EQ("fields: 'a b:float': 'a b' is not a valid pin name; use letters, digits, - _ and .", rejection("a b:float"));
-    EXPECT_EQ("fields: '' has no type; write NAME:TYPE, as in angle:float,ready:bit", rejection("a:float,"));
-    EXPECT_EQ("fields: more than 1024 fields; split them into two topics", rejection("a:bit*600,b:bit*600"));
+    EXPECT_EQ("fields: 'a b:float': 'a b' is not a valid pin name; use letters, digits, - _ and .",
+              rejection("a b:float"));
+    EXPECT_EQ("fields: '' has no type; write NAME:TYPE, as in angle:float,ready:bit",
+              rejection("a:float,"));
+    EXPECT_EQ("fields: more than 1024 fields; split them into two topics",
+              rejection("a:bit*600,b:bit*600"));
 }
 
 TEST(Schema, of_ros_uses_the_names_and_fields_of_the_message) {
     EXPECT_EQ("std_msgs::msg::dds_::Float64_", Schema::of_ros("std_msgs/Float64").type);
     EXPECT_EQ("rt/", Schema::of_ros("std_msgs/Bool").prefix);
     EXPECT_EQ("data ", names(Schema::of_ros("std_msgs/Int32")));
-    EXPECT_EQ("linear-x linear-y linear-z angular-x angular-y angular-z ", names(Schema::of_ros("geometry_msgs/Twist")));
-    EXPECT_EQ("force-x force-y force-z torque-x torque-y torque-z ", names(Schema::of_ros("geometry_msgs/WrenchStamped")));
+    EXPECT_EQ("linear-x linear-y linear-z angular-x angular-y angular-z ",
+              names(Schema::of_ros("geometry_msgs/Twist")));
+    EXPECT_EQ("force-x force-y force-z torque-x torque-y torque-z ",
+              names(Schema::of_ros("geometry_msgs/WrenchStamped")));
     EXPECT_EQ("a-position b-position a-velocity b-velocity a-effort b-effort ",
               names(Schema::of_ros("sensor_msgs/JointState", {"a", "b"})));
     EXPECT_EQ("height width step ", names(Schema::of_ros("sensor_msgs/Image")));
 }
 
 TEST(Schema, of_ros_rejects_invalid_messages_with_the_reason) {
-    const auto rejection = [](const char* type, const std::vector<std::string>& joints) -> std::string {
+    const auto rejection = [](const char* type,
+                              const std::vector<std::string>& joints) -> std::string {
         try {
             Schema::of_ros(type, joints);
-        } catch (const std::invalid_argument& e) { return e.what(); }
+        } catch (const std::invalid_argument& e) {
+            return e.what();
+        }
         return "accepted";
     };
-    EXPECT_EQ("ros=sensor_msgs/JointState: missing joint names; write joints=shoulder,elbow", rejection("sensor_msgs/JointState", {}));
+    EXPECT_EQ("ros=sensor_msgs/JointState: missing joint names; write joints=shoulder,elbow",
+              rejection("sensor_msgs/JointState", {}));
     EXPECT_EQ("joints: duplicate joint 'a'", rejection("sensor_msgs/JointState", {"a", "b", "a"}));
-    EXPECT_EQ("joints: 'a b': 'a b' is not a valid pin name; use letters, digits, - _ and .", rejection("sensor_msgs/JointState", {"a b"}));
+    EXPECT_EQ("joints: 'a b': 'a b' is not a valid pin name; use letters, digits, - _ and .",
+              rejection("sensor_msgs/JointState", {"a b"}));
     EXPECT_EQ("joints: more than 256 joints; split them into two topics",
               rejection("sensor_msgs/JointState", std::vector<std::string>(257, "a")));
-    EXPECT_EQ("ros=sensor_msgs/Imu: unsupported message type; supported are std_msgs/Float64 Bool Int32 UInt32 Int64 UInt64, "
-              "geometry_msgs/Twist WrenchStamped, sensor_msgs/JointState Image; other types that consist of plain numbers: fields= and type=",
-              rejection("sensor_msgs/Imu", {}));
+    EXPECT_EQ(
+        "ros=sensor_msgs/Imu: unsupported message type; supported are std_msgs/Float64 Bool Int32 "
+        "UInt32 Int64 UInt64, "
+        "geometry_msgs/Twist WrenchStamped, sensor_msgs/JointState Image; other types that consist "
+        "of plain numbers: fields= and type=",
+        rejection("sensor_msgs/Imu", {}));
     std::vector<std::string> long_names;
-    for (int i = 0; i < 256; ++i) long_names.push_back(std::to_string(i) + std::string(250, 'j'));
-    EXPECT_EQ("ros=sensor_msgs/JointState: the message exceeds 60000 bytes; shorten joints=, frame= or encoding=",
-              rejection("sensor_msgs/JointState", long_names));
+    for (int i = 0; i < 256; ++i) {
+        long_names.push_back(std::to_string(i) + std::string(250, 'j'));
+    }
+    EXPECT_EQ(
+        "ros=sensor_msgs/JointState: the message exceeds 60000 bytes; shorten joints=, frame= or "
+        "encoding=",
+        rejection("sensor_msgs/JointState", long_names));
 }
 
 TEST(Schema, decode_matches_joints_by_name) {
-    Schema theirs = Schema::of_ros("sensor_msgs/JointState", {"elbow", "wrist", "shoulder"}, "base");
-    for (std::size_t i = 0; i < 9; ++i) put(theirs, i, static_cast<double>(i + 1));
+    Schema theirs =
+        Schema::of_ros("sensor_msgs/JointState", {"elbow", "wrist", "shoulder"}, "base");
+    for (std::size_t i = 0; i < 9; ++i) {
+        put(theirs, i, static_cast<double>(i + 1));
+    }
     const Schema ours = Schema::of_ros("sensor_msgs/JointState", {"shoulder", "elbow", "tool"});
     std::vector<hal_value> v(9);
     v[2].real = 77;  // the tool, a joint that the sample does not contain
@@ -151,12 +179,17 @@ TEST(Schema, decode_matches_joints_by_name) {
 }
 
 TEST(Schema, decode_leaves_the_values_unchanged_for_a_sample_of_another_type) {
-    for (const Schema& s : {Schema::of_fields("a:float,b:bit"), Schema::of_ros("sensor_msgs/JointState", {"a", "b"}, "base"),
+    for (const Schema& s : {Schema::of_fields("a:float,b:bit"),
+                            Schema::of_ros("sensor_msgs/JointState", {"a", "b"}, "base"),
                             Schema::of_ros("sensor_msgs/Image", {}, "camera")}) {
         std::vector<hal_value> v(s.fields.size());
-        for (hal_value& x : v) x.raw = 0x1234;
+        for (hal_value& x : v) {
+            x.raw = 0x1234;
+        }
         Bytes bytes = s.sample;
-        for (std::size_t i = s.places.back().offset + 1; i < bytes.size(); ++i) bytes[i] = 0xff;
+        for (std::size_t i = s.places.back().offset + 1; i < bytes.size(); ++i) {
+            bytes[i] = 0xff;
+        }
         while (!bytes.empty()) {
             bytes.pop_back();
             ASSERT_FALSE(decode(s, bytes, v)) << bytes.size();
@@ -167,7 +200,9 @@ TEST(Schema, decode_leaves_the_values_unchanged_for_a_sample_of_another_type) {
         bytes = s.sample;
         bytes[1] = 3;  // a parameter list
         EXPECT_FALSE(decode(s, bytes, v));
-        for (const hal_value& x : v) EXPECT_EQ(0x1234u, x.raw);
+        for (const hal_value& x : v) {
+            EXPECT_EQ(0x1234u, x.raw);
+        }
     }
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Riccati's equations and the gains that follow from them, against SciPy and python-control with SLICOT (golden/make.py).
+// Riccati's equations and the gains that follow from them, against SciPy and python-control with
+// SLICOT (golden/make.py).
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
@@ -25,11 +26,13 @@ Dense matrix(const Case& c, const char* name) {
 
 void expect_near(const Dense& got, const std::vector<double>& wanted, const char* what) {
     ASSERT_EQ(static_cast<std::size_t>(got.size()), wanted.size()) << what;
-    for (Eigen::Index i = 0; i < got.rows(); ++i)
+    for (Eigen::Index i = 0; i < got.rows(); ++i) {
         for (Eigen::Index j = 0; j < got.cols(); ++j) {
             const double w = wanted[static_cast<std::size_t>(i * got.cols() + j)];
-            EXPECT_NEAR(got(i, j), w, decimals * std::max(1.0, std::fabs(w))) << what << " " << i << " " << j;
+            EXPECT_NEAR(got(i, j), w, decimals * std::max(1.0, std::fabs(w)))
+                << what << " " << i << " " << j;
         }
+    }
 }
 
 struct Golden : testing::TestWithParam<Case> {};
@@ -38,12 +41,16 @@ TEST_P(Golden, Solution_of_the_equation_agrees_with_SciPy_and_SLICOT) {
     const Case& c = GetParam();
     std::optional<Riccati> solved;
     const std::string plant = c.arguments.at("plant");
-    if (c.component == std::string("kalman"))
-        solved = discrete_riccati(matrix(c, "a").transpose(), matrix(c, "c").transpose(), matrix(c, "qn"), matrix(c, "rn"));
-    else if (plant == "continuous") solved = continuous_riccati(matrix(c, "a"), matrix(c, "b"), matrix(c, "q"), matrix(c, "r"));
-    else if (plant == "discrete") solved = discrete_riccati(matrix(c, "a"), matrix(c, "b"), matrix(c, "q"), matrix(c, "r"));
-    else {
-        const Sampled s = sample(matrix(c, "a"), matrix(c, "b"), matrix(c, "q"), matrix(c, "r"), 0.001);
+    if (c.component == std::string("kalman")) {
+        solved = discrete_riccati(matrix(c, "a").transpose(), matrix(c, "c").transpose(),
+                                  matrix(c, "qn"), matrix(c, "rn"));
+    } else if (plant == "continuous") {
+        solved = continuous_riccati(matrix(c, "a"), matrix(c, "b"), matrix(c, "q"), matrix(c, "r"));
+    } else if (plant == "discrete") {
+        solved = discrete_riccati(matrix(c, "a"), matrix(c, "b"), matrix(c, "q"), matrix(c, "r"));
+    } else {
+        const Sampled s =
+            sample(matrix(c, "a"), matrix(c, "b"), matrix(c, "q"), matrix(c, "r"), 0.001);
         solved = discrete_riccati(s.a, s.b, s.q, s.r, s.n);
     }
     ASSERT_TRUE(solved);
@@ -60,12 +67,17 @@ TEST_P(Golden, Component_has_the_gain) {
         instance.run("update", 1'000'000, 20'000);
     }
     Dense gain(c.rows, c.columns);
-    for (int i = 0; i < c.rows; ++i)
-        for (int j = 0; j < c.columns; ++j) gain(i, j) = instance.get<double>("gain-" + std::to_string(i) + "-" + std::to_string(j));
+    for (int i = 0; i < c.rows; ++i) {
+        for (int j = 0; j < c.columns; ++j) {
+            gain(i, j) =
+                instance.get<double>("gain-" + std::to_string(i) + "-" + std::to_string(j));
+        }
+    }
     expect_near(gain, c.gain, "K");
 }
 
-INSTANTIATE_TEST_SUITE_P(Of, Golden, testing::ValuesIn(golden::cases),
-                         [](const auto& of) { return std::string(of.param.component) + "_" + of.param.name; });
+INSTANTIATE_TEST_SUITE_P(Of, Golden, testing::ValuesIn(golden::cases), [](const auto& of) {
+    return std::string(of.param.component) + "_" + of.param.name;
+});
 
 }  // namespace

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// What comes to the CAN drivers from outside: datagrams, lines of a serial adapter, captures. The first byte chooses. What was
-// understood is a valid frame, and is understood again after it was written.
+// What comes to the CAN drivers from outside: datagrams, lines of a serial adapter, captures. The
+// first byte chooses. What was understood is a valid frame, and is understood again after it was
+// written.
 #include <cstdint>
 #include <string_view>
 
@@ -31,7 +32,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         check(f);
         canudp::Datagram out;
         const auto written = canudp::encode(f, 0, out);
-        require(canudp::decode({out.data(), written}, again) && again.same(f), "a datagram survives the way back");
+        require(canudp::decode({out.data(), written}, again) && again.same(f),
+                "a datagram survives the way back");
     } else if (data[0] % 3 == 1) {
         slcan::Decoder decoder;
         for (const char c : text) {
@@ -41,13 +43,17 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
             const auto written = slcan::encode(decoder.frame(), out);
             slcan::Decoder second;
             auto found = slcan::Decoder::Found::nothing;
-            for (std::size_t i = 0; i < written; ++i) found = second.take(out[i]);
-            require(found == slcan::Decoder::Found::frame && second.frame().same(decoder.frame()), "a line survives the way back");
+            for (std::size_t i = 0; i < written; ++i) {
+                found = second.take(out[i]);
+            }
+            require(found == slcan::Decoder::Found::frame && second.frame().same(decoder.frame()),
+                    "a line survives the way back");
         }
     } else {
         for (const auto& frame : parse_capture(text).frames) {
             check(frame);
-            const bool back = frame.error || (parse_log_line(log_line(frame, "can0"), again) && again.same(frame));
+            const bool back = frame.error ||
+                              (parse_log_line(log_line(frame, "can0"), again) && again.same(frame));
             require(back, "a log line survives the way back");
         }
     }

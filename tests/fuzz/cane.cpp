@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Frames of type 0x9023, as anybody on the segment can send them: the decoders as it comes, and again with the header made right.
+// Frames of type 0x9023, as anybody on the segment can send them: the decoders as it comes, and
+// again with the header made right.
 #include <algorithm>
 
 #include "drivers/can/cane/cane_format.hpp"
@@ -18,7 +19,8 @@ void unpack(std::span<const std::uint8_t> whole, Nodes& nodes, Streams& streams)
     if (u.open(whole) != Wrong::none) return;
     hal::ethernet::Address from{};
     std::copy_n(whole.begin() + 6, 6, from.begin());
-    streams.take(from, (whole[0] & 1) != 0, u.stamp(), static_cast<std::int64_t>(whole.size()) * 100'000'000);
+    streams.take(from, (whole[0] & 1) != 0, u.stamp(),
+                 static_cast<std::int64_t>(whole.size()) * 100'000'000);
     Frame f;
     unsigned count = 0;
     for (; u.next(f); ++count) {
@@ -41,17 +43,23 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         require(f.valid(), "a frame that was read is valid");
         std::array<std::uint8_t, single_bytes + 8> again{};
         const auto length = put_single(f, order, again);
-        require(length != 0 && std::equal(again.begin(), again.begin() + static_cast<std::ptrdiff_t>(length), data), "it is written as it was read");
+        require(
+            length != 0 && std::equal(again.begin(),
+                                      again.begin() + static_cast<std::ptrdiff_t>(length), data),
+            "it is written as it was read");
     }
     Nodes nodes;
     Streams streams;
     unpack(bytes, nodes, streams);
-    if (size < hal::ethernet::header_bytes + packed_header || size > hal::ethernet::largest_frame) return 0;
+    if (size < hal::ethernet::header_bytes + packed_header || size > hal::ethernet::largest_frame) {
+        return 0;
+    }
     std::array<std::uint8_t, hal::ethernet::largest_frame> room{};
     const auto whole = std::span(room).first(size);
     std::copy(bytes.begin(), bytes.end(), whole.begin());
     const auto messages = whole[hal::ethernet::header_bytes + 2];
-    close_packed(whole, messages, {static_cast<std::uint16_t>(size % 5), static_cast<std::uint16_t>(size % 7)});
+    close_packed(whole, messages,
+                 {static_cast<std::uint16_t>(size % 5), static_cast<std::uint16_t>(size % 7)});
     unpack(whole, nodes, streams);
     return 0;
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Configurations of CANopen networks: any file is read, or rejected with a position, and what was read can be used.
+// Configurations of CANopen networks: any file is read, or rejected with a position, and what was
+// read can be used.
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -36,7 +37,10 @@ PDOMapping=1
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     using namespace hal::canopen;
     const std::string_view text(reinterpret_cast<const char*>(data), size);
-    const auto file = [](const std::string&, std::string& bytes) { return bytes = description, true; };
+    const auto file = [](const std::string&, std::string& bytes) {
+        bytes = description;
+        return true;
+    };
     const config::Reading reading = config::read(text, "folder/net.canopen", file);
     for (const config::Message& m : reading.messages) {
         require(m.at.offset + std::size_t{m.at.length} <= size, "a place lies in the text");
@@ -46,11 +50,16 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     std::size_t pdos = 0;
     for (const config::Node& n : reading.config.nodes) {
         pdos += n.pdos.size();
-        for (const config::Pdo& p : n.pdos) require((p.multiplexed() || p.bits() <= 64) && p.cob != 0, "a PDO fits into a frame and has an identifier");
+        for (const config::Pdo& p : n.pdos) {
+            require((p.multiplexed() || p.bits() <= 64) && p.cob != 0,
+                    "a PDO fits into a frame and has an identifier");
+        }
     }
     require(problems_of(reading.config.setup()).empty(), "a master can be made of it");
     const OwnNode own = own_node(reading.config);
     require(own.sent.size() + own.received.size() <= pdos, "a PDO of ours for each of a node");
-    if (reading.config.nodes.size() + reading.config.foreign.size() < 40) config::schedule_of(reading.config, millisecond);
+    if (reading.config.nodes.size() + reading.config.foreign.size() < 40) {
+        config::schedule_of(reading.config, millisecond);
+    }
     return 0;
 }

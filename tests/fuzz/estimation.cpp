@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What a user gives a filter or a controller: a file of matrices, or a model in formulas. The first byte chooses which.
+// What a user gives a filter or a controller: a file of matrices, or a model in formulas. The first
+// byte chooses which.
 #include <cmath>
 #include <cstdint>
 #include <string>
@@ -28,7 +29,8 @@ void matrices(const std::string& text) {
     places(read.problems, text.size());
     if (!read.problems.empty()) return;
     for (const Given& given : read.found) {
-        require(given.value.rows() >= 1 && given.value.rows() <= most && given.value.cols() >= 1 && given.value.cols() <= most,
+        require(given.value.rows() >= 1 && given.value.rows() <= most && given.value.cols() >= 1 &&
+                    given.value.cols() <= most,
                 "a matrix that is taken has a size that one may have");
         require(given.value.allFinite(), "and consists of numbers");
     }
@@ -39,7 +41,8 @@ void model(const std::string& text) {
     read.read(text);
     places(read.problems, text.size());
     if (!read.problems.empty()) return;
-    require(!read.states.empty() && read.states.size() <= most_slopes && !read.measures.empty() && read.inputs.size() <= Model::most_inputs,
+    require(!read.states.empty() && read.states.size() <= most_slopes && !read.measures.empty() &&
+                read.inputs.size() <= Model::most_inputs,
             "a model that is taken has states and measurements, and not too many");
     std::vector<Dual> values(read.variables());
     for (std::size_t i = 0; i < read.constants.size(); ++i) {
@@ -47,7 +50,8 @@ void model(const std::string& text) {
         values[most_slopes + Model::most_inputs + i].value = read.constants[i];
     }
     for (const Model::State& s : read.states) {
-        require(s.sigma >= 0.0 && s.noise >= 0.0 && std::isfinite(s.start), "so are the state's figures");
+        require(s.sigma >= 0.0 && s.noise >= 0.0 && std::isfinite(s.start),
+                "so are the state's figures");
         s.rate(values.data(), read.states.size());
     }
     for (const Model::Measure& m : read.measures) {
@@ -61,7 +65,10 @@ void model(const std::string& text) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     if (size == 0) return 0;
     const std::string text(reinterpret_cast<const char*>(data) + 1, size - 1);
-    if (data[0] == 'm') matrices(text);
-    else model(text);
+    if (data[0] == 'm') {
+        matrices(text);
+    } else {
+        model(text);
+    }
     return 0;
 }

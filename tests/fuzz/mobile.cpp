@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The files of mobile robots: floor plans, lists of goals, programs of steps. The first byte chooses which.
+// The files of mobile robots: floor plans, lists of goals, programs of steps. The first byte
+// chooses which.
 #include <cmath>
 #include <cstdint>
 #include <string_view>
@@ -31,7 +32,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         FloorPlan floor;
         floor.read(text);
         places(floor.problems, text.size());
-        require(floor.walls.size() + floor.discs.size() + floor.beacons.size() <= FloorPlan::most_shapes, "a floor plan is bounded");
+        require(floor.walls.size() + floor.discs.size() + floor.beacons.size() <=
+                    FloorPlan::most_shapes,
+                "a floor plan is bounded");
         for (int i = 0; i < 8; ++i) {
             const Hit hit = floor.cast(0.1, 0.2, i * 0.8, 10.0);
             require(hit.distance >= 0.0 && !std::isnan(hit.distance), "a ray has a length");
@@ -42,16 +45,24 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         GoalList list;
         list.read(text);
         places(list.problems, text.size());
-        require(!list.problems.empty() || (!list.goals.empty() && list.goals.size() <= GoalList::most_goals), "a list that is taken has goals");
+        require(!list.problems.empty() ||
+                    (!list.goals.empty() && list.goals.size() <= GoalList::most_goals),
+                "a list that is taken has goals");
     } else {
         StepText program;
         program.read(text);
         places(program.problems, text.size());
         if (!program.problems.empty()) return 0;
-        require(!program.steps.empty() && program.steps.size() <= StepText::most_steps, "a program that is taken has steps");
-        for (const Step& s : program.steps)
-            for (const Transition& t : s.transitions) require(t.to < program.steps.size(), "a transition leads to a step");
-        for (const Transition& t : program.alarms) require(t.to < program.steps.size(), "and so does an alarm");
+        require(!program.steps.empty() && program.steps.size() <= StepText::most_steps,
+                "a program that is taken has steps");
+        for (const Step& s : program.steps) {
+            for (const Transition& t : s.transitions) {
+                require(t.to < program.steps.size(), "a transition leads to a step");
+            }
+        }
+        for (const Transition& t : program.alarms) {
+            require(t.to < program.steps.size(), "and so does an alarm");
+        }
     }
     return 0;
 }

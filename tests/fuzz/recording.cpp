@@ -19,14 +19,18 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     for (const auto& [id, channel] : reader.channels()) {
         const auto schema = reader.schemas().find(channel.schema);
         RowReader row;
-        if (schema != reader.schemas().end() && row.open(schema->second, channel)) rows.emplace(id, row);
+        if (schema != reader.schemas().end() && row.open(schema->second, channel)) {
+            rows.emplace(id, row);
+        }
     }
     std::vector<std::uint64_t> values;
     std::size_t messages = 0;
     reader.each([&](const Message& message) {
         const auto row = rows.find(message.channel);
-        if (row != rows.end() && row->second.read(message.payload, values) && values.size() != row->second.columns().size()) {
-            std::fprintf(stderr, "broken: a row of %zu values for %zu columns\n", values.size(), row->second.columns().size());
+        if (row != rows.end() && row->second.read(message.payload, values) &&
+            values.size() != row->second.columns().size()) {
+            std::fprintf(stderr, "broken: a row of %zu values for %zu columns\n", values.size(),
+                         row->second.columns().size());
             std::abort();
         }
         return ++messages < 100'000;

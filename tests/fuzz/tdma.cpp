@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// TDMA: any frame is read within its bytes or rejected, and what was read is written identically; any
-// schedule is read, or rejected with a position, and an accepted one can be used.
+// TDMA: any frame is read within its bytes or rejected, and what was read is written identically;
+// any schedule is read, or rejected with a position, and an accepted one can be used.
 #include <array>
 #include <cstdint>
 #include <cstring>
@@ -22,33 +22,54 @@ using namespace hal::tdma;
 using hal::fuzz::require;
 
 void frames(std::span<const std::uint8_t> given) {
-    const std::vector<std::uint8_t> frame(given.begin(), given.end());  // so that a byte too far is seen
+    // so that a byte too far is seen
+    const std::vector<std::uint8_t> frame(given.begin(), given.end());
     const Decoded d = decode(frame);
-    require((d.kind == Kind::none) == (d.defect != Defect::none), "a frame is something, or there is a reason");
-    if (d.kind == Kind::sync) require(decode(encode(d.from, d.sync)).sync.stamp == d.sync.stamp, "a sync is written as it was read");
-    if (d.kind == Kind::request)
-        require(decode(encode(d.to, d.from, d.request)).request.reply_offset == d.request.reply_offset, "a request too");
-    if (d.kind == Kind::reply) require(decode(encode(d.to, d.from, d.reply)).reply.received == d.reply.received, "a reply too");
-    if (d.kind == Kind::ping) require(decode(encode(d.to, d.from, d.ping)).ping.number == d.ping.number, "a ping too");
-    if (d.kind == Kind::echo) require(decode(encode(d.to, d.from, d.echo)).echo.stamp == d.echo.stamp, "an answer too");
+    require((d.kind == Kind::none) == (d.defect != Defect::none),
+            "a frame is something, or there is a reason");
+    if (d.kind == Kind::sync) {
+        require(decode(encode(d.from, d.sync)).sync.stamp == d.sync.stamp,
+                "a sync is written as it was read");
+    }
+    if (d.kind == Kind::request) {
+        require(
+            decode(encode(d.to, d.from, d.request)).request.reply_offset == d.request.reply_offset,
+            "a request too");
+    }
+    if (d.kind == Kind::reply) {
+        require(decode(encode(d.to, d.from, d.reply)).reply.received == d.reply.received,
+                "a reply too");
+    }
+    if (d.kind == Kind::ping) {
+        require(decode(encode(d.to, d.from, d.ping)).ping.number == d.ping.number, "a ping too");
+    }
+    if (d.kind == Kind::echo) {
+        require(decode(encode(d.to, d.from, d.echo)).echo.stamp == d.echo.stamp, "an answer too");
+    }
     std::array<std::uint8_t, 1514> out{}, back{};
     if (const std::size_t n = tunnel(frame, out); n != 0) {
-        require(untunnel(std::span(out).first(n), back) == frame.size(), "what went into the tunnel comes out");
+        require(untunnel(std::span(out).first(n), back) == frame.size(),
+                "what went into the tunnel comes out");
         require(std::memcmp(back.data(), frame.data(), frame.size()) == 0, "as it was");
     }
     const std::size_t packet = untunnel(frame, out);
-    require(!is_packet(d, d.to) || packet == frame.size() - rtmac_bytes, "what is a packet has a place in the kernel's longest frame");
+    require(!is_packet(d, d.to) || packet == frame.size() - rtmac_bytes,
+            "what is a packet has a place in the kernel's longest frame");
     rtcfg::Message m;
     if (!rtcfg::decode(frame, m)) return;
     const std::size_t n = rtcfg::encode(m, out);
     rtcfg::Message again;
-    require(n == 0 || (rtcfg::decode(std::span(out).first(n), again) && again.id == m.id && again.from == m.from),
+    require(n == 0 || (rtcfg::decode(std::span(out).first(n), again) && again.id == m.id &&
+                       again.from == m.from),
             "RTcfg is written as it was read");
 }
 
 struct Nothing final : rtcfg::ClientEvents {
-    void on_stage_1(std::span<const std::uint8_t> bytes, const Address&) noexcept override { require(bytes.size() <= 65535, "one frame"); }
-    void on_stage_2(std::vector<std::uint8_t>& file, std::uint32_t length, const Address&) noexcept override {
+    void on_stage_1(std::span<const std::uint8_t> bytes, const Address&) noexcept override {
+        require(bytes.size() <= 65535, "one frame");
+    }
+    void on_stage_2(std::vector<std::uint8_t>& file, std::uint32_t length,
+                    const Address&) noexcept override {
         require(length <= file.size(), "the received part fits into the file");
     }
     void on_dead_station(const Address&) noexcept override {}
@@ -69,19 +90,30 @@ void configuration(std::span<const std::uint8_t> given) {
     require(read || client.foreign() == before + 1, "what cannot be read is counted");
     require(!client.configured(), "a frame alone configures nothing");
     client.accept(m.from, 100);
-    for (int i = 0; i < 3; ++i) client.arrived(frame, 2), client.before_slots(3);
-    static Station leading(StationSetup{.role = Role::master, .slots = {{.size = 200}}});  // only who sends the syncs serves
+    for (int i = 0; i < 3; ++i) {
+        client.arrived(frame, 2);
+        client.before_slots(3);
+    }
+    // only who sends the syncs serves
+    static Station leading(StationSetup{.role = Role::master, .slots = {{.size = 200}}});
     static const auto segment = hal::ethernet::open("sim:fuzz");
     static const bool leads = [] {
         leading.attach(*segment.port);
-        for (Time now = 1'000'000; now < 20'000'000; now += 1'000'000) leading.receive(now);
+        for (Time now = 1'000'000; now < 20'000'000; now += 1'000'000) {
+            leading.receive(now);
+        }
         return leading.ready() && leading.status().leading;
     }();
     require(leads, "a master that is alone leads");
-    rtcfg::Server server(leading, {}, {{m.from, {}, "slave:\nslot 0 100\n", "a file"}, {{}, {true, {10, 0, 0, 3}}, "", ""}}, 100);
+    rtcfg::Server server(
+        leading, {},
+        {{m.from, {}, "slave:\nslot 0 100\n", "a file"}, {{}, {true, {10, 0, 0, 3}}, "", ""}}, 100);
     server.before_slots(0);
-    for (Time now = 1; now < 3'000'000'000; now += 700'000'000)
-        server.arrived(frame, now), server.heard(m.from, now), server.before_slots(now);
+    for (Time now = 1; now < 3'000'000'000; now += 700'000'000) {
+        server.arrived(frame, now);
+        server.heard(m.from, now);
+        server.before_slots(now);
+    }
     require(server.ready() <= server.clients(), "as many as there are");
 }
 
@@ -98,14 +130,19 @@ void schedule(std::string_view text) {
         StationSetup setup = config::setup_of(reading.schedule, i);
         setup.queue = 1;
         const Station station(setup);
-        require(config::read(config::block_of(reading.schedule, i)).schedule.stations.size() == 1, "a station's block is a schedule");
+        require(config::read(config::block_of(reading.schedule, i)).schedule.stations.size() == 1,
+                "a station's block is a schedule");
     }
 }
 
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-    if (size != 0 && data[0] < 0x20 && data[0] != '\n') frames({data, size}), configuration({data, size});
-    else schedule({reinterpret_cast<const char*>(data), size});
+    if (size != 0 && data[0] < 0x20 && data[0] != '\n') {
+        frames({data, size});
+        configuration({data, size});
+    } else {
+        schedule({reinterpret_cast<const char*>(data), size});
+    }
     return 0;
 }

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: MIT
-// What a user gives a camera's components: a picture from a folder, the calibration of a camera or of the ground, an address. The first
-// byte chooses which.
+// What a user gives a camera's components: a picture from a folder, the calibration of a camera or
+// of the ground, an address. The first byte chooses which.
 #include <cmath>
 #include <cstdint>
 #include <stdexcept>
 #include <string>
 
+#include "tests/fuzz/driver/require.hpp"
 #include "vision/capture/camera.hpp"
 #include "vision/capture/pnm.hpp"
 #include "vision/capture/source.hpp"
 #include "vision/detect/homography.hpp"
-#include "tests/fuzz/driver/require.hpp"
 
 using namespace hal::vision;
 
@@ -21,24 +21,33 @@ using hal::fuzz::require;
 void picture(const std::uint8_t* bytes, std::size_t count) {
     Frame frame;
     if (const auto problem = read_pnm(bytes, count, frame)) {
-        require(problem->kind == FrameError::damaged || problem->kind == FrameError::too_large, "the kind of the problem is reported");
-        require(frame.pixels.size() <= 3 * most_pixels, "no picture takes more memory than one may have");
+        require(problem->kind == FrameError::damaged || problem->kind == FrameError::too_large,
+                "the kind of the problem is reported");
+        require(frame.pixels.size() <= 3 * most_pixels,
+                "no picture takes more memory than one may have");
         return;
     }
     require(Frame::fits(frame.width, frame.height), "a picture has a size that one may have");
-    require(frame.pixels.size() == frame.stride() * static_cast<std::size_t>(frame.height), "the number of pixels matches the size");
+    require(frame.pixels.size() == frame.stride() * static_cast<std::size_t>(frame.height),
+            "the number of pixels matches the size");
     const std::string written = write_pnm(frame);
     Frame again;
-    require(!read_pnm(reinterpret_cast<const std::uint8_t*>(written.data()), written.size(), again) && again.pixels == frame.pixels,
-            "what was written is read back");
+    require(
+        !read_pnm(reinterpret_cast<const std::uint8_t*>(written.data()), written.size(), again) &&
+            again.pixels == frame.pixels,
+        "what was written is read back");
     to_grey(frame);
-    require(frame.pixels.size() == static_cast<std::size_t>(frame.width) * static_cast<std::size_t>(frame.height),
+    require(frame.pixels.size() ==
+                static_cast<std::size_t>(frame.width) * static_cast<std::size_t>(frame.height),
             "grey has a byte per pixel");
 }
 
 template <class Problems>
 void places(const Problems& problems, std::size_t size) {
-    for (const auto& p : problems) require(p.begin <= p.end && p.end <= size && !p.sentence.empty(), "a problem has a place in the text");
+    for (const auto& p : problems) {
+        require(p.begin <= p.end && p.end <= size && !p.sentence.empty(),
+                "a problem has a place in the text");
+    }
 }
 
 void camera(const std::string& text) {
@@ -46,7 +55,8 @@ void camera(const std::string& text) {
     places(read.problems, text.size());
     if (!read.problems.empty()) return;
     const Camera& c = read.camera;
-    require(c.width >= 1 && c.height >= 1 && c.fx > 0 && c.fy > 0 && std::isfinite(c.cx) && std::isfinite(c.cy),
+    require(c.width >= 1 && c.height >= 1 && c.fx > 0 && c.fy > 0 && std::isfinite(c.cx) &&
+                std::isfinite(c.cy),
             "a camera that is taken is one");
 }
 
@@ -56,7 +66,8 @@ void ground(const std::string& text) {
     places(read.problems, text.size());
     if (!read.problems.empty()) return;
     for (const GroundPoint& p : read.points) {
-        double x = 0, y = 0;
+        double x = 0;
+        double y = 0;
         made.map(p.u, p.v, x, y);
         require(std::isfinite(x) && std::isfinite(y), "a place is a number");
     }
@@ -66,7 +77,9 @@ void address(const std::string& text) {
     try {
         const auto source = make_source(text, {});
         require(source != nullptr, "an address that is taken is a source");
-    } catch (const std::invalid_argument& e) { require(*e.what() != '\0', "a rejection has a reason"); }
+    } catch (const std::invalid_argument& e) {
+        require(*e.what() != '\0', "a rejection has a reason");
+    }
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Every component of the build tree runs a thousand cycles under the real-time guard, its inputs changing at random.
+// Every component of the build tree runs a thousand cycles under the real-time guard, its inputs
+// changing at random.
 #include <filesystem>
 #include <limits>
 #include <map>
@@ -13,9 +14,11 @@
 namespace hal::test {
 namespace {
 
-#define SCOCAN_TABLE                                                                                                                 \
-    " table=\"cycle 10ms; slots 10; node clock A sync; node n A; node bridge A bridge; node watch B monitor; mode 0 run; 0 sync; " \
-    "1 private n 0x100; 2 private clock 0x101; message a 0x100 fields x:f64; message b 0x101 fields y:s16,z:u8; "                  \
+#define SCOCAN_TABLE                                                                           \
+    " table=\"cycle 10ms; slots 10; node clock A sync; node n A; node bridge A bridge; node "  \
+    "watch B monitor; mode 0 run; 0 sync; "                                                    \
+    "1 private n 0x100; 2 private clock 0x101; message a 0x100 fields x:f64; message b 0x101 " \
+    "fields y:s16,z:u8; "                                                                      \
     "message c 0x300 node n event 10ms fields w:f32\""
 // Load arguments of components that cannot be made without.
 const std::map<std::string, std::string> arguments{
@@ -34,8 +37,11 @@ const std::map<std::string, std::string> arguments{
 
 std::vector<std::string> all_components() {
     std::vector<std::string> names;
-    for (const auto& entry : std::filesystem::directory_iterator(paths::build_components))
-        if (entry.path().extension() == ".so") names.push_back(entry.path().stem().string());
+    for (const auto& entry : std::filesystem::directory_iterator(paths::build_components)) {
+        if (entry.path().extension() == ".so") {
+            names.push_back(entry.path().stem().string());
+        }
+    }
     std::sort(names.begin(), names.end());
     return names;
 }
@@ -49,12 +55,18 @@ std::string load(const std::string& name) {
 class RandomInputs {
 public:
     explicit RandomInputs(const Model& model, std::uint32_t seed) : random_(seed) {
-        for (const Pin* pin : model.sorted_pins())
-            if (pin->instance && pin->type != HAL_TYPE_PORT && pin->dir != HAL_DIR_OUT) pins_.push_back(pin);
+        for (const Pin* pin : model.sorted_pins()) {
+            if (pin->instance && pin->type != HAL_TYPE_PORT && pin->dir != HAL_DIR_OUT) {
+                pins_.push_back(pin);
+            }
+        }
     }
     void change() {
-        for (const Pin* pin : pins_)
-            if (random_() % 4 == 0) pin->memory->slot->raw = value(pin->type).raw;
+        for (const Pin* pin : pins_) {
+            if (random_() % 4 == 0) {
+                pin->memory->slot->raw = value(pin->type).raw;
+            }
+        }
     }
 
 private:
@@ -65,13 +77,30 @@ private:
         switch (type) {
         case HAL_TYPE_BIT: value.bit = random_() & 1; break;
         case HAL_TYPE_FLOAT: {
-            constexpr double edges[] = {0.0, -0.0, 1e300, -1e300, 1e-310, std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity(), std::numeric_limits<double>::quiet_NaN()};
-            value.real = edge ? edges[random_() % std::size(edges)] : std::uniform_real_distribution(-10.0, 10.0)(random_);
+            constexpr double edges[] = {0.0,
+                                        -0.0,
+                                        1e300,
+                                        -1e300,
+                                        1e-310,
+                                        std::numeric_limits<double>::infinity(),
+                                        -std::numeric_limits<double>::infinity(),
+                                        std::numeric_limits<double>::quiet_NaN()};
+            value.real = edge ? edges[random_() % std::size(edges)]
+                              : std::uniform_real_distribution(-10.0, 10.0)(random_);
             break;
         }
-        case HAL_TYPE_S32: value.s32 = edge ? static_cast<std::int32_t>(random_()) : static_cast<std::int32_t>(random_() % 21) - 10; break;
-        case HAL_TYPE_U32: value.u32 = edge ? static_cast<std::uint32_t>(random_()) : static_cast<std::uint32_t>(random_() % 20); break;
-        case HAL_TYPE_S64: value.s64 = edge ? static_cast<std::int64_t>(wide) : static_cast<std::int64_t>(random_() % 21) - 10; break;
+        case HAL_TYPE_S32:
+            value.s32 = edge ? static_cast<std::int32_t>(random_())
+                             : static_cast<std::int32_t>(random_() % 21) - 10;
+            break;
+        case HAL_TYPE_U32:
+            value.u32 = edge ? static_cast<std::uint32_t>(random_())
+                             : static_cast<std::uint32_t>(random_() % 20);
+            break;
+        case HAL_TYPE_S64:
+            value.s64 = edge ? static_cast<std::int64_t>(wide)
+                             : static_cast<std::int64_t>(random_() % 21) - 10;
+            break;
         case HAL_TYPE_U64: value.u64 = edge ? wide : random_() % 20; break;
         case HAL_TYPE_PORT: break;
         }
@@ -93,12 +122,16 @@ struct Component : testing::TestWithParam<std::string> {
         Machine machine;
         machine.must("newthread t 1000000\n" + load(GetParam()));
         std::string text;
-        for (const LoadedFunction* function : machine.session.model().sorted_functions()) text += "addf " + function->name + " t\n";
+        for (const LoadedFunction* function : machine.session.model().sorted_functions()) {
+            text += "addf " + function->name + " t\n";
+        }
         int number = 0;
         for (const Pin* pin : machine.session.model().sorted_pins()) {
             if (!linked || !pin->instance || pin->dir == HAL_DIR_PARAM) continue;
             text += "net s" + std::to_string(++number) + " " + pin->name + "\n";
-            if (pin->type == HAL_TYPE_PORT) text += "sets s" + std::to_string(number) + " 256\n";
+            if (pin->type == HAL_TYPE_PORT) {
+                text += "sets s" + std::to_string(number) + " 256\n";
+            }
         }
         machine.must(text);
         RandomInputs inputs(machine.session.model(), 1);
@@ -110,11 +143,16 @@ struct Component : testing::TestWithParam<std::string> {
                 inputs.change();
                 machine.cycles(1);
             }
-            if (part > 0) fewest = std::min(fewest, page_faults() - before);
+            if (part > 0) {
+                fewest = std::min(fewest, page_faults() - before);
+            }
         }
         EXPECT_EQ(machine.get("t.threadbeat"), "1000");
-        for (const FaultRecord& fault : machine.session.reports().faults()) EXPECT_NE(fault.code, "exception") << fault.sentence;
-        // the kernel may take a page away at any moment, but not in each of nine rows of a hundred cycles
+        for (const FaultRecord& fault : machine.session.reports().faults()) {
+            EXPECT_NE(fault.code, "exception") << fault.sentence;
+        }
+        // the kernel may take a page away at any moment, but not in each of nine rows of a hundred
+        // cycles
         if (guarded) {
             EXPECT_EQ(fewest, 0) << "it touches new memory all the time";
         }
@@ -124,20 +162,29 @@ struct Component : testing::TestWithParam<std::string> {
 TEST_P(Component, neither_allocates_nor_locks_nor_blocks) { run(false); }
 TEST_P(Component, neither_allocates_nor_locks_nor_blocks_with_all_pins_linked) { run(true); }
 
-INSTANTIATE_TEST_SUITE_P(Of, Component, testing::ValuesIn(all_components()), [](const auto& component) { return component.param; });
+INSTANTIATE_TEST_SUITE_P(Of, Component, testing::ValuesIn(all_components()),
+                         [](const auto& component) { return component.param; });
 
 TEST(All_components, are_found) { EXPECT_GT(all_components().size(), 30u); }
 
-// All of them at once on a real thread, with edits: taking plans, carrying values and answering are real time, too.
+// All of them at once on a real thread, with edits: taking plans, carrying values and answering are
+// real time, too.
 TEST(All_components, run_together_on_a_real_thread_while_it_is_edited) {
     Machine machine(Clock::real);
     std::string text = "newthread t 2000000\nnewthread u 4000000\n";
-    for (const std::string& name : all_components()) text += load(name);
+    for (const std::string& name : all_components()) {
+        text += load(name);
+    }
     machine.must(text + "loadrt test-counter names=a,b\nloadrt test-two names=w\n");
-    machine.must("addf a t\naddf w.fast t\naddf w.first u\naddf w.last u\nnet a w.a => w.a-in w.a-again\nnet b w.b => w.b-in w.b-again");
+    machine.must(
+        "addf a t\naddf w.fast t\naddf w.first u\naddf w.last u\nnet a w.a => w.a-in "
+        "w.a-again\nnet b w.b => w.b-in w.b-again");
     machine.must("addf --auto t");
     machine.start();
-    for (int i = 0; i < 50; ++i) machine.must(i % 2 ? "delf a t\naddf a t\ndelsig x" : "delf b t\naddf b t 1\nnet x a.sum => b.step\nsetp a.step 2");
+    for (int i = 0; i < 50; ++i) {
+        machine.must(i % 2 ? "delf a t\naddf a t\ndelsig x"
+                           : "delf b t\naddf b t 1\nnet x a.sum => b.step\nsetp a.step 2");
+    }
     ASSERT_TRUE(eventually([&] { return machine.number("t.threadbeat") >= 300; }));
     EXPECT_EQ(machine.get("w.torn"), "0");
 }

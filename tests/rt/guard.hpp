@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The real-time guard of every build: while a cycle is open on a thread, allocating, locking or blocking ends the process
-// with a line that names the call. Under HALCYON_RT_GUARD the real-time sanitizer does the same, with a stack.
+// The real-time guard of every build: while a cycle is open on a thread, allocating, locking or
+// blocking ends the process with a line that names the call. Under HALCYON_RT_GUARD the real-time
+// sanitizer does the same, with a stack.
 #pragma once
 
 namespace hal::test {

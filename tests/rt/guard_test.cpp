@@ -17,15 +17,21 @@ struct Guard : testing::TestWithParam<const char*> {
 };
 
 TEST_P(Guard, catches_a_component_that) {
-    if (!guarded) GTEST_SKIP() << "this sanitizer needs the calls for itself";
+    if (!guarded) {
+        GTEST_SKIP() << "this sanitizer needs the calls for itself";
+    }
     machine.must(std::string("setp f.") + GetParam() + " 1");
 #ifdef HALCYON_RT_GUARD
-    EXPECT_DEATH(machine.cycles(1), "intercepted call to real-time unsafe function `[a-z_]+` in real-time context.*test-faulty: function 'f.run' made the call that the real-time guard prints above");
+    EXPECT_DEATH(machine.cycles(1),
+                 "intercepted call to real-time unsafe function `[a-z_]+` in real-time "
+                 "context.*test-faulty: function 'f.run' made the call that the real-time guard "
+                 "prints above");
 #else
     EXPECT_DEATH(machine.cycles(1), "real-time guard: [a-z_]+ in a cycle");
 #endif
 }
-INSTANTIATE_TEST_SUITE_P(Component, Guard, testing::Values("allocates", "frees", "locks", "sleeps"), [](const auto& fault) { return fault.param; });
+INSTANTIATE_TEST_SUITE_P(Component, Guard, testing::Values("allocates", "frees", "locks", "sleeps"),
+                         [](const auto& fault) { return fault.param; });
 
 TEST_F(Guard, lets_everything_pass_outside_of_cycles) {
     machine.must("loadrt test-counter count=100");

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Probes over the control protocol: the verbs, the batches on the wire, and the client that reads them.
+// Probes over the control protocol: the verbs, the batches on the wire, and the client that reads
+// them.
 #include <bit>
 #include <cstring>
 
@@ -15,7 +16,8 @@ namespace {
 struct ProbeProtocol : testing::Test {
     ProbeProtocol() {
         machine.must(
-            "loadrt and2 names=a\nloadrt sum2 names=s\nnewthread t 1000000\nnewsig level float\nnet level s.in0\naddf a t\naddf s t\n");
+            "loadrt and2 names=a\nloadrt sum2 names=s\nnewthread t 1000000\nnewsig level "
+            "float\nnet level s.in0\naddf a t\naddf s t\n");
     }
 
     Json ask(const Json& request) {
@@ -35,7 +37,8 @@ TEST_F(ProbeProtocol, a_probe_is_described_in_its_reply) {
     EXPECT_EQ(reply["probe"], 1);
     EXPECT_EQ(reply["columns"][0], (Json{{"name", "s.out"}, {"type", "float"}, {"unit", ""}}));
     EXPECT_EQ(reply["columns"][2]["type"], "bit");
-    EXPECT_EQ(reply["groups"], Json::parse(R"([{"thread":"t","period_ns":3000000,"columns":[0,1,2]}])"));
+    EXPECT_EQ(reply["groups"],
+              Json::parse(R"([{"thread":"t","period_ns":3000000,"columns":[0,1,2]}])"));
     EXPECT_FALSE(connection.idle());
     EXPECT_EQ(ask({{"unprobe", 1}})["lost"], 0);
     EXPECT_TRUE(connection.idle());
@@ -77,13 +80,18 @@ TEST_F(ProbeProtocol, a_congested_client_loses_nothing_until_its_ring_is_full) {
 }
 
 TEST_F(ProbeProtocol, rejected_requests_say_why) {
-    EXPECT_EQ(refusal({{"probe", {"s.uot"}}}), "unknown pin, parameter or signal 's.uot'; did you mean 's.out'?");
+    EXPECT_EQ(refusal({{"probe", {"s.uot"}}}),
+              "unknown pin, parameter or signal 's.uot'; did you mean 's.out'?");
     EXPECT_EQ(refusal({{"probe", "s.out"}}), "probe must be an array of names");
-    EXPECT_EQ(refusal({{"probe", {"s.out"}}, {"every", 0}}), "every must be a whole number from 1 to 1000000");
-    EXPECT_EQ(refusal({{"probe", {"s.out"}}, {"buffer_ms", 1}}), "buffer_ms must be a whole number from 10 to 60000");
+    EXPECT_EQ(refusal({{"probe", {"s.out"}}, {"every", 0}}),
+              "every must be a whole number from 1 to 1000000");
+    EXPECT_EQ(refusal({{"probe", {"s.out"}}, {"buffer_ms", 1}}),
+              "buffer_ms must be a whole number from 10 to 60000");
     EXPECT_EQ(refusal({{"unprobe", 7}}), "unknown probe 7");
     EXPECT_EQ(refusal({{"journal", 1}}), "journal must be true or false");
-    for (int i = 0; i < 64; ++i) EXPECT_EQ(ask({{"probe", {"s.out"}}})["ok"], true);
+    for (int i = 0; i < 64; ++i) {
+        EXPECT_EQ(ask({{"probe", {"s.out"}}})["ok"], true);
+    }
     EXPECT_EQ(refusal({{"probe", {"s.out"}}}), "a client has at most 64 probes");
 }
 
@@ -99,7 +107,9 @@ TEST_F(ProbeProtocol, the_journal_has_edits_and_commands_but_no_queries) {
     EXPECT_NE(events.find(R"("kind":"edit","text":"setp s.in1 4"})"), events.npos) << events;
     EXPECT_NE(events.find(R"("kind":"command","text":"start"})"), events.npos) << events;
     EXPECT_NE(events.find(R"("kind":"edit","text":"setp a.in1 TRUE"})"), events.npos) << events;
-    EXPECT_NE(events.find(R"("kind":"message","text":"canopen.0: node 3: emergency 8110h"})"), events.npos) << events;
+    EXPECT_NE(events.find(R"("kind":"message","text":"canopen.0: node 3: emergency 8110h"})"),
+              events.npos)
+        << events;
     EXPECT_EQ(events.find("getp"), events.npos) << events;
     ask({{"journal", false}});
     messages.add(&messages, line.data(), line.size());
@@ -114,7 +124,8 @@ TEST_F(ProbeProtocol, the_journal_has_edits_and_commands_but_no_queries) {
 TEST_F(ServerTest, a_client_reads_batches_layouts_and_replies_between_them) {
     serve();
     machine->must("start\n");
-    const auto one = client(), other = client();
+    const auto one = client();
+    const auto other = client();
     std::string problem;
     EXPECT_EQ(ProbeClient::attach(*one, {"nothing"}, {}, problem), nullptr);
     EXPECT_EQ(problem, "unknown pin, parameter or signal 'nothing'");
@@ -124,17 +135,25 @@ TEST_F(ServerTest, a_client_reads_batches_layouts_and_replies_between_them) {
     const auto probe = ProbeClient::attach(*one, {"s.out", "a.out"}, options, problem);
     ASSERT_NE(probe, nullptr) << problem;
     ASSERT_EQ(probe->groups().size(), 2u) << "a has no thread";
-    bool layout = false, journal = false;
-    std::size_t rows = 0, wide = 0;
+    bool layout = false;
+    bool journal = false;
+    std::size_t rows = 0;
+    std::size_t wide = 0;
     for (int turn = 0; turn < 2000 && !(layout && journal && wide > 10); ++turn) {
         ASSERT_EQ(other->run("advance 3 cycles").status, 0);
-        if (turn == 20) ASSERT_EQ(other->run("addf a t").status, 0);
-        if (turn % 7 == 0) ASSERT_EQ(one->run("getp a.out").out, "FALSE\n");
+        if (turn == 20) {
+            ASSERT_EQ(other->run("addf a t").status, 0);
+        }
+        if (turn % 7 == 0) {
+            ASSERT_EQ(one->run("getp a.out").out, "FALSE\n");
+        }
         ProbeBatch batch;
-        for (auto got = probe->next(batch, 0); got != ProbeClient::Got::nothing; got = probe->next(batch, 0)) {
+        for (auto got = probe->next(batch, 0); got != ProbeClient::Got::nothing;
+             got = probe->next(batch, 0)) {
             ASSERT_NE(got, ProbeClient::Got::disconnected);
             layout = layout || got == ProbeClient::Got::layout;
-            journal = journal || (got == ProbeClient::Got::journal && probe->entry().text == "addf a t");
+            journal =
+                journal || (got == ProbeClient::Got::journal && probe->entry().text == "addf a t");
             if (got != ProbeClient::Got::batch) continue;
             std::int64_t last = 0;
             batch.in_time_order([&](const ProbeBatch::Part& part, std::size_t row) {

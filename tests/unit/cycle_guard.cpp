@@ -16,7 +16,9 @@ struct CycleTimeLimitTest : testing::Test {
     Action run(std::uint64_t cycle, std::uint32_t function, std::int64_t from, std::int64_t until) {
         for (std::int64_t t = from; t <= until; ++t) {
             const Action action = time_limit.check({core, cycle, function}, t * s);
-            if (action == Action::report) reports.push_back(t);
+            if (action == Action::report) {
+                reports.push_back(t);
+            }
             if (action == Action::end) return action;
         }
         return Action::none;
@@ -31,12 +33,18 @@ TEST_F(CycleTimeLimitTest, Endless_cycle_is_reported_after_10_s_and_then_ever_mo
 }
 
 TEST_F(CycleTimeLimitTest, Fast_cycles_are_not_reported) {
-    for (std::uint64_t cycle = 0; cycle < 1000; ++cycle) run(cycle, 1, static_cast<std::int64_t>(9 * cycle), static_cast<std::int64_t>(9 * cycle + 8));
+    for (std::uint64_t cycle = 0; cycle < 1000; ++cycle) {
+        run(cycle, 1, static_cast<std::int64_t>(9 * cycle),
+            static_cast<std::int64_t>(9 * cycle + 8));
+    }
     EXPECT_TRUE(reports.empty());
 }
 
 TEST_F(CycleTimeLimitTest, Slow_cycles_share_the_limit_of_reports_and_are_counted) {
-    for (std::uint64_t cycle = 0; cycle < 100; ++cycle) run(cycle, 1, static_cast<std::int64_t>(12 * cycle), static_cast<std::int64_t>(12 * cycle + 11));
+    for (std::uint64_t cycle = 0; cycle < 100; ++cycle) {
+        run(cycle, 1, static_cast<std::int64_t>(12 * cycle),
+            static_cast<std::int64_t>(12 * cycle + 11));
+    }
     EXPECT_EQ(time_limit.slow_cycles(), 100u);
     EXPECT_LE(reports.size(), 9u);
     EXPECT_EQ(reports.front(), 10);
@@ -58,7 +66,9 @@ TEST_F(CycleTimeLimitTest, Limit_ends_only_a_cycle_that_is_longer) {
 
 TEST_F(CycleTimeLimitTest, Time_between_cycles_does_not_count) {
     run(0, 1, 0, 5);
-    for (std::int64_t t = 6; t < 100; ++t) EXPECT_EQ(time_limit.check({}, t * s), Action::none);
+    for (std::int64_t t = 6; t < 100; ++t) {
+        EXPECT_EQ(time_limit.check({}, t * s), Action::none);
+    }
     EXPECT_FALSE(time_limit.in_cycle());
     run(1, 1, 100, 105);
     EXPECT_TRUE(reports.empty());

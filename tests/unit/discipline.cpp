@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Discipline against a simulated reference clock: the phase results from the adjustments and the drift.
+// Discipline against a simulated reference clock: the phase results from the adjustments and the
+// drift.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -10,13 +11,19 @@
 namespace hal::test {
 namespace {
 
-/// Reference whose period is `drift` longer than the clock's, measured with normally distributed noise.
+/// Reference whose period is `drift` longer than the clock's, measured with normally distributed
+/// noise.
 struct Reference {
-    double period_ns = 1e6, drift = 200e-6, noise_ns = 2000;
+    double period_ns = 1e6;
+    double drift = 200e-6;
+    double noise_ns = 2000;
     double phase_ns = 0;  ///< of the reference, by the clock; a perfect discipline brings it to 0
     std::mt19937 random{1};
 
-    std::int64_t seen() { return std::llround(phase_ns + (noise_ns > 0 ? std::normal_distribution<>(0, noise_ns)(random) : 0.0)); }
+    std::int64_t seen() {
+        return std::llround(phase_ns +
+                            (noise_ns > 0 ? std::normal_distribution<>(0, noise_ns)(random) : 0.0));
+    }
     void pass(std::int64_t step) { phase_ns += drift * period_ns - static_cast<double>(step); }
     std::int64_t turn(Discipline& discipline) {
         const std::int64_t step = discipline.follow(seen(), static_cast<std::int64_t>(period_ns));
@@ -57,15 +64,20 @@ TEST(Discipline, Does_the_same_at_100_us) {
 TEST(Discipline, Converges_exactly_to_an_exact_reference) {
     Reference reference{.noise_ns = 0, .phase_ns = -450'000};
     Discipline discipline;
-    for (int i = 0; i < 300; ++i) reference.turn(discipline);
+    for (int i = 0; i < 300; ++i) {
+        reference.turn(discipline);
+    }
     EXPECT_LE(reference.rms(discipline, 100), 1.0);
     EXPECT_NEAR(discipline.rate(), 200e-6, 1e-6);
 }
 
 TEST(Discipline, Brings_a_fraction_of_a_nanosecond_per_period_to_account) {
-    Reference reference{.drift = 3e-10, .noise_ns = 0};  // 0.3 ns in ten periods: far below one adjustment
+    // 0.3 ns in ten periods: far below one adjustment
+    Reference reference{.drift = 3e-10, .noise_ns = 0};
     Discipline discipline;
-    for (int i = 0; i < 100'000; ++i) reference.turn(discipline);
+    for (int i = 0; i < 100'000; ++i) {
+        reference.turn(discipline);
+    }
     EXPECT_LT(std::abs(reference.phase_ns), 5.0) << "there is no dead band";
 }
 
@@ -73,7 +85,8 @@ TEST(Discipline, Acquires_the_phase_in_steps_of_its_limit_and_overshoots_by_no_m
     Reference reference{.phase_ns = 450'000};
     Discipline discipline;
     int periods = 0;
-    for (double before = reference.phase_ns; reference.phase_ns > 5000; before = reference.phase_ns, ++periods) {
+    for (double before = reference.phase_ns; reference.phase_ns > 5000;
+         before = reference.phase_ns, ++periods) {
         ASSERT_LE(std::abs(reference.turn(discipline)), 100'000);
         ASSERT_LT(reference.phase_ns, before);
         ASSERT_FALSE(discipline.locked());
@@ -96,7 +109,8 @@ TEST(Discipline, Delayed_references_hardly_count) {
     Discipline discipline;
     reference.rms(discipline, 500);
     for (int i = 0; i < 100; ++i) {
-        reference.phase_ns += 130'000;  // behind a long frame of lower priority; three in a row at most
+        // behind a long frame of lower priority; three in a row at most
+        reference.phase_ns += 130'000;
         for (int k = 0; k < 1 + i % 3; ++k) {
             const std::int64_t step = discipline.follow(reference.seen(), 1'000'000);
             reference.pass(step);
@@ -113,7 +127,9 @@ TEST(Discipline, A_reference_with_a_new_phase_is_adopted_at_once_with_the_rate_k
     Discipline discipline;
     reference.rms(discipline, 500);
     reference.phase_ns += 300'000;
-    for (int i = 0; i < 4 + 3; ++i) reference.turn(discipline);
+    for (int i = 0; i < 4 + 3; ++i) {
+        reference.turn(discipline);
+    }
     reference.rms(discipline, 20);
     EXPECT_LT(std::abs(reference.phase_ns), 1000);
     EXPECT_NEAR(discipline.rate(), 200e-6, 100e-6);
@@ -124,7 +140,9 @@ TEST(Discipline, Coasts_at_the_rate_it_has_found) {
     Discipline discipline;
     EXPECT_EQ(discipline.coast(1'000'000), 0) << "nothing is known yet";
     reference.rms(discipline, 2000);
-    for (int i = 0; i < 100; ++i) reference.pass(discipline.coast(1'000'000));
+    for (int i = 0; i < 100; ++i) {
+        reference.pass(discipline.coast(1'000'000));
+    }
     EXPECT_LT(std::abs(reference.phase_ns), 1500) << "without it the clock would be 20 us off";
 }
 
@@ -145,20 +163,29 @@ TEST(Discipline, Forgets_the_phase_and_keeps_the_rate_when_the_reference_is_lost
 
 TEST(Discipline, Is_locked_by_sixteen_near_periods_and_no_longer_when_they_are_twice_as_far) {
     Discipline discipline({.lock_ns = 1000});
-    for (int i = 0; i < 15; ++i) discipline.follow(0, 1'000'000);
+    for (int i = 0; i < 15; ++i) {
+        discipline.follow(0, 1'000'000);
+    }
     EXPECT_FALSE(discipline.locked());
     discipline.follow(0, 1'000'000);
     EXPECT_TRUE(discipline.locked());
-    for (int i = 0; i < 40; ++i) discipline.follow(i % 2 ? 1900 : -1900, 1'000'000);
+    for (int i = 0; i < 40; ++i) {
+        discipline.follow(i % 2 ? 1900 : -1900, 1'000'000);
+    }
     EXPECT_TRUE(discipline.locked());
-    for (int i = 0; i < 40; ++i) discipline.follow(i % 2 ? 2200 : -2200, 1'000'000);
+    for (int i = 0; i < 40; ++i) {
+        discipline.follow(i % 2 ? 2200 : -2200, 1'000'000);
+    }
     EXPECT_FALSE(discipline.locked());
 }
 
 TEST(Discipline, Gives_up_on_a_reference_that_moves_with_the_clock) {
     Discipline discipline;
     std::int64_t sum = 0;
-    for (int i = 0; i < 10'000; ++i) sum += discipline.follow(250'000, 1'000'000);  // no adjustment changes the phase of the reference
+    // no adjustment changes the phase of the reference
+    for (int i = 0; i < 10'000; ++i) {
+        sum += discipline.follow(250'000, 1'000'000);
+    }
     EXPECT_TRUE(discipline.in_vain());
     EXPECT_LT(sum, 3'000'000);
     EXPECT_FALSE(discipline.locked());
@@ -169,7 +196,9 @@ TEST(Discipline, Gives_up_on_a_reference_that_moves_with_the_clock) {
 TEST(Discipline, Does_not_give_up_on_a_reference_with_much_noise) {
     Reference reference{.noise_ns = 80'000};
     Discipline discipline({.lock_ns = 10'000});
-    for (int i = 0; i < 100'000; ++i) reference.turn(discipline);
+    for (int i = 0; i < 100'000; ++i) {
+        reference.turn(discipline);
+    }
     EXPECT_FALSE(discipline.locked());
     EXPECT_FALSE(discipline.in_vain());
 }

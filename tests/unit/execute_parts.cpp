@@ -40,7 +40,9 @@ TEST(FaultBoard, keeps_one_fault_for_each_condition_that_lasts) {
     const int keys[2]{};
     board.begin(&owner, &keys[0]);
     board.begin(&owner, &keys[0]);
-    for (int i = 0; i < 3; ++i) board.count({HAL_FAULT_COMPONENT}, 1);
+    for (int i = 0; i < 3; ++i) {
+        board.count({HAL_FAULT_COMPONENT}, 1);
+    }
     board.clear();
     EXPECT_EQ(open(), 1u);
     board.begin(&owner, &keys[1]);
@@ -60,9 +62,13 @@ TEST(FaultBoard, keeps_one_fault_for_each_condition_that_lasts) {
 TEST(FaultBoard, has_room_for_a_limited_number_of_conditions) {
     FaultBoard board;
     std::vector<int> keys(FaultBoard::max_lasting + 10);
-    for (const int& key : keys) board.begin(&board, &key);
+    for (const int& key : keys) {
+        board.begin(&board, &key);
+    }
     EXPECT_EQ(board.shared.lasting, FaultBoard::max_lasting);
-    for (const int& key : keys) board.end(&board, &key);
+    for (const int& key : keys) {
+        board.end(&board, &key);
+    }
     EXPECT_EQ(board.shared.lasting, 0u);
 }
 
@@ -71,7 +77,9 @@ TEST(Queue, gives_items_back_in_order_and_refuses_when_full) {
     int out = 0;
     EXPECT_FALSE(queue.pop(out));
     for (int turn = 0; turn < 10; ++turn) {  // over the wrap
-        for (int i = 0; i < 4; ++i) EXPECT_TRUE(queue.push(turn * 10 + i));
+        for (int i = 0; i < 4; ++i) {
+            EXPECT_TRUE(queue.push(turn * 10 + i));
+        }
         EXPECT_FALSE(queue.push(99));
         EXPECT_EQ(queue.size(), 4u);
         for (int i = 0; i < 4; ++i) {
@@ -104,12 +112,17 @@ TEST(Queue, shows_its_reader_whole_rows_only) {
     std::thread writer([&] {
         for (int i = 0; i < rows; ++i) {
             const int row[] = {i, i, i};
-            while (!queue.push(row, 3)) std::this_thread::yield();
+            while (!queue.push(row, 3)) {
+                std::this_thread::yield();
+            }
         }
     });
     for (int i = 0; i < rows; ++i) {
-        int first = -1, next = -1;
-        while (!queue.pop(first)) std::this_thread::yield();
+        int first = -1;
+        int next = -1;
+        while (!queue.pop(first)) {
+            std::this_thread::yield();
+        }
         ASSERT_EQ(first, i);
         for (int k = 0; k < 2; ++k) {
             ASSERT_TRUE(queue.pop(next)) << "a part of a row";
@@ -126,7 +139,9 @@ TEST(Mailbox, gives_the_newest_value_and_never_a_torn_one) {
     Mailbox<Pair> mailbox(Pair{0, 0});
     constexpr std::uint64_t last = 50'000;
     std::thread writer([&] {
-        for (std::uint64_t i = 1; i <= last; ++i) mailbox.put({i, i});
+        for (std::uint64_t i = 1; i <= last; ++i) {
+            mailbox.put({i, i});
+        }
     });
     std::uint64_t before = 0;
     while (before < last) {
@@ -143,8 +158,12 @@ TEST(Mailbox, gives_the_newest_value_and_never_a_torn_one) {
 TEST(Histogram, finds_quantiles_within_its_resolution) {
     Histogram histogram;
     EXPECT_EQ(histogram.quantile(0.5), 0.0);
-    for (int ns = 1; ns <= 100'000; ++ns) histogram.add(ns);
-    for (const double share : {0.01, 0.5, 0.9, 0.99}) EXPECT_NEAR(histogram.quantile(share), share * 100'000, share * 100'000 * 0.125) << share;
+    for (int ns = 1; ns <= 100'000; ++ns) {
+        histogram.add(ns);
+    }
+    for (const double share : {0.01, 0.5, 0.9, 0.99}) {
+        EXPECT_NEAR(histogram.quantile(share), share * 100'000, share * 100'000 * 0.125) << share;
+    }
     EXPECT_EQ(histogram.max_ns(), 100'000u);
     EXPECT_EQ(histogram.quantile(1.0), 100'000.0);
 }
@@ -153,17 +172,23 @@ TEST(Histogram, counts_every_value_in_the_bucket_of_its_size) {
     Histogram histogram;
     std::mt19937_64 random(7);
     std::vector<std::int64_t> values{-5, 0, 1, 7, 8, 9, 15, 16, 1'000'000'000'000, INT64_MAX};
-    for (int i = 0; i < 1000; ++i) values.push_back(static_cast<std::int64_t>(random() >> (1 + random() % 60)));
-    for (const std::int64_t value : values) histogram.add(value);
+    for (int i = 0; i < 1000; ++i) {
+        values.push_back(static_cast<std::int64_t>(random() >> (1 + random() % 60)));
+    }
+    for (const std::int64_t value : values) {
+        histogram.add(value);
+    }
     std::uint64_t all = 0;
     for (std::size_t i = 0; i < Histogram::buckets; ++i) {
         all += histogram.count(i);
         if (i > 0) {
             EXPECT_GT(Histogram::edge(i), Histogram::edge(i - 1));
         }
-        const auto inside = static_cast<std::uint64_t>(std::count_if(values.begin(), values.end(), [&](std::int64_t value) {
+        const auto inside = static_cast<std::uint64_t>(
+            std::count_if(values.begin(), values.end(), [&](std::int64_t value) {
             const auto size = static_cast<std::uint64_t>(value < 0 ? 0 : value);
-            return size >= Histogram::edge(i) && (i + 1 == Histogram::buckets || size < Histogram::edge(i + 1));
+            return size >= Histogram::edge(i) &&
+                   (i + 1 == Histogram::buckets || size < Histogram::edge(i + 1));
         }));
         EXPECT_EQ(histogram.count(i), inside) << "bucket from " << Histogram::edge(i);
     }

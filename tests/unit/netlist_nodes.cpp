@@ -43,7 +43,10 @@ TEST_F(Nodes, times_are_said_once_and_a_deadline_follows_the_rate) {
     EXPECT_EQ(all[2].deadline(), 100'000'000);
     EXPECT_EQ(render(found, sources), "");
     nodes("node x rate=50ms\nnode x rate=20ms\n");
-    EXPECT_NE(render(found, sources).find("node 'x' has two different values of rate= or deadline="), std::string::npos) << render(found, sources);
+    EXPECT_NE(
+        render(found, sources).find("node 'x' has two different values of rate= or deadline="),
+        std::string::npos)
+        << render(found, sources);
 }
 
 TEST_F(Nodes, a_pin_called_node_is_no_line) {

@@ -6,7 +6,8 @@ namespace {
 class Parser : public netlist_text::Netlist {};
 
 TEST_F(Parser, splits_commands_at_blanks_and_lines) {
-    EXPECT_EQ(words("loadrt and2 count=2\n\n  \t net  a\tx.out   => y.in \nstart"), R"(<loadrt> <and2> <count=2>
+    EXPECT_EQ(words("loadrt and2 count=2\n\n  \t net  a\tx.out   => y.in \nstart"),
+              R"(<loadrt> <and2> <count=2>
 <net> <a> <x.out> <=>> <y.in>
 <start>
 )");
@@ -21,11 +22,13 @@ TEST_F(Parser, gives_nothing_for_an_empty_text) {
 TEST_F(Parser, skips_a_byte_order_mark) { EXPECT_EQ(words("\xEF\xBB\xBFstart\n"), "<start>\n"); }
 
 TEST_F(Parser, cuts_comments_outside_quotes) {
-    EXPECT_EQ(words("setp a 1 # it's \"this\nsetp b#c 2\nprint '#1' # x\n"), "<setp> <a> <1>\n<setp> <b>\n<print> <'#1'>\n");
+    EXPECT_EQ(words("setp a 1 # it's \"this\nsetp b#c 2\nprint '#1' # x\n"),
+              "<setp> <a> <1>\n<setp> <b>\n<print> <'#1'>\n");
 }
 
 TEST_F(Parser, keeps_quotes_in_the_word_and_blanks_between_them) {
-    EXPECT_EQ(words("loadrt hostmot2 config=\"a  b\" x='\"' y=\"it's\""), "<loadrt> <hostmot2> <config=\"a  b\"> <x='\"'> <y=\"it's\">\n");
+    EXPECT_EQ(words("loadrt hostmot2 config=\"a  b\" x='\"' y=\"it's\""),
+              "<loadrt> <hostmot2> <config=\"a  b\"> <x='\"'> <y=\"it's\">\n");
 }
 
 TEST_F(Parser, joins_lines_at_a_backslash) {
@@ -58,15 +61,19 @@ TEST_F(Parser, points_at_the_reference_of_each_word_of_a_value) {
 
 TEST_F(Parser, replaces_references_everywhere_but_in_comments) {
     environment.variable = [](const std::string& name) { return std::optional("<" + name + ">"); };
-    EXPECT_EQ(words("setp $A-b.c_1 $(A b)x \"$A\" '$(B)' # $\n"), "<setp> <<A-b.c_1>> <<A> <b>x> <\"<A>\"> <'<B>'>\n");
+    EXPECT_EQ(words("setp $A-b.c_1 $(A b)x \"$A\" '$(B)' # $\n"),
+              "<setp> <<A-b.c_1>> <<A> <b>x> <\"<A>\"> <'<B>'>\n");
 }
 
 TEST_F(Parser, splits_values_at_their_blanks) {
-    EXPECT_EQ(words("setp $B \"$B\" x$(B)y $EMPTY z $QUOTED"), "<setp> <two> <words> <\"two words\"> <xtwo> <wordsy> <z> <\"one word\">\n");
+    EXPECT_EQ(words("setp $B \"$B\" x$(B)y $EMPTY z $QUOTED"),
+              "<setp> <two> <words> <\"two words\"> <xtwo> <wordsy> <z> <\"one word\">\n");
     EXPECT_EQ(words("$EMPTY"), "");
 }
 
-TEST_F(Parser, takes_a_hash_in_a_value_as_a_character) { EXPECT_EQ(words("setp $HASH 1"), "<setp> <a#b> <1>\n"); }
+TEST_F(Parser, takes_a_hash_in_a_value_as_a_character) {
+    EXPECT_EQ(words("setp $HASH 1"), "<setp> <a#b> <1>\n");
+}
 
 TEST_F(Parser, does_not_look_into_values_for_references) {
     environment.variable = [](const std::string&) { return std::optional<std::string>("$A[X]Y"); };
@@ -77,23 +84,30 @@ TEST_F(Parser, uses_the_process_environment_by_default) {
     environment.variable = nullptr;
     ::setenv("HALCYON_TEST_VALUE", "7", 1);
     EXPECT_EQ(words("setp a $HALCYON_TEST_VALUE"), "<setp> <a> <7>\n");
-    EXPECT_EQ(said("setp a $HALCYON_TEST_VALU"),
-              R"(test.hal:1:8: error: the environment variable 'HALCYON_TEST_VALU' is not set [unset-variable]
+    EXPECT_EQ(
+        said("setp a $HALCYON_TEST_VALU"),
+        R"(test.hal:1:8: error: the environment variable 'HALCYON_TEST_VALU' is not set [unset-variable]
     1 | setp a $HALCYON_TEST_VALU
       |        ^^^^^^^^^^^^^^^^^^ did you mean 'HALCYON_TEST_VALUE'?
       = help: set it before the command: HALCYON_TEST_VALU=… hal …
 )");
 }
 
-TEST_F(Parser, leaves_ranges_and_sets_alone) { EXPECT_EQ(words("net j[0..5]cmd {x,y}[00..11]"), "<net> <j[0..5]cmd> <{x,y}[00..11]>\n"); }
+TEST_F(Parser, leaves_ranges_and_sets_alone) {
+    EXPECT_EQ(words("net j[0..5]cmd {x,y}[00..11]"), "<net> <j[0..5]cmd> <{x,y}[00..11]>\n");
+}
 
 TEST_F(Parser, takes_a_bracket_in_show_and_list_as_part_of_a_pattern) {
-    EXPECT_EQ(words("show pin pid.[01].* [\nlist pin [a-z](x)"), "<show> <pin> <pid.[01].*> <[>\n<list> <pin> <[a-z](x)>\n");
+    EXPECT_EQ(words("show pin pid.[01].* [\nlist pin [a-z](x)"),
+              "<show> <pin> <pid.[01].*> <[>\n<list> <pin> <[a-z](x)>\n");
 }
 
 TEST_F(Parser, accepts_dos_line_ends_with_one_warning) {
-    EXPECT_EQ(netlist_text::joined(parse("start\r\nnet a \\\r\n b\r\nstop\r\n")), "start\nnet a b\nstop\n");
-    EXPECT_EQ(render(found, sources), R"(test.hal:1:6: warning: the lines of this file end in CR LF (DOS line endings) [dos-line-endings]
+    EXPECT_EQ(netlist_text::joined(parse("start\r\nnet a \\\r\n b\r\nstop\r\n")),
+              "start\nnet a b\nstop\n");
+    EXPECT_EQ(
+        render(found, sources),
+        R"(test.hal:1:6: warning: the lines of this file end in CR LF (DOS line endings) [dos-line-endings]
     1 | start
       |      ^
       = help: harmless here; `hal fmt` converts them to LF
@@ -102,7 +116,8 @@ TEST_F(Parser, accepts_dos_line_ends_with_one_warning) {
 
 TEST_F(Parser, refuses_a_carriage_return_inside_a_line_once_per_file) {
     EXPECT_EQ(netlist_text::joined(parse("start\rstop\nnet a b\nshow\r")), "net a b\n");
-    EXPECT_EQ(render(found, sources), R"(test.hal:1:6: error: carriage return without a line feed [lone-carriage-return]
+    EXPECT_EQ(render(found, sources),
+              R"(test.hal:1:6: error: carriage return without a line feed [lone-carriage-return]
     1 | start\x0dstop
       |      ^^^^
       = help: end lines with LF (or CR LF); `tr '\r' '\n'` converts a file with CR line endings
@@ -111,7 +126,8 @@ TEST_F(Parser, refuses_a_carriage_return_inside_a_line_once_per_file) {
 
 TEST_F(Parser, refuses_an_open_quote_and_goes_on_with_the_next_line) {
     EXPECT_EQ(netlist_text::joined(parse("print \"it's\nsetp x 'y' z'\nstart\n")), "start\n");
-    EXPECT_EQ(render(found, sources), R"(test.hal:1:7: error: the quote " is never closed [unterminated-quote]
+    EXPECT_EQ(render(found, sources),
+              R"(test.hal:1:7: error: the quote " is never closed [unterminated-quote]
     1 | print "it's
       |       ^ opened here
       = help: close it with " on the same line; there is no escape character, but one kind of quote may appear inside the other
@@ -124,7 +140,8 @@ test.hal:2:13: error: the quote ' is never closed [unterminated-quote]
 }
 
 TEST_F(Parser, refuses_a_value_that_leaves_a_quote_open) {
-    EXPECT_EQ(said("setp x $HALF"), R"(test.hal:1:8: error: the quote " is never closed [unterminated-quote]
+    EXPECT_EQ(said("setp x $HALF"),
+              R"(test.hal:1:8: error: the quote " is never closed [unterminated-quote]
     1 | setp x $HALF
       |        ^^^^^ it comes from this value
       = help: close it with " on the same line; there is no escape character, but one kind of quote may appear inside the other
@@ -132,7 +149,8 @@ TEST_F(Parser, refuses_a_value_that_leaves_a_quote_open) {
 }
 
 TEST_F(Parser, refuses_unset_variables_all_at_once) {
-    EXPECT_EQ(said("setp $X $A\nsetp a $Y b $(Z z)\n"), R"(test.hal:1:6: error: the environment variable 'X' is not set [unset-variable]
+    EXPECT_EQ(said("setp $X $A\nsetp a $Y b $(Z z)\n"),
+              R"(test.hal:1:6: error: the environment variable 'X' is not set [unset-variable]
     1 | setp $X $A
       |      ^^
       = help: set it before the command: X=… hal …
@@ -150,8 +168,9 @@ test.hal:2:13: error: the environment variable 'Z z' is not set [unset-variable]
 }
 
 TEST_F(Parser, refuses_references_without_a_name_or_an_end) {
-    EXPECT_EQ(said("setp $ 1\nsetp $(A 1\nsetp [X 1\nsetp [X] 1\nsetp [X](Y 1\nsetp a[0..3 1\n"),
-              R"(test.hal:1:6: error: missing name of an environment variable after '$' [bad-reference]
+    EXPECT_EQ(
+        said("setp $ 1\nsetp $(A 1\nsetp [X 1\nsetp [X] 1\nsetp [X](Y 1\nsetp a[0..3 1\n"),
+        R"(test.hal:1:6: error: missing name of an environment variable after '$' [bad-reference]
     1 | setp $ 1
       |      ^
       = help: write $NAME or $(NAME)
@@ -202,8 +221,9 @@ TEST_F(Parser, accepts_any_bytes_but_zero_in_comments_and_8_bit_names) {
 
 TEST_F(Parser, warns_of_a_comment_that_swallows_the_next_line) {
     EXPECT_EQ(netlist_text::joined(parse("start # C:\\\nstop\nshow\n")), "start\nshow\n");
-    EXPECT_EQ(render(found, sources),
-              R"(test.hal:1:7: warning: this comment ends in \ and therefore includes the next line, which is not executed [continued-comment]
+    EXPECT_EQ(
+        render(found, sources),
+        R"(test.hal:1:7: warning: this comment ends in \ and therefore includes the next line, which is not executed [continued-comment]
     1 | start # C:\
       |       ^
       = help: remove the \, or move the comment to the end of the last line
@@ -212,10 +232,14 @@ TEST_F(Parser, warns_of_a_comment_that_swallows_the_next_line) {
 
 TEST_F(Parser, shows_20_errors_and_counts_the_others) {
     std::string text;
-    for (int i = 0; i < 1000; ++i) text += "print '\nsetp $NO 1\n";
+    for (int i = 0; i < 1000; ++i) {
+        text += "print '\nsetp $NO 1\n";
+    }
     parse(text);
     EXPECT_EQ(found.errors(), 21u);
-    EXPECT_EQ(render(found.all().back(), sources), R"(test.hal:2000:6: error: 1980 more errors in this file are not shown [too-many-errors]
+    EXPECT_EQ(
+        render(found.all().back(), sources),
+        R"(test.hal:2000:6: error: 1980 more errors in this file are not shown [too-many-errors]
  2000 | setp $NO 1
       |      ^^^ the last of them
 )");
@@ -223,15 +247,20 @@ TEST_F(Parser, shows_20_errors_and_counts_the_others) {
 
 TEST_F(Parser, bounds_what_references_become) {
     std::string text = "setp";
-    for (int i = 0; i < 33; ++i) text += " $LONG";
+    for (int i = 0; i < 33; ++i) {
+        text += " $LONG";
+    }
     EXPECT_EQ(netlist_text::joined(parse(text + "\nstart\n")), "start\n");
     ASSERT_EQ(found.errors(), 1u);
-    EXPECT_EQ(found.all()[0].message, "the values that replace references in this file exceed 32 MB in total");
+    EXPECT_EQ(found.all()[0].message,
+              "the values that replace references in this file exceed 32 MB in total");
 }
 
 TEST_F(Parser, has_no_small_limits) {
     std::string text = "net " + std::string(10'000, 'n');
-    for (int i = 0; i < 100'000; ++i) text += " pin" + std::to_string(i);
+    for (int i = 0; i < 100'000; ++i) {
+        text += " pin" + std::to_string(i);
+    }
     const auto commands = parse(text);
     ASSERT_EQ(commands.size(), 1u);
     EXPECT_EQ(commands[0].args.size(), 100'001u);
@@ -244,10 +273,13 @@ TEST_F(Parser, takes_time_in_proportion_to_the_text) {
     constexpr std::size_t size = 500'000;
     const auto repeat = [](std::string_view part) {
         std::string text;
-        while (text.size() < size) text += part;
+        while (text.size() < size) {
+            text += part;
+        }
         return text;
     };
-    for (const char* part : {"[", "$", "$(", "[A](", "[0..", "\"", "' \"", "\\\n", "a\\\n", "[A", "]", "{", "$A ", "#"}) {
+    for (const char* part : {"[", "$", "$(", "[A](", "[0..", "\"", "' \"", "\\\n", "a\\\n", "[A",
+                             "]", "{", "$A ", "#"}) {
         hal::Diagnostics local;
         hal::parse(sources, add(repeat(part)), environment, local);
         hal::format(sources, add(repeat(part)), local);
@@ -256,8 +288,12 @@ TEST_F(Parser, takes_time_in_proportion_to_the_text) {
 }
 
 TEST(Arrow, is_one_of_three_words) {
-    for (const char* word : {"=>", "<=", "<=>"}) EXPECT_TRUE(hal::is_arrow(word));
-    for (const char* word : {"==>", "<==", "=", "", "x=>y"}) EXPECT_FALSE(hal::is_arrow(word));
+    for (const char* word : {"=>", "<=", "<=>"}) {
+        EXPECT_TRUE(hal::is_arrow(word));
+    }
+    for (const char* word : {"==>", "<==", "=", "", "x=>y"}) {
+        EXPECT_FALSE(hal::is_arrow(word));
+    }
 }
 
 }  // namespace

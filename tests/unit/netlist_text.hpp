@@ -19,7 +19,9 @@ inline std::string joined(const std::vector<hal::Command>& commands, const char*
     std::string text;
     for (const hal::Command& command : commands) {
         text += command.name.text;
-        for (const hal::Token& arg : command.args) text += between + arg.text;
+        for (const hal::Token& arg : command.args) {
+            text += between + arg.text;
+        }
         text += "\n";
     }
     return text;
@@ -28,16 +30,22 @@ inline std::string joined(const std::vector<hal::Command>& commands, const char*
 /// One text called test.hal, with `A`, `B` and `LIST` in its environment.
 class Netlist : public testing::Test {
 protected:
-    std::uint32_t add(std::string text) { return source_ = sources.add("test.hal", std::move(text)); }
+    std::uint32_t add(std::string text) {
+        return source_ = sources.add("test.hal", std::move(text));
+    }
 
-    std::vector<hal::Command> parse(std::string text) { return hal::parse(sources, add(std::move(text)), environment, found); }
+    std::vector<hal::Command> parse(std::string text) {
+        return hal::parse(sources, add(std::move(text)), environment, found);
+    }
 
     /// The commands of a text without fault, a line each, words in <>.
     std::string words(std::string text) {
         std::string out;
         for (const hal::Command& command : parse(std::move(text))) {
             out += "<" + command.name.text + ">";
-            for (const hal::Token& arg : command.args) out += " <" + arg.text + ">";
+            for (const hal::Token& arg : command.args) {
+                out += " <" + arg.text + ">";
+            }
             out += "\n";
         }
         EXPECT_EQ(render(found, sources), "");
@@ -53,8 +61,11 @@ protected:
     /// What the text stands for after expansion.
     std::string expanded(std::string text) {
         std::vector<hal::Command> all;
-        for (const hal::Command& command : parse(std::move(text)))
-            for (hal::Command& one : hal::expand(command, found)) all.push_back(std::move(one));
+        for (const hal::Command& command : parse(std::move(text))) {
+            for (hal::Command& one : hal::expand(command, found)) {
+                all.push_back(std::move(one));
+            }
+        }
         return joined(all);
     }
 
@@ -62,14 +73,17 @@ protected:
 
     hal::Sources sources;
     hal::Diagnostics found;
-    hal::Environment environment{.ini = nullptr, .variable = [](const std::string& name) -> std::optional<std::string> {
+    hal::Environment environment{
+        .ini = nullptr, .variable = [](const std::string& name) -> std::optional<std::string> {
         if (name == "A") return "alpha";
         if (name == "B") return "two words";
         if (name == "EMPTY") return "";
         if (name == "QUOTED") return "\"one word\"";
         if (name == "HALF") return "\"half";
         if (name == "HASH") return "a#b";
-        if (name == "LIST") return "{x,y}";
+        if (name == "LIST") {
+            return "{x,y}";
+        }
         if (name == "LONG") return std::string(1 << 20, 'l');
         return std::nullopt;
     }};
@@ -81,7 +95,9 @@ private:
 /// A directory that goes when the test does.
 class Folder {
 public:
-    Folder() : path_(std::filesystem::temp_directory_path() / ("halcyon-netlist-" + std::to_string(::getpid()))) {
+    Folder()
+        : path_(std::filesystem::temp_directory_path() /
+                ("halcyon-netlist-" + std::to_string(::getpid()))) {
         std::filesystem::create_directories(path_);
     }
     ~Folder() { std::filesystem::remove_all(path_); }

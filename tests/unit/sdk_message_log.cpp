@@ -25,7 +25,9 @@ TEST_F(MessageLogTest, First_message_of_each_subject_is_printed_at_once) {
 }
 
 TEST_F(MessageLogTest, Storm_is_one_line_per_second_with_the_newest_message_and_a_count) {
-    for (int i = 0; i < 3000; ++i) log.print("storm", "latency " + std::to_string(i) + " us", i * ms);
+    for (int i = 0; i < 3000; ++i) {
+        log.print("storm", "latency " + std::to_string(i) + " us", i * ms);
+    }
     EXPECT_EQ(lines, (Lines{"it.0: latency 0 us\n", "it.0: latency 999 us (999 times in 1.0 s)\n",
                             "it.0: latency 1999 us (1000 times in 1.0 s)\n"}));
     log.flush(3000 * ms);
@@ -33,7 +35,8 @@ TEST_F(MessageLogTest, Storm_is_one_line_per_second_with_the_newest_message_and_
     EXPECT_EQ(lines.back(), "it.0: latency 2999 us (1000 times in 1.0 s)\n");
     log.flush(4000 * ms);
     log.print("storm", "latency 1 us", 4500 * ms);
-    EXPECT_EQ(lines.back(), "it.0: latency 1 us\n") << "after a quiet second it is printed at once again";
+    EXPECT_EQ(lines.back(), "it.0: latency 1 us\n")
+        << "after a quiet second it is printed at once again";
     EXPECT_EQ(lines.size(), 5u);
 }
 
@@ -51,7 +54,9 @@ TEST_F(MessageLogTest, Alternating_states_keep_their_order) {
     log.print("back", "back", 100 * ms);
     log.print("lost", "lost", 200 * ms);
     log.print("back", "back", 300 * ms);
-    for (int i = 300; i < 2000; ++i) log.flush(i * ms);
+    for (int i = 300; i < 2000; ++i) {
+        log.flush(i * ms);
+    }
     EXPECT_EQ(lines, (Lines{"it.0: lost\n", "it.0: back\n", "it.0: lost\n", "it.0: back\n"}));
 }
 
@@ -61,7 +66,8 @@ TEST_F(MessageLogTest, What_was_counted_is_printed_before_news_about_another_sub
     log.print("frozen", "frozen", 200 * ms);
     log.print("good", "good again", 300 * ms);
     log.print("gone", "unplugged", 400 * ms);
-    EXPECT_EQ(lines, (Lines{"it.0: frozen\n", "it.0: good again\n", "it.0: frozen\n", "it.0: good again\n", "it.0: unplugged\n"}));
+    EXPECT_EQ(lines, (Lines{"it.0: frozen\n", "it.0: good again\n", "it.0: frozen\n",
+                            "it.0: good again\n", "it.0: unplugged\n"}));
 }
 
 TEST_F(MessageLogTest, Without_a_subject_numbers_do_not_count) {
@@ -69,11 +75,14 @@ TEST_F(MessageLogTest, Without_a_subject_numbers_do_not_count) {
     log.print("no frame for 12 s", 1 * ms);
     EXPECT_EQ(lines.size(), 1u);
     EXPECT_EQ(MessageLog::without_numbers("can0: 0x1F is 1.5 s, 12."), "can#: # is # s, #.");
-    EXPECT_EQ(MessageLog::without_numbers("'cell' (010f44aa5e) of 02:00:5e:0a, after 5us"), "'cell' (#) of #:#:#:#, after #us");
+    EXPECT_EQ(MessageLog::without_numbers("'cell' (010f44aa5e) of 02:00:5e:0a, after 5us"),
+              "'cell' (#) of #:#:#:#, after #us");
 }
 
 TEST_F(MessageLogTest, Subjects_beyond_the_limit_are_counted) {
-    for (int i = 0; i < 100'000; ++i) log.print(std::to_string(i), "subject " + std::to_string(i), 0);
+    for (int i = 0; i < 100'000; ++i) {
+        log.print(std::to_string(i), "subject " + std::to_string(i), 0);
+    }
     EXPECT_EQ(lines.size(), MessageLog::most_subjects);
     log.flush(1000 * ms);
     ASSERT_EQ(lines.size(), MessageLog::most_subjects + 1);
@@ -81,27 +90,41 @@ TEST_F(MessageLogTest, Subjects_beyond_the_limit_are_counted) {
 }
 
 // What a device chooses, such as an error code, may be different every time.
-TEST_F(MessageLogTest, Storm_of_one_kind_with_ever_other_details_is_a_few_lines_and_one_per_second) {
-    for (int i = 0; i < 3000; ++i)
-        log.print(hal::MessageSubject{"emergency 3", std::to_string(i)}, "node 3: emergency " + std::to_string(i), i * ms);
+TEST_F(MessageLogTest,
+       Storm_of_one_kind_with_ever_other_details_is_a_few_lines_and_one_per_second) {
+    for (int i = 0; i < 3000; ++i) {
+        log.print(hal::MessageSubject{"emergency 3", std::to_string(i)},
+                  "node 3: emergency " + std::to_string(i), i * ms);
+    }
     ASSERT_EQ(lines.size(), MessageLog::most_details + 2);
     EXPECT_EQ(lines[0], "it.0: node 3: emergency 0\n");
     EXPECT_EQ(lines[MessageLog::most_details - 1], "it.0: node 3: emergency 7\n");
-    EXPECT_EQ(lines[MessageLog::most_details], "it.0: node 3: emergency 1007 (999 similar messages in 1.0 s not shown)\n");
-    EXPECT_EQ(lines.back(), "it.0: node 3: emergency 2007 (999 similar messages in 1.0 s not shown)\n");
+    EXPECT_EQ(lines[MessageLog::most_details],
+              "it.0: node 3: emergency 1007 (999 similar messages in 1.0 s not shown)\n");
+    EXPECT_EQ(lines.back(),
+              "it.0: node 3: emergency 2007 (999 similar messages in 1.0 s not shown)\n");
     log.close();
-    EXPECT_EQ(lines.back(), "it.0: node 3: emergency 2999 (991 similar messages in 1.0 s not shown)\n");
+    EXPECT_EQ(lines.back(),
+              "it.0: node 3: emergency 2999 (991 similar messages in 1.0 s not shown)\n");
 }
 
 TEST_F(MessageLogTest, Storm_of_one_kind_does_not_hide_another) {
-    for (int i = 0; i < 500; ++i) log.print(hal::MessageSubject{"emergency 3", std::to_string(i)}, "node 3: emergency", i * ms);
+    for (int i = 0; i < 500; ++i) {
+        log.print(hal::MessageSubject{"emergency 3", std::to_string(i)}, "node 3: emergency",
+                  i * ms);
+    }
     log.print(hal::MessageSubject{"lost 4", ""}, "node 4 is lost", 500 * ms);
     EXPECT_EQ(lines.back(), "it.0: node 4 is lost\n");
 }
 
 TEST_F(MessageLogTest, Storm_of_one_kind_ends_with_a_quiet_second) {
-    const auto print = [&](int detail, std::int64_t at) { log.print(hal::MessageSubject{"k", std::to_string(detail)}, "k " + std::to_string(detail), at); };
-    for (int i = 0; i < 20; ++i) print(i, i * ms);
+    const auto print = [&](int detail, std::int64_t at) {
+        log.print(hal::MessageSubject{"k", std::to_string(detail)}, "k " + std::to_string(detail),
+                  at);
+    };
+    for (int i = 0; i < 20; ++i) {
+        print(i, i * ms);
+    }
     log.flush(1100 * ms);
     log.flush(2200 * ms);
     const std::size_t before = lines.size();
@@ -111,13 +134,19 @@ TEST_F(MessageLogTest, Storm_of_one_kind_ends_with_a_quiet_second) {
 }
 
 TEST_F(MessageLogTest, Endless_subjects_get_few_lines_after_the_first_second) {
-    for (int i = 0; i < 5000; ++i) log.print(std::to_string(i), "subject", i * ms);
-    EXPECT_LE(lines.size(), MessageLog::most_subjects + 5 * (MessageLog::most_subjects_of_a_storm + 1));
+    for (int i = 0; i < 5000; ++i) {
+        log.print(std::to_string(i), "subject", i * ms);
+    }
+    EXPECT_LE(lines.size(),
+              MessageLog::most_subjects + 5 * (MessageLog::most_subjects_of_a_storm + 1));
 }
 
 TEST_F(MessageLogTest, Lines_go_to_the_journal_of_the_machine_while_it_is_set) {
     Lines kept;
-    const hal_messages journal{sizeof journal, [](const hal_messages* self, const char* line, std::size_t bytes) { static_cast<Lines*>(self->data)->emplace_back(line, bytes); }, &kept};
+    const hal_messages journal{sizeof journal,
+                               [](const hal_messages* self, const char* line, std::size_t bytes) {
+        static_cast<Lines*>(self->data)->emplace_back(line, bytes);
+    }, &kept};
     log.print("before", 0);
     log.journal(&journal);
     log.print("node # is lost", "node 3 is lost", 0);
@@ -130,7 +159,9 @@ TEST_F(MessageLogTest, Lines_go_to_the_journal_of_the_machine_while_it_is_set) {
 }
 
 TEST_F(MessageLogTest, Close_prints_what_was_only_counted) {
-    for (int i = 0; i < 5; ++i) log.print("a", "x", i * 100 * ms);
+    for (int i = 0; i < 5; ++i) {
+        log.print("a", "x", i * 100 * ms);
+    }
     log.close();
     EXPECT_EQ(lines.back(), "it.0: x (4 times in 0.4 s)\n");
     log.close();

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Work of components outside of the cycle: in step with the virtual clock, in a thread of its own on the real one.
+// Work of components outside of the cycle: in step with the virtual clock, in a thread of its own
+// on the real one.
 #include "machine.hpp"
 
 namespace hal::test {
@@ -7,7 +8,9 @@ namespace {
 
 TEST(Background, Work_is_done_after_each_instant_of_the_virtual_clock) {
     Machine machine;
-    machine.must("newthread f 1000000\nnewthread s 2000000\nloadrt test-background names=a,b\naddf a f\naddf b s");
+    machine.must(
+        "newthread f 1000000\nnewthread s 2000000\nloadrt test-background names=a,b\naddf a "
+        "f\naddf b s");
     machine.must("setp a.question 21\nsetp b.question 4");
     machine.start();
     machine.cycles(1);
@@ -40,7 +43,8 @@ TEST(Background, Work_ends_when_its_instance_goes_and_begins_when_one_comes) {
 
 TEST(Background, Work_has_a_thread_of_its_own_on_the_real_clock) {
     Machine machine(Clock::real);
-    machine.must("newthread f 1000000\nloadrt test-background names=a\naddf a f\nsetp a.question 3");
+    machine.must(
+        "newthread f 1000000\nloadrt test-background names=a\naddf a f\nsetp a.question 3");
     machine.start();
     EXPECT_TRUE(eventually([&] { return machine.number("a.answer") == 6; }));
     EXPECT_EQ(machine.get("a.waits"), "TRUE");

@@ -32,7 +32,8 @@ TEST_F(DisciplinedThreads, All_threads_keep_their_phase_to_one_another) {
     machine.start();
     for (int turn = 1; turn <= 50; ++turn) {
         machine.cycles(4);
-        EXPECT_EQ(machine.number("slow.due"), machine.number("fast.due")) << turn;  // they are due at one position of the grid
+        // they are due at one position of the grid
+        EXPECT_EQ(machine.number("slow.due"), machine.number("fast.due")) << turn;
         EXPECT_EQ(machine.number("fast.due"), 4'000'000 * turn - 20'000 * (4 * turn - 1));
     }
 }
@@ -96,9 +97,13 @@ TEST_F(DisciplinedThreads, A_grid_that_goes_back_loses_no_cycle) {
 
 TEST_F(DisciplinedThreads, A_second_leader_is_rejected_with_the_name_of_the_first) {
     machine.rejected("loadrt test-clock names=other", "start-failed");
-    EXPECT_NE(machine.said.find("'other' (test-clock) cannot start: the threads already follow the clock of 'fast' (test-clock) [start-failed]"), std::string::npos)
+    EXPECT_NE(machine.said.find("'other' (test-clock) cannot start: the threads already follow the "
+                                "clock of 'fast' (test-clock) [start-failed]"),
+              std::string::npos)
         << machine.said;
-    EXPECT_NE(machine.said.find("`clock = thread` in [bus] of an EtherCAT bus, `clock = own` of a CANopen bus; or unload 'fast' first"), std::string::npos);
+    EXPECT_NE(machine.said.find("`clock = thread` in [bus] of an EtherCAT bus, `clock = own` of a "
+                                "CANopen bus; or unload 'fast' first"),
+              std::string::npos);
     machine.must("unloadrt fast");
     machine.must("loadrt test-clock names=other");
     EXPECT_EQ(machine.session.reports().clock()->leader, "other");
@@ -137,7 +142,9 @@ TEST_F(DisciplinedThreads, The_report_names_the_leader_the_offset_and_the_rate) 
 
 TEST(DisciplinedRealThreads, Follow_adjustments_while_they_sleep_and_keep_their_phase) {
     Machine machine(Clock::real);
-    machine.must("newthread f 1000000\nnewthread s 20000000\nnewthread ss 100000000\nloadrt test-clock names=fast");
+    machine.must(
+        "newthread f 1000000\nnewthread s 20000000\nnewthread ss 100000000\nloadrt test-clock "
+        "names=fast");
     machine.must("loadrt test-clock names=slow lead=0");
     machine.must("loadrt test-clock names=slower lead=0");
     machine.must("addf fast f\naddf slow s\naddf slower ss");
@@ -146,12 +153,18 @@ TEST(DisciplinedRealThreads, Follow_adjustments_while_they_sleep_and_keep_their_
     EXPECT_TRUE(eventually([&] { return machine.session.reports().threads()[2].cycles >= 4; }));
     machine.must("setp fast.step 0");
     machine.session.threads().advance_ns(250'000'000);
-    // what was due last in each thread, brought back to the grid, is a multiple of the periods apart
-    const std::int64_t fast = machine.number("fast.due"), slow = machine.number("slow.due"), slower = machine.number("slower.due");
+    // what was due last in each thread, brought back to the grid, is a multiple of the periods
+    // apart
+    const std::int64_t fast = machine.number("fast.due");
+    const std::int64_t slow = machine.number("slow.due");
+
+    const std::int64_t slower = machine.number("slower.due");
     EXPECT_EQ((fast - slow) % 1'000'000, 0);
     EXPECT_EQ((slow - slower) % 20'000'000, 0);
     EXPECT_LT(machine.number("fast.shift"), 0);
-    EXPECT_EQ(machine.number("fast.backwards") + machine.number("slow.backwards") + machine.number("slower.backwards"), 0);
+    EXPECT_EQ(machine.number("fast.backwards") + machine.number("slow.backwards") +
+                  machine.number("slower.backwards"),
+              0);
 }
 
 }  // namespace

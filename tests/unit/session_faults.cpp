@@ -12,7 +12,12 @@ namespace {
 namespace fs = std::filesystem;
 
 struct Faulty : testing::Test {
-    Faulty() { machine.must("loadrt threads name1=t period1=1000000 name2=u period2=2000000\nloadrt test-faulty names=f\nloadrt test-counter names=c,d\naddf f.run t\naddf c t\naddf d u\nnet v f.value\nnet on f.on\nnet c-on c.on"); }
+    Faulty() {
+        machine.must(
+            "loadrt threads name1=t period1=1000000 name2=u period2=2000000\nloadrt test-faulty "
+            "names=f\nloadrt test-counter names=c,d\naddf f.run t\naddf c t\naddf d u\nnet v "
+            "f.value\nnet on f.on\nnet c-on c.on");
+    }
     Machine machine;
 };
 
@@ -33,7 +38,10 @@ TEST_F(Faulty, A_function_that_throws_stops_its_thread_only) {
     EXPECT_EQ(faults[0].code, "exception");
     EXPECT_EQ(faults[0].thread, "t");
     EXPECT_EQ(faults[0].cycle, 4u);
-    EXPECT_EQ(faults[0].sentence, "t: function 'f.run' (test-faulty) threw an exception at cycle 4; the thread's functions are stopped and its outputs were set to their safe values; see: show thread, start");
+    EXPECT_EQ(
+        faults[0].sentence,
+        "t: function 'f.run' (test-faulty) threw an exception at cycle 4; the thread's functions "
+        "are stopped and its outputs were set to their safe values; see: show thread, start");
     machine.must("setp f.throws 0");
     machine.cycles(2);
     EXPECT_EQ(machine.get("c.count"), "4") << "it stays stopped until start";
@@ -74,7 +82,9 @@ TEST_F(Faulty, Not_a_number_on_a_finite_output_is_replaced_and_one_fault_per_row
     machine.must("setp f.bad-number 1");
     machine.cycles(3);
     EXPECT_EQ(machine.session.reports().fault_count(), 2u);
-    EXPECT_EQ(machine.session.reports().faults()[0].sentence, "t: pin 'f.value' (test-faulty) became nan at cycle 2; it was set to -5; see: show pin f");
+    EXPECT_EQ(
+        machine.session.reports().faults()[0].sentence,
+        "t: pin 'f.value' (test-faulty) became nan at cycle 2; it was set to -5; see: show pin f");
 }
 
 TEST_F(Faulty, A_component_raises_faults_of_its_own) {
@@ -85,12 +95,15 @@ TEST_F(Faulty, A_component_raises_faults_of_its_own) {
     const auto faults = machine.session.reports().faults();
     ASSERT_EQ(faults.size(), 1u);
     EXPECT_EQ(faults[0].code, "component");
-    EXPECT_NE(faults[0].sentence.find("a finger in the gear (3) at cycle 0"), std::string::npos) << faults[0].sentence;
+    EXPECT_NE(faults[0].sentence.find("a finger in the gear (3) at cycle 0"), std::string::npos)
+        << faults[0].sentence;
 }
 
 TEST(FaultsOnTheRealClock, Have_an_age_that_grows) {
     Machine machine(Clock::real);
-    machine.must("loadrt threads name1=t period1=1000000\nloadrt test-faulty names=f\naddf f.run t\nsetp f.raises 1");
+    machine.must(
+        "loadrt threads name1=t period1=1000000\nloadrt test-faulty names=f\naddf f.run t\nsetp "
+        "f.raises 1");
     machine.start();
     ASSERT_TRUE(eventually([&] { return !machine.session.reports().faults().empty(); }));
     const auto age = machine.session.reports().faults()[0].age_ns;
@@ -132,7 +145,8 @@ TEST_F(Faulty, A_storm_of_one_kind_is_one_record_with_a_count_and_buries_no_othe
     EXPECT_EQ(faults[5].line(), faults[5].sentence + " (4996 times in 5.0 s)");
     machine.must("setp f.raises 1");
     machine.cycles(1);
-    EXPECT_EQ(machine.session.reports().faults().size(), 7u) << "after a quiet second it is another one";
+    EXPECT_EQ(machine.session.reports().faults().size(), 7u)
+        << "after a quiet second it is another one";
 }
 
 TEST(A_cycle_beyond_its_budget, is_a_fault_once_per_row) {
@@ -155,8 +169,10 @@ TEST(Missed_periods, are_counted_and_skipped_and_the_phase_stays) {
     ASSERT_TRUE(eventually([&] { return machine.session.reports().threads()[0].missed >= 8; }));
     machine.must("setp f.slow 0");
     const auto seen = machine.get_all({"t.missed", "t.threadbeat"});
-    EXPECT_GE(std::stoll(seen[0]), 6) << "the pin is written when the overrun has ended, the report counts up to now";
-    EXPECT_EQ(machine.session.reports().fault_count(), 0u) << "an overrun raises no fault without a budget";
+    EXPECT_GE(std::stoll(seen[0]), 6)
+        << "the pin is written when the overrun has ended, the report counts up to now";
+    EXPECT_EQ(machine.session.reports().fault_count(), 0u)
+        << "an overrun raises no fault without a budget";
 }
 
 // --- a thread that hangs -----------------------------------------------------------------------------------------------
@@ -164,19 +180,26 @@ TEST(Missed_periods, are_counted_and_skipped_and_the_phase_stays) {
 TEST(A_function_that_hangs, rejects_edits_with_its_name_and_leaves_the_other_threads_running) {
     Watch watch;
     Machine machine(Clock::real);
-    machine.must("newthread good 1000000\nnewthread bad 2000000\nloadrt test-life names=x " + watch.argument() + "\nloadrt test-counter names=c,d\naddf x bad\naddf c good\nnet s c.sum");
+    machine.must("newthread good 1000000\nnewthread bad 2000000\nloadrt test-life names=x " +
+                 watch.argument() +
+                 "\nloadrt test-counter names=c,d\naddf x bad\naddf c good\nnet s c.sum");
     machine.start();
     ASSERT_TRUE(eventually([&] { return watch.runs > 2; }));
     watch.hang = true;
     ASSERT_TRUE(eventually([&] { return watch.hanging.load(); }));
 
-    EXPECT_FALSE(machine.edit("loadrt test-counter names=e\naddf e good\nsetp c.step 5\nnet s e.step"));
-    EXPECT_NE(machine.said.find("thread 'bad' has not finished a cycle for "), std::string::npos) << machine.said;
-    EXPECT_NE(machine.said.find("function 'x' (test-life) does not return [hung-thread]"), std::string::npos) << machine.said;
+    EXPECT_FALSE(
+        machine.edit("loadrt test-counter names=e\naddf e good\nsetp c.step 5\nnet s e.step"));
+    EXPECT_NE(machine.said.find("thread 'bad' has not finished a cycle for "), std::string::npos)
+        << machine.said;
+    EXPECT_NE(machine.said.find("function 'x' (test-life) does not return [hung-thread]"),
+              std::string::npos)
+        << machine.said;
     EXPECT_EQ(machine.session.model().find_instance("e"), nullptr);
     EXPECT_EQ(machine.get("c.step"), "1");
     const auto counted = machine.number("c.count");
-    EXPECT_TRUE(eventually([&] { return machine.number("c.count") > counted + 5; })) << "the good thread runs on";
+    EXPECT_TRUE(eventually([&] { return machine.number("c.count") > counted + 5; }))
+        << "the good thread runs on";
     EXPECT_FALSE(machine.edit("delthread bad"));
     EXPECT_NE(machine.said.find("[hung-thread]"), std::string::npos);
     EXPECT_FALSE(machine.edit("setp x.in 1"));
@@ -190,7 +213,8 @@ TEST(A_function_that_hangs, rejects_edits_with_its_name_and_leaves_the_other_thr
 
     watch.hang = false;
     ASSERT_TRUE(eventually([&] { return !machine.session.reports().threads()[1].hung; }));
-    EXPECT_EQ(machine.get("x.out"), "TRUE") << "its safe value, not that of the cycle that ended late";
+    EXPECT_EQ(machine.get("x.out"), "TRUE")
+        << "its safe value, not that of the cycle that ended late";
     EXPECT_TRUE(machine.session.threads().start());
     const auto runs = watch.runs.load();
     ASSERT_TRUE(eventually([&] { return watch.runs > runs + 2; }));
@@ -202,27 +226,35 @@ TEST(A_function_that_hangs, rejects_edits_with_its_name_and_leaves_the_other_thr
 TEST(A_function_that_hangs, leaves_safe_values_to_other_threads_and_is_one_fault) {
     static Watch watch;
     Machine machine(Clock::real);
-    machine.must("newthread bad 1000000\nnewthread good 2000000\nloadrt test-life names=x,y " + watch.argument() +
-                 "\nloadrt test-counter names=c,d\naddf c bad\naddf x bad\naddf d good\nnet level x.level => d.step\nnet on c.on");
+    machine.must("newthread bad 1000000\nnewthread good 2000000\nloadrt test-life names=x,y " +
+                 watch.argument() +
+                 "\nloadrt test-counter names=c,d\naddf c bad\naddf x bad\naddf d good\nnet level "
+                 "x.level => d.step\nnet on c.on");
     machine.start();
     ASSERT_TRUE(eventually([&] { return watch.runs > 2; }));
     const int emergencies = watch.emergencies;
     watch.hang = true;
     ASSERT_TRUE(eventually([&] { return machine.session.reports().fault_count() != 0; }));
     EXPECT_EQ(machine.get("x.level"), "-1");
-    EXPECT_TRUE(eventually([&] { return machine.get("d.step") == "-1"; })) << "the other thread reads the safe value";
+    EXPECT_TRUE(eventually([&] { return machine.get("d.step") == "-1"; }))
+        << "the other thread reads the safe value";
     EXPECT_GT(watch.emergencies, emergencies);
     const auto missed = machine.session.reports().threads()[0].missed;
-    EXPECT_TRUE(eventually([&] { return machine.session.reports().threads()[0].missed > missed + 100; })) << "by the clock";
+    EXPECT_TRUE(eventually([&] {
+        return machine.session.reports().threads()[0].missed > missed + 100;
+    })) << "by the clock";
     EXPECT_EQ(machine.session.reports().fault_count(), 1u);
     const auto faults = machine.session.reports().faults();
     ASSERT_EQ(faults.size(), 1u);
     EXPECT_EQ(faults[0].code, "hung-thread");
-    EXPECT_NE(faults[0].sentence.find("bad: function 'x' (test-life) has not returned"), std::string::npos) << faults[0].sentence;
+    EXPECT_NE(faults[0].sentence.find("bad: function 'x' (test-life) has not returned"),
+              std::string::npos)
+        << faults[0].sentence;
     watch.hang = false;
     ASSERT_TRUE(eventually([&] { return !machine.session.reports().threads()[0].hung; }));
     EXPECT_EQ(machine.get("x.level"), "-1");
-    EXPECT_EQ(machine.session.reports().fault_count(), 1u) << "the return of the function raises no second fault";
+    EXPECT_EQ(machine.session.reports().fault_count(), 1u)
+        << "the return of the function raises no second fault";
     machine.start();
     EXPECT_TRUE(eventually([&] { return machine.get("x.level") == "7"; }));
     EXPECT_EQ(machine.session.reports().threads()[0].hangs, 1u);
@@ -231,7 +263,8 @@ TEST(A_function_that_hangs, leaves_safe_values_to_other_threads_and_is_one_fault
 TEST(A_thread_without_supervision, may_hang_and_goes_on) {
     Watch watch;
     Machine machine(Clock::real);
-    machine.must("newthread t 1000000 supervise=off\nloadrt test-life names=x " + watch.argument() + "\naddf x t");
+    machine.must("newthread t 1000000 supervise=off\nloadrt test-life names=x " + watch.argument() +
+                 "\naddf x t");
     machine.start();
     ASSERT_TRUE(eventually([&] { return watch.runs > 2; }));
     watch.hang = true;
@@ -244,15 +277,22 @@ TEST(A_thread_without_supervision, may_hang_and_goes_on) {
 
 TEST(A_cycle_of_many_periods, is_a_fault_that_names_the_function) {
     Machine machine(Clock::real);
-    machine.must("newthread t 1000000\nloadrt test-faulty names=f\nloadrt test-counter names=c\naddf c t\naddf f.run t");
+    machine.must(
+        "newthread t 1000000\nloadrt test-faulty names=f\nloadrt test-counter names=c\naddf c "
+        "t\naddf f.run t");
     machine.start();
     machine.must("setp f.slow 30000");
     // The supervisor samples: on a busy host the first fault may name another function.
     std::string sentence;
     EXPECT_TRUE(eventually([&] {
-        for (const auto& fault : machine.session.reports().faults())
-            if (sentence = fault.sentence; fault.code == "overrun" && sentence.find("periods), last seen in function 'f.run' (test-faulty)") != sentence.npos)
+        for (const auto& fault : machine.session.reports().faults()) {
+            if (sentence = fault.sentence;
+                fault.code == "overrun" &&
+                sentence.find("periods), last seen in function 'f.run' (test-faulty)") !=
+                    sentence.npos) {
                 return true;
+            }
+        }
         machine.session.reports().clear_faults();
         return false;
     })) << sentence;
@@ -264,7 +304,8 @@ TEST(A_session, ends_while_a_function_hangs) {
     static Watch watch;  // the thread may go on using it
     {
         Machine machine(Clock::real);
-        machine.must("newthread bad 2000000\nloadrt test-life names=x " + watch.argument() + "\naddf x bad");
+        machine.must("newthread bad 2000000\nloadrt test-life names=x " + watch.argument() +
+                     "\naddf x bad");
         machine.start();
         watch.hang = true;
         ASSERT_TRUE(eventually([&] { return watch.hanging.load(); }));
@@ -286,17 +327,23 @@ TEST_P(BadPlugin, is_a_diagnostic) {
     machine.rejected(std::string("loadrt ") + GetParam().component, GetParam().code);
     EXPECT_NE(machine.said.find(GetParam().words), std::string::npos) << machine.said;
 }
-INSTANTIATE_TEST_SUITE_P(Built, BadPlugin,
-                         testing::Values(Bad{"test-pin-twice", "construct-failed", "declares pin 'test-pin-twice.0.in' twice"},
-                                         Bad{"test-function-below", "construct-failed", "pin 'in' uses a function that is declared below it"},
-                                         Bad{"test-other-version", "bad-plugin", "version 2 of the component interface, this runtime has 1"},
-                                         Bad{"test-short", "bad-plugin", "at least"}, Bad{"test-no-symbol", "bad-plugin", "it exports no symbol hal_plugin"},
-                                         Bad{"../plugins/test-counter", "no-such-component", "unknown component"}));
+INSTANTIATE_TEST_SUITE_P(
+    Built, BadPlugin,
+    testing::Values(Bad{"test-pin-twice", "construct-failed",
+                        "declares pin 'test-pin-twice.0.in' twice"},
+                    Bad{"test-function-below", "construct-failed",
+                        "pin 'in' uses a function that is declared below it"},
+                    Bad{"test-other-version", "bad-plugin",
+                        "version 2 of the component interface, this runtime has 1"},
+                    Bad{"test-short", "bad-plugin", "at least"},
+                    Bad{"test-no-symbol", "bad-plugin", "it exports no symbol hal_plugin"},
+                    Bad{"../plugins/test-counter", "no-such-component", "unknown component"}));
 
 struct BadFile : testing::Test {
     BadFile() : folder(fs::temp_directory_path() / ("halcyon-bad-" + std::to_string(getpid()))) {
         fs::create_directories(folder);
-        std::ifstream from(std::string(HALCYON_TEST_PLUGINS) + "/test_counter.so", std::ios::binary);
+        std::ifstream from(std::string(HALCYON_TEST_PLUGINS) + "/test_counter.so",
+                           std::ios::binary);
         good.assign(std::istreambuf_iterator<char>(from), {});
     }
     ~BadFile() override { fs::remove_all(folder); }
@@ -310,21 +357,29 @@ struct BadFile : testing::Test {
         Diagnostics diagnostics;
         const auto source = session.sources.add("x", "loadrt broken\n");
         Transaction transaction = session.begin();
-        for (const Command& command : parse(session.sources, source, {}, diagnostics)) apply_edit(transaction, command, diagnostics);
+        for (const Command& command : parse(session.sources, source, {}, diagnostics)) {
+            apply_edit(transaction, command, diagnostics);
+        }
         return transaction.commit(diagnostics) ? "" : render(diagnostics, session.sources);
     }
     fs::path folder;
     std::string good;
 };
 
-TEST_F(BadFile, That_is_empty_is_a_diagnostic) { EXPECT_NE(load("").find("[bad-plugin]"), std::string::npos); }
-TEST_F(BadFile, That_is_text_is_a_diagnostic) { EXPECT_NE(load("int main() { return 0; }\n").find("it is not a shared library [bad-plugin]"), std::string::npos); }
+TEST_F(BadFile, That_is_empty_is_a_diagnostic) {
+    EXPECT_NE(load("").find("[bad-plugin]"), std::string::npos);
+}
+TEST_F(BadFile, That_is_text_is_a_diagnostic) {
+    EXPECT_NE(load("int main() { return 0; }\n").find("it is not a shared library [bad-plugin]"),
+              std::string::npos);
+}
 TEST_F(BadFile, That_is_complete_loads) { EXPECT_EQ(load(good), ""); }
 TEST_F(BadFile, Cut_anywhere_is_a_diagnostic) {
     ASSERT_GT(good.size(), 5000u);
     for (std::size_t part = 0; part < 64; ++part) {
         const std::size_t bytes = good.size() * part / 64;
-        ASSERT_NE(load(good.substr(0, bytes)).find("[bad-plugin]"), std::string::npos) << bytes << " of " << good.size();
+        ASSERT_NE(load(good.substr(0, bytes)).find("[bad-plugin]"), std::string::npos)
+            << bytes << " of " << good.size();
     }
     ASSERT_NE(load(good.substr(0, good.size() - 1)).find("[bad-plugin]"), std::string::npos);
 }

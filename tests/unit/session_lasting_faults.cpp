@@ -7,7 +7,12 @@ namespace hal::test {
 namespace {
 
 struct LastingFaults : testing::Test {
-    LastingFaults() { machine.must("loadrt threads name1=t period1=1000000 name2=u period2=2000000\nloadrt test-faulty names=f\nloadrt test-counter names=c,d\naddf f.run t\naddf c t\naddf d u\nnet v f.value\nnet on f.on\nnet c-on c.on"); }
+    LastingFaults() {
+        machine.must(
+            "loadrt threads name1=t period1=1000000 name2=u period2=2000000\nloadrt test-faulty "
+            "names=f\nloadrt test-counter names=c,d\naddf f.run t\naddf c t\naddf d u\nnet v "
+            "f.value\nnet on f.on\nnet c-on c.on");
+    }
     Machine machine;
 };
 
@@ -101,13 +106,15 @@ TEST(A_row_of_overruns, stays_a_fault_while_cycles_are_too_long) {
     EXPECT_EQ(reports.clear_faults().size(), 1u);
     EXPECT_GE(reports.fault_count(), 1u);
     machine.must("setp f.slow 0");
-    EXPECT_TRUE(eventually([&] { return reports.clear_faults().empty() && reports.fault_count() == 0; }));
+    EXPECT_TRUE(
+        eventually([&] { return reports.clear_faults().empty() && reports.fault_count() == 0; }));
 }
 
 TEST(A_hang, stays_a_fault_until_it_was_started_again) {
     static Watch watch;
     Machine machine(Clock::real);
-    machine.must("newthread bad 1000000\nnewthread good 2000000\nloadrt test-life names=x " + watch.argument() + "\naddf x bad\nloadrt test-counter names=c\naddf c good");
+    machine.must("newthread bad 1000000\nnewthread good 2000000\nloadrt test-life names=x " +
+                 watch.argument() + "\naddf x bad\nloadrt test-counter names=c\naddf c good");
     machine.start();
     ASSERT_TRUE(eventually([&] { return watch.runs > 2; }));
     watch.hang = true;

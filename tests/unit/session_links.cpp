@@ -7,7 +7,11 @@ namespace {
 
 // x and y: a pin of every type and direction each; both in thread t.
 struct Links : testing::Test {
-    Links() { machine.must("loadrt threads name1=t period1=1000000\nloadrt test-types names=x,y,z\naddf x t\naddf y t\naddf z t\n"); }
+    Links() {
+        machine.must(
+            "loadrt threads name1=t period1=1000000\nloadrt test-types names=x,y,z\naddf x t\naddf "
+            "y t\naddf z t\n");
+    }
     Machine machine;
 };
 
@@ -16,14 +20,30 @@ TEST_F(Links, Net_makes_the_signal_with_the_type_of_its_first_pin) {
     EXPECT_EQ(machine.session.model().find_signal("a")->type, HAL_TYPE_S64);
 }
 
-TEST_F(Links, A_signal_has_one_output) { machine.rejected("net a x.bit-out y.bit-out", "two-writers"); }
-TEST_F(Links, A_signal_with_an_output_takes_no_io_pin) { machine.rejected("net a x.bit-out y.bit-io", "two-writers"); }
-TEST_F(Links, A_signal_with_io_pins_takes_no_output) { machine.rejected("net a x.bit-io y.bit-out", "two-writers"); }
-TEST_F(Links, Types_must_be_equal) { machine.rejected("net a x.s32-out y.u32-in", "type-mismatch"); }
-TEST_F(Links, A_pin_is_in_one_signal_only) { machine.rejected("net a x.bit-in\nnet b x.bit-in", "pin-linked"); }
-TEST_F(Links, Parameters_are_not_linked) { machine.rejected("net a x.float-param", "parameter-link"); }
-TEST_F(Links, A_signal_is_not_named_like_a_pin) { machine.rejected("net x.bit-in y.bit-in", "signal-named-like-pin"); }
-TEST_F(Links, Net_without_pins_makes_no_signal) { machine.rejected("net nothing", "wrong-arguments"); }
+TEST_F(Links, A_signal_has_one_output) {
+    machine.rejected("net a x.bit-out y.bit-out", "two-writers");
+}
+TEST_F(Links, A_signal_with_an_output_takes_no_io_pin) {
+    machine.rejected("net a x.bit-out y.bit-io", "two-writers");
+}
+TEST_F(Links, A_signal_with_io_pins_takes_no_output) {
+    machine.rejected("net a x.bit-io y.bit-out", "two-writers");
+}
+TEST_F(Links, Types_must_be_equal) {
+    machine.rejected("net a x.s32-out y.u32-in", "type-mismatch");
+}
+TEST_F(Links, A_pin_is_in_one_signal_only) {
+    machine.rejected("net a x.bit-in\nnet b x.bit-in", "pin-linked");
+}
+TEST_F(Links, Parameters_are_not_linked) {
+    machine.rejected("net a x.float-param", "parameter-link");
+}
+TEST_F(Links, A_signal_is_not_named_like_a_pin) {
+    machine.rejected("net x.bit-in y.bit-in", "signal-named-like-pin");
+}
+TEST_F(Links, Net_without_pins_makes_no_signal) {
+    machine.rejected("net nothing", "wrong-arguments");
+}
 
 TEST_F(Links, Io_pins_share_one_value_within_a_thread) {
     machine.must("net a x.s32-io y.s32-io => z.s32-in\nsets a 5");
@@ -41,10 +61,12 @@ TEST_F(Links, A_pin_linked_to_the_same_signal_again_is_accepted) {
 }
 
 TEST_F(Links, Linkps_linksp_and_linkpp_link_as_net_does) {
-    machine.must("newsig a s32\nlinkps x.s32-out => a\nlinksp a => y.s32-in\nlinkpp x.bit-out y.bit-in");
+    machine.must(
+        "newsig a s32\nlinkps x.s32-out => a\nlinksp a => y.s32-in\nlinkpp x.bit-out y.bit-in");
     EXPECT_EQ(machine.session.model().find_signal("a")->pins.size(), 2u);
     ASSERT_NE(machine.session.model().find_pin("y.bit-in")->signal, nullptr);
-    EXPECT_EQ(machine.session.model().find_pin("y.bit-in")->signal, machine.session.model().find_pin("x.bit-out")->signal);
+    EXPECT_EQ(machine.session.model().find_pin("y.bit-in")->signal,
+              machine.session.model().find_pin("x.bit-out")->signal);
     machine.rejected("linkpp x.bit-out y.bit-io", "pin-linked");
     machine.rejected("linkpp y.bit-io x.bit-out", "pin-linked");
     machine.rejected("linkpp x.bit-out y.bit-in", "pin-linked");
@@ -143,8 +165,10 @@ TEST_P(Unlinked, pin_keeps_the_last_value_of_its_signal) {
     EXPECT_EQ(machine.session.model().find_pin(in)->signal, nullptr);
 }
 INSTANTIATE_TEST_SUITE_P(Types, Unlinked,
-                         testing::Values(Kept{"bit", "TRUE"}, Kept{"float", "-2.5e-07"}, Kept{"s32", "-2147483648"}, Kept{"u32", "4294967295"},
-                                         Kept{"s64", "-9223372036854775807"}, Kept{"u64", "18446744073709551615"}),
+                         testing::Values(Kept{"bit", "TRUE"}, Kept{"float", "-2.5e-07"},
+                                         Kept{"s32", "-2147483648"}, Kept{"u32", "4294967295"},
+                                         Kept{"s64", "-9223372036854775807"},
+                                         Kept{"u64", "18446744073709551615"}),
                          [](const auto& kept) { return kept.param.type; });
 
 TEST_F(Links, An_unlinked_output_keeps_its_value_and_goes_on_writing_its_own) {
@@ -186,7 +210,9 @@ TEST_F(Links, Linked_and_unlinked_in_one_transaction_keeps_what_was_inherited) {
 // --- setp and sets -----------------------------------------------------------------------------------------------------
 
 TEST_F(Links, Setp_rejects_outputs) { machine.rejected("setp x.bit-out 1", "output-set"); }
-TEST_F(Links, Sets_rejects_signals_with_a_writer) { machine.rejected("net a x.bit-out\nsets a 1", "writer-set"); }
+TEST_F(Links, Sets_rejects_signals_with_a_writer) {
+    machine.rejected("net a x.bit-out\nsets a 1", "writer-set");
+}
 TEST_F(Links, Setp_of_nothing_is_an_error) { machine.rejected("setp x.bit-inn 1", "no-such-pin"); }
 TEST_F(Links, Sets_of_nothing_is_an_error) { machine.rejected("sets nowhere 1", "no-such-signal"); }
 TEST_F(Links, Setp_rejects_linked_pins) {
@@ -205,13 +231,19 @@ struct BadValue {
     const char *pin, *value;
 };
 struct Refused : Links, testing::WithParamInterface<BadValue> {};
-TEST_P(Refused, value_changes_nothing) { machine.rejected(std::string("setp x.") + GetParam().pin + " " + GetParam().value, "bad-value"); }
+TEST_P(Refused, value_changes_nothing) {
+    machine.rejected(std::string("setp x.") + GetParam().pin + " " + GetParam().value, "bad-value");
+}
 INSTANTIATE_TEST_SUITE_P(Values, Refused,
-                         testing::Values(BadValue{"s64-in", "9223372036854775808"}, BadValue{"u64-in", "18446744073709551616"},
-                                         BadValue{"bit-in", "maybe"}, BadValue{"float-in", "1.5x"}, BadValue{"s32-in", "1.5"}, BadValue{"s32-in", "0x"}));
+                         testing::Values(BadValue{"s64-in", "9223372036854775808"},
+                                         BadValue{"u64-in", "18446744073709551616"},
+                                         BadValue{"bit-in", "maybe"}, BadValue{"float-in", "1.5x"},
+                                         BadValue{"s32-in", "1.5"}, BadValue{"s32-in", "0x"}));
 
 TEST_F(Links, Values_are_read_in_every_way_they_may_be_written) {
-    machine.must("setp x.s32-in 0x1F\nsetp x.u32-in 017\nsetp x.bit-in Yes\nsetp x.float-in 1e3\nsetp x.u64-in 0xFFFFFFFFFFFFFFFF");
+    machine.must(
+        "setp x.s32-in 0x1F\nsetp x.u32-in 017\nsetp x.bit-in Yes\nsetp x.float-in 1e3\nsetp "
+        "x.u64-in 0xFFFFFFFFFFFFFFFF");
     EXPECT_EQ(machine.get("x.s32-in"), "31");
     EXPECT_EQ(machine.get("x.u32-in"), "15");
     EXPECT_EQ(machine.get("x.bit-in"), "TRUE");
@@ -234,7 +266,9 @@ TEST_F(Links, Getp_after_setp_and_gets_after_sets_see_the_new_value) {
 // --- types ----------------------------------------------------------------------------------------------------------------
 
 TEST_F(Links, Newsig_knows_both_dialects) {
-    machine.must("newsig a bool\nnewsig b real\nnewsig c sint\nnewsig d uint\nnewsig e port\nnewsig f si32\nnewsig g ui32");
+    machine.must(
+        "newsig a bool\nnewsig b real\nnewsig c sint\nnewsig d uint\nnewsig e port\nnewsig f "
+        "si32\nnewsig g ui32");
     const Model& model = machine.session.model();
     EXPECT_EQ(model.find_signal("a")->type, HAL_TYPE_BIT);
     EXPECT_EQ(model.find_signal("b")->type, HAL_TYPE_FLOAT);
@@ -289,7 +323,11 @@ TEST_F(Links, An_alias_goes_with_its_instance) {
 // --- ports ------------------------------------------------------------------------------------------------------------------
 
 struct Ports : testing::Test {
-    Ports() { machine.must("loadrt threads name1=t period1=1000000\nloadrt test-port names=p,q,r\naddf p t\naddf q t\n"); }
+    Ports() {
+        machine.must(
+            "loadrt threads name1=t period1=1000000\nloadrt test-port names=p,q,r\naddf p t\naddf "
+            "q t\n");
+    }
     Machine machine;
 };
 

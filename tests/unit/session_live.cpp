@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Edits of a running machine, on real threads. Everything waits for cycles or events, never for time.
+// Edits of a running machine, on real threads. Everything waits for cycles or events, never for
+// time.
 #include <atomic>
 #include <random>
 #include <set>
@@ -17,9 +18,14 @@ constexpr int edits = 10'000;
 #endif
 
 struct Live : testing::Test {
-    Live() : machine(Clock::real) { machine.must("loadrt threads name1=fast period1=1000000 name2=slow period2=2000000\nloadrt test-counter names=a,b,c\n"); }
+    Live() : machine(Clock::real) {
+        machine.must(
+            "loadrt threads name1=fast period1=1000000 name2=slow period2=2000000\nloadrt "
+            "test-counter names=a,b,c\n");
+    }
     void until(const std::string& pin, std::int64_t at_least) {
-        ASSERT_TRUE(eventually([&] { return machine.number(pin) >= at_least; })) << pin << " stands at " << machine.get(pin);
+        ASSERT_TRUE(eventually([&] { return machine.number(pin) >= at_least; }))
+            << pin << " stands at " << machine.get(pin);
     }
     Machine machine;
 };
@@ -28,7 +34,8 @@ TEST_F(Live, A_counter_loses_and_doubles_no_step_over_edits_around_it) {
     machine.must("addf a fast\naddf b fast\nnet s a.count");
     machine.start();
     for (int i = 0; i < 50; ++i) {
-        machine.must(i % 2 ? "delsig x\ndelf c fast" : "net x a.sum => b.step c.step\naddf c fast 1");
+        machine.must(i % 2 ? "delsig x\ndelf c fast"
+                           : "net x a.sum => b.step c.step\naddf c fast 1");
         const auto seen = machine.get_all({"a.count", "a.sum", "a.twin", "s"});
         EXPECT_EQ(seen[0], seen[1]);
         EXPECT_EQ(seen[0], seen[2]);
@@ -37,7 +44,9 @@ TEST_F(Live, A_counter_loses_and_doubles_no_step_over_edits_around_it) {
     const auto first = machine.get_all({"a.count", "fast.threadbeat"});
     until("a.count", std::stoll(first[0]) + 20);
     const auto last = machine.get_all({"a.count", "fast.threadbeat"});
-    EXPECT_EQ(std::stoll(last[0]) - std::stoll(first[0]), std::stoll(last[1]) - std::stoll(first[1])) << "a run per cycle";
+    EXPECT_EQ(std::stoll(last[0]) - std::stoll(first[0]),
+              std::stoll(last[1]) - std::stoll(first[1]))
+        << "a run per cycle";
 }
 
 TEST_F(Live, Edits_of_every_kind_take_effect_while_running) {
@@ -50,7 +59,8 @@ TEST_F(Live, Edits_of_every_kind_take_effect_while_running) {
     EXPECT_GE(std::stod(machine.get("a.sum")), before + 30 - 1);
     machine.must("net x a.sum => b.step\naddf b fast");
     until("b.count", 3);
-    machine.must("newthread slower 4000000\nloadrt test-counter names=d\naddf d slower\nnet x d.step");
+    machine.must(
+        "newthread slower 4000000\nloadrt test-counter names=d\naddf d slower\nnet x d.step");
     until("d.count", 3);
     EXPECT_GT(std::stod(machine.get("d.sum")), 0.0);
     machine.must("unlinkp a.sum\nsets x 0.5");
@@ -84,11 +94,15 @@ TEST_F(Live, A_function_moved_between_running_threads_is_never_in_both) {
 }
 
 TEST_F(Live, What_one_thread_reads_from_another_is_of_one_cycle) {
-    machine.must("loadrt test-two names=w\naddf w.fast fast\naddf w.first slow\naddf w.last slow\nnet a w.a => w.a-in w.a-again\nnet b w.b => w.b-in w.b-again");
+    machine.must(
+        "loadrt test-two names=w\naddf w.fast fast\naddf w.first slow\naddf w.last slow\nnet a w.a "
+        "=> w.a-in w.a-again\nnet b w.b => w.b-in w.b-again");
     machine.start();
     until("w.looks", 200);
     EXPECT_EQ(machine.get("w.torn"), "0");
-    for (int i = 0; i < 30; ++i) machine.must(i % 2 ? "delf c fast" : "addf c fast 1");
+    for (int i = 0; i < 30; ++i) {
+        machine.must(i % 2 ? "delf c fast" : "addf c fast 1");
+    }
     until("w.looks", 300);
     EXPECT_EQ(machine.get("w.torn"), "0");
 }
@@ -118,7 +132,8 @@ TEST_F(Live, Getp_sees_what_setp_wrote_whatever_the_thread_is_doing) {
 
 TEST(A_slow_thread, takes_edits_and_answers_between_its_cycles) {
     Machine machine(Clock::real);
-    machine.must("newthread rare 1000000000000 policy=other\nloadrt test-counter names=a,b\naddf a rare");
+    machine.must(
+        "newthread rare 1000000000000 policy=other\nloadrt test-counter names=a,b\naddf a rare");
     machine.start();
     // its next cycle is a quarter of an hour away; this test ends long before
     for (int i = 0; i < 20; ++i) {
@@ -138,22 +153,41 @@ TEST(A_period_of_more_than_a_thousand_seconds, is_rejected) {
 TEST_F(Live, Priorities_fall_with_the_period_also_when_a_faster_thread_comes_later) {
     machine.must("newthread faster 500000");
     std::vector<std::string> policies;
-    for (const ThreadReport& report : machine.session.reports().threads()) policies.push_back(report.policy);
+    for (const ThreadReport& report : machine.session.reports().threads()) {
+        policies.push_back(report.policy);
+    }
     ASSERT_EQ(policies.size(), 3u);
-    if (policies[0].starts_with("SCHED_FIFO")) EXPECT_EQ(policies, (std::vector<std::string>{"SCHED_FIFO 98", "SCHED_FIFO 97", "SCHED_FIFO 96"}));
-    else EXPECT_FALSE(machine.session.reports().missing_privileges().empty());
+    if (policies[0].starts_with("SCHED_FIFO")) {
+        EXPECT_EQ(policies,
+                  (std::vector<std::string>{"SCHED_FIFO 98", "SCHED_FIFO 97", "SCHED_FIFO 96"}));
+    } else {
+        EXPECT_FALSE(machine.session.reports().missing_privileges().empty());
+    }
 }
 
-// Ten thousand edits that a seed chose: the machine counts on, the model stays whole, and nothing is torn.
+// Ten thousand edits that a seed chose: the machine counts on, the model stays whole, and nothing
+// is torn.
 TEST_F(Live, Random_edits_keep_a_running_machine_consistent) {
-    machine.must("loadrt test-two names=w\naddf w.fast fast\naddf w.first slow\naddf w.last slow\nnet wa w.a => w.a-in w.a-again\nnet wb w.b => w.b-in w.b-again\n"
-                 "loadrt test-types names=x,y,z\nloadrt test-port names=p,q\nloadrt test-counter names=still\naddf still fast");
+    machine.must(
+        "loadrt test-two names=w\naddf w.fast fast\naddf w.first slow\naddf w.last slow\nnet wa "
+        "w.a => w.a-in w.a-again\nnet wb w.b => w.b-in w.b-again\n"
+        "loadrt test-types names=x,y,z\nloadrt test-port names=p,q\nloadrt test-counter "
+        "names=still\naddf still fast");
     machine.start();
     std::mt19937 random(20240607);
-    const auto one_of = [&](const std::vector<const char*>& words) { return std::string(words[random() % words.size()]); };
+    const auto one_of = [&](const std::vector<const char*>& words) {
+        return std::string(words[random() % words.size()]);
+    };
     const auto any_line = [&]() -> std::string {
-        const std::string instance = one_of({"a", "b", "c", "x", "y", "z", "p", "q", "late"}), thread = one_of({"fast", "slow"}), signal = one_of({"s1", "s2", "s3", "s4"});
-        const std::string pin = one_of({"a.step", "a.sum", "b.step", "b.sum", "c.step", "x.float-in", "x.float-out", "y.float-io", "z.float-io", "x.s64-in", "y.s64-out", "z.bit-io", "p.to", "q.from", "late.sum", "late.step"});
+        const std::string instance = one_of({"a", "b", "c", "x", "y", "z", "p", "q", "late"});
+
+        const std::string thread = one_of({"fast", "slow"});
+
+        const std::string signal = one_of({"s1", "s2", "s3", "s4"});
+        const std::string pin =
+            one_of({"a.step", "a.sum", "b.step", "b.sum", "c.step", "x.float-in", "x.float-out",
+                    "y.float-io", "z.float-io", "x.s64-in", "y.s64-out", "z.bit-io", "p.to",
+                    "q.from", "late.sum", "late.step"});
         switch (random() % 14) {
         case 0: return "addf " + instance + " " + thread + " " + one_of({"1", "-1", "2", ""});
         case 1: return "delf " + instance + " " + thread;
@@ -161,7 +195,9 @@ TEST_F(Live, Random_edits_keep_a_running_machine_consistent) {
         case 3: return "delf " + instance + " slow\naddf " + instance + " fast";
         case 4:
         case 5: return "net " + signal + " " + pin;
-        case 6: return "net " + signal + " " + pin + " " + one_of({"a.step", "b.step", "c.step", "x.float-in"});
+        case 6:
+            return "net " + signal + " " + pin + " " +
+                   one_of({"a.step", "b.step", "c.step", "x.float-in"});
         case 7: return "unlinkp " + pin;
         case 8: return "setp " + pin + " " + std::to_string(random() % 1000);
         case 9: return "sets " + signal + " " + std::to_string(1 + random() % 1000);
@@ -174,15 +210,20 @@ TEST_F(Live, Random_edits_keep_a_running_machine_consistent) {
     int taken = 0;
     for (int i = 0; i < edits; ++i) {
         std::string text;
-        for (auto lines = 1 + random() % 2; lines > 0; --lines) text += any_line() + "\n";
+        for (auto lines = 1 + random() % 2; lines > 0; --lines) {
+            text += any_line() + "\n";
+        }
         taken += machine.edit(text);
         if (i % 100 != 0) continue;
         const auto seen = machine.get_all({"still.count", "still.twin", "still.sum"});
         ASSERT_EQ(seen[0], seen[1]);
         ASSERT_EQ(seen[0], seen[2]);
         for (const auto& signal : machine.session.model().signals) {
-            ASSERT_EQ(signal->pins.size(), signal->readers + signal->ios + (signal->writer ? 1 : 0));
-            for (const Pin* pin : signal->pins) ASSERT_EQ(pin->signal, signal.get());
+            ASSERT_EQ(signal->pins.size(),
+                      signal->readers + signal->ios + (signal->writer ? 1 : 0));
+            for (const Pin* pin : signal->pins) {
+                ASSERT_EQ(pin->signal, signal.get());
+            }
         }
     }
     EXPECT_GT(taken, edits / 10) << "most random edits are rejected, but not nearly all";

@@ -25,11 +25,14 @@ struct Rows {
 
     void take(Session& session, LiveProbe& probe, ProbeLayout layout) {
         for (const ProbeRows& rows : session.probes().take(probe)) {
-            if (rows.layout) layout = *rows.layout;
+            if (rows.layout) {
+                layout = *rows.layout;
+            }
             std::size_t at = 0;
             for (const auto& part : rows.parts) {
                 lost += part.lost;
-                if (rows.layout_number != layout.number) {  // of the layout before, whose width is unknown here
+                // of the layout before, whose width is unknown here
+                if (rows.layout_number != layout.number) {
                     ASSERT_GE(rows.bytes.size(), at);
                     return;
                 }
@@ -38,7 +41,8 @@ struct Rows {
                     std::vector<std::uint64_t> row(words);
                     std::memcpy(row.data(), rows.bytes.data() + at, words * 8);
                     at += words * 8;
-                    of[{layout.number, part.group}].push_back({row[0], static_cast<std::int64_t>(row[1]), {row.begin() + 2, row.end()}});
+                    of[{layout.number, part.group}].push_back(
+                        {row[0], static_cast<std::int64_t>(row[1]), {row.begin() + 2, row.end()}});
                 }
             }
             EXPECT_EQ(at, rows.bytes.size());
@@ -56,7 +60,8 @@ std::shared_ptr<LiveProbe> attach(Session& session, const ProbeRequest& request)
 struct Probed : testing::Test {
     Probed() {
         machine.must(
-            "loadrt threads name1=fast period1=1000000 name2=slow period2=4000000\nloadrt test-counter names=a,b,c\n"
+            "loadrt threads name1=fast period1=1000000 name2=slow period2=4000000\nloadrt "
+            "test-counter names=a,b,c\n"
             "addf a fast\naddf b slow\nnet s a.sum => b.step");
         machine.start();
     }
@@ -89,8 +94,12 @@ TEST_F(Probed, Every_nth_cycle_is_a_grid_of_cycle_numbers) {
     rows.take(machine.session, *probe, Probes::layout(*probe));
     const auto& seen = rows.of[{1, 0}];
     ASSERT_GE(seen.size(), 5u);
-    for (std::size_t i = 1; i < seen.size(); ++i) EXPECT_EQ(seen[i].cycle % 5, 0u);
-    for (std::size_t i = 2; i < seen.size(); ++i) EXPECT_EQ(seen[i].cycle - seen[i - 1].cycle, 5u);
+    for (std::size_t i = 1; i < seen.size(); ++i) {
+        EXPECT_EQ(seen[i].cycle % 5, 0u);
+    }
+    for (std::size_t i = 2; i < seen.size(); ++i) {
+        EXPECT_EQ(seen[i].cycle - seen[i - 1].cycle, 5u);
+    }
 }
 
 TEST_F(Probed, Values_are_grouped_by_the_thread_that_owns_them) {
@@ -100,7 +109,8 @@ TEST_F(Probed, Values_are_grouped_by_the_thread_that_owns_them) {
     const ProbeLayout layout = Probes::layout(*probe);
     ASSERT_EQ(layout.groups.size(), 3u);
     EXPECT_EQ(layout.groups[0].thread, "slow");
-    EXPECT_EQ(layout.groups[0].columns, (std::vector<std::size_t>{0, 2, 4})) << "a signal without a writer is seen where it is read";
+    EXPECT_EQ(layout.groups[0].columns, (std::vector<std::size_t>{0, 2, 4}))
+        << "a signal without a writer is seen where it is read";
     EXPECT_EQ(layout.groups[0].period_ns, 4'000'000);
     EXPECT_EQ(layout.groups[1].thread, "fast");
     EXPECT_EQ(layout.groups[2].thread, "") << "no thread reads it";
@@ -143,7 +153,9 @@ TEST_F(Probed, An_edit_elsewhere_loses_no_row_and_starts_no_layout) {
     EXPECT_EQ(Probes::layout(*probe).number, 1u);
     const auto& seen = rows.of[{1, 0}];
     ASSERT_GE(seen.size(), 57u);
-    for (std::size_t i = 1; i < seen.size(); ++i) EXPECT_EQ(seen[i].values[0], seen[i - 1].values[0] + 1);
+    for (std::size_t i = 1; i < seen.size(); ++i) {
+        EXPECT_EQ(seen[i].values[0], seen[i - 1].values[0] + 1);
+    }
 }
 
 TEST_F(Probed, A_value_that_moves_or_leaves_starts_another_layout) {
@@ -176,9 +188,11 @@ TEST_F(Probed, A_rejected_request_says_why) {
         EXPECT_EQ(machine.session.probes().attach(request, problem), nullptr);
         return problem;
     };
-    EXPECT_EQ(why({{"a.cuont"}}), "unknown pin, parameter or signal 'a.cuont'; did you mean 'a.count'?");
+    EXPECT_EQ(why({{"a.cuont"}}),
+              "unknown pin, parameter or signal 'a.cuont'; did you mean 'a.count'?");
     EXPECT_EQ(why({{}}), "a probe needs at least one name");
-    EXPECT_NE(why({std::vector<std::string>(4096, "a.count"), 1, 60'000'000'000}).find("MiB"), std::string::npos);
+    EXPECT_NE(why({std::vector<std::string>(4096, "a.count"), 1, 60'000'000'000}).find("MiB"),
+              std::string::npos);
 }
 
 TEST_F(Probed, Rows_up_to_until_ns_are_complete_in_all_groups) {
@@ -188,20 +202,22 @@ TEST_F(Probed, Rows_up_to_until_ns_are_complete_in_all_groups) {
         machine.session.threads().advance_ns(3'000'000);
         for (const ProbeRows& rows : machine.session.probes().take(*probe)) {
             std::size_t at = 0;
-            for (const auto& part : rows.parts)
+            for (const auto& part : rows.parts) {
                 for (std::size_t k = 0; k < part.rows; ++k, at += 24) {
                     std::int64_t time_ns;
                     std::memcpy(&time_ns, rows.bytes.data() + at + 8, 8);
                     EXPECT_GE(time_ns, until);
                     EXPECT_LT(time_ns, rows.until_ns);
                 }
+            }
             until = rows.until_ns;
         }
     }
     EXPECT_GT(until, 140'000'000);
 }
 
-// Under a sanitizer the reader may be without the lock for longer than the ring; then rows are lost, and counted.
+// Under a sanitizer the reader may be without the lock for longer than the ring; then rows are
+// lost, and counted.
 #if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
 constexpr bool keeps_up = false;
 #else
@@ -211,7 +227,8 @@ constexpr bool keeps_up = true;
 TEST(LiveProbes, Attached_and_detached_under_load_they_lose_nothing_and_disturb_nobody) {
     Machine machine(Clock::real);
     machine.must(
-        "loadrt threads name1=fast period1=200000 name2=slow period2=1000000\nloadrt test-counter names=a,b,c\naddf a fast\naddf b slow");
+        "loadrt threads name1=fast period1=200000 name2=slow period2=1000000\nloadrt test-counter "
+        "names=a,b,c\naddf a fast\naddf b slow");
     machine.start();
     std::atomic<bool> over{false};
     std::atomic<int> edits{0};
@@ -220,7 +237,8 @@ TEST(LiveProbes, Attached_and_detached_under_load_they_lose_nothing_and_disturb_
             auto lock = machine.session.lock();
             machine.must(edits % 2 ? "delf c fast" : "addf c fast 1");
             lock.unlock();
-            std::this_thread::sleep_for(std::chrono::microseconds(500));  // others want the lock, too
+            // others want the lock, too
+            std::this_thread::sleep_for(std::chrono::microseconds(500));
         }
     });
     const int rounds = 10;
@@ -228,7 +246,9 @@ TEST(LiveProbes, Attached_and_detached_under_load_they_lose_nothing_and_disturb_
         std::shared_ptr<LiveProbe> probe;
         {
             const auto lock = machine.session.lock();
-            probe = attach(machine.session, {{"a.count", "a.twin", "b.count", "b.twin", "a.sum"}, 1, 20'000'000'000});
+            probe =
+                attach(machine.session,
+                       {{"a.count", "a.twin", "b.count", "b.twin", "a.sum"}, 1, 20'000'000'000});
         }
         Rows rows;
         for (int k = 0; k < 3; ++k) {
@@ -236,12 +256,18 @@ TEST(LiveProbes, Attached_and_detached_under_load_they_lose_nothing_and_disturb_
             const auto lock = machine.session.lock();
             rows.take(machine.session, *probe, Probes::layout(*probe));
         }
-        for (const auto& [group, seen] : rows.of)
+        for (const auto& [group, seen] : rows.of) {
             for (std::size_t k = 0; k < seen.size(); ++k) {
                 ASSERT_EQ(seen[k].values[0], seen[k].values[1]) << "of one cycle";
-                if (k > 0 && (keeps_up || rows.lost == 0)) { ASSERT_EQ(seen[k].values[0], seen[k - 1].values[0] + 1) << "no row lost or doubled"; }
+                if (k > 0 && (keeps_up || rows.lost == 0)) {
+                    ASSERT_EQ(seen[k].values[0], seen[k - 1].values[0] + 1)
+                        << "no row lost or doubled";
+                }
             }
-        if (keeps_up) { EXPECT_EQ(rows.lost, 0u); }
+        }
+        if (keeps_up) {
+            EXPECT_EQ(rows.lost, 0u);
+        }
         const auto lock = machine.session.lock();
         machine.session.probes().detach(probe);
     }

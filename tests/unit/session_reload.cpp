@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Reloading: the versions are the same file here, so that whatever changes is the reload's doing. tests/cli/reload_test.py has others.
+// Reloading: the versions are the same file here, so that whatever changes is the reload's doing.
+// tests/cli/reload_test.py has others.
 #include "machine.hpp"
 #include "plugins/watch.hpp"
 
@@ -7,7 +8,9 @@ namespace hal::test {
 namespace {
 
 struct Reload : testing::Test {
-    Reload() : machine(Clock::real) { machine.must("loadrt threads name1=fast period1=1000000 name2=slow period2=2000000\n"); }
+    Reload() : machine(Clock::real) {
+        machine.must("loadrt threads name1=fast period1=1000000 name2=slow period2=2000000\n");
+    }
     Machine machine;
 };
 
@@ -22,14 +25,17 @@ TEST_F(Reload, of_a_component_without_start_loses_and_doubles_no_cycle) {
         EXPECT_EQ(seen[0], seen[1]);
     }
     const auto last = machine.get_all({"a.count", "fast.threadbeat"});
-    EXPECT_EQ(std::stoll(last[0]) - std::stoll(first[0]), std::stoll(last[1]) - std::stoll(first[1])) << "a run per cycle";
+    EXPECT_EQ(std::stoll(last[0]) - std::stoll(first[0]),
+              std::stoll(last[1]) - std::stoll(first[1]))
+        << "a run per cycle";
     EXPECT_EQ(machine.get("a.step"), "1");
     machine.must("unload test-counter");
 }
 
 TEST_F(Reload, of_a_component_that_starts_stops_the_old_one_first) {
     Watch watch;
-    machine.must("loadrt test-life names=x " + watch.argument() + "\naddf x fast\nnet l x.level\nsetp x.in TRUE");
+    machine.must("loadrt test-life names=x " + watch.argument() +
+                 "\naddf x fast\nnet l x.level\nsetp x.in TRUE");
     machine.start();
     ASSERT_TRUE(eventually([&] { return machine.get("x.out") == "TRUE"; }));
     machine.must("reload test-life");
@@ -49,8 +55,12 @@ TEST_F(Reload, of_a_component_that_starts_stops_the_old_one_first) {
 
 TEST_F(Reload, in_an_edit_that_fails_elsewhere_is_rolled_back) {
     Watch watch;
-    machine.must("loadrt test-life names=x " + watch.argument() + "\naddf x fast\nloadrt test-counter names=c\nalias pin c.step pace\nsetp c.step 4");
-    machine.rejected("reload test-life\nreload test-counter\nreload test-counter\nsetp c.step nonsense", "bad-value");
+    machine.must(
+        "loadrt test-life names=x " + watch.argument() +
+        "\naddf x fast\nloadrt test-counter names=c\nalias pin c.step pace\nsetp c.step 4");
+    machine.rejected(
+        "reload test-life\nreload test-counter\nreload test-counter\nsetp c.step nonsense",
+        "bad-value");
     EXPECT_EQ(watch.started, 1);
     EXPECT_EQ(watch.constructed, watch.destroyed + 1);
     machine.start();
@@ -62,10 +72,12 @@ TEST_F(Reload, and_other_edits_take_effect_together) {
     machine.must("loadrt test-counter names=a,b\naddf a fast\nsetp a.step 2\nnet s a.sum");
     machine.start();
     ASSERT_TRUE(eventually([&] { return machine.number("a.count") > 3; }));
-    machine.must("delf a fast\naddf a slow\nreload test-counter\nsetp b.step 5\naddf b slow\nnet s b.step");
+    machine.must(
+        "delf a fast\naddf a slow\nreload test-counter\nsetp b.step 5\naddf b slow\nnet s b.step");
     const auto count = machine.number("a.count");
     EXPECT_GT(count, 3);
-    ASSERT_TRUE(eventually([&] { return machine.number("a.count") > count + 3 && machine.number("b.count") > 3; }));
+    ASSERT_TRUE(eventually(
+        [&] { return machine.number("a.count") > count + 3 && machine.number("b.count") > 3; }));
     EXPECT_EQ(machine.get("a.step"), "2");
     machine.must("reload test-counter\nreload test-counter\nsetp a.step 3");
     EXPECT_EQ(machine.get("a.step"), "3");
@@ -74,10 +86,14 @@ TEST_F(Reload, and_other_edits_take_effect_together) {
 }
 
 TEST_F(Reload, of_functions_in_two_threads_tears_nothing) {
-    machine.must("loadrt test-two names=w\naddf w.fast fast\naddf w.first slow\naddf w.last slow\nnet a w.a => w.a-in w.a-again\nnet b w.b => w.b-in w.b-again");
+    machine.must(
+        "loadrt test-two names=w\naddf w.fast fast\naddf w.first slow\naddf w.last slow\nnet a w.a "
+        "=> w.a-in w.a-again\nnet b w.b => w.b-in w.b-again");
     machine.start();
     ASSERT_TRUE(eventually([&] { return machine.number("w.looks") > 20; }));
-    for (int i = 0; i < 20; ++i) machine.must("reload test-two");
+    for (int i = 0; i < 20; ++i) {
+        machine.must("reload test-two");
+    }
     const auto looks = machine.number("w.looks");
     ASSERT_TRUE(eventually([&] { return machine.number("w.looks") != looks; }));
     EXPECT_EQ(machine.get("w.torn"), "0");

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Functions of one kind in a row are run by one loop of their plugin, without an observable difference.
+// Functions of one kind in a row are run by one loop of their plugin, without an observable
+// difference.
 #include <string>
 
 #include "machine.hpp"
@@ -10,8 +11,13 @@ namespace {
 struct Rows : testing::Test {
     /// Ten in a chain within one thread, the first fed with 100.
     Rows() {
-        std::string text = "loadrt threads name1=t period1=1000000\nloadrt test-row count=10\nloadrt test-counter names=c\n";
-        for (int i = 0; i + 1 < 10; ++i) text += "net n" + std::to_string(i) + " test-row." + std::to_string(i) + ".out => test-row." + std::to_string(i + 1) + ".in\n";
+        std::string text =
+            "loadrt threads name1=t period1=1000000\nloadrt test-row count=10\nloadrt test-counter "
+            "names=c\n";
+        for (int i = 0; i + 1 < 10; ++i) {
+            text += "net n" + std::to_string(i) + " test-row." + std::to_string(i) +
+                    ".out => test-row." + std::to_string(i + 1) + ".in\n";
+        }
         text += "addf test-row.[0..9] t\nsetp test-row.0.in 100\n";
         machine.must(text);
     }
@@ -48,7 +54,10 @@ TEST_F(Rows, A_fault_names_the_one_that_failed) {
     machine.cycles(1);
     const auto faults = machine.session.reports().faults();
     ASSERT_EQ(faults.size(), 1u);
-    EXPECT_EQ(faults[0].sentence, "t: function 'test-row.6' (test-row) threw an exception at cycle 2; the thread's functions are stopped and its outputs were set to their safe values; see: show thread, start");
+    EXPECT_EQ(
+        faults[0].sentence,
+        "t: function 'test-row.6' (test-row) threw an exception at cycle 2; the thread's functions "
+        "are stopped and its outputs were set to their safe values; see: show thread, start");
     EXPECT_EQ(machine.get("test-row.5.out"), "306");
     EXPECT_EQ(machine.get("test-row.6.out"), "107");
     EXPECT_EQ(machine.get("c.count"), "2");

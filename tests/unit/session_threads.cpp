@@ -8,13 +8,16 @@ namespace {
 
 std::string row(const Machine& machine, const char* thread) {
     std::string names;
-    for (const LoadedFunction* function : machine.session.model().find_thread(thread)->functions)
+    for (const LoadedFunction* function : machine.session.model().find_thread(thread)->functions) {
         names += (names.empty() ? "" : " ") + function->name;
+    }
     return names;
 }
 
 struct Threads : testing::Test {
-    Threads() { machine.must("loadrt threads name1=t period1=1000000\nloadrt test-counter names=a,b,c,d\n"); }
+    Threads() {
+        machine.must("loadrt threads name1=t period1=1000000\nloadrt test-counter names=a,b,c,d\n");
+    }
     Machine machine;
 };
 
@@ -31,7 +34,9 @@ TEST_F(Threads, Addf_places_functions_by_position) {
 
 TEST_F(Threads, Addf_rejects_invalid_positions) {
     machine.must("addf a t\naddf b t");
-    for (const char* position : {"0", "4", "-4", "x", "1.5", "99999999999999999999"}) machine.rejected(std::string("addf c t ") + position, "bad-position");
+    for (const char* position : {"0", "4", "-4", "x", "1.5", "99999999999999999999"}) {
+        machine.rejected(std::string("addf c t ") + position, "bad-position");
+    }
 }
 
 TEST_F(Threads, A_function_is_in_one_thread_once) {
@@ -69,9 +74,12 @@ TEST_F(Threads, An_earlier_reader_sees_the_cycle_before) {
 }
 
 TEST_F(Threads, Another_threads_value_is_its_last_finished_cycle) {
-    machine.must("newthread slow 4000000\naddf a t\naddf b slow\nnet s a.sum => b.step\nnet r b.sum => c.step\naddf c t");
+    machine.must(
+        "newthread slow 4000000\naddf a t\naddf b slow\nnet s a.sum => b.step\nnet r b.sum => "
+        "c.step\naddf c t");
     machine.start();
-    machine.cycles(4);  // at 4 ms the fast thread has run for the fourth time when the slow one starts
+    // at 4 ms the fast thread has run for the fourth time when the slow one starts
+    machine.cycles(4);
     EXPECT_EQ(machine.get("b.sum"), "4");
     EXPECT_EQ(machine.get("c.sum"), "0");  // it ran before the slow thread in each of the four
     machine.cycles(1);
@@ -102,7 +110,9 @@ TEST_F(Threads, A_new_fastest_thread_must_divide_all_others) {
 }
 
 TEST_F(Threads, Invalid_periods_are_rejected) {
-    for (const char* period : {"0", "999", "-1000000", "x", "1e99"}) machine.rejected(std::string("newthread u ") + period, "bad-period");
+    for (const char* period : {"0", "999", "-1000000", "x", "1e99"}) {
+        machine.rejected(std::string("newthread u ") + period, "bad-period");
+    }
     machine.rejected("newthread t 1000000", "name-taken");
     machine.rejected("newthread u 1000000 cpu=x", "bad-argument");
     machine.rejected("newthread u 1000000 colour=red", "unknown-argument");
@@ -163,7 +173,9 @@ TEST_F(Threads, Initf_runs_once_in_a_cycle_of_its_own) {
 }
 
 TEST_F(Threads, Time_pins_of_threads_and_functions_link_and_set_like_others) {
-    machine.must("addf a t\nnet ticks t.threadbeat\nnewsig n s32\nlinkps a.time n\nsetp a.tmax 5\nsetp t.tmax 7");
+    machine.must(
+        "addf a t\nnet ticks t.threadbeat\nnewsig n s32\nlinkps a.time n\nsetp a.tmax 5\nsetp "
+        "t.tmax 7");
     machine.start();
     machine.cycles(3);
     EXPECT_EQ(machine.get("ticks"), "3");
@@ -171,7 +183,10 @@ TEST_F(Threads, Time_pins_of_threads_and_functions_link_and_set_like_others) {
     EXPECT_EQ(machine.get("t.tmax"), "7");
     machine.rejected("setp t.threadbeat 0", "output-set");
     machine.rejected("net m t.tmax", "parameter-link");
-    for (const char* pin : {"t.time", "t.tmax-increased", "t.missed", "t.wakeup", "a.tmax-increased"}) EXPECT_NE(machine.get(pin), "?") << pin;
+    for (const char* pin :
+         {"t.time", "t.tmax-increased", "t.missed", "t.wakeup", "a.tmax-increased"}) {
+        EXPECT_NE(machine.get(pin), "?") << pin;
+    }
 }
 
 TEST_F(Threads, Delthread_frees_its_functions_and_keeps_values) {
@@ -204,8 +219,10 @@ TEST_F(Threads, A_function_moved_between_threads_keeps_its_state) {
 TEST_F(Threads, A_virtual_run_is_the_same_every_time) {
     const auto run = [] {
         Machine one;
-        one.must("loadrt threads name1=f period1=250000 name2=s period2=1000000\nloadrt test-counter names=a,b\naddf a f\naddf b s\n"
-                     "net x a.sum => b.step\nnet y b.sum => a.step");
+        one.must(
+            "loadrt threads name1=f period1=250000 name2=s period2=1000000\nloadrt test-counter "
+            "names=a,b\naddf a f\naddf b s\n"
+            "net x a.sum => b.step\nnet y b.sum => a.step");
         one.start();
         one.cycles(1000);
         return one.dump();
@@ -221,7 +238,10 @@ TEST(Instances, are_numbered_named_and_added_at_any_time) {
     machine.must("loadrt test-counter");
     machine.must("loadrt test-counter names=left,right");
     machine.must("loadrt test_counter num_chan=1");
-    for (const char* name : {"test-counter.0", "test-counter.1", "test-counter.2", "left", "right", "test-counter.3"}) EXPECT_NE(machine.session.model().find_instance(name), nullptr) << name;
+    for (const char* name : {"test-counter.0", "test-counter.1", "test-counter.2", "left", "right",
+                             "test-counter.3"}) {
+        EXPECT_NE(machine.session.model().find_instance(name), nullptr) << name;
+    }
     EXPECT_EQ(machine.session.model().components.size(), 1u);
     machine.rejected("loadrt test-counter names=left", "name-taken");
     machine.rejected("loadrt test-counter names=x,,y", "bad-argument");
@@ -230,7 +250,8 @@ TEST(Instances, are_numbered_named_and_added_at_any_time) {
     machine.rejected("loadrt test-counter coutn=1", "unknown-argument");
     machine.rejected("loadrt test-counter word", "bad-argument");
     machine.must("loadrt test-counter");
-    EXPECT_NE(machine.session.model().find_instance("test-counter.4"), nullptr) << "a rejected load takes no number";
+    EXPECT_NE(machine.session.model().find_instance("test-counter.4"), nullptr)
+        << "a rejected load takes no number";
 }
 
 TEST(Instances, of_a_singleton_are_one) {
@@ -244,7 +265,9 @@ TEST(Instances, of_a_singleton_are_one) {
 
 TEST(Instances, get_arguments_personalities_and_lists) {
     Machine machine;
-    machine.must("loadrt threads\nloadrt test-shared count=3 kind=4,5,6 gain=2.5 personality=7,8\naddf test-shared.update thread1");
+    machine.must(
+        "loadrt threads\nloadrt test-shared count=3 kind=4,5,6 gain=2.5 personality=7,8\naddf "
+        "test-shared.update thread1");
     machine.start();
     machine.cycles(1);
     EXPECT_EQ(machine.get("test-shared.0.kind"), "4");
@@ -288,7 +311,9 @@ TEST(A_shared_function, runs_all_instances_in_order_and_those_loaded_later_too) 
 
 TEST(Functions_of_one_instance, spread_over_threads_only_when_each_has_its_own_pins) {
     Machine machine;
-    machine.must("loadrt threads name1=t period1=1000000 name2=u period2=2000000\nloadrt test-two names=free\nloadrt test-two names=tied common=1");
+    machine.must(
+        "loadrt threads name1=t period1=1000000 name2=u period2=2000000\nloadrt test-two "
+        "names=free\nloadrt test-two names=tied common=1");
     machine.must("addf free.fast t\naddf free.first u\naddf free.last u");
     machine.rejected("addf tied.fast t\naddf tied.first u", "spread-pins");
 }
@@ -296,7 +321,8 @@ TEST(Functions_of_one_instance, spread_over_threads_only_when_each_has_its_own_p
 TEST(An_instance, lives_from_construct_to_destroy_in_order) {
     Watch watch;
     Machine machine;
-    machine.must("loadrt threads\nloadrt test-life names=x " + watch.argument() + "\naddf x thread1");
+    machine.must("loadrt threads\nloadrt test-life names=x " + watch.argument() +
+                 "\naddf x thread1");
     EXPECT_EQ(watch.constructed, 1);
     EXPECT_EQ(watch.started, 1);
     machine.start();
@@ -306,13 +332,16 @@ TEST(An_instance, lives_from_construct_to_destroy_in_order) {
     EXPECT_EQ(watch.stopped, 1);
     EXPECT_EQ(watch.destroyed, 1);
     EXPECT_GE(watch.emergencies, 1);
-    EXPECT_TRUE(machine.session.model().find_component("test-life") == nullptr) << "the plugin goes with its last instance";
+    EXPECT_TRUE(machine.session.model().find_component("test-life") == nullptr)
+        << "the plugin goes with its last instance";
 }
 
 TEST(An_unloaded_instance, leaves_safe_values_in_the_signals_it_drove) {
     Watch watch;
     Machine machine;
-    machine.must("loadrt threads\nloadrt test-life names=x " + watch.argument() + "\nloadrt test-counter names=c\naddf x thread1\naddf c thread1\nnet level x.level => c.step\nnet out x.out");
+    machine.must("loadrt threads\nloadrt test-life names=x " + watch.argument() +
+                 "\nloadrt test-counter names=c\naddf x thread1\naddf c thread1\nnet level x.level "
+                 "=> c.step\nnet out x.out");
     machine.start();
     machine.cycles(3);
     EXPECT_EQ(machine.get("level"), "7");
@@ -327,7 +356,8 @@ TEST(Unload_all, takes_everything_back) {
     Watch watch;
     Machine machine;
     const std::string empty = machine.dump();
-    machine.must("loadrt threads\nloadrt test-life count=3 " + watch.argument() + "\nloadrt test-counter\naddf test-counter.0 thread1\naddf test-life.1 thread1");
+    machine.must("loadrt threads\nloadrt test-life count=3 " + watch.argument() +
+                 "\nloadrt test-counter\naddf test-counter.0 thread1\naddf test-life.1 thread1");
     machine.start();
     machine.cycles(2);
     machine.must("unloadrt all");
@@ -339,7 +369,8 @@ TEST(A_session, stops_and_destroys_the_remaining_instances_when_it_ends) {
     Watch watch;
     {
         Machine machine;
-        machine.must("loadrt threads\nloadrt test-life count=3 " + watch.argument() + "\naddf test-life.1 thread1");
+        machine.must("loadrt threads\nloadrt test-life count=3 " + watch.argument() +
+                     "\naddf test-life.1 thread1");
         machine.start();
         machine.cycles(2);
     }
@@ -356,9 +387,13 @@ TEST(Check_only, constructs_and_starts_nothing) {
     {
         Session session(options);
         Diagnostics diagnostics;
-        const auto source = session.sources.add("x", "loadrt threads\nloadrt test-life fail=start " + watch.argument() + "\naddf test-life.0 thread1\n");
+        const auto source =
+            session.sources.add("x", "loadrt threads\nloadrt test-life fail=start " +
+                                         watch.argument() + "\naddf test-life.0 thread1\n");
         Transaction transaction = session.begin();
-        for (const Command& command : parse(session.sources, source, {}, diagnostics)) apply_edit(transaction, command, diagnostics);
+        for (const Command& command : parse(session.sources, source, {}, diagnostics)) {
+            apply_edit(transaction, command, diagnostics);
+        }
         EXPECT_TRUE(transaction.commit(diagnostics)) << render(diagnostics, session.sources);
         EXPECT_EQ(watch.constructed, 1);
         EXPECT_EQ(watch.started, 0);
@@ -369,7 +404,9 @@ TEST(Check_only, constructs_and_starts_nothing) {
 
 TEST(Auto_order, puts_writers_before_readers_and_reports_where_it_cut_a_loop) {
     Machine machine;
-    machine.must("loadrt threads name1=t period1=1000000\nloadrt test-counter names=a,b,c\nnet x c.sum => b.step\nnet y b.sum => a.step");
+    machine.must(
+        "loadrt threads name1=t period1=1000000\nloadrt test-counter names=a,b,c\nnet x c.sum => "
+        "b.step\nnet y b.sum => a.step");
     machine.must("addf --auto t");
     EXPECT_EQ(row(machine, "t"), "c b a");
     machine.must("delf a t\ndelf b t\ndelf c t\nnet z a.sum => c.step");

@@ -10,13 +10,17 @@ namespace {
 
 struct Traced : testing::Test {
     Traced() {
-        machine.must("loadrt threads name1=servo period1=1000000\nloadrt test-counter names=a,b\naddf a servo\naddf b servo");
+        machine.must(
+            "loadrt threads name1=servo period1=1000000\nloadrt test-counter names=a,b\naddf a "
+            "servo\naddf b servo");
         machine.start();
     }
     /// Takes events until there are `cycles` more cycles.
     void collect(std::size_t cycles) {
         const auto count = [&] {
-            return std::count_if(events.begin(), events.end(), [](const TraceEvent& event) { return event.kind == TraceEvent::cycle; });
+            return std::count_if(events.begin(), events.end(), [](const TraceEvent& event) {
+                return event.kind == TraceEvent::cycle;
+            });
         };
         const auto until = count() + static_cast<std::ptrdiff_t>(cycles);
         EXPECT_TRUE(eventually([&] {
@@ -41,7 +45,9 @@ TEST_F(Traced, Each_cycle_has_its_functions_in_order_and_within_it) {
     std::vector<TraceEvent> inner;
     std::size_t whole = 0;
     for (const TraceEvent& event : events) {
-        if (event.kind == TraceEvent::function) inner.push_back(event);
+        if (event.kind == TraceEvent::function) {
+            inner.push_back(event);
+        }
         if (event.kind != TraceEvent::cycle) continue;
         if (inner.size() == 2) {  // the first cycle may have begun before the trace
             ++whole;
@@ -62,13 +68,16 @@ TEST_F(Traced, An_edit_is_recorded_and_a_thread_that_is_added_too) {
     collect(3);
     machine.must("delf b servo");
     collect(3);
-    EXPECT_TRUE(std::any_of(events.begin(), events.end(), [](const TraceEvent& event) { return event.kind == TraceEvent::plan; }));
+    EXPECT_TRUE(std::any_of(events.begin(), events.end(), [](const TraceEvent& event) {
+        return event.kind == TraceEvent::plan;
+    }));
     events.clear();
     machine.must("newthread second 2000000\naddf b second");
     EXPECT_TRUE(eventually([&] {
         const TraceBatch batch = machine.session.traces().take();
-        return std::any_of(batch.parts.begin(), batch.parts.end(),
-                           [](const TraceBatch::Part& part) { return part.thread.name == "second"; });
+        return std::any_of(
+            batch.parts.begin(), batch.parts.end(),
+            [](const TraceBatch::Part& part) { return part.thread.name == "second"; });
     }));
 }
 
@@ -90,12 +99,15 @@ TEST_F(Traced, Nothing_is_recorded_after_the_end_and_names_come_again) {
 TEST(Traces, are_rejected_on_the_virtual_clock) {
     Machine machine;
     EXPECT_EQ(machine.session.traces().begin(),
-              "this instance runs on a virtual clock, whose cycles take no time; trace an instance of: hal run");
+              "this instance runs on a virtual clock, whose cycles take no time; trace an instance "
+              "of: hal run");
 }
 
 TEST(TraceRing, counts_what_does_not_fit) {
     TraceRing ring;
-    for (std::size_t i = 0; i < TraceRing::capacity + 3; ++i) ring.put(TraceEvent::function, 1, 2, i, 7);
+    for (std::size_t i = 0; i < TraceRing::capacity + 3; ++i) {
+        ring.put(TraceEvent::function, 1, 2, i, 7);
+    }
     EXPECT_EQ(ring.lost(), 3u);
     TraceEvent event;
     ASSERT_TRUE(ring.take(event));

@@ -9,18 +9,24 @@ namespace {
 
 struct Complete : testing::Test {
     Complete() {
-        machine.must("loadrt and2 names=a,b\nloadrt sum2 names=s\nloadrt encoder names=e,f\nnewthread fast 100000\nnewthread slow 1000000\n"
-                     "addf a fast\nnet on a.out => b.in0\nnewsig level float\nnewsig flag bit\nalias pin a.in1 start\n");
+        machine.must(
+            "loadrt and2 names=a,b\nloadrt sum2 names=s\nloadrt encoder names=e,f\nnewthread fast "
+            "100000\nnewthread slow 1000000\n"
+            "addf a fast\nnet on a.out => b.in0\nnewsig level float\nnewsig flag bit\nalias pin "
+            "a.in1 start\n");
     }
     /// The candidates for the end of the line, blank-separated.
     std::string after(const std::string& line) {
         std::string text;
-        for (const Candidate& candidate : machine.shell.complete(line, line.size()).candidates) text += (text.empty() ? "" : " ") + candidate.text;
+        for (const Candidate& candidate : machine.shell.complete(line, line.size()).candidates) {
+            text += (text.empty() ? "" : " ") + candidate.text;
+        }
         return text;
     }
     bool offers(const std::string& line, const std::string& word) {
         const auto found = machine.shell.complete(line, line.size()).candidates;
-        return std::any_of(found.begin(), found.end(), [&](const Candidate& candidate) { return candidate.text == word; });
+        return std::any_of(found.begin(), found.end(),
+                           [&](const Candidate& candidate) { return candidate.text == word; });
     }
     ShellMachine machine;
 };

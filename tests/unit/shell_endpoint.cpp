@@ -22,7 +22,10 @@ TEST_F(ServerTest, a_second_instance_of_the_same_name_is_rejected) {
     Diagnostics diagnostics;
     EXPECT_FALSE(refused.start(diagnostics));
     const std::string said = render(diagnostics, second.session.sources);
-    EXPECT_NE(said.find("an instance named 'test' is already running (process " + std::to_string(getpid()) + ") [instance-running]"), std::string::npos) << said;
+    EXPECT_NE(said.find("an instance named 'test' is already running (process " +
+                        std::to_string(getpid()) + ") [instance-running]"),
+              std::string::npos)
+        << said;
     EXPECT_TRUE(alive());
     ShellMachine third({}, shell_session("third"));
     Server other(third.shell);
@@ -31,7 +34,8 @@ TEST_F(ServerTest, a_second_instance_of_the_same_name_is_rejected) {
     EXPECT_EQ(running_instances(), (std::vector<std::string>{"test", "third"}));
     std::string problem;
     EXPECT_EQ(Client::connect("fourth", problem), nullptr);
-    EXPECT_EQ(problem, "no instance 'fourth' is running; running: test, third (choose with --name)");
+    EXPECT_EQ(problem,
+              "no instance 'fourth' is running; running: test, third (choose with --name)");
 }
 
 TEST_F(ServerTest, files_of_a_dead_process_are_replaced) {
@@ -66,11 +70,15 @@ TEST_F(ServerTest, a_folder_of_another_user_is_rejected) {
         return render(diagnostics, other.session.sources);
     };
     std::filesystem::create_directory_symlink("/tmp", folder.path + "/halcyon");
-    EXPECT_NE(said("x").find("belongs to another user or is accessible to others [no-socket]"), std::string::npos) << said("x");
+    EXPECT_NE(said("x").find("belongs to another user or is accessible to others [no-socket]"),
+              std::string::npos)
+        << said("x");
     std::filesystem::remove(folder.path + "/halcyon");
     folder.write("halcyon", "a file");
     EXPECT_NE(said("x").find("[no-socket]"), std::string::npos);
-    for (const char* name : {"../x", "", ".x", "a b", "x/y"}) EXPECT_NE(said(name).find("is not a valid instance name"), std::string::npos) << name;
+    for (const char* name : {"../x", "", ".x", "a b", "x/y"}) {
+        EXPECT_NE(said(name).find("is not a valid instance name"), std::string::npos) << name;
+    }
     EXPECT_NE(said(std::string(65, 'x')).find("[no-socket]"), std::string::npos);
     setenv("XDG_RUNTIME_DIR", (folder.path + "/" + std::string(100, 'd')).c_str(), 1);
     EXPECT_NE(said("x").find("too long"), std::string::npos);

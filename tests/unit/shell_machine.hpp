@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A session with its shell for tests, on the virtual clock: lines and texts in, what the user reads out.
+// A session with its shell for tests, on the virtual clock: lines and texts in, what the user reads
+// out.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -10,8 +11,8 @@
 
 #include <unistd.h>
 
-#include "machine/session.hpp"
 #include "commands/shell.hpp"
+#include "machine/session.hpp"
 
 namespace hal::test {
 
@@ -19,7 +20,8 @@ namespace hal::test {
 class Folder {
 public:
     Folder() {
-        std::string name = (std::filesystem::temp_directory_path() / "halcyon-test-XXXXXX").string();
+        std::string name =
+            (std::filesystem::temp_directory_path() / "halcyon-test-XXXXXX").string();
         path = mkdtemp(name.data());
     }
     ~Folder() {
@@ -38,7 +40,8 @@ public:
     std::string path;
 };
 
-inline SessionOptions shell_session(const std::string& name = "test", bool virtual_clock = true, bool check_only = false) {
+inline SessionOptions shell_session(const std::string& name = "test", bool virtual_clock = true,
+                                    bool check_only = false) {
     SessionOptions options;
     options.name = name;
     options.virtual_clock = virtual_clock;
@@ -48,11 +51,14 @@ inline SessionOptions shell_session(const std::string& name = "test", bool virtu
 
 class ShellMachine {
 public:
-    explicit ShellMachine(ShellOptions options = {}, SessionOptions session_options = shell_session())
+    explicit ShellMachine(ShellOptions options = {},
+                          SessionOptions session_options = shell_session())
         : session(std::move(session_options)), shell(session, std::move(options)) {}
 
     /// Executes one line as typed. Returns its status; its output is in out and err.
-    int line(const std::string& text) { return keep([&](Output& output) { return shell.execute(text, output); }); }
+    int line(const std::string& text) {
+        return keep([&](Output& output) { return shell.execute(text, output); });
+    }
     int file(const std::string& text, const std::string& name = "test.hal") {
         return keep([&](Output& output) { return shell.run_text(name, text, output); });
     }

@@ -10,7 +10,9 @@
 namespace hal::test {
 namespace {
 
-bool has(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+bool has(const std::string& text, const std::string& part) {
+    return text.find(part) != std::string::npos;
+}
 
 /// With the session's lock: what is known of a program.
 bool running(ShellMachine& machine, const std::string& name) {
@@ -23,20 +25,24 @@ TEST(Process, waited_for_its_output_and_status_come_back) {
     EXPECT_EQ(machine.line("loadusr -w echo hello"), 0) << machine.err;
     EXPECT_EQ(machine.out, "hello\n");
     EXPECT_EQ(machine.line("loadusr -w false"), 1);
-    EXPECT_TRUE(has(machine.err, "'false' failed with exit status 1 [program-failed]")) << machine.err;
+    EXPECT_TRUE(has(machine.err, "'false' failed with exit status 1 [program-failed]"))
+        << machine.err;
     EXPECT_EQ(machine.line("loadusr -i -w false"), 0) << machine.err;
     const Folder folder;
-    const std::string script = folder.write("both", "#!/bin/sh\necho out\necho err >&2\nkill -TERM $$\n");
+    const std::string script =
+        folder.write("both", "#!/bin/sh\necho out\necho err >&2\nkill -TERM $$\n");
     std::filesystem::permissions(script, std::filesystem::perms::owner_all);
     EXPECT_EQ(machine.line("loadusr -w " + script), 1);
     EXPECT_EQ(machine.out, "out\n");
-    EXPECT_TRUE(has(machine.err, "err\n") && has(machine.err, "was terminated by signal 15")) << machine.err;
+    EXPECT_TRUE(has(machine.err, "err\n") && has(machine.err, "was terminated by signal 15"))
+        << machine.err;
     EXPECT_EQ(machine.says("list comp"), "\n");
 }
 
 TEST(Process, much_output_is_cut_and_the_program_still_ends) {
     ShellMachine machine;
-    EXPECT_EQ(machine.line("loadusr -w head -c 3000000 /dev/zero"), 0) << machine.err.substr(0, 200);
+    EXPECT_EQ(machine.line("loadusr -w head -c 3000000 /dev/zero"), 0)
+        << machine.err.substr(0, 200);
     EXPECT_GT(machine.out.size(), 1'000'000U);
     EXPECT_LT(machine.out.size(), 1'200'000U);
     EXPECT_TRUE(has(machine.err, "output truncated after 1 MiB")) << machine.err;
@@ -105,7 +111,9 @@ TEST(Process, W_waits_until_the_program_says_it_is_ready) {
 TEST(Process, W_gives_up_when_the_program_ends_first) {
     ShellMachine machine;
     EXPECT_EQ(machine.line("loadusr -W true"), 1);
-    EXPECT_TRUE(has(machine.err, "'true' ended before a component 'true' was ready [program-ended]")) << machine.err;
+    EXPECT_TRUE(
+        has(machine.err, "'true' ended before a component 'true' was ready [program-ended]"))
+        << machine.err;
     EXPECT_EQ(machine.says("list comp"), "\n");
 }
 
@@ -117,9 +125,13 @@ TEST(Process, a_reserved_name_is_not_for_a_program_from_before) {
         usleep(30'000);
         const auto lock = machine.session.lock();
         Programs& programs = machine.session.programs();
-        const auto older = programs.find("sleep")->pid, newer = programs.find("panel")->pid;
-        EXPECT_NE(programs.announce(older, "panel").find("is reserved for process " + std::to_string(newer)), std::string::npos);
-        EXPECT_EQ(programs.announce(newer, "second", 1), "") << "a component of another name does not give the first away";
+        const auto older = programs.find("sleep")->pid;
+        const auto newer = programs.find("panel")->pid;
+        EXPECT_NE(programs.announce(older, "panel")
+                      .find("is reserved for process " + std::to_string(newer)),
+                  std::string::npos);
+        EXPECT_EQ(programs.announce(newer, "second", 1), "")
+            << "a component of another name does not give the first away";
         EXPECT_NE(programs.find("panel"), nullptr);
         EXPECT_EQ(programs.announce(newer, "panel", 2), "");
     });

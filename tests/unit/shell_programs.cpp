@@ -2,8 +2,8 @@
 // Programs as components, without a socket: pins, exchange, death and take-over, ports, streams.
 #include <nlohmann/json.hpp>
 
-#include "machine/programs.hpp"
 #include "control/connection.hpp"
+#include "machine/programs.hpp"
 #include "shell_machine.hpp"
 
 namespace hal::test {
@@ -12,7 +12,11 @@ namespace {
 using Json = nlohmann::json;
 
 struct Programs : testing::Test {
-    Programs() { machine.must("loadrt sum2 names=s,second\nnewthread t 1000000\nnewthread slow 10000000\naddf s t\naddf second slow\nstart\n"); }
+    Programs() {
+        machine.must(
+            "loadrt sum2 names=s,second\nnewthread t 1000000\nnewthread slow 10000000\naddf s "
+            "t\naddf second slow\nstart\n");
+    }
 
     static Json ask(Connection& connection, const Json& request) {
         std::string reply;
@@ -25,9 +29,14 @@ struct Programs : testing::Test {
         EXPECT_EQ(reply["ok"], false) << reply;
         return reply.value("error", "");
     }
-    static Json pin(const char* name, const char* type, const char* dir) { return {{"name", name}, {"type", type}, {"dir", dir}}; }
+    static Json pin(const char* name, const char* type, const char* dir) {
+        return {{"name", name}, {"type", type}, {"dir", dir}};
+    }
     Json declare(const Json& more = Json::object()) {
-        Json body{{"component", "p"}, {"pins", {pin("in", "float", "in"), pin("out", "float", "out"), pin("io", "s32", "io"), pin("gain", "u64", "rw"), pin("about", "bit", "ro")}}};
+        Json body{{"component", "p"},
+                  {"pins",
+                   {pin("in", "float", "in"), pin("out", "float", "out"), pin("io", "s32", "io"),
+                    pin("gain", "u64", "rw"), pin("about", "bit", "ro")}}};
         body["pins"][1]["safe"] = -1;
         body.update(more);
         return ask(body);
@@ -41,8 +50,13 @@ TEST_F(Programs, declare_pins_that_are_there_like_any_other) {
     const Json reply = declare({{"ready", false}});
     EXPECT_EQ(reply["first"], 0) << reply;
     EXPECT_EQ(reply["values"], (Json{0.0, 0.0, 0, 0, false}));
-    EXPECT_NE(machine.says("show comp p").find(" initializing\n"), std::string::npos) << machine.out;
-    EXPECT_EQ(ask({{"component", "p"}, {"ready", true}, {"prefix", "q"}, {"pins", {pin("more", "bit", "out")}}})["first"], 5);
+    EXPECT_NE(machine.says("show comp p").find(" initializing\n"), std::string::npos)
+        << machine.out;
+    EXPECT_EQ(ask({{"component", "p"},
+                   {"ready", true},
+                   {"prefix", "q"},
+                   {"pins", {pin("more", "bit", "out")}}})["first"],
+              5);
     EXPECT_NE(machine.says("show comp p").find(" 4242 ready\n"), std::string::npos) << machine.out;
     EXPECT_EQ(machine.says("list pin p. q."), "p.in p.io p.out q.more \n");
     EXPECT_EQ(machine.says("list param p."), "p.about p.gain \n");
@@ -51,7 +65,8 @@ TEST_F(Programs, declare_pins_that_are_there_like_any_other) {
     EXPECT_EQ(machine.line("setp p.about 1"), 1);
     EXPECT_NE(machine.err.find("read-only"), std::string::npos) << machine.err;
     EXPECT_EQ(machine.line("setp p.out 1"), 1);
-    EXPECT_EQ(ask({{"exchange", "p"}, {"read", true}})["values"], (Json{2.5, 0, 18446744073709551615U}));
+    EXPECT_EQ(ask({{"exchange", "p"}, {"read", true}})["values"],
+              (Json{2.5, 0, 18446744073709551615U}));
 }
 
 TEST_F(Programs, one_writer_and_types_hold_for_their_pins_too) {
@@ -71,7 +86,8 @@ TEST_F(Programs, values_reach_every_thread_and_come_back) {
     machine.must("advance 20ms\n");
     EXPECT_EQ(machine.says("getp second.out"), "4.5\n");
     const Json reply = ask({{"exchange", "p"}, {"read", true}});
-    EXPECT_EQ(reply["values"], (Json{4.5, 0, 0})) << "own outputs and read-only parameters are not repeated";
+    EXPECT_EQ(reply["values"], (Json{4.5, 0, 0}))
+        << "own outputs and read-only parameters are not repeated";
     EXPECT_FALSE(reply.contains("loops"));
     EXPECT_EQ(machine.says("getp p.about"), "TRUE\n");
     machine.must("unlinkp p.in\nunlinkp p.out\n");
@@ -89,15 +105,19 @@ TEST_F(Programs, an_input_is_set_only_while_nothing_writes_it) {
     EXPECT_EQ(machine.says("gets c"), "5\n");
     machine.must("net c p.out\nadvance 2ms\n");
     ask({{"exchange", "p"}, {"write", {0, 7}}});
-    EXPECT_EQ(machine.says("gets c"), "0\n") << "an output hands its own value to a signal without writer";
+    EXPECT_EQ(machine.says("gets c"), "0\n")
+        << "an output hands its own value to a signal without writer";
     EXPECT_EQ(ask({{"exchange", "p"}, {"read", true}})["loops"], true);
 }
 
 TEST_F(Programs, what_is_wrong_is_refused_and_changes_nothing) {
     EXPECT_NE(refusal({{"exchange", "p"}, {"read", true}}), "");
     EXPECT_NE(refusal({{"exit", "p"}}), "");
-    EXPECT_NE(refusal({{"component", "s"}, {"pins", Json::array()}}).find("in use"), std::string::npos);
-    EXPECT_NE(refusal({{"component", "p"}, {"pins", {pin("a", "float", "in"), pin("a", "float", "in")}}}), "");
+    EXPECT_NE(refusal({{"component", "s"}, {"pins", Json::array()}}).find("in use"),
+              std::string::npos);
+    EXPECT_NE(
+        refusal({{"component", "p"}, {"pins", {pin("a", "float", "in"), pin("a", "float", "in")}}}),
+        "");
     EXPECT_EQ(machine.says("list comp"), "sum2 \n") << "not even the component";
     EXPECT_NE(refusal({{"component", "p"}, {"pins", {pin("a", "colour", "in")}}}), "");
     EXPECT_NE(refusal({{"component", "p"}, {"pins", {pin("a", "bit", "sideways")}}}), "");
@@ -112,7 +132,8 @@ TEST_F(Programs, what_is_wrong_is_refused_and_changes_nothing) {
     EXPECT_NE(refusal({{"exchange", "p"}, {"write", {1, 2.0, 2, 1e10}}}), "");
     EXPECT_EQ(machine.says("getp p.out"), "0\n");
     Connection other(machine.shell, 4243);
-    EXPECT_EQ(ask(other, {{"exchange", "p"}, {"read", true}})["ok"], false) << "only its own connection";
+    EXPECT_EQ(ask(other, {{"exchange", "p"}, {"read", true}})["ok"], false)
+        << "only its own connection";
     EXPECT_EQ(ask(other, {{"component", "p"}})["ok"], false);
     EXPECT_EQ(machine.line("unloadrt p"), 1);
     EXPECT_NE(machine.err.find("[is-a-program]"), std::string::npos) << machine.err;
@@ -135,10 +156,12 @@ TEST_F(Programs, a_dead_one_keeps_its_pins_for_its_successor) {
     program = std::make_unique<Connection>(machine.shell, 4243);
     EXPECT_NE(machine.says("show comp p").find(" dead since "), std::string::npos) << machine.out;
     EXPECT_EQ(machine.says("gets a"), "4.5\n");
-    Json pins{pin("out", "float", "out"), pin("io", "bit", "io"), pin("gain", "u64", "rw"), pin("new", "bit", "in")};
+    Json pins{pin("out", "float", "out"), pin("io", "bit", "io"), pin("gain", "u64", "rw"),
+              pin("new", "bit", "in")};
     const Json reply = ask({{"component", "p"}, {"pins", pins}});
     EXPECT_EQ(reply["values"], (Json{4.5, false, 3, false})) << "another type is another pin";
-    EXPECT_EQ(machine.says("list pin p."), "p.io p.new p.out \n") << "what the successor does not have goes";
+    EXPECT_EQ(machine.says("list pin p."), "p.io p.new p.out \n")
+        << "what the successor does not have goes";
     EXPECT_NE(machine.says("show comp p").find(" 4243 ready\n"), std::string::npos) << machine.out;
     ask({{"exchange", "p"}, {"write", {0, 6}}});
     EXPECT_EQ(machine.says("gets a"), "6\n");
@@ -149,7 +172,9 @@ TEST_F(Programs, a_dead_one_takes_its_declared_values_after_its_time) {
     machine.must("net a p.out => s.in0\n");
     ask({{"exchange", "p"}, {"write", {1, 4.5, 2, 9}}});
     program.reset();
-    for (int i = 0; i < 3000 && machine.says("gets a") != "-1\n"; ++i) usleep(10'000);
+    for (int i = 0; i < 3000 && machine.says("gets a") != "-1\n"; ++i) {
+        usleep(10'000);
+    }
     EXPECT_EQ(machine.says("gets a"), "-1\n");
     EXPECT_EQ(machine.says("getp p.io"), "9\n") << "not declared: it stays";
     machine.must("unloadusr p\n");
@@ -160,13 +185,16 @@ TEST_F(Programs, one_that_declares_a_rate_and_misses_it_does_not_respond) {
     declare({{"timeout_ms", 0}, {"every_ms", 1}});
     machine.must("net a p.out => s.in0\n");
     const auto says = [&](const char* command, const char* what) {
-        for (int i = 0; i < 3000 && machine.says(command).find(what) == std::string::npos; ++i) usleep(10'000);
+        for (int i = 0; i < 3000 && machine.says(command).find(what) == std::string::npos; ++i) {
+            usleep(10'000);
+        }
         return machine.out.find(what) != std::string::npos;
     };
     EXPECT_TRUE(says("show comp p", " not responding since ")) << machine.out;
     EXPECT_EQ(machine.says("gets a"), "-1\n");
     ask({{"exchange", "p"}, {"write", {1, 4.5}}, {"alive", false}});
-    EXPECT_EQ(machine.says("gets a"), "-1\n") << "values sent by a thread of its library do not count as a sign of life";
+    EXPECT_EQ(machine.says("gets a"), "-1\n")
+        << "values sent by a thread of its library do not count as a sign of life";
     ask({{"component", "p"}, {"every_ms", 0}});
     EXPECT_EQ(machine.says("gets a"), "4.5\n") << "what it wrote meanwhile";
     EXPECT_NE(machine.says("show comp p").find(" ready\n"), std::string::npos) << machine.out;
@@ -179,13 +207,17 @@ TEST_F(Programs, one_that_declares_a_rate_and_misses_it_does_not_respond) {
 
 TEST_F(Programs, a_hundred_thousand_pins_come_die_and_are_taken_over) {
     Json pins = Json::array();
-    for (int i = 0; i < 100'000; ++i) pins.push_back(pin(("n" + std::to_string(i)).c_str(), "float", i % 2 ? "in" : "out"));
+    for (int i = 0; i < 100'000; ++i) {
+        pins.push_back(pin(("n" + std::to_string(i)).c_str(), "float", i % 2 ? "in" : "out"));
+    }
     const Json request{{"component", "many"}, {"pins", pins}};
     EXPECT_EQ(ask(request)["values"].size(), 100'000U);
     program = std::make_unique<Connection>(machine.shell, 4243);
     EXPECT_EQ(ask(request)["values"].size(), 100'000U);
     program = std::make_unique<Connection>(machine.shell, 4244);
-    EXPECT_EQ(ask({{"component", "many"}, {"pins", {pin("n0", "float", "out")}}})["values"].size(), 1U) << "all others go";
+    EXPECT_EQ(ask({{"component", "many"}, {"pins", {pin("n0", "float", "out")}}})["values"].size(),
+              1U)
+        << "all others go";
     EXPECT_EQ(ask({{"exit", "many"}})["ok"], true);
 }
 
@@ -206,10 +238,20 @@ TEST_F(Programs, bytes_go_through_a_port) {
 
 TEST_F(Programs, records_go_through_a_stream_of_their_own) {
     ask({{"component", "p"}});
-    EXPECT_EQ(ask({{"stream", "stream.7"}, {"create", {{"types", "fs"}, {"depth", 2}}}, {"owner", "p"}})["depth"], 2);
-    EXPECT_NE(refusal({{"stream", "stream.7"}, {"create", {{"types", "f"}, {"depth", 2}}}, {"owner", "p"}}), "");
-    EXPECT_NE(refusal({{"stream", "stream.8"}, {"create", {{"types", "x"}, {"depth", 2}}}, {"owner", "p"}}), "");
-    EXPECT_EQ(ask({{"stream", "stream.7"}, {"records", {{1.5, 2}, {"nan", 3}, {0, 4}}}})["taken"], 2);
+    EXPECT_EQ(ask({{"stream", "stream.7"},
+                   {"create", {{"types", "fs"}, {"depth", 2}}},
+                   {"owner", "p"}})["depth"],
+              2);
+    EXPECT_NE(
+        refusal(
+            {{"stream", "stream.7"}, {"create", {{"types", "f"}, {"depth", 2}}}, {"owner", "p"}}),
+        "");
+    EXPECT_NE(
+        refusal(
+            {{"stream", "stream.8"}, {"create", {{"types", "x"}, {"depth", 2}}}, {"owner", "p"}}),
+        "");
+    EXPECT_EQ(ask({{"stream", "stream.7"}, {"records", {{1.5, 2}, {"nan", 3}, {0, 4}}}})["taken"],
+              2);
     Connection other(machine.shell, 4243);
     EXPECT_EQ(ask(other, {{"stream", "stream.7"}, {"take", 1}})["records"], (Json{{1.5, 2}}));
     ask({{"exit", "p"}});

@@ -11,7 +11,11 @@ namespace {
 using Json = nlohmann::json;
 
 struct Protocol : testing::Test {
-    Protocol() { machine.must("loadrt and2 names=a,b\nloadrt sum2 names=s\nnewthread t 1000000\nnet on a.out => b.in0\nnewsig level float\naddf a t\n"); }
+    Protocol() {
+        machine.must(
+            "loadrt and2 names=a,b\nloadrt sum2 names=s\nnewthread t 1000000\nnet on a.out => "
+            "b.in0\nnewsig level float\naddf a t\n");
+    }
 
     std::string raw(const std::string& line) {
         std::string replies;
@@ -20,7 +24,9 @@ struct Protocol : testing::Test {
     }
     Json ask(const Json& request) {
         std::string reply = raw(request.dump());
-        if (handled == Connection::Handled::wants_thread) handled = connection.handle(request.dump(), reply, true);
+        if (handled == Connection::Handled::wants_thread) {
+            handled = connection.handle(request.dump(), reply, true);
+        }
         EXPECT_TRUE(reply.ends_with("\n")) << reply;
         return Json::parse(reply);
     }
@@ -33,7 +39,9 @@ struct Protocol : testing::Test {
         std::string events;
         connection.publish(now, congested, events);
         std::vector<Json> all;
-        for (std::size_t at = 0, end; (end = events.find('\n', at)) != events.npos; at = end + 1) all.push_back(Json::parse(events.substr(at, end - at)));
+        for (std::size_t at = 0, end; (end = events.find('\n', at)) != events.npos; at = end + 1) {
+            all.push_back(Json::parse(events.substr(at, end - at)));
+        }
         return all;
     }
 
@@ -51,21 +59,26 @@ TEST_F(Protocol, the_hello_names_instance_and_version) {
 }
 
 TEST_F(Protocol, run_gives_output_errors_and_status) {
-    EXPECT_EQ(raw(R"({"id":7,"run":"getp a.in0"})"), "{\"id\":7,\"ok\":true,\"status\":0,\"out\":\"FALSE\\n\",\"err\":\"\"}\n");
+    EXPECT_EQ(raw(R"({"id":7,"run":"getp a.in0"})"),
+              "{\"id\":7,\"ok\":true,\"status\":0,\"out\":\"FALSE\\n\",\"err\":\"\"}\n");
     const Json failed = ask({{"id", "x"}, {"run", "getp a.ot"}, {"name", "<commandline>"}});
     EXPECT_EQ(failed["id"], "x");
     EXPECT_EQ(failed["ok"], true);
     EXPECT_EQ(failed["status"], 1);
-    EXPECT_TRUE(failed["err"].get<std::string>().starts_with("<commandline>:1:6: error:")) << failed;
+    EXPECT_TRUE(failed["err"].get<std::string>().starts_with("<commandline>:1:6: error:"))
+        << failed;
     EXPECT_EQ(ask({{"run", "quit"}})["quit"], true);
     EXPECT_EQ(ask({{"run", "begin"}})["collecting"], true);
 }
 
 TEST_F(Protocol, a_script_is_a_file_with_its_own_environment) {
-    const Json reply = ask({{"script", "setp a.in0 $ON\ngetp a.in0\nsetp a.in1 $OFF\n"}, {"name", "x.hal"}, {"env", {{"ON", "TRUE"}}}});
+    const Json reply = ask({{"script", "setp a.in0 $ON\ngetp a.in0\nsetp a.in1 $OFF\n"},
+                            {"name", "x.hal"},
+                            {"env", {{"ON", "TRUE"}}}});
     EXPECT_EQ(reply["status"], 1);
     EXPECT_EQ(reply["out"], "TRUE\n");
-    EXPECT_NE(reply["err"].get<std::string>().find("x.hal:3:12: error:"), std::string::npos) << reply;
+    EXPECT_NE(reply["err"].get<std::string>().find("x.hal:3:12: error:"), std::string::npos)
+        << reply;
     EXPECT_NE(refusal({{"script", "start"}, {"env", {{"ON", 1}}}}), "");
 }
 
@@ -77,9 +90,13 @@ TEST_F(Protocol, read_is_one_bulk_of_pins_and_signals) {
 }
 
 TEST_F(Protocol, set_is_one_transaction_of_pins_and_signals) {
-    EXPECT_EQ(ask({{"set", {{"a.in0", true}, {"s.in0", 1.5}, {"level", -2}, {"s.gain0", "3"}}}})["count"], 4);
-    EXPECT_EQ(ask({{"read", {"a.in0", "s.in0", "level", "s.gain0"}}})["values"], (Json{true, 1.5, -2.0, 3.0}));
-    EXPECT_NE(refusal({{"set", {{"a.in0", false}, {"b.in0", true}}}}).find("nothing was changed"), std::string::npos);
+    EXPECT_EQ(
+        ask({{"set", {{"a.in0", true}, {"s.in0", 1.5}, {"level", -2}, {"s.gain0", "3"}}}})["count"],
+        4);
+    EXPECT_EQ(ask({{"read", {"a.in0", "s.in0", "level", "s.gain0"}}})["values"],
+              (Json{true, 1.5, -2.0, 3.0}));
+    EXPECT_NE(refusal({{"set", {{"a.in0", false}, {"b.in0", true}}}}).find("nothing was changed"),
+              std::string::npos);
     EXPECT_EQ(ask({{"read", {"a.in0"}}})["values"][0], true);
     EXPECT_NE(refusal({{"set", {{"a.in0", 3}}}}), "");
     EXPECT_NE(refusal({{"set", {{"a.in0", nullptr}}}}), "");
@@ -91,7 +108,8 @@ TEST_F(Protocol, set_is_one_transaction_of_pins_and_signals) {
 
 TEST_F(Protocol, values_without_a_json_number_are_words) {
     machine.must("setp s.in0 inf\nsetp s.in1 nan\nsetp s.offset -inf\n");
-    EXPECT_EQ(ask({{"read", {"s.in0", "s.in1", "s.offset"}}})["values"], (Json{"inf", "nan", "-inf"}));
+    EXPECT_EQ(ask({{"read", {"s.in0", "s.in1", "s.offset"}}})["values"],
+              (Json{"inf", "nan", "-inf"}));
     EXPECT_EQ(ask({{"set", {{"s.in0", "-inf"}}}})["count"], 1);
 }
 
@@ -135,7 +153,8 @@ TEST_F(Protocol, a_subscription_to_changes_is_silent_while_nothing_changes) {
 
 TEST_F(Protocol, list_and_describe) {
     EXPECT_EQ(ask({{"list", "sig"}})["names"], (Json{"level", "on"}));
-    EXPECT_EQ(ask({{"list", "pin"}, {"patterns", {"a.in", "b.o*"}}})["names"], (Json{"a.in0", "a.in1", "b.out"}));
+    EXPECT_EQ(ask({{"list", "pin"}, {"patterns", {"a.in", "b.o*"}}})["names"],
+              (Json{"a.in0", "a.in1", "b.out"}));
     const Json pin = ask({{"describe", "pin"}, {"patterns", {"b.in0"}}})["objects"][0];
     EXPECT_EQ(pin["signal"], "on");
     EXPECT_EQ(pin["component"], "and2");
@@ -169,10 +188,14 @@ TEST_F(Protocol, a_component_is_there_as_long_as_its_client) {
 }
 
 TEST_F(Protocol, a_sampler_is_drained_and_a_streamer_fed) {
-    machine.must("loadrt sampler cfg=fb depth=5\nloadrt streamer cfg=fs depth=4\nnet level sampler.0.pin.0\naddf sampler.0 t\naddf streamer.0 t\n");
+    machine.must(
+        "loadrt sampler cfg=fb depth=5\nloadrt streamer cfg=fs depth=4\nnet level "
+        "sampler.0.pin.0\naddf sampler.0 t\naddf streamer.0 t\n");
     EXPECT_EQ(ask({{"stream", "sampler.0"}})["types"], "fb");
     EXPECT_EQ(ask({{"stream", "sampler.0"}})["depth"], 4);
-    EXPECT_EQ(ask({{"stream", "streamer.0"}, {"records", {{1.5, 1}, {2.5, -2}, {3, 3}, {4, 4}}}})["taken"], 3);
+    EXPECT_EQ(ask({{"stream", "streamer.0"},
+                   {"records", {{1.5, 1}, {2.5, -2}, {3, 3}, {4, 4}}}})["taken"],
+              3);
     machine.must("start\nadvance 2 cycles\nsets level 7\nadvance 4 cycles\n");
     EXPECT_EQ(machine.says("getp streamer.0.pin.1"), "3\n");
     Json first = ask({{"stream", "sampler.0"}, {"take", 3}});
@@ -185,15 +208,21 @@ TEST_F(Protocol, a_sampler_is_drained_and_a_streamer_fed) {
     EXPECT_TRUE(ask({{"stream", "sampler.0"}, {"take", 100}})["records"].empty());
     EXPECT_NE(refusal({{"stream", "sampler.0"}, {"records", {{1, 0}}}}), "");
     EXPECT_NE(refusal({{"stream", "streamer.0"}, {"take", 1}}), "");
-    EXPECT_NE(refusal({{"stream", "streamer.0"}, {"records", {{1}}}}).find("record 0 has 1"), std::string::npos);
-    EXPECT_NE(refusal({{"stream", "streamer.0"}, {"records", {{1, 2}, {1, 2.5}}}}).find("record 1, value 1"), std::string::npos);
+    EXPECT_NE(refusal({{"stream", "streamer.0"}, {"records", {{1}}}}).find("record 0 has 1"),
+              std::string::npos);
+    EXPECT_NE(refusal({{"stream", "streamer.0"}, {"records", {{1, 2}, {1, 2.5}}}})
+                  .find("record 1, value 1"),
+              std::string::npos);
     EXPECT_NE(refusal({{"stream", "streamer.0"}, {"records", 3}}), "");
     EXPECT_EQ(ask({{"stream", "streamer.0"}, {"records", {{1, 2}}}})["taken"], 1);
-    EXPECT_NE(refusal({{"stream", "sampler.1"}}).find("did you mean 'sampler.0'"), std::string::npos);
+    EXPECT_NE(refusal({{"stream", "sampler.1"}}).find("did you mean 'sampler.0'"),
+              std::string::npos);
 }
 
 TEST_F(Protocol, options_hold_for_the_connection) {
-    EXPECT_EQ(ask({{"options", {{"script", true}, {"level", "results"}, {"directory", "/"}}}})["ok"], true);
+    EXPECT_EQ(
+        ask({{"options", {{"script", true}, {"level", "results"}, {"directory", "/"}}}})["ok"],
+        true);
     EXPECT_EQ(ask({{"run", "show sig level"}})["out"], "float  0  level\n\n");
     EXPECT_EQ(ask({{"run", "sets level 1"}})["err"], "1 edit took effect\n");
     EXPECT_FALSE(machine.shell.options.script);
@@ -204,10 +233,37 @@ TEST_F(Protocol, options_hold_for_the_connection) {
 }
 
 TEST_F(Protocol, rubbish_gets_an_error_and_changes_nothing) {
-    for (const std::string line : {"", "hello", "{", "[]", "null", "17", "\"run\"", "{\"id\":1", "{\"run\":\"start\"}}", "\xff\xfe\x00\x01", "{}", "{\"id\":3}", "{\"rum\":\"start\"}",
-                                   "{\"run\":\"start\",\"read\":[]}", "{\"run\":\"start\",\"colour\":1}", "{\"run\":5}", "{\"run\":[\"start\",5]}", "{\"run\":[[\"start\"]]}", "{\"script\":null}", "{\"read\":\"a\"}",
-                                   "{\"read\":[1]}", "{\"read\":{}}", "{\"subscribe\":[],\"every_ms\":0}", "{\"subscribe\":[],\"every_ms\":1e300}", "{\"subscribe\":[],\"every_ms\":\"x\"}",
-                                   "{\"unsubscribe\":-1}", "{\"complete\":\"x\",\"cursor\":-1}", "{\"stream\":\"sampler.0\",\"take\":-5}", "{\"set\":5}", "{\"\":1}", "{\"run\":\"\xc3\x28\"}"}) {
+    for (const std::string line : {"",
+                                   "hello",
+                                   "{",
+                                   "[]",
+                                   "null",
+                                   "17",
+                                   "\"run\"",
+                                   "{\"id\":1",
+                                   "{\"run\":\"start\"}}",
+                                   "\xff\xfe\x00\x01",
+                                   "{}",
+                                   "{\"id\":3}",
+                                   "{\"rum\":\"start\"}",
+                                   "{\"run\":\"start\",\"read\":[]}",
+                                   "{\"run\":\"start\",\"colour\":1}",
+                                   "{\"run\":5}",
+                                   "{\"run\":[\"start\",5]}",
+                                   "{\"run\":[[\"start\"]]}",
+                                   "{\"script\":null}",
+                                   "{\"read\":\"a\"}",
+                                   "{\"read\":[1]}",
+                                   "{\"read\":{}}",
+                                   "{\"subscribe\":[],\"every_ms\":0}",
+                                   "{\"subscribe\":[],\"every_ms\":1e300}",
+                                   "{\"subscribe\":[],\"every_ms\":\"x\"}",
+                                   "{\"unsubscribe\":-1}",
+                                   "{\"complete\":\"x\",\"cursor\":-1}",
+                                   "{\"stream\":\"sampler.0\",\"take\":-5}",
+                                   "{\"set\":5}",
+                                   "{\"\":1}",
+                                   "{\"run\":\"\xc3\x28\"}"}) {
         const std::string reply = raw(line);
         ASSERT_TRUE(reply.ends_with("\n") && reply.find('\n') == reply.size() - 1) << line;
         EXPECT_EQ(Json::parse(reply)["ok"], false) << line << "\n" << reply;
@@ -216,7 +272,9 @@ TEST_F(Protocol, rubbish_gets_an_error_and_changes_nothing) {
     const std::string nested = raw("{\"run\":" + std::string(10'000'000, '['));
     EXPECT_EQ(Json::parse(nested)["ok"], false);
     EXPECT_LT(nested.size(), 200U);
-    EXPECT_EQ(Json::parse(raw("{\"id\":\"" + std::string(1000, 'x') + "\",\"run\":\"status\"}"))["id"], nullptr);
+    EXPECT_EQ(
+        Json::parse(raw("{\"id\":\"" + std::string(1000, 'x') + "\",\"run\":\"status\"}"))["id"],
+        nullptr);
     EXPECT_GT(connection.rubbish(), 5U);
     EXPECT_EQ(ask({{"run", "getp a.in0"}})["out"], "FALSE\n");
 }
@@ -225,7 +283,8 @@ TEST_F(Protocol, what_may_wait_asks_for_a_thread_first) {
     EXPECT_EQ(raw(R"({"id":1,"run":"loadusr -w echo hi"})"), "");
     EXPECT_EQ(handled, Connection::Handled::wants_thread);
     std::string reply;
-    EXPECT_EQ(connection.handle(R"({"id":1,"run":"loadusr -w echo hi"})", reply, true), Connection::Handled::done);
+    EXPECT_EQ(connection.handle(R"({"id":1,"run":"loadusr -w echo hi"})", reply, true),
+              Connection::Handled::done);
     EXPECT_EQ(Json::parse(reply)["out"], "hi\n");
     raw(R"({"run":"$COMMAND -w true"})");  // what it stands for may wait
     EXPECT_EQ(handled, Connection::Handled::wants_thread);
@@ -247,7 +306,8 @@ TEST_F(Protocol, stop_ends_the_instance) {
 }
 
 TEST_F(Protocol, a_program_without_a_process_id_here_is_no_component) {
-    Connection outside(machine.shell, 0);  // as the kernel reports a process outside of the PID namespace
+    // as the kernel reports a process outside of the PID namespace
+    Connection outside(machine.shell, 0);
     std::string reply;
     outside.handle(R"({"component":"panel"})", reply);
     EXPECT_EQ(Json::parse(reply)["ok"], false);

@@ -31,8 +31,12 @@ TEST_F(ServerTest, pipelined_requests_are_answered_in_order) {
     serve();
     const auto c = client();
     std::vector<std::uint64_t> ids;
-    for (int i = 0; i < 5000; ++i) ids.push_back(c->send({{"run", "setp s.in0 " + std::to_string(i)}}));
-    for (const auto id : ids) EXPECT_EQ(c->wait(id)["status"], 0);
+    for (int i = 0; i < 5000; ++i) {
+        ids.push_back(c->send({{"run", "setp s.in0 " + std::to_string(i)}}));
+    }
+    for (const auto id : ids) {
+        EXPECT_EQ(c->wait(id)["status"], 0);
+    }
     EXPECT_EQ(c->run("getp s.in0").out, "4999\n");
     EXPECT_EQ(server->counts().requests, 5001U);
 }
@@ -40,10 +44,16 @@ TEST_F(ServerTest, pipelined_requests_are_answered_in_order) {
 TEST_F(ServerTest, many_clients_are_served_at_once) {
     serve();
     std::vector<std::unique_ptr<Client>> clients;
-    for (int i = 0; i < 40; ++i) clients.push_back(client());
+    for (int i = 0; i < 40; ++i) {
+        clients.push_back(client());
+    }
     std::vector<std::uint64_t> ids;
-    for (auto& c : clients) ids.push_back(c->send({{"read", {"a.in0"}}}));
-    for (std::size_t i = clients.size(); i-- > 0;) EXPECT_EQ(clients[i]->wait(ids[i])["ok"], true);
+    for (auto& c : clients) {
+        ids.push_back(c->send({{"read", {"a.in0"}}}));
+    }
+    for (std::size_t i = clients.size(); i-- > 0;) {
+        EXPECT_EQ(clients[i]->wait(ids[i])["ok"], true);
+    }
     EXPECT_EQ(server->counts().clients, 40U);
     clients.clear();
     EXPECT_TRUE(eventually([&] { return server->counts().clients == 0; }));
@@ -57,7 +67,8 @@ TEST_F(ServerTest, subscriptions_send_values_by_themselves) {
     ASSERT_TRUE(c->next_event(event, 10'000));
     EXPECT_EQ(event["values"], (Json{false}));
     EXPECT_EQ(c->run("setp a.in0 1").status, 0);
-    EXPECT_TRUE(eventually([&] { return c->next_event(event, 10'000) && event["values"] == Json{true}; }));
+    EXPECT_TRUE(
+        eventually([&] { return c->next_event(event, 10'000) && event["values"] == Json{true}; }));
 }
 
 TEST_F(ServerTest, a_waiting_command_holds_up_nobody_else_and_ends_with_its_client) {
@@ -106,7 +117,9 @@ TEST_F(ServerTest, a_line_received_in_parts_is_one_request) {
     serve();
     Wire wire(server->path());
     wire.line();
-    for (const char c : std::string("{\"id\":1,\"run\":\"getp a.out\"}\n")) wire.send(std::string_view(&c, 1));
+    for (const char c : std::string("{\"id\":1,\"run\":\"getp a.out\"}\n")) {
+        wire.send(std::string_view(&c, 1));
+    }
     EXPECT_EQ(Json::parse(wire.line())["out"], "FALSE\n");
 }
 
@@ -117,7 +130,8 @@ TEST_F(ServerTest, a_truncated_request_is_never_executed) {
         wire.line();
         wire.send("{\"id\":1,\"run\":\"setp a.in0 1\"}");  // no end of line
     }
-    EXPECT_TRUE(eventually([&] { return server->counts().accepted == 1 && server->counts().clients == 0; }));
+    EXPECT_TRUE(eventually(
+        [&] { return server->counts().accepted == 1 && server->counts().clients == 0; }));
     EXPECT_EQ(client()->run("getp a.in0").out, "FALSE\n");
     EXPECT_EQ(server->counts().requests, 1U);
 }
@@ -128,12 +142,16 @@ TEST_F(ServerTest, a_line_of_100_megabytes_is_rejected_and_skipped) {
     wire.line();
     const std::string megabyte(1 << 20, 'x');
     wire.send("{\"run\":\"");
-    for (int i = 0; i < 100; ++i) ASSERT_TRUE(wire.send(megabyte));
+    for (int i = 0; i < 100; ++i) {
+        ASSERT_TRUE(wire.send(megabyte));
+    }
     EXPECT_TRUE(alive());
     wire.send("\"}\n{\"id\":2,\"run\":\"getp a.out\"}\n");
     const Json refused = Json::parse(wire.line());
     EXPECT_EQ(refused["ok"], false);
-    EXPECT_NE(refused["error"].get<std::string>().find("longer than 16777216 bytes"), std::string::npos) << refused;
+    EXPECT_NE(refused["error"].get<std::string>().find("longer than 16777216 bytes"),
+              std::string::npos)
+        << refused;
     EXPECT_EQ(Json::parse(wire.line())["id"], 2);
 }
 
@@ -145,12 +163,15 @@ TEST_F(ServerTest, a_client_that_never_reads_is_disconnected_and_the_reason_is_l
     Wire wire(server->path());
     const std::string request = "{\"run\":\"help\"}\n";
     std::string many;
-    for (int i = 0; i < 1000; ++i) many += request;
+    for (int i = 0; i < 1000; ++i) {
+        many += request;
+    }
     EXPECT_TRUE(eventually([&] {
         wire.push(many);
         return server->counts().dropped == 1;
     }));
-    EXPECT_TRUE(eventually([&] { return log().find("nothing read") != std::string::npos; })) << log();
+    EXPECT_TRUE(eventually([&] { return log().find("nothing read") != std::string::npos; }))
+        << log();
     EXPECT_TRUE(eventually([&] { return server->counts().clients == 0; }));
     EXPECT_TRUE(alive());
 }
@@ -162,11 +183,16 @@ TEST_F(ServerTest, a_subscriber_that_sleeps_misses_values_but_stays) {
     Wire wire(server->path());
     wire.line();
     std::string names = "\"a.in0\"";
-    for (int i = 0; i < 5000; ++i) names += ",\"a.in0\"";
+    for (int i = 0; i < 5000; ++i) {
+        names += ",\"a.in0\"";
+    }
     wire.send("{\"subscribe\":[" + names + "],\"every_ms\":1}\n");
     EXPECT_EQ(Json::parse(wire.line())["subscription"], 1);
-    // The client reads nothing while others are served; then it resumes, and an event has the number of skipped ones.
-    for (int i = 0; i < 100; ++i) EXPECT_TRUE(alive());
+    // The client reads nothing while others are served; then it resumes, and an event has the
+    // number of skipped ones.
+    for (int i = 0; i < 100; ++i) {
+        EXPECT_TRUE(alive());
+    }
     EXPECT_TRUE(eventually([&] { return Json::parse(wire.line()).contains("skipped"); }));
     EXPECT_EQ(server->counts().dropped, 0U);
 }
@@ -175,11 +201,18 @@ TEST_F(ServerTest, clients_that_connect_and_disconnect_leak_nothing) {
     serve();
     for (int i = 0; i < 200; ++i) {
         Wire wire(server->path());
-        if (i % 3 == 0) wire.send("{\"run\":\"show pin\"}\n{\"run\":\"advance 100 cycles\"}\n{\"run\":\"loadusr -w sleep 1000\"}\n");
-        if (i % 3 == 1) wire.send("{\"subscribe\":[\"a.in0\"],\"every_ms\":1}\n{\"ru");
+        if (i % 3 == 0) {
+            wire.send(
+                "{\"run\":\"show pin\"}\n{\"run\":\"advance 100 cycles\"}\n{\"run\":\"loadusr -w "
+                "sleep 1000\"}\n");
+        }
+        if (i % 3 == 1) {
+            wire.send("{\"subscribe\":[\"a.in0\"],\"every_ms\":1}\n{\"ru");
+        }
         wire.shut();
     }
-    EXPECT_TRUE(eventually([&] { return server->counts().accepted == 200 && server->counts().clients == 0; }));
+    EXPECT_TRUE(eventually(
+        [&] { return server->counts().accepted == 200 && server->counts().clients == 0; }));
     EXPECT_TRUE(alive());
     const auto lock = machine->session.lock();
     EXPECT_FALSE(machine->session.in_transaction());
@@ -196,7 +229,9 @@ TEST_F(ServerTest, an_operator_gets_in_when_all_places_are_taken_by_idle_clients
         idle.push_back(std::make_unique<Wire>(server->path()));
         EXPECT_EQ(Json::parse(idle.back()->line())["halcyon"], 1);
     }
-    for (int i = 0; i < 5; ++i) EXPECT_EQ(client()->run("getp a.out").out, "FALSE\n");
+    for (int i = 0; i < 5; ++i) {
+        EXPECT_EQ(client()->run("getp a.out").out, "FALSE\n");
+    }
     EXPECT_EQ(client()->run("stop").status, 0);
     EXPECT_EQ(client()->stop().status, 0);
     EXPECT_EQ(server->counts().reclaimed, 0U);
@@ -217,13 +252,18 @@ TEST_F(ServerTest, idle_clients_are_closed_first_and_are_told_why) {
     auto operator_ = client();
     const Json event = Json::parse(idle.line());
     EXPECT_EQ(event["event"], "closed");
-    EXPECT_NE(event["reason"].get<std::string>().find("more than 3 clients are connected, and this one sent no request for"), std::string::npos) << event;
+    EXPECT_NE(event["reason"].get<std::string>().find(
+                  "more than 3 clients are connected, and this one sent no request for"),
+              std::string::npos)
+        << event;
     EXPECT_EQ(idle.line(), "");
     EXPECT_EQ(operator_->run("getp a.out").out, "FALSE\n");
-    EXPECT_TRUE(eventually([&] { return server->counts().clients == 3; })) << "those on which something depends stay";
+    EXPECT_TRUE(eventually([&] { return server->counts().clients == 3; }))
+        << "those on which something depends stay";
     Wire fourth(server->path());
     EXPECT_TRUE(eventually([&] { return !operator_->look(); })) << "it is idle now";
-    EXPECT_NE(operator_->closed_because().find("more than 3 clients"), std::string::npos) << operator_->closed_because();
+    EXPECT_NE(operator_->closed_because().find("more than 3 clients"), std::string::npos)
+        << operator_->closed_because();
 }
 
 TEST_F(ServerTest, a_reserved_place_is_not_kept_by_a_subscription) {

@@ -12,10 +12,10 @@
 #include <sys/stat.h>
 #include <sys/un.h>
 
-#include "machine.hpp"
-#include "machine/address.hpp"
 #include "control/client.hpp"
 #include "control/server.hpp"
+#include "machine.hpp"
+#include "machine/address.hpp"
 #include "shell_machine.hpp"
 
 namespace hal::test {
@@ -27,13 +27,16 @@ class Wire {
 public:
     /// Makes a socket, and connects it unless the path is empty.
     explicit Wire(const std::string& path) : fd_(socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
-        if (!path.empty()) connect_to(path);
+        if (!path.empty()) {
+            connect_to(path);
+        }
     }
     void connect_to(const std::string& path) {
         sockaddr_un address{};
         address.sun_family = AF_UNIX;
         path.copy(address.sun_path, sizeof address.sun_path - 1);
-        connected = ::connect(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
+        connected =
+            ::connect(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
     }
     ~Wire() { close(fd_); }
     Wire(const Wire&) = delete;
@@ -77,7 +80,8 @@ struct ServerTest : testing::Test {
     ServerTest() {
         setenv("XDG_RUNTIME_DIR", folder.path.c_str(), 1);
         machine = std::make_unique<ShellMachine>();
-        machine->must("loadrt and2 names=a,b\nloadrt sum2 names=s\nnewthread t 1000000\naddf s t\n");
+        machine->must(
+            "loadrt and2 names=a,b\nloadrt sum2 names=s\nnewthread t 1000000\naddf s t\n");
     }
     ~ServerTest() override { server.reset(); }
     void serve(ServerOptions options = {}) {

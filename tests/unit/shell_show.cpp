@@ -35,16 +35,20 @@ TEST_F(Show, pins_are_listed_with_owner_type_direction_value_and_signal) {
               "Component Pins:\n"
               "Owner   Type  Dir                 Value  Name\n" +
                   [&] {
-                      const std::string id = std::to_string(machine.session.model().find_component("and2")->id);
-                      const std::string owner = std::string(6 - id.size(), ' ') + id;
-                      return owner + "  bit   IN                  FALSE  a.in1\n" + owner + "  bit   OUT                 FALSE  a.out ==> s\n" + owner +
-                             "  bit   IN                  FALSE  b.in0 <== s\n" + owner + "  bit   IN                  FALSE  b.in1 <== s\n\n";
-                  }());
+        const std::string id = std::to_string(machine.session.model().find_component("and2")->id);
+        const std::string owner = std::string(6 - id.size(), ' ') + id;
+        return owner + "  bit   IN                  FALSE  a.in1\n" + owner +
+               "  bit   OUT                 FALSE  a.out ==> s\n" + owner +
+               "  bit   IN                  FALSE  b.in0 <== s\n" + owner +
+               "  bit   IN                  FALSE  b.in1 <== s\n\n";
+    }());
 }
 
 TEST_F(Show, pins_for_scripts_have_the_owners_name_and_no_title) {
     machine.shell.options.script = true;
-    EXPECT_EQ(machine.says("show pin a.out b.in0 start"), "and2 bit   OUT FALSE a.out ==> s\nand2 bit   IN FALSE b.in0 <== s\nand2 bit   IN FALSE start\n\n");
+    EXPECT_EQ(machine.says("show pin a.out b.in0 start"),
+              "and2 bit   OUT FALSE a.out ==> s\nand2 bit   IN FALSE b.in0 <== s\nand2 bit   IN "
+              "FALSE start\n\n");
 }
 
 TEST_F(Show, signals_have_a_line_per_pin_for_people_and_one_line_for_scripts) {
@@ -61,7 +65,8 @@ TEST_F(Show, signals_have_a_line_per_pin_for_people_and_one_line_for_scripts) {
               "                                 ==> b.in1\n"
               "\n");
     machine.shell.options.script = true;
-    EXPECT_EQ(machine.says("show sig s count"), "u32    300  count\nbit    FALSE  s <== a.out ==> b.in0 ==> b.in1\n\n");
+    EXPECT_EQ(machine.says("show sig s count"),
+              "u32    300  count\nbit    FALSE  s <== a.out ==> b.in0 ==> b.in1\n\n");
 }
 
 TEST_F(Show, a_type_selects) {
@@ -74,7 +79,8 @@ TEST_F(Show, a_type_selects) {
 
 TEST_F(Show, parameters_are_apart_from_pins) {
     machine.shell.options.script = true;
-    EXPECT_EQ(machine.says("show param a"), "and2 s32   RW 0 a.tmax\nand2 bit   RO FALSE a.tmax-increased\n\n");
+    EXPECT_EQ(machine.says("show param a"),
+              "and2 s32   RW 0 a.tmax\nand2 bit   RO FALSE a.tmax-increased\n\n");
     EXPECT_EQ(machine.says("list pin a"), "a.in1 a.out a.time \n");
     EXPECT_EQ(machine.says("list param a."), "a.tmax a.tmax-increased \n");
 }
@@ -89,7 +95,8 @@ TEST_F(Show, threads_are_listed_slowest_first_with_their_functions) {
               "                  1 b\n"
               "\n");
     machine.shell.options.script = true;
-    EXPECT_EQ(machine.says("show thread"), "1000000 YES slow        0 0 a\n100000 YES fast        0 0 b\n\n");
+    EXPECT_EQ(machine.says("show thread"),
+              "1000000 YES slow        0 0 a\n100000 YES fast        0 0 b\n\n");
     EXPECT_EQ(machine.says("list thread"), "slow fast \n");
 }
 
@@ -105,15 +112,19 @@ TEST_F(Show, components_are_listed_newest_first) {
     EXPECT_EQ(machine.says("list comp"), "threads and2 \n");
     const std::string table = machine.says("show comp and2");
     const std::string id = std::to_string(machine.session.model().find_component("and2")->id);
-    EXPECT_EQ(table, "Loaded HAL Components:\n"
-                     "ID      Type  Name                                            PID   State\n" +
-                         std::string(6 - id.size(), ' ') + id + "  RT    and2                                                  ready\n\n");
+    EXPECT_EQ(table,
+              "Loaded HAL Components:\n"
+              "ID      Type  Name                                            PID   State\n" +
+                  std::string(6 - id.size(), ' ') + id +
+                  "  RT    and2                                                  ready\n\n");
 }
 
 TEST_F(Show, aliases_have_both_names) {
-    EXPECT_EQ(machine.says("show alias"),
-              "Pin Aliases:\n Alias                                            Original Name\n start                                            a.in0\n\n"
-              "Parameter Aliases:\n Alias                                            Original Name\n\n");
+    EXPECT_EQ(
+        machine.says("show alias"),
+        "Pin Aliases:\n Alias                                            Original Name\n start     "
+        "                                       a.in0\n\n"
+        "Parameter Aliases:\n Alias                                            Original Name\n\n");
     machine.shell.options.script = true;
     EXPECT_EQ(machine.says("show alias"), " start  a.in0\n\n\n");
 }
@@ -121,7 +132,9 @@ TEST_F(Show, aliases_have_both_names) {
 TEST_F(Show, everything_comes_in_linuxcncs_order) {
     const std::string all = machine.says("show");
     std::size_t last = 0;
-    for (const char* title : {"Loaded HAL Components:", "Component Pins:", "Pin Aliases:", "Signals:", "Parameters:", "Parameter Aliases:", "Exported Functions:", "Realtime Threads:"}) {
+    for (const char* title :
+         {"Loaded HAL Components:", "Component Pins:", "Pin Aliases:", "Signals:", "Parameters:",
+          "Parameter Aliases:", "Exported Functions:", "Realtime Threads:"}) {
         const auto at = all.find(title, last);
         ASSERT_NE(at, std::string::npos) << title;
         last = at;
@@ -170,8 +183,11 @@ TEST_F(Show, the_lock_status_is_linuxcncs) {
     machine.line("unlock tune");
     EXPECT_EQ(machine.session.locked, 252U);
     machine.line("unlock");
-    EXPECT_EQ(machine.says("status lock"), "HAL locking status:\n  current lock value 0 (00)\n  HAL_LOCK_NONE - nothing is locked\n");
-    EXPECT_NE(machine.says("status").find("active signals:     5\n"), std::string::npos) << machine.out;
+    EXPECT_EQ(
+        machine.says("status lock"),
+        "HAL locking status:\n  current lock value 0 (00)\n  HAL_LOCK_NONE - nothing is locked\n");
+    EXPECT_NE(machine.says("status").find("active signals:     5\n"), std::string::npos)
+        << machine.out;
 }
 
 TEST_F(Show, json_holds_the_same) {
@@ -200,7 +216,8 @@ TEST_F(Show, timing_and_latency_are_readable) {
     EXPECT_NE(timing.find("\nslow "), std::string::npos) << timing;
     EXPECT_NE(timing.find("virtual clock"), std::string::npos) << timing;
     EXPECT_EQ(machine.says("show fault"), "no faults\n");
-    EXPECT_NE(machine.says("show latency s").find("a.out => b.in0"), std::string::npos) << machine.out;
+    EXPECT_NE(machine.says("show latency s").find("a.out => b.in0"), std::string::npos)
+        << machine.out;
 }
 
 TEST(ShowLarge, a_hundred_thousand_pins_are_printed_by_one_read) {

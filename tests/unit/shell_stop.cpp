@@ -16,7 +16,9 @@ struct StopTest : testing::Test {
     StopTest() {
         setenv("XDG_RUNTIME_DIR", folder.path.c_str(), 1);
         machine = std::make_unique<ShellMachine>(ShellOptions{}, shell_session("test", false));
-        machine->must("loadrt sum2 names=s\nnewthread fast 1000000\nnewthread slow 1000000000\naddf s slow\nstart\n");
+        machine->must(
+            "loadrt sum2 names=s\nnewthread fast 1000000\nnewthread slow 1000000000\naddf s "
+            "slow\nstart\n");
         options.stop = [this] { ended = true; };
     }
     ~StopTest() override { server.reset(); }
@@ -45,7 +47,8 @@ struct StopTest : testing::Test {
 
 TEST_F(StopTest, stop_is_carried_out_while_another_client_has_the_machine) {
     serve();
-    const auto busy = client(), calm = client();
+    const auto busy = client();
+    const auto calm = client();
     auto lock = machine->session.lock();
     const auto waiting = busy->send({{"run", "getp s.out"}});
     Client::Options how;
@@ -72,7 +75,9 @@ TEST_F(StopTest, outputs_have_their_safe_values_when_stop_has_been_answered) {
         start();
         EXPECT_EQ(c->run("stop").status, 0);
         const std::string once = c->run("getp pump.out").out;
-        for (int look = 0; look < 3; ++look) EXPECT_EQ(c->run("getp pump.out").out, once);
+        for (int look = 0; look < 3; ++look) {
+            EXPECT_EQ(c->run("getp pump.out").out, once);
+        }
     }
 }
 
@@ -123,7 +128,9 @@ TEST_F(StopTest, a_client_without_a_place_gets_one_when_another_leaves) {
     options.reserved = 1;
     options.idle_ms = 300'000;
     serve();
-    auto first = client(), second = client(), third = client();
+    auto first = client();
+    auto second = client();
+    auto third = client();
     const auto id = third->send({{"run", "getp s.in0"}});
     first.reset();
     EXPECT_EQ(third->wait(id)["out"], "0\n");
@@ -137,7 +144,8 @@ TEST_F(StopTest, stop_gets_in_when_the_process_has_no_descriptor_left) {
         busy.push_back(client());
         busy.back()->send({{"run", "getp s.out"}});
     }
-    // This process is client and server: the client's descriptor comes first, the server has none but that in reserve.
+    // This process is client and server: the client's descriptor comes first, the server has none
+    // but that in reserve.
     const auto calm = std::make_unique<Wire>("");
     rlimit before{};
     ASSERT_EQ(getrlimit(RLIMIT_NOFILE, &before), 0);
@@ -145,14 +153,18 @@ TEST_F(StopTest, stop_gets_in_when_the_process_has_no_descriptor_left) {
     rlimit few = before;
     few.rlim_cur = 200;
     ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &few), 0);
-    for (int fd; (fd = open("/dev/null", O_RDONLY | O_CLOEXEC)) >= 0;) filler.push_back(fd);
+    for (int fd; (fd = open("/dev/null", O_RDONLY | O_CLOEXEC)) >= 0;) {
+        filler.push_back(fd);
+    }
     calm->connect_to(server->path());
     EXPECT_TRUE(calm->send("{\"id\":1,\"options\":{}}\n{\"id\":2,\"run\":\"stop\"}\n"));
     calm->line();  // hello
     EXPECT_EQ(Json::parse(calm->line())["ok"], true);
     EXPECT_EQ(Json::parse(calm->line())["status"], 0);
     EXPECT_FALSE(machine->session.threads().running());
-    for (const int fd : filler) close(fd);
+    for (const int fd : filler) {
+        close(fd);
+    }
     setrlimit(RLIMIT_NOFILE, &before);
 }
 
@@ -160,7 +172,9 @@ TEST_F(StopTest, an_interrupted_session_ends_the_texts_and_queries_of_clients_ea
     serve();
     const auto c = client();
     std::string text;
-    for (int i = 0; i < 1000; ++i) text += "newsig x" + std::to_string(i) + " float\n";
+    for (int i = 0; i < 1000; ++i) {
+        text += "newsig x" + std::to_string(i) + " float\n";
+    }
     machine->session.interrupt();
     const auto reply = c->request({{"script", text}});
     EXPECT_EQ(reply["ok"], false) << reply;

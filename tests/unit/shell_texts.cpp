@@ -7,14 +7,17 @@
 namespace hal::test {
 namespace {
 
-bool has(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+bool has(const std::string& text, const std::string& part) {
+    return text.find(part) != std::string::npos;
+}
 
 TEST(Texts, texts_of_reverted_edits_are_freed) {
     ShellMachine machine;
     machine.must("loadrt and2 names=a\nnewthread t 1000000\n");
     const Sources& sources = machine.session.sources;
     const std::string large(2000, '#');
-    std::size_t most = 0, most_bytes = 0;
+    std::size_t most = 0;
+    std::size_t most_bytes = 0;
     for (int i = 0; i < 20'000; ++i) {
         const std::string name = "x" + std::to_string(i);
         EXPECT_EQ(machine.line("net " + name + " a.out " + (i % 10 == 0 ? large : "")), 0);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The property of all edits: whatever a text, or the lines between begin and commit, contain, a failure leaves the machine unchanged, or
-// exactly as the lines that the message names make it. Model, values, programs, locks and threads are compared.
+// The property of all edits: whatever a text, or the lines between begin and commit, contain, a
+// failure leaves the machine unchanged, or exactly as the lines that the message names make it.
+// Model, values, programs, locks and threads are compared.
 #include "transaction_world.hpp"
 
 #include <csignal>
@@ -12,13 +13,15 @@
 
 #include <sys/wait.h>
 
-#include "machine/programs.hpp"
 #include "control/connection.hpp"
+#include "machine/programs.hpp"
 
 namespace hal::test {
 namespace {
 
-bool has(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+bool has(const std::string& text, const std::string& part) {
+    return text.find(part) != std::string::npos;
+}
 
 /// A world that is made anew after a change.
 class Worlds {
@@ -40,30 +43,92 @@ private:
     std::string before_;
 };
 
-const std::vector<std::string> edits{
-    "loadrt and2 names=x", "loadrt not count=2", "unloadrt b", "unload spare", "unload and2", "unload gone", "unload prog", "unload all", "unloadrt all",
-    "reload not", "newthread third 8000000", "delthread slow", "addf spare slow", "addf spare fast 1", "addf --auto slow", "delf a fast", "initf b slow",
-    "net new n.out => b.in0", "net link b.in0", "newsig another u32", "delsig link", "delsig all", "linkps s.out free", "linksp free s.in1", "linkpp n.out b.in0",
-    "unlinkp n.in", "unlinkp prog.out", "unlinkp gone.out", "setp a.in0 0", "s.gain0 = 7", "setp s.offset -1", "sets free 9", "alias param s.gain0 factor",
-    "alias pin prog.out pin-of-prog", "unalias pin second", "lock", "lock tune", "unlock", "unloadusr prog", "unloadusr gone", "unloadusr all", "fault clear",
-    "source good.hal"};
-const std::vector<std::string> looks{"show", "show comp", "show pin", "show thread", "show timing", "show latency", "show fault", "list sig", "status", "save", "save signalvalues", "getp a.in0",
-                                     "gets free", "ptype a.in0", "stype free", "print hello", "help net", "explain two-writers", "echo", "unecho", "debug 1"};
+const std::vector<std::string> edits{"loadrt and2 names=x",
+                                     "loadrt not count=2",
+                                     "unloadrt b",
+                                     "unload spare",
+                                     "unload and2",
+                                     "unload gone",
+                                     "unload prog",
+                                     "unload all",
+                                     "unloadrt all",
+                                     "reload not",
+                                     "newthread third 8000000",
+                                     "delthread slow",
+                                     "addf spare slow",
+                                     "addf spare fast 1",
+                                     "addf --auto slow",
+                                     "delf a fast",
+                                     "initf b slow",
+                                     "net new n.out => b.in0",
+                                     "net link b.in0",
+                                     "newsig another u32",
+                                     "delsig link",
+                                     "delsig all",
+                                     "linkps s.out free",
+                                     "linksp free s.in1",
+                                     "linkpp n.out b.in0",
+                                     "unlinkp n.in",
+                                     "unlinkp prog.out",
+                                     "unlinkp gone.out",
+                                     "setp a.in0 0",
+                                     "s.gain0 = 7",
+                                     "setp s.offset -1",
+                                     "sets free 9",
+                                     "alias param s.gain0 factor",
+                                     "alias pin prog.out pin-of-prog",
+                                     "unalias pin second",
+                                     "lock",
+                                     "lock tune",
+                                     "unlock",
+                                     "unloadusr prog",
+                                     "unloadusr gone",
+                                     "unloadusr all",
+                                     "fault clear",
+                                     "source good.hal"};
+const std::vector<std::string> looks{"show",
+                                     "show comp",
+                                     "show pin",
+                                     "show thread",
+                                     "show timing",
+                                     "show latency",
+                                     "show fault",
+                                     "list sig",
+                                     "status",
+                                     "save",
+                                     "save signalvalues",
+                                     "getp a.in0",
+                                     "gets free",
+                                     "ptype a.in0",
+                                     "stype free",
+                                     "print hello",
+                                     "help net",
+                                     "explain two-writers",
+                                     "echo",
+                                     "unecho",
+                                     "debug 1"};
 const std::vector<std::string> acts{"start", "stop"};
-const std::vector<std::string> outside{"advance 3 cycles", "loadusr -w true", "loadusr sleep 1000", "waitusr nobody", "save all saved.hal"};
+const std::vector<std::string> outside{"advance 3 cycles", "loadusr -w true", "loadusr sleep 1000",
+                                       "waitusr nobody", "save all saved.hal"};
 const std::vector<std::string> failures{"setp nothere 1", "frobnicate", "loadrt nowhere"};
-const std::vector<std::string> fillers{"newsig f1 bit", "setp s.gain1 3", "net f2 spare.out", "newthread f3 16000000"};
+const std::vector<std::string> fillers{"newsig f1 bit", "setp s.gain1 3", "net f2 spare.out",
+                                       "newthread f3 16000000"};
 
-std::vector<std::string> with(const std::string& command, std::size_t position, const std::string& failure) {
+std::vector<std::string> with(const std::string& command, std::size_t position,
+                              const std::string& failure) {
     std::vector<std::string> lines = fillers;
     lines.insert(lines.begin() + static_cast<std::ptrdiff_t>(position), command);
-    if (!failure.empty()) lines.push_back(failure);
+    if (!failure.empty()) {
+        lines.push_back(failure);
+    }
     return lines;
 }
 
 std::string joined(const std::vector<std::string>& lines) {
     std::string text;
-    for (const std::string& line : lines) text += line + "\n";
+    for (const std::string& line : lines) {
+        text += line + "\n";
+    }
     return text;
 }
 
@@ -73,11 +138,16 @@ std::vector<std::size_t> named_lines(const std::string& err) {
     const auto end = err.rfind(" took effect");
     if (end == std::string::npos) return named;
     std::string row = err.substr(0, end);
-    row = row.substr(std::min(row.rfind("; ") == std::string::npos ? 0 : row.rfind("; ") + 2, row.size()));
+    row = row.substr(
+        std::min(row.rfind("; ") == std::string::npos ? 0 : row.rfind("; ") + 2, row.size()));
     static const std::regex run("([0-9]+)( to ([0-9]+))?");
     for (std::sregex_iterator at(row.begin(), row.end(), run), none; at != none; ++at) {
-        const std::size_t first = std::stoul((*at)[1]), last = (*at)[3].matched ? std::stoul((*at)[3]) : first;
-        for (std::size_t line = first; line <= last; ++line) named.push_back(line);
+        const std::size_t first = std::stoul((*at)[1]);
+
+        const std::size_t last = (*at)[3].matched ? std::stoul((*at)[3]) : first;
+        for (std::size_t line = first; line <= last; ++line) {
+            named.push_back(line);
+        }
     }
     return named;
 }
@@ -91,9 +161,12 @@ struct Property : testing::Test {
         ++combinations;
         const int status = world.machine.file(joined(lines));
         ASSERT_EQ(status, 1) << joined(lines);
-        const std::string err = world.machine.err, after = world.state();
+        const std::string err = world.machine.err;
+        const std::string after = world.state();
         const bool lives = world.child_lives();
-        if (after != worlds.before()) worlds.changed();
+        if (after != worlds.before()) {
+            worlds.changed();
+        }
         if (err.ends_with("nothing was changed\n")) {
             ASSERT_EQ(after, worlds.before()) << joined(lines) << err;
             ASSERT_TRUE(lives) << joined(lines) << err;
@@ -108,9 +181,13 @@ struct Property : testing::Test {
         ASSERT_TRUE(has(err, " had no effect\n")) << joined(lines) << err;
         worlds.changed();
         World& other = worlds.fresh();
-        ASSERT_EQ(other.machine.file(joined(effective)), 0) << joined(effective) << "of\n" << joined(lines) << err << other.machine.err;
+        ASSERT_EQ(other.machine.file(joined(effective)), 0)
+            << joined(effective) << "of\n"
+            << joined(lines) << err << other.machine.err;
         const std::string wanted = other.state();
-        if (wanted != worlds.before()) worlds.changed();
+        if (wanted != worlds.before()) {
+            worlds.changed();
+        }
         ASSERT_EQ(after, wanted) << joined(lines) << err;
     }
 
@@ -119,7 +196,8 @@ struct Property : testing::Test {
         ++combinations;
         std::string said;
         if (as_file) {
-            ASSERT_EQ(world.machine.file("begin\n" + joined(lines) + "commit\n"), 1) << joined(lines);
+            ASSERT_EQ(world.machine.file("begin\n" + joined(lines) + "commit\n"), 1)
+                << joined(lines);
             said = world.machine.err;
             ASSERT_TRUE(said.ends_with("nothing was changed\n")) << joined(lines) << said;
         } else {
@@ -134,8 +212,11 @@ struct Property : testing::Test {
         }
         const std::string after = world.state();
         const bool lives = world.child_lives();
-        if (after != worlds.before()) worlds.changed();
-        // by lines, what is rejected where it is typed leaves the transaction, which may then be a good one
+        if (after != worlds.before()) {
+            worlds.changed();
+        }
+        // by lines, what is rejected where it is typed leaves the transaction, which may then be a
+        // good one
         if (!as_file && has(said, "\"status\":0")) return worlds.changed();
         ASSERT_EQ(after, worlds.before()) << joined(lines) << said;
         ASSERT_TRUE(lives) << joined(lines) << said;
@@ -143,36 +224,48 @@ struct Property : testing::Test {
 };
 
 TEST_F(Property, a_file_that_fails_changes_nothing_or_what_its_message_names) {
-    for (const auto* const kind : {&edits, &looks, &acts, &outside})
-        for (const std::string& command : *kind)
-            for (std::size_t position = 0; position <= fillers.size(); ++position)
+    for (const auto* const kind : {&edits, &looks, &acts, &outside}) {
+        for (const std::string& command : *kind) {
+            for (std::size_t position = 0; position <= fillers.size(); ++position) {
                 for (const std::string& failure : failures) {
                     file(with(command, position, failure));
                     if (HasFatalFailure()) return;
                 }
+            }
+        }
+    }
     RecordProperty("combinations", combinations);
     RecordProperty("worlds", worlds.made);
     EXPECT_GT(combinations, 1000);
 }
 
 TEST_F(Property, a_begin_that_fails_changes_nothing) {
-    for (const auto* const kind : {&edits, &looks, &acts, &outside})
-        for (const std::string& command : *kind)
-            for (std::size_t position = 0; position <= fillers.size(); ++position)
-                for (const std::string& failure : failures)
+    for (const auto* const kind : {&edits, &looks, &acts, &outside}) {
+        for (const std::string& command : *kind) {
+            for (std::size_t position = 0; position <= fillers.size(); ++position) {
+                for (const std::string& failure : failures) {
                     for (const bool as_file : {true, false}) {
-                        if (command == "save all saved.hal" || command == "debug 1" || command.starts_with("advance")) continue;  // they act at once
-                        if (!as_file && failure == "frobnicate") continue;  // rejected where it is typed
+                        // they act at once
+                        if (command == "save all saved.hal" || command == "debug 1" ||
+                            command.starts_with("advance")) {
+                            continue;
+                        }
+                        // rejected where it is typed
+                        if (!as_file && failure == "frobnicate") continue;
                         grouped(with(command, position, failure), as_file);
                         if (HasFatalFailure()) return;
                     }
+                }
+            }
+        }
+    }
     RecordProperty("combinations", combinations);
     RecordProperty("worlds", worlds.made);
     EXPECT_GT(combinations, 1500);
 }
 
 TEST_F(Property, a_commit_does_what_its_lines_do_one_by_one) {
-    for (const auto* const kind : {&edits, &acts})
+    for (const auto* const kind : {&edits, &acts}) {
         for (const std::string& command : *kind) {
             const auto lines = with(command, 2, "");
             const int expected = worlds.fresh().machine.file(joined(lines));
@@ -183,13 +276,17 @@ TEST_F(Property, a_commit_does_what_its_lines_do_one_by_one) {
             EXPECT_EQ(worlds.fresh().state(), wanted) << joined(lines);
             worlds.changed();
         }
+    }
 }
 
 // Two clients, line by line; each may be in a begin of its own, and one dies now and then.
 TEST_F(Property, random_lines_of_two_clients_change_all_or_nothing) {
     std::mt19937 random(12);
-    const auto one_of = [&](const std::vector<std::string>& all) { return all[random() % all.size()]; };
-    int refused = 0, taken = 0;
+    const auto one_of = [&](const std::vector<std::string>& all) {
+        return all[random() % all.size()];
+    };
+    int refused = 0;
+    int taken = 0;
     for (int sequence = 0; sequence < 60; ++sequence) {
         World& world = worlds.fresh();
         std::unique_ptr<Connection> clients[2];
@@ -197,13 +294,15 @@ TEST_F(Property, random_lines_of_two_clients_change_all_or_nothing) {
         std::string before = world.state(), history;
         for (int step = 0; step < 25; ++step) {
             const std::size_t who = random() % 2;
-            if (!clients[who]) clients[who] = std::make_unique<Connection>(world.machine.shell, ::getpid());
+            if (!clients[who]) {
+                clients[who] = std::make_unique<Connection>(world.machine.shell, ::getpid());
+            }
             const auto what = random() % 20;
-            std::string line = what < 2   ? "begin"
-                               : what < 4 ? "commit"
-                               : what < 5 ? "abort"
-                               : what < 7 ? one_of(failures)
-                               : what < 8 ? "source bad.hal"
+            std::string line = what < 2    ? "begin"
+                               : what < 4  ? "commit"
+                               : what < 5  ? "abort"
+                               : what < 7  ? one_of(failures)
+                               : what < 8  ? "source bad.hal"
                                : what < 10 ? one_of(looks)
                                : what < 11 ? one_of(acts)
                                : what < 12 ? one_of(fillers)
@@ -218,7 +317,8 @@ TEST_F(Property, random_lines_of_two_clients_change_all_or_nothing) {
             history += std::to_string(who) + " " + line + "\n";
             const std::string reply = World::run(*clients[who], line);
             const std::string after = world.state();
-            const bool now = has(reply, "\"collecting\":true"), good = has(reply, "\"status\":0");
+            const bool now = has(reply, "\"collecting\":true");
+            const bool good = has(reply, "\"status\":0");
             if (!good) {
                 ++refused;
                 ASSERT_EQ(after, before) << history << reply;

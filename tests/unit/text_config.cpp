@@ -12,7 +12,8 @@ using namespace hal::text;
 
 TEST(ConfigLines, have_no_comments_blanks_or_empty_lines) {
     Lines lines("\xef\xbb\xbf# first\n\n  a = 1  # one\r\n; second\nb=2#3;4 ;five");
-    const auto a = lines.next(), b = lines.next();
+    const auto a = lines.next();
+    const auto b = lines.next();
     ASSERT_TRUE(a && b);
     EXPECT_EQ(a->text, "a = 1");
     EXPECT_EQ(a->at.line, 3u);
@@ -35,7 +36,9 @@ TEST(ConfigWords, point_at_characters_and_bytes_of_the_file) {
 
 TEST(ConfigMessages, keep_a_hundred_errors_and_one_more) {
     Messages<int> messages;
-    for (int i = 0; i < 1000; ++i) messages.error(0, {}, "wrong");
+    for (int i = 0; i < 1000; ++i) {
+        messages.error(0, {}, "wrong");
+    }
     messages.note(0, {}, "still kept");
     EXPECT_EQ(messages.all.size(), most_errors + 2);
     EXPECT_TRUE(messages.failed());
@@ -43,13 +46,16 @@ TEST(ConfigMessages, keep_a_hundred_errors_and_one_more) {
 
 TEST(ConfigMessages, are_sorted_by_place_and_not_repeated) {
     std::vector<Message<int>> messages;
-    for (const char* sentence : {"b", "a", "b"}) messages.push_back({hal::Severity::error, 0, {2, 1, 9, 1}, sentence});
+    for (const char* sentence : {"b", "a", "b"}) {
+        messages.push_back({hal::Severity::error, 0, {2, 1, 9, 1}, sentence});
+    }
     messages.push_back({hal::Severity::warning, 0, {1, 4, 3, 1}, "c", "write d"});
     sort(messages);
     ASSERT_EQ(messages.size(), 3u);
     EXPECT_EQ(messages[0].sentence + messages[1].sentence + messages[2].sentence, "cba");
     EXPECT_EQ(errors_text(messages, "f"), "f:2:1: error: b\nf:2:1: error: a");
-    EXPECT_EQ(message_text("f", hal::Severity::warning, messages[0].at, "c", "write d"), "f:1:4: warning: c; write d");
+    EXPECT_EQ(message_text("f", hal::Severity::warning, messages[0].at, "c", "write d"),
+              "f:1:4: warning: c; write d");
 }
 
 TEST(IniLine, is_a_section_an_entry_a_comment_or_something_else) {
@@ -70,10 +76,14 @@ TEST(IniLine, is_a_section_an_entry_a_comment_or_something_else) {
 TEST(Numbers, are_read_whole_or_not_at_all) {
     EXPECT_EQ(hal::parse_natural("0x1F"), 31u);
     EXPECT_EQ(hal::parse_natural("010"), 10u);
-    for (const char* text : {"", "0x", "-1", "1.5", "1 ", "99999999999999999999"}) EXPECT_EQ(hal::parse_natural(text), std::nullopt) << text;
+    for (const char* text : {"", "0x", "-1", "1.5", "1 ", "99999999999999999999"}) {
+        EXPECT_EQ(hal::parse_natural(text), std::nullopt) << text;
+    }
     EXPECT_EQ(hal::parse_real("-2e-3"), -2e-3);
     EXPECT_EQ(hal::parse_real("+1.5"), 1.5);
-    for (const char* text : {"", "1,5", "1x", "1 ", "inf", "nan", "+-1", "1e999"}) EXPECT_EQ(hal::parse_real(text), std::nullopt) << text;
+    for (const char* text : {"", "1,5", "1x", "1 ", "inf", "nan", "+-1", "1e999"}) {
+        EXPECT_EQ(hal::parse_real(text), std::nullopt) << text;
+    }
     const auto rate = hal::parse_quantity("500 k");
     ASSERT_TRUE(rate);
     EXPECT_EQ(rate->number, 500.0);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The index of names that messages offer: the same answers as the plain search, at a fraction of its cost.
+// The index of names that messages offer: the same answers as the plain search, at a fraction of
+// its cost.
 #include <gtest/gtest.h>
 
 #include <random>
@@ -13,10 +14,14 @@ namespace {
 
 TEST(NameIndex, finds_what_the_plain_search_finds) {
     std::mt19937 random(30);
-    const auto number = [&](int below) { return static_cast<int>(random() % static_cast<unsigned>(below)); };
+    const auto number = [&](int below) {
+        return static_cast<int>(random() % static_cast<unsigned>(below));
+    };
     const auto word = [&](int longest) {
         std::string text;
-        for (int i = number(longest + 1); i > 0; --i) text += "abcAB.-_01"[number(10)];
+        for (int i = number(longest + 1); i > 0; --i) {
+            text += "abcAB.-_01"[number(10)];
+        }
         return text;
     };
     for (int round = 0; round < 60; ++round) {
@@ -27,12 +32,19 @@ TEST(NameIndex, finds_what_the_plain_search_finds) {
             index.add(names.back());
         }
         for (int i = 0; i < 60; ++i) {
-            std::string wanted = names.empty() || number(4) == 0 ? word(12) : names[static_cast<std::size_t>(number(static_cast<int>(names.size())))];
+            std::string wanted =
+                names.empty() || number(4) == 0
+                    ? word(12)
+                    : names[static_cast<std::size_t>(number(static_cast<int>(names.size())))];
             for (int edit = number(4); edit > 0 && !wanted.empty(); --edit) {
                 const auto at = static_cast<std::size_t>(number(static_cast<int>(wanted.size())));
-                if (number(3) == 0) wanted.erase(at, 1);
-                else if (number(2) == 0) wanted.insert(at, 1, 'c');
-                else std::swap(wanted[at], wanted[wanted.size() / 2]);
+                if (number(3) == 0) {
+                    wanted.erase(at, 1);
+                } else if (number(2) == 0) {
+                    wanted.insert(at, 1, 'c');
+                } else {
+                    std::swap(wanted[at], wanted[wanted.size() / 2]);
+                }
             }
             const auto count = static_cast<std::size_t>(1 + number(5));
             EXPECT_EQ(index.similar(wanted, count), similar(wanted, names, count)) << wanted;
@@ -42,14 +54,21 @@ TEST(NameIndex, finds_what_the_plain_search_finds) {
 
 TEST(NameIndex, a_search_among_many_names_compares_few_of_them) {
     NameIndex index;
-    for (int i = 0; i < 2500; ++i)
-        for (const char* pin : {"command", "feedback", "output", "error", "Pgain", "Igain", "Dgain", "enable", "saturated", "bias",
-                                "maxoutput", "deadband", "errorI", "errorD", "index-enable", "feedback-deriv", "FF0", "FF1", "FF2", "maxerror"})
+    for (int i = 0; i < 2500; ++i) {
+        for (const char* pin : {"command",        "feedback", "output", "error",     "Pgain",
+                                "Igain",          "Dgain",    "enable", "saturated", "bias",
+                                "maxoutput",      "deadband", "errorI", "errorD",    "index-enable",
+                                "feedback-deriv", "FF0",      "FF1",    "FF2",       "maxerror"}) {
             index.add("pid." + std::to_string(i) + "." + pin);
+        }
+    }
     EXPECT_EQ(did_you_mean("pid.1207.outptu", index), "did you mean 'pid.1207.output'?");
     const std::uint64_t once = index.steps();
-    for (int i = 0; i < 99; ++i) index.similar("pid." + std::to_string(i) + ".outputt");
-    const std::uint64_t plain = 100ULL * index.size() * 15;  // characters that the plain search compares
+    for (int i = 0; i < 99; ++i) {
+        index.similar("pid." + std::to_string(i) + ".outputt");
+    }
+    // characters that the plain search compares
+    const std::uint64_t plain = 100ULL * index.size() * 15;
     EXPECT_LT(index.steps(), plain / 3) << once;
 }
 

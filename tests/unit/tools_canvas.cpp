@@ -10,8 +10,11 @@ namespace {
 
 std::size_t marks(const Canvas& canvas, const std::string& blank) {
     std::size_t count = 0;
-    for (const std::string& row : canvas.rows())
-        for (std::size_t i = 0; i < row.size(); i += blank.size()) count += row.compare(i, blank.size(), blank) != 0;
+    for (const std::string& row : canvas.rows()) {
+        for (std::size_t i = 0; i < row.size(); i += blank.size()) {
+            count += row.compare(i, blank.size(), blank) != 0;
+        }
+    }
     return count;
 }
 
@@ -19,7 +22,9 @@ TEST(Canvas, rows_have_the_asked_size_in_both_alphabets) {
     for (const bool unicode : {true, false}) {
         const auto rows = Canvas(7, 3, unicode).rows();
         ASSERT_EQ(rows.size(), 3u);
-        for (const std::string& row : rows) EXPECT_EQ(row.size(), unicode ? 21u : 7u);
+        for (const std::string& row : rows) {
+            EXPECT_EQ(row.size(), unicode ? 21u : 7u);
+        }
     }
 }
 
@@ -68,10 +73,16 @@ TEST(Canvas, a_circle_keeps_its_radius) {
     Canvas canvas(11, 5, true);
     canvas.circle(0, 0, 0.5);
     Canvas inside(11, 5, true);
-    for (double x = -0.15; x <= 0.15; x += 0.01) inside.dot(x, 0);
-    const std::string ring = canvas.rows()[2], middle = inside.rows()[2];
-    for (std::size_t i = 0; i < ring.size(); i += 3)
-        if (middle.compare(i, 3, "\u2800") != 0) { EXPECT_EQ(ring.substr(i, 3), "\u2800") << i; }
+    for (double x = -0.15; x <= 0.15; x += 0.01) {
+        inside.dot(x, 0);
+    }
+    const std::string ring = canvas.rows()[2];
+    const std::string middle = inside.rows()[2];
+    for (std::size_t i = 0; i < ring.size(); i += 3) {
+        if (middle.compare(i, 3, "\u2800") != 0) {
+            EXPECT_EQ(ring.substr(i, 3), "\u2800") << i;
+        }
+    }
 }
 
 }  // namespace

@@ -17,9 +17,13 @@ struct Pipe {
         ::close(ends[0]);
         finish();
     }
-    void write(const std::string& text) { ASSERT_EQ(::write(ends[1], text.data(), text.size()), static_cast<ssize_t>(text.size())); }
+    void write(const std::string& text) {
+        ASSERT_EQ(::write(ends[1], text.data(), text.size()), static_cast<ssize_t>(text.size()));
+    }
     void finish() {
-        if (ends[1] >= 0) ::close(ends[1]);
+        if (ends[1] >= 0) {
+            ::close(ends[1]);
+        }
         ends[1] = -1;
     }
 };
@@ -83,7 +87,8 @@ TEST(CommonPrefix, is_what_all_candidates_begin_with) {
 }
 
 TEST(CandidateTable, fills_the_width_column_by_column) {
-    EXPECT_EQ(candidate_table({{"a", "bit"}, {"bb", "s32"}, {"c", ""}}, 24), "a   bit   c\nbb  s32\n");
+    EXPECT_EQ(candidate_table({{"a", "bit"}, {"bb", "s32"}, {"c", ""}}, 24),
+              "a   bit   c\nbb  s32\n");
     EXPECT_EQ(candidate_table({{"a", ""}, {"bb", ""}}, 1), "a\nbb\n");
 }
 

@@ -34,7 +34,8 @@ struct OptionSetTest : testing::Test {
 };
 
 TEST_F(OptionSetTest, fills_the_members) {
-    const auto reading = set.read({"one", "-l", "--name", "a", "--name", "b", "--for", "2s", "-f", "x", "two"});
+    const auto reading =
+        set.read({"one", "-l", "--name", "a", "--name", "b", "--for", "2s", "-f", "x", "two"});
     EXPECT_EQ(reading.outcome, OptionSet::Outcome::good);
     EXPECT_TRUE(reading.extra.empty());
     EXPECT_EQ(options.words, (std::vector<std::string>{"one", "two"}));
@@ -44,34 +45,46 @@ TEST_F(OptionSetTest, fills_the_members) {
     EXPECT_TRUE(options.loud);
 }
 
-TEST_F(OptionSetTest, reports_missing_words) { EXPECT_EQ(set.read({"-l"}).outcome, OptionSet::Outcome::missing); }
+TEST_F(OptionSetTest, reports_missing_words) {
+    EXPECT_EQ(set.read({"-l"}).outcome, OptionSet::Outcome::missing);
+}
 
-TEST_F(OptionSetTest, reports_a_request_for_help) { EXPECT_EQ(set.read({"--help"}).outcome, OptionSet::Outcome::help); }
+TEST_F(OptionSetTest, reports_a_request_for_help) {
+    EXPECT_EQ(set.read({"--help"}).outcome, OptionSet::Outcome::help);
+}
 
 TEST_F(OptionSetTest, names_the_option_and_the_invalid_value) {
     EXPECT_EQ(set.read({"one", "--factor", "fast"}).problem, "--factor: 'fast' is not a number");
     EXPECT_EQ(set.read({"one", "--factor", "x"}).problem, "--factor: 'x' is not a number");
-    EXPECT_EQ(set.read({"one", "--for", "long"}).problem, "--for: invalid duration 'long'; use 10s, 250ms or 2min");
-    EXPECT_TRUE(set.read({"one", "--level", "7"}).problem.starts_with("--level: Value 7 not in range "));  // the rest is the library's
+    EXPECT_EQ(set.read({"one", "--for", "long"}).problem,
+              "--for: invalid duration 'long'; use 10s, 250ms or 2min");
+    // the rest is the library's
+    EXPECT_TRUE(
+        set.read({"one", "--level", "7"}).problem.starts_with("--level: Value 7 not in range "));
 }
 
-TEST_F(OptionSetTest, returns_what_no_declaration_takes) { EXPECT_EQ(set.read({"one", "--lout"}).extra, std::vector<std::string>{"--lout"}); }
+TEST_F(OptionSetTest, returns_what_no_declaration_takes) {
+    EXPECT_EQ(set.read({"one", "--lout"}).extra, std::vector<std::string>{"--lout"});
+}
 
 TEST_F(OptionSetTest, lists_the_options_as_they_are_typed) {
     const auto names = set.names();
-    for (const char* name : {"--file", "-f", "--name", "--for", "--factor", "--level", "--loud", "-l", "--help", "-h"})
+    for (const char* name : {"--file", "-f", "--name", "--for", "--factor", "--level", "--loud",
+                             "-l", "--help", "-h"}) {
         EXPECT_NE(std::find(names.begin(), names.end(), name), names.end()) << name;
+    }
 }
 
 TEST_F(OptionSetTest, shows_words_values_and_ranges_in_the_help) {
-    EXPECT_EQ(set.help(), "\n  WORD                     what to do\n"
-                          "  -f, --file FILE          a file\n"
-                          "  --name NAME              a name; may be repeated\n"
-                          "  --for TIME               end after 2s\n"
-                          "  --factor F               a factor\n"
-                          "  --level N:0..3           a level\n"
-                          "  -l, --loud               with noise\n"
-                          "  -h, --help               print this\n");
+    EXPECT_EQ(set.help(),
+              "\n  WORD                     what to do\n"
+              "  -f, --file FILE          a file\n"
+              "  --name NAME              a name; may be repeated\n"
+              "  --for TIME               end after 2s\n"
+              "  --factor F               a factor\n"
+              "  --level N:0..3           a level\n"
+              "  -l, --loud               with noise\n"
+              "  -h, --help               print this\n");
 }
 
 }  // namespace

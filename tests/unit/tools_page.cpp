@@ -60,7 +60,9 @@ DESCRIPTION
 )");
 }
 
-TEST(Page, markdown_escapes_the_bar) { EXPECT_NE(as_markdown(example()).find("writes \\| all"), std::string::npos); }
+TEST(Page, markdown_escapes_the_bar) {
+    EXPECT_NE(as_markdown(example()).find("writes \\| all"), std::string::npos);
+}
 
 TEST(Page, numbered_pins_stay_apart_when_they_differ) {
     Page page = example();
@@ -77,7 +79,8 @@ TEST(Page, troff_keeps_dots_and_backslashes) {
 
 /// A component in C: what it declares, and how it fails.
 extern "C" bool declare(const hal_host* host, void* memory) {
-    const hal_function_decl function{sizeof function, 0, "", "runs", [](void*, const hal_cycle*) {}, memory, memory, nullptr};
+    const hal_function_decl function{
+        sizeof function, 0, "", "runs", [](void*, const hal_cycle*) {}, memory, memory, nullptr};
     if (!host->function(host, &function)) return false;
     hal_pin_decl decl{};
     decl.size = sizeof decl;
@@ -86,7 +89,8 @@ extern "C" bool declare(const hal_host* host, void* memory) {
     decl.name = "count";
     decl.doc = "counts";
     decl.function = memory;
-    return host->allocate(host, 100, 64) != nullptr && host->pin(host, &decl, static_cast<hal_pin*>(memory));
+    return host->allocate(host, 100, 64) != nullptr &&
+           host->pin(host, &decl, static_cast<hal_pin*>(memory));
 }
 extern "C" bool refuse(const hal_host* host, void*) {
     host->fail(host, "not today");

@@ -14,7 +14,9 @@ constexpr double pi = std::numbers::pi;
 template <class F>
 Samples sampled(int from_ms, int to_ms, F f) {
     Samples samples;
-    for (int i = from_ms; i <= to_ms; ++i) samples.push_back({i * 1'000'000LL, f(i * 1e-3)});
+    for (int i = from_ms; i <= to_ms; ++i) {
+        samples.push_back({i * 1'000'000LL, f(i * 1e-3)});
+    }
     return samples;
 }
 
@@ -25,7 +27,8 @@ Measurements measure_all(const Samples& samples, std::int64_t step_ns = 0) {
 TEST(Measure, a_noisy_sine_has_the_frequency_of_its_periods_not_of_its_crossings) {
     std::mt19937 random(1);
     std::normal_distribution<double> noise(0, 0.1);
-    const auto found = measure_all(sampled(0, 2000, [&](double t) { return std::sin(2 * pi * 5 * t) + noise(random); }));
+    const auto found = measure_all(
+        sampled(0, 2000, [&](double t) { return std::sin(2 * pi * 5 * t) + noise(random); }));
     ASSERT_TRUE(found.frequency_hz);
     EXPECT_NEAR(*found.frequency_hz, 5, 0.05);
     EXPECT_NEAR(*found.rms, std::sqrt(0.5 + 0.01), 0.02);
@@ -35,7 +38,9 @@ TEST(Measure, a_noisy_sine_has_the_frequency_of_its_periods_not_of_its_crossings
 }
 
 TEST(Measure, mean_and_rms_are_taken_over_whole_periods) {
-    const auto found = measure_all(sampled(0, 1250, [](double t) { return 3 + std::sin(2 * pi * 2 * t - 1); }));  // two periods and a half
+    // two periods and a half
+    const auto found =
+        measure_all(sampled(0, 1250, [](double t) { return 3 + std::sin(2 * pi * 2 * t - 1); }));
     EXPECT_NEAR(*found.mean, 3, 1e-3);
     EXPECT_NEAR(*found.ac_rms, std::sqrt(0.5), 1e-3);
     EXPECT_NEAR(*found.rms, std::sqrt(9.5), 1e-3);
@@ -45,20 +50,27 @@ TEST(Measure, mean_and_rms_are_taken_over_whole_periods) {
 double step_response(double t, double zeta, double w) {
     if (t < 0) return 0;
     const double damped = w * std::sqrt(1 - zeta * zeta);
-    return 1 - std::exp(-zeta * w * t) * (std::cos(damped * t) + zeta / std::sqrt(1 - zeta * zeta) * std::sin(damped * t));
+    return 1 - std::exp(-zeta * w * t) * (std::cos(damped * t) +
+                                          zeta / std::sqrt(1 - zeta * zeta) * std::sin(damped * t));
 }
 
 TEST(Measure, a_step_response_has_the_overshoot_and_settling_time_of_theory) {
-    const double zeta = 0.3, w = 10 * pi;
+    const double zeta = 0.3;
+    const double w = 10 * pi;
     for (const double height : {2.0, -0.5}) {
-        const auto found = measure_all(sampled(-100, 1400, [&](double t) { return 7 + height * step_response(t, zeta, w); }));
+        const auto found = measure_all(
+            sampled(-100, 1400, [&](double t) { return 7 + height * step_response(t, zeta, w); }));
         ASSERT_TRUE(found.overshoot_percent) << height;
-        EXPECT_NEAR(*found.overshoot_percent, 100 * std::exp(-zeta * pi / std::sqrt(1 - zeta * zeta)), 0.05);
+        EXPECT_NEAR(*found.overshoot_percent,
+                    100 * std::exp(-zeta * pi / std::sqrt(1 - zeta * zeta)), 0.05);
         EXPECT_NEAR(*found.initial, 7, 1e-9);
         EXPECT_NEAR(*found.final, 7 + height, 1e-3);
         double outside = 0;  // the same by its definition on a fine grid
-        for (double t = 0; t < 1.4; t += 1e-5)
-            if (std::abs(step_response(t, zeta, w) - 1) > 0.02) outside = t;
+        for (double t = 0; t < 1.4; t += 1e-5) {
+            if (std::abs(step_response(t, zeta, w) - 1) > 0.02) {
+                outside = t;
+            }
+        }
         EXPECT_NEAR(*found.settling_s, outside, 1.1e-3);
         ASSERT_TRUE(found.rise_s);
         EXPECT_NEAR(*found.rise_s, 0.0421, 0.001);
@@ -66,13 +78,15 @@ TEST(Measure, a_step_response_has_the_overshoot_and_settling_time_of_theory) {
 }
 
 TEST(Measure, what_has_not_settled_within_the_window_is_unknown) {
-    const auto found = measure_all(sampled(-100, 100, [](double t) { return step_response(t, 0.05, 10 * pi); }));
+    const auto found =
+        measure_all(sampled(-100, 100, [](double t) { return step_response(t, 0.05, 10 * pi); }));
     EXPECT_FALSE(found.overshoot_percent);
     EXPECT_FALSE(found.settling_s);
 }
 
 TEST(Measure, too_few_samples_on_an_edge_give_no_rise_time) {
-    const auto found = measure_all(sampled(-20, 100, [](double t) { return t < 0.001 ? 0.0 : 1.0; }));
+    const auto found =
+        measure_all(sampled(-20, 100, [](double t) { return t < 0.001 ? 0.0 : 1.0; }));
     ASSERT_TRUE(found.settling_s);
     EXPECT_EQ(*found.overshoot_percent, 0);
     EXPECT_FALSE(found.rise_s);

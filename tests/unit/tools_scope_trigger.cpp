@@ -8,13 +8,17 @@
 namespace hal::tools {
 namespace {
 
-std::vector<std::int64_t> fired(const char* text, const std::vector<double>& values, bool bit = false) {
+std::vector<std::int64_t> fired(const char* text, const std::vector<double>& values,
+                                bool bit = false) {
     const TriggerText read = read_trigger(text);
     EXPECT_EQ(read.problem, "");
     TriggerSearch search(read.trigger, bit);
     std::vector<std::int64_t> times;
-    for (std::size_t i = 0; i < values.size(); ++i)
-        if (const auto time = search.feed({static_cast<std::int64_t>(i) * 100, values[i]})) times.push_back(*time);
+    for (std::size_t i = 0; i < values.size(); ++i) {
+        if (const auto time = search.feed({static_cast<std::int64_t>(i) * 100, values[i]})) {
+            times.push_back(*time);
+        }
+    }
     return times;
 }
 
@@ -39,16 +43,19 @@ TEST(Trigger, texts_name_source_edge_and_level) {
 
 TEST(Trigger, invalid_texts_are_rejected_with_an_example) {
     EXPECT_EQ(read_trigger("x > much").problem,
-              "invalid trigger 'x > much': 'much' is not a number; type for example: --trigger 'x-error > 0.1', "
+              "invalid trigger 'x > much': 'much' is not a number; type for example: --trigger "
+              "'x-error > 0.1', "
               "'x-error < 0', '|x-error| > 0.1' or 'estop'");
-    for (const char* bad : {"", "> 1", "a b > 1", "x >", "level x <> 1", "||", "x > nan", "!"})
+    for (const char* bad : {"", "> 1", "a b > 1", "x >", "level x <> 1", "||", "x > nan", "!"}) {
         EXPECT_NE(read_trigger(bad).problem, "") << bad;
+    }
 }
 
 TEST(Trigger, a_formatted_trigger_reads_back) {
     const std::vector<Channel> channels{{"x", "", false, false}, {"stop", "", true, true}};
-    for (const char* text : {"x > 0.1", "x < -3", "x <> 0", "level x > 2", "|x| > 1"})
+    for (const char* text : {"x > 0.1", "x < -3", "x <> 0", "level x > 2", "|x| > 1"}) {
         EXPECT_EQ(format_trigger(read_trigger(text).trigger, channels), text);
+    }
     for (const char* text : {"stop", "!stop", "level !stop"}) {
         auto trigger = read_trigger(text).trigger;
         trigger.source = 1;
@@ -62,7 +69,9 @@ TEST(Trigger, an_edge_is_interpolated_between_two_samples) {
     EXPECT_EQ(fired("x <> 1", {0, 2, 0}), (Times{50, 150}));
 }
 
-TEST(Trigger, a_signal_that_begins_above_the_level_has_no_edge) { EXPECT_EQ(fired("x > 1", {5, 5, 5}), Times{}); }
+TEST(Trigger, a_signal_that_begins_above_the_level_has_no_edge) {
+    EXPECT_EQ(fired("x > 1", {5, 5, 5}), Times{});
+}
 
 TEST(Trigger, noise_below_the_hysteresis_does_not_fire_again) {
     EXPECT_EQ(fired("x > 1", {0, 2, 0.99, 1.01, 0.99, 1.01}).size(), 1u) << "1 % of the range of 2";
@@ -74,18 +83,25 @@ TEST(Trigger, a_bit_has_no_hysteresis_and_fires_at_its_sample) {
     EXPECT_EQ(fired("!b", {0, 1, 0, 1}, true), Times{200});
 }
 
-TEST(Trigger, a_level_fires_at_every_sample_of_the_state) { EXPECT_EQ(fired("level x > 1", {5, 0, 5, 5}), (Times{0, 200, 300})); }
+TEST(Trigger, a_level_fires_at_every_sample_of_the_state) {
+    EXPECT_EQ(fired("level x > 1", {5, 0, 5, 5}), (Times{0, 200, 300}));
+}
 
 TEST(Trigger, not_a_number_neither_arms_nor_fires) {
     const double nan = std::nan("");
-    EXPECT_EQ(fired("x > 1", {0, nan, 2, 2}), Times{}) << "an edge across an invalid value is not one";
+    EXPECT_EQ(fired("x > 1", {0, nan, 2, 2}), Times{})
+        << "an edge across an invalid value is not one";
     EXPECT_EQ(fired("level x > 1", {nan, nan}), Times{});
     EXPECT_EQ(fired("x > 1", {nan, 0, 2}), Times{150});
 }
 
-TEST(Trigger, infinity_fires_at_its_sample) { EXPECT_EQ(fired("x > 1", {0, std::numeric_limits<double>::infinity()}).size(), 1u); }
+TEST(Trigger, infinity_fires_at_its_sample) {
+    EXPECT_EQ(fired("x > 1", {0, std::numeric_limits<double>::infinity()}).size(), 1u);
+}
 
-TEST(Trigger, a_magnitude_fires_on_both_sides) { EXPECT_EQ(fired("|x| > 1", {0, -2, 0, 2}).size(), 2u); }
+TEST(Trigger, a_magnitude_fires_on_both_sides) {
+    EXPECT_EQ(fired("|x| > 1", {0, -2, 0, 2}).size(), 2u);
+}
 
 // One channel, a sample each 10 ns, in batches of one.
 struct Scope {
@@ -198,7 +214,9 @@ TEST(Acquisition, channels_of_several_threads_are_cut_by_time) {
     acquisition.set_trigger(read_trigger("fast > 1").trigger);
     for (std::int64_t t = 0; t < 1000; t += 10) {
         acquisition.feed(0, {t, t >= 500 ? 2.0 : 0.0});
-        if (t % 100 == 0) acquisition.feed(1, {t, static_cast<double>(t)});
+        if (t % 100 == 0) {
+            acquisition.feed(1, {t, static_cast<double>(t)});
+        }
         acquisition.progress(t);
     }
     ASSERT_EQ(acquisition.finished(), 1u);

@@ -11,9 +11,11 @@ namespace {
 
 constexpr std::int64_t ms = 1'000'000;
 
-// A step of x at 100 ms and a bit that is set at the same time; 20 ms before, 80 ms after the trigger.
+// A step of x at 100 ms and a bit that is set at the same time; 20 ms before, 80 ms after the
+// trigger.
 struct Bench {
-    Acquisition acquisition{{{"x", "mm", false, false}, {"done", "", true, true}}, 20 * ms, 80 * ms};
+    Acquisition acquisition{
+        {{"x", "mm", false, false}, {"done", "", true, true}}, 20 * ms, 80 * ms};
     ScopeView view{acquisition, false, false};
     Bench() {
         acquisition.set_mode(Mode::normal);
@@ -28,9 +30,13 @@ struct Bench {
         }
     }
     void type(const char* letters) {
-        for (; *letters; ++letters) view.key({Code::character, *letters, false});
+        for (; *letters; ++letters) {
+            view.key({Code::character, *letters, false});
+        }
     }
-    std::string line(std::size_t i, std::size_t columns = 120) { return view.frame(columns, 20)[i]; }
+    std::string line(std::size_t i, std::size_t columns = 120) {
+        return view.frame(columns, 20)[i];
+    }
 };
 
 bool has(const std::string& text, const char* part) { return text.find(part) != std::string::npos; }
@@ -38,8 +44,9 @@ bool has(const std::string& text, const char* part) { return text.find(part) != 
 TEST(ScopeView, the_status_line_has_mode_state_trigger_and_record) {
     Bench bench;
     const std::string status = bench.line(0);
-    for (const char* part : {"normal armed", "10 ms/div", "trigger x > 1", "record 1"})
+    for (const char* part : {"normal armed", "10 ms/div", "trigger x > 1", "record 1"}) {
         EXPECT_TRUE(has(status, part)) << part << ": " << status;
+    }
     EXPECT_TRUE(has(bench.view.frame(120, 20, 7)[0], "LOST 7 samples"));
 }
 
@@ -47,20 +54,26 @@ TEST(ScopeView, a_frame_fills_the_terminal_and_a_small_one_says_so) {
     Bench bench;
     const auto lines = bench.view.frame(80, 24);
     ASSERT_EQ(lines.size(), 24u);
-    for (const std::string& line : lines) EXPECT_EQ(line.size(), 80u);
+    for (const std::string& line : lines) {
+        EXPECT_EQ(line.size(), 80u);
+    }
     EXPECT_TRUE(has(bench.view.frame(39, 24)[0], "too small"));
 }
 
 TEST(ScopeView, channels_are_fitted_into_lanes_with_the_step_drawn) {
     Bench bench;
-    const auto lines = bench.view.frame(100, 24);  // two channels: 20 rows for the picture, 10 for each lane
+    // two channels: 20 rows for the picture, 10 for each lane
+    const auto lines = bench.view.frame(100, 24);
     EXPECT_EQ(bench.view.traces()[0].per_division, 2) << "4 mm within 3.6 divisions";
     EXPECT_EQ(bench.view.traces()[1].per_division, 0.5);
     // Before the trigger at one fifth of the width x is low in its lane, after it high.
     const auto dots = [&](std::size_t column) {
         std::vector<std::size_t> rows;
-        for (std::size_t row = 1; row <= 10; ++row)
-            if (lines[row][column] != ' ') rows.push_back(row);
+        for (std::size_t row = 1; row <= 10; ++row) {
+            if (lines[row][column] != ' ') {
+                rows.push_back(row);
+            }
+        }
         return rows;
     };
     EXPECT_GT(dots(5).back(), dots(95).front());
@@ -70,8 +83,9 @@ TEST(ScopeView, channels_are_fitted_into_lanes_with_the_step_drawn) {
 TEST(ScopeView, channel_lines_have_measurements) {
     Bench bench;
     const std::string line = bench.line(17);
-    for (const char* part : {">1 x ", "2 mm/div", "min 0 mm", "max 4 mm", "overshoot 0 %"})
+    for (const char* part : {">1 x ", "2 mm/div", "min 0 mm", "max 4 mm", "overshoot 0 %"}) {
         EXPECT_TRUE(has(line, part)) << part << ": " << line;
+    }
     bench.type("m");
     EXPECT_FALSE(has(bench.line(17), "min 0 mm"));
 }
@@ -120,14 +134,17 @@ TEST(ScopeView, cursors_step_from_sample_to_sample_and_measure_between_them) {
     ASSERT_TRUE(bench.view.cursors().on);
     bench.view.key({Code::right, 0, false});
     const Record record = bench.view.shown();
-    EXPECT_EQ(bench.view.cursors().at_ns[0] + record.trigger_ns, 100 * ms) << "the first sample after the interpolated trigger";
+    EXPECT_EQ(bench.view.cursors().at_ns[0] + record.trigger_ns, 100 * ms)
+        << "the first sample after the interpolated trigger";
     bench.view.key({Code::left, 0, false});
     EXPECT_EQ(bench.view.cursors().at_ns[0] + record.trigger_ns, 99 * ms);
     bench.type("c");
     bench.view.key({Code::left, 0, true});
     EXPECT_EQ(bench.view.cursors().active, 1);
     const std::string line = bench.line(17, 160);
-    for (const char* part : {"y1 0 mm", "y2 4 mm", "dy 4 mm", "min 0 mm"}) EXPECT_TRUE(has(line, part)) << part << ": " << line;
+    for (const char* part : {"y1 0 mm", "y2 4 mm", "dy 4 mm", "min 0 mm"}) {
+        EXPECT_TRUE(has(line, part)) << part << ": " << line;
+    }
     EXPECT_TRUE(has(bench.line(19, 160), "cursors: t1")) << bench.line(19, 160);
     bench.type("c");
     EXPECT_FALSE(bench.view.cursors().on);
@@ -139,16 +156,22 @@ TEST(ScopeView, every_key_works_without_any_sample) {
     view.frame(80, 24);
     for (char c = ' '; c < 127; ++c) {
         view.key({Code::character, c, false});
-        for (const Code code : {Code::up, Code::down, Code::left, Code::right, Code::page_up, Code::page_down, Code::tab, Code::escape})
+        for (const Code code : {Code::up, Code::down, Code::left, Code::right, Code::page_up,
+                                Code::page_down, Code::tab, Code::escape}) {
             view.key({code, 0, true});
+        }
         EXPECT_EQ(view.frame(80, 24).size(), 24u) << c;
     }
 }
 
 TEST(ScopeView, steps_are_1_2_5) {
     double value = 0.001;
-    for (const double next : {0.002, 0.005, 0.01, 0.02, 0.05, 0.1}) EXPECT_NEAR(value = next_step(value, true), next, next * 1e-9);
-    for (const double next : {0.05, 0.02, 0.01, 0.005}) EXPECT_NEAR(value = next_step(value, false), next, next * 1e-9);
+    for (const double next : {0.002, 0.005, 0.01, 0.02, 0.05, 0.1}) {
+        EXPECT_NEAR(value = next_step(value, true), next, next * 1e-9);
+    }
+    for (const double next : {0.05, 0.02, 0.01, 0.005}) {
+        EXPECT_NEAR(value = next_step(value, false), next, next * 1e-9);
+    }
 }
 
 TEST(Chart, a_table_has_a_row_per_time_relative_to_the_trigger) {
@@ -157,7 +180,8 @@ TEST(Chart, a_table_has_a_row_per_time_relative_to_the_trigger) {
     record.trigger_ns = 5;
     record.end_ns = 10;
     const std::vector<Channel> channels{{"x", "mm", false, false}, {"a,b", "", true, true}};
-    EXPECT_EQ(chart_csv(channels, record), "time_s,x [mm],\"a,b\"\n-0.000000005,1.5,\n0.000000000,1.5,1\n0.000000005,2.5,1\n");
+    EXPECT_EQ(chart_csv(channels, record),
+              "time_s,x [mm],\"a,b\"\n-0.000000005,1.5,\n0.000000000,1.5,1\n0.000000005,2.5,1\n");
 }
 
 TEST(Chart, a_picture_has_a_lane_per_channel_and_skips_invalid_values) {
@@ -165,11 +189,13 @@ TEST(Chart, a_picture_has_a_lane_per_channel_and_skips_invalid_values) {
     record.samples = {{{0, 1.5}, {10, std::nan("")}, {20, 2.5}, {30, 3}}, {{0, 1}}};
     record.end_ns = 30;
     record.triggered = true;
-    const std::string svg = chart_svg({{"x<y", "mm", false, false}, {"on", "", true, true}}, record, "x<y > 1");
+    const std::string svg =
+        chart_svg({{"x<y", "mm", false, false}, {"on", "", true, true}}, record, "x<y > 1");
     EXPECT_TRUE(has(svg, "x&lt;y [mm]"));
     EXPECT_TRUE(has(svg, ">on<"));
     EXPECT_FALSE(has(svg, "nan"));
-    EXPECT_EQ(svg.find("M84.00"), svg.rfind("M84.00", svg.find(">on<"))) << "one line begins at the left";
+    EXPECT_EQ(svg.find("M84.00"), svg.rfind("M84.00", svg.find(">on<")))
+        << "one line begins at the left";
 }
 
 }  // namespace

@@ -9,7 +9,8 @@ namespace {
 TEST(TopTest, reads_what_an_instance_says) {
     SeenInstance seen;
     ASSERT_TRUE(
-        read_status("instance arm\nhost lab\npid 77\nrunning 1\nthread servo 1000000 12345 2 0\nthread slow 10000000 1234 0 1\nfaults "
+        read_status("instance arm\nhost lab\npid 77\nrunning 1\nthread servo 1000000 12345 2 "
+                    "0\nthread slow 10000000 1234 0 1\nfaults "
                     "3\nfault it broke\ncell line\nnode left\n",
                     seen));
     EXPECT_EQ(seen.instance + seen.host + seen.cell + seen.node, "armlablineleft");
@@ -18,26 +19,35 @@ TEST(TopTest, reads_what_an_instance_says) {
     EXPECT_EQ(seen.threads[0].missed, 2u);
     EXPECT_TRUE(seen.threads[1].faulted);
     EXPECT_EQ(seen.faults, 3u);
-    EXPECT_EQ(
-        top_table({seen}),
-        "INSTANCE         HOST         NODE                 THREAD            PERIOD       CYCLES   MISSED FAULTS\n"
-        "arm              lab          line/left            servo               1 ms        12345        2      3\n"
-        "                                                   slow               10 ms         1234        0         stopped by a fault\n"
-        "                 newest fault: it broke\n");
+    EXPECT_EQ(top_table({seen}),
+              "INSTANCE         HOST         NODE                 THREAD            PERIOD       "
+              "CYCLES   MISSED FAULTS\n"
+              "arm              lab          line/left            servo               1 ms        "
+              "12345        2      3\n"
+              "                                                   slow               10 ms         "
+              "1234        0         stopped by a fault\n"
+              "                 newest fault: it broke\n");
 }
 
 TEST(TopTest, a_text_from_the_network_does_not_steer_the_terminal) {
     SeenInstance seen;
     EXPECT_FALSE(read_status("", seen));
     EXPECT_FALSE(read_status("thread\nthread a b\npid x\n\n\n", seen));
-    ASSERT_TRUE(read_status("instance \x1b[2Jbad\nfault " + std::string(5000, 'x') + "\nthread x -1 -2 -3 -4\n", seen));
+    ASSERT_TRUE(read_status(
+        "instance \x1b[2Jbad\nfault " + std::string(5000, 'x') + "\nthread x -1 -2 -3 -4\n", seen));
     EXPECT_EQ(seen.instance, "\\x1b[2Jbad");
     EXPECT_LT(seen.fault.size(), 300u);
-    ASSERT_TRUE(read_status("instance a\xc2\x9b" "2Jb\nhost \xe2\x80\xaezyx\n", seen));  // the control sequence introducer of 8 bits; a mark that turns the line round
+    // the control sequence introducer of 8 bits; a mark that turns the line round
+    ASSERT_TRUE(
+        read_status("instance a\xc2\x9b"
+                    "2Jb\nhost \xe2\x80\xaezyx\n",
+                    seen));
     EXPECT_EQ(seen.instance, "a\\xc2\\x9b2Jb");
     EXPECT_EQ(seen.host, "\\xe2\\x80\\xaezyx");
     std::string many = "instance a\n";
-    for (int i = 0; i < 1000; ++i) many += "thread t 1 1 1 0\n";
+    for (int i = 0; i < 1000; ++i) {
+        many += "thread t 1 1 1 0\n";
+    }
     SeenInstance flood;
     ASSERT_TRUE(read_status(many, flood));
     EXPECT_EQ(flood.threads.size(), 100u);

@@ -8,7 +8,8 @@ namespace hal::tools {
 namespace {
 
 TEST(Message, numbers_and_texts_have_the_bytes_of_protobuf) {
-    EXPECT_EQ(Message().number(1, 150).bytes(), "\x08\x96\x01");  // the example of protobuf's encoding guide
+    // the example of protobuf's encoding guide
+    EXPECT_EQ(Message().number(1, 150).bytes(), "\x08\x96\x01");
     EXPECT_EQ(Message().text(2, "testing").bytes(), "\x12\x07testing");
     EXPECT_EQ(Message().message(3, Message().number(1, 150)).bytes(), "\x1a\x03\x08\x96\x01");
     EXPECT_EQ(Message().number(58, 0).bytes(), std::string("\xd0\x03\x00", 3));
@@ -17,7 +18,9 @@ TEST(Message, numbers_and_texts_have_the_bytes_of_protobuf) {
 
 std::size_t count(const std::string& bytes, const std::string& part) {
     std::size_t found = 0;
-    for (auto at = bytes.find(part); at != bytes.npos; at = bytes.find(part, at + 1)) ++found;
+    for (auto at = bytes.find(part); at != bytes.npos; at = bytes.find(part, at + 1)) {
+        ++found;
+    }
     return found;
 }
 
@@ -27,8 +30,11 @@ TEST(PerfettoWriter, a_thread_is_described_once_and_a_name_interned_once) {
     EXPECT_EQ(count(head, "hal default"), 1u);
     writer.name(5, "pid.do-pid-calcs");
     const TraceThread servo{"servo", 1'000'000, 8};
-    const std::vector<ThreadEvent> cycle{{110, 120, 1, 5, ThreadEvent::function}, {100, 130, 1, 10, ThreadEvent::cycle}};
-    const std::string first = writer.events(servo, cycle, 0), second = writer.events(servo, cycle, 0);
+    const std::vector<ThreadEvent> cycle{{110, 120, 1, 5, ThreadEvent::function},
+                                         {100, 130, 1, 10, ThreadEvent::cycle}};
+    const std::string first = writer.events(servo, cycle, 0);
+
+    const std::string second = writer.events(servo, cycle, 0);
     EXPECT_EQ(count(first, "pid.do-pid-calcs"), 1u);
     EXPECT_EQ(count(second, "pid.do-pid-calcs"), 0u);
     EXPECT_EQ(count(first, "overrun"), 0u);
@@ -40,7 +46,9 @@ TEST(PerfettoWriter, functions_wait_for_the_cycle_they_belong_to) {
     writer.begin("default", 7, {});
     writer.name(5, "late-function");
     const TraceThread servo{"servo", 1000, 8};
-    EXPECT_EQ(count(writer.events(servo, {{110, 120, 1, 5, ThreadEvent::function}}, 0), "late-function"), 0u);
+    EXPECT_EQ(
+        count(writer.events(servo, {{110, 120, 1, 5, ThreadEvent::function}}, 0), "late-function"),
+        0u);
     const std::string bytes = writer.events(servo, {{100, 3000, 1, 10, ThreadEvent::cycle}}, 0);
     EXPECT_LT(bytes.find("cycle"), bytes.find("late-function"));
     EXPECT_EQ(count(bytes, "overrun"), 1u);
@@ -48,7 +56,8 @@ TEST(PerfettoWriter, functions_wait_for_the_cycle_they_belong_to) {
 
 TEST(Switch, a_line_of_trace_pipe_is_read_with_names_that_have_blanks) {
     const auto one = read_switch(
-        "          <idle>-0       [001] d..2.  1234.567890: sched_switch: prev_comm=swapper/1 prev_pid=0 prev_prio=120 prev_state=R ==> "
+        "          <idle>-0       [001] d..2.  1234.567890: sched_switch: prev_comm=swapper/1 "
+        "prev_pid=0 prev_prio=120 prev_state=R ==> "
         "next_comm=my servo next_pid=77 next_prio=1");
     ASSERT_TRUE(one);
     EXPECT_EQ(one->cpu, 1);

@@ -9,7 +9,10 @@ namespace hal::tools {
 namespace {
 
 TEST(WatchTable, has_value_extremes_and_rate_of_the_last_second) {
-    WatchTable table({{"position", "mm", false, false}, {"pulse", "", true, true}, {"count", "", true, false}, {"nothing", "", false, false}});
+    WatchTable table({{"position", "mm", false, false},
+                      {"pulse", "", true, true},
+                      {"count", "", true, false},
+                      {"nothing", "", false, false}});
     for (int i = 0; i <= 3000; ++i) {
         const std::int64_t now = i * 1'000'000LL;
         table.feed(0, {now, i < 1500 ? -0.5 : (i - 2000) * 0.002});
@@ -18,11 +21,16 @@ TEST(WatchTable, has_value_extremes_and_rate_of_the_last_second) {
     }
     const auto lines = table.lines();
     ASSERT_EQ(lines.size(), 5u);
-    EXPECT_EQ(lines[0], "NAME              VALUE UNIT                MIN            MAX           RATE");
-    EXPECT_EQ(lines[1], "position              2 mm                   -1              2         2 mm/s");
-    EXPECT_EQ(lines[2], "pulse             FALSE                   FALSE           TRUE     20 edges/s");
-    EXPECT_EQ(lines[3], "count              3000                       0           3000        1000 /s");
-    EXPECT_EQ(lines[4], "nothing               -                       -              -              -");
+    EXPECT_EQ(lines[0],
+              "NAME              VALUE UNIT                MIN            MAX           RATE");
+    EXPECT_EQ(lines[1],
+              "position              2 mm                   -1              2         2 mm/s");
+    EXPECT_EQ(lines[2],
+              "pulse             FALSE                   FALSE           TRUE     20 edges/s");
+    EXPECT_EQ(lines[3],
+              "count              3000                       0           3000        1000 /s");
+    EXPECT_EQ(lines[4],
+              "nothing               -                       -              -              -");
 }
 
 TEST(WatchTable, the_unit_of_a_rate_has_one_more_second) {
@@ -45,14 +53,18 @@ TEST(WatchTable, reset_forgets_the_extremes_and_not_a_number_does_not_stay) {
     table.feed(0, {0, std::nan("")});
     table.feed(0, {1, 5});
     table.feed(0, {2, 3});
-    EXPECT_EQ(table.lines()[1], "x                 3                       3              5              -");
+    EXPECT_EQ(table.lines()[1],
+              "x                 3                       3              5              -");
     table.reset();
-    EXPECT_EQ(table.lines()[1], "x                 3                       3              3              -");
+    EXPECT_EQ(table.lines()[1],
+              "x                 3                       3              3              -");
 }
 
 TEST(WatchTable, shows_all_digits_of_64_bits) {
-    WatchTable table({{"s", "", true, false, Channel::Wide::s64}, {"u", "", true, false, Channel::Wide::u64}});
-    for (const std::uint64_t word : {std::uint64_t{1} << 53 | 1, std::uint64_t{INT64_MAX}, std::uint64_t{UINT64_MAX}}) {
+    WatchTable table(
+        {{"s", "", true, false, Channel::Wide::s64}, {"u", "", true, false, Channel::Wide::u64}});
+    for (const std::uint64_t word :
+         {std::uint64_t{1} << 53 | 1, std::uint64_t{INT64_MAX}, std::uint64_t{UINT64_MAX}}) {
         table.feed(0, {0, static_cast<double>(static_cast<std::int64_t>(word)), word});
         table.feed(1, {0, static_cast<double>(word), word});
     }
@@ -63,15 +75,22 @@ TEST(WatchTable, shows_all_digits_of_64_bits) {
 }
 
 TEST(WatchTable, a_narrow_terminal_loses_columns_and_never_a_value) {
-    WatchTable table({{"axis.0.position-command", "mm", false, false}, {"axis.1.position-command", "mm", false, false}});
-    for (std::size_t i = 0; i < 2; ++i) table.feed(i, {0, 1.5 + static_cast<double>(i)});
-    EXPECT_EQ(table.lines(80)[1], "axis.0.position-command            1.5 mm                  1.5            1.5");
+    WatchTable table({{"axis.0.position-command", "mm", false, false},
+                      {"axis.1.position-command", "mm", false, false}});
+    for (std::size_t i = 0; i < 2; ++i) {
+        table.feed(i, {0, 1.5 + static_cast<double>(i)});
+    }
+    EXPECT_EQ(table.lines(80)[1],
+              "axis.0.position-command            1.5 mm                  1.5            1.5");
     EXPECT_EQ(table.lines(60)[1], "axis.0.position-command            1.5 mm      ");
     EXPECT_EQ(table.lines(40)[2], "axis.1.position-command            2.5");
     EXPECT_EQ(table.lines(32)[2], "…position-command            2.5");
     EXPECT_EQ(table.lines(1)[0], "NAME          VALUE");
-    for (const std::size_t columns : {32, 40, 60, 80, 100, 200})
-        for (const std::string& line : table.lines(columns)) EXPECT_LE(hal::columns(line), columns) << line;
+    for (const std::size_t columns : {32, 40, 60, 80, 100, 200}) {
+        for (const std::string& line : table.lines(columns)) {
+            EXPECT_LE(hal::columns(line), columns) << line;
+        }
+    }
 }
 
 }  // namespace

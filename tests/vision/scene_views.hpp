@@ -20,11 +20,13 @@ inline scene::State usual_state() {
 
 inline scene::State rig_state(double arm, double pendulum) {
     scene::State state = usual_state();
-    state.values[scene::at::arm] = arm, state.values[scene::at::pendulum] = pendulum;
+    state.values[scene::at::arm] = arm;
+    state.values[scene::at::pendulum] = pendulum;
     return state;
 }
 
-inline Frame frame_of(const scene::Settings& settings, const scene::State& from, const scene::State& to, std::uint64_t number) {
+inline Frame frame_of(const scene::Settings& settings, const scene::State& from,
+                      const scene::State& to, std::uint64_t number) {
     Frame frame;
     frame.resize(settings.width, settings.height, Format::bgr);
     frame.pixels = scene::render(settings, from, to, number);
@@ -32,7 +34,8 @@ inline Frame frame_of(const scene::Settings& settings, const scene::State& from,
     return frame;
 }
 
-/// A number between `least` and `most` that is spread evenly over n = 0, 1, 2 … `step`: a prime for each quantity. (R. Richtmyer, 1951)
+/// A number between `least` and `most` that is spread evenly over n = 0, 1, 2 … `step`: a prime for
+/// each quantity. (R. Richtmyer, 1951)
 inline double spread(int n, double step, double least, double most) {
     const double part = n * std::sqrt(step);
     return least + (most - least) * (part - std::floor(part));

@@ -26,7 +26,9 @@ namespace hal::tools {
 bool wait_readable(int descriptor, int stop, const std::function<void()>& meanwhile) {
     pollfd both[2] = {{descriptor, POLLIN, 0}, {stop, POLLIN, 0}};
     for (;;) {
-        if (meanwhile) meanwhile();
+        if (meanwhile) {
+            meanwhile();
+        }
         both[0].revents = both[1].revents = 0;
         if (::poll(both, 2, meanwhile ? 10 : -1) < 0 && errno != EINTR) return false;
         if (both[1].revents != 0) return false;
@@ -50,16 +52,22 @@ bool LineReader::read(std::string& line) {
         char block[65536];
         if (!wait_readable(descriptor_, stop_, meanwhile_)) return false;
         const ssize_t n = ::read(descriptor_, block, sizeof block);
-        if (n > 0) waiting_.append(block, static_cast<std::size_t>(n));
-        else if (n == 0 || errno != EINTR) ended_ = true;
+        if (n > 0) {
+            waiting_.append(block, static_cast<std::size_t>(n));
+        } else if (n == 0 || errno != EINTR) {
+            ended_ = true;
+        }
     }
 }
 
 std::string common_prefix(const std::vector<Candidate>& candidates) {
-    if (candidates.empty()) return {};
+    if (candidates.empty()) {
+        return {};
+    }
     std::string prefix = candidates.front().text;
     for (const Candidate& candidate : candidates) {
-        const auto [end, other] = std::mismatch(prefix.begin(), prefix.end(), candidate.text.begin(), candidate.text.end());
+        const auto [end, other] = std::mismatch(prefix.begin(), prefix.end(),
+                                                candidate.text.begin(), candidate.text.end());
         prefix.erase(end, prefix.end());
     }
     return prefix;
@@ -67,25 +75,33 @@ std::string common_prefix(const std::vector<Candidate>& candidates) {
 
 std::string candidate_table(const std::vector<Candidate>& candidates, std::size_t columns) {
     constexpr std::size_t most = 200;
-    std::size_t name_width = 0, hint_width = 0;
+    std::size_t name_width = 0;
+    std::size_t hint_width = 0;
     const std::size_t shown = std::min(candidates.size(), most);
     for (std::size_t i = 0; i < shown; ++i) {
         name_width = std::max(name_width, candidates[i].text.size());
         hint_width = std::max(hint_width, candidates[i].hint.size());
     }
     const std::size_t cell = name_width + (hint_width != 0 ? hint_width + 2 : 0) + 3;
-    const std::size_t across = std::max<std::size_t>(1, columns / cell), rows = (shown + across - 1) / across;
+    const std::size_t across = std::max<std::size_t>(1, columns / cell);
+
+    const std::size_t rows = (shown + across - 1) / across;
     std::string text;
     for (std::size_t r = 0; r < rows; ++r) {
         std::string line;
         for (std::size_t i = r; i < shown; i += rows) {
             line.resize(std::max(line.size(), i / rows * cell), ' ');
             line += candidates[i].text;
-            if (!candidates[i].hint.empty()) line += std::string(name_width - candidates[i].text.size() + 2, ' ') + candidates[i].hint;
+            if (!candidates[i].hint.empty()) {
+                line += std::string(name_width - candidates[i].text.size() + 2, ' ') +
+                        candidates[i].hint;
+            }
         }
         text += line + "\n";
     }
-    if (shown < candidates.size()) text += "… and " + std::to_string(candidates.size() - shown) + " more\n";
+    if (shown < candidates.size()) {
+        text += "… and " + std::to_string(candidates.size() - shown) + " more\n";
+    }
     return text;
 }
 
@@ -93,7 +109,8 @@ std::string candidate_table(const std::vector<Candidate>& candidates, std::size_
 
 namespace {
 
-/// One line per command, in the user's state folder; appended to at once, so that several shells share it.
+/// One line per command, in the user's state folder; appended to at once, so that several shells
+/// share it.
 class HistoryFile {
 public:
     static constexpr std::size_t most = 2000;
@@ -102,26 +119,39 @@ public:
         namespace fs = std::filesystem;
         const char* state = std::getenv("XDG_STATE_HOME");
         const char* home = std::getenv("HOME");
-        if ((!state || !*state) && (!home || !*home)) return {};
-        const fs::path folder = (state && *state ? fs::path(state) : fs::path(home) / ".local/state") / "halcyon";
+        if ((!state || !*state) && (!home || !*home)) {
+            return {};
+        }
+        const fs::path folder =
+            (state && *state ? fs::path(state) : fs::path(home) / ".local/state") / "halcyon";
         std::error_code problem;
         fs::create_directories(folder, problem);
-        if (problem) return {};
+        if (problem) {
+            return {};
+        }
         path_ = folder / "history";
         std::vector<std::string> lines;
         std::ifstream file(path_);
-        for (std::string line; std::getline(file, line);) lines.push_back(line);
+        for (std::string line; std::getline(file, line);) {
+            lines.push_back(line);
+        }
         if (lines.size() > 2 * most) {
             lines.erase(lines.begin(), lines.end() - static_cast<std::ptrdiff_t>(most));
             std::string all;
-            for (const auto& line : lines) all += line + "\n";
+            for (const auto& line : lines) {
+                all += line + "\n";
+            }
             const fs::path fresh = path_.string() + "." + std::to_string(::getpid());
-            if (store(fresh, O_TRUNC, all)) fs::rename(fresh, path_, problem);
+            if (store(fresh, O_TRUNC, all)) {
+                fs::rename(fresh, path_, problem);
+            }
         }
         return lines;
     }
     void append(const std::string& line) const {
-        if (!path_.empty()) store(path_, O_APPEND, line + "\n");
+        if (!path_.empty()) {
+            store(path_, O_APPEND, line + "\n");
+        }
     }
 
 private:
@@ -146,9 +176,11 @@ struct Editor::State {
     History* history = nullptr;
     HistoryFile file;
     std::string prompt, last;
-    bool stopped = false, interrupted = false;
+    bool stopped = false;
+    bool interrupted = false;
 
-    State(Completer c, int s, const std::function<void()>& m) : complete(std::move(c)), stop(s), meanwhile(m), plain(STDIN_FILENO, s, m) {}
+    State(Completer c, int s, const std::function<void()>& m)
+        : complete(std::move(c)), stop(s), meanwhile(m), plain(STDIN_FILENO, s, m) {}
 
     static State& of(EditLine* line) {
         void* self = nullptr;
@@ -168,7 +200,8 @@ struct Editor::State {
             char byte = 0;
             if (::read(STDIN_FILENO, &byte, 1) <= 0) return 0;
             const std::size_t used = std::mbrtowc(to, &byte, 1, &partial);
-            if (used == static_cast<std::size_t>(-2)) continue;  // more bytes of this character follow
+            // more bytes of this character follow
+            if (used == static_cast<std::size_t>(-2)) continue;
             if (used == static_cast<std::size_t>(-1)) {
                 partial = {};
                 continue;  // not a character: dropped
@@ -185,14 +218,17 @@ struct Editor::State {
     static unsigned char on_tab(EditLine* line, int) {
         State& self = of(line);
         const LineInfo* now = el_line(line);
-        const std::string_view text(now->buffer, static_cast<std::size_t>(now->lastchar - now->buffer));
+        const std::string_view text(now->buffer,
+                                    static_cast<std::size_t>(now->lastchar - now->buffer));
         const auto cursor = static_cast<std::size_t>(now->cursor - now->buffer);
         const Completion found = self.complete(text, cursor);
         if (found.candidates.empty() || found.begin > cursor) return CC_REFRESH_BEEP;
         const std::string typed(text.substr(found.begin, cursor - found.begin));
         std::string word = common_prefix(found.candidates);
         const bool unique = found.candidates.size() == 1;
-        if (unique) word += ' ';
+        if (unique) {
+            word += ' ';
+        }
         if (word.size() > typed.size() || unique) {
             el_deletestr(line, static_cast<int>(typed.size()));
             el_insertstr(line, word.c_str());
@@ -221,7 +257,8 @@ struct Editor::State {
         el_set(line, EL_HIST, ::history, history);
         el_set(line, EL_PROMPT, &show_prompt);
         el_set(line, EL_GETCFN, &next_character);
-        el_wset(line, EL_ADDFN, L"hal-complete", L"complete a name", &on_tab);  // el_set would leak copies of the texts
+        // el_set would leak copies of the texts
+        el_wset(line, EL_ADDFN, L"hal-complete", L"complete a name", &on_tab);
         el_wset(line, EL_ADDFN, L"hal-interrupt", L"drop the line", &on_interrupt);
         el_set(line, EL_BIND, "^I", "hal-complete", nullptr);
         el_set(line, EL_BIND, "^R", "em-inc-search-prev", nullptr);
@@ -233,24 +270,34 @@ struct Editor::State {
 Editor::Editor(Completer complete, int stop, const std::function<void()>& meanwhile)
     : state_(std::make_unique<State>(std::move(complete), stop, meanwhile)) {
     const char* term = std::getenv("TERM");
-    if (::isatty(STDIN_FILENO) && ::isatty(STDOUT_FILENO) && term && std::string_view(term) != "dumb") state_->open();
+    if (::isatty(STDIN_FILENO) && ::isatty(STDOUT_FILENO) && term &&
+        std::string_view(term) != "dumb") {
+        state_->open();
+    }
 }
 
 Editor::~Editor() {
-    if (state_->line) el_end(state_->line);
-    if (state_->history) history_end(state_->history);
+    if (state_->line) {
+        el_end(state_->line);
+    }
+    if (state_->history) {
+        history_end(state_->history);
+    }
 }
 
 bool Editor::read(const std::string& prompt, std::string& line) {
     State& s = *state_;
     if (!s.line) {
-        if (::isatty(STDIN_FILENO)) print(prompt);
+        if (::isatty(STDIN_FILENO)) {
+            print(prompt);
+        }
         return s.plain.read(line);
     }
     s.prompt = prompt;
     s.interrupted = false;
     int length = 0;
-    el_set(s.line, EL_PREP_TERM, 1);  // before the prompt shows: a ^C in between would end the program
+    el_set(s.line, EL_PREP_TERM,
+           1);  // before the prompt shows: a ^C in between would end the program
     const char* text = el_gets(s.line, &length);
     if (s.interrupted) {
         print("^C\n");
@@ -263,7 +310,9 @@ bool Editor::read(const std::string& prompt, std::string& line) {
         return false;
     }
     line.assign(text, static_cast<std::size_t>(length));
-    while (!line.empty() && (line.back() == '\n' || line.back() == '\r')) line.pop_back();
+    while (!line.empty() && (line.back() == '\n' || line.back() == '\r')) {
+        line.pop_back();
+    }
     if (line.find_first_not_of(" \t") != std::string::npos && line != s.last) {
         HistEvent event{};
         ::history(s.history, &event, H_ENTER, line.c_str());
@@ -284,7 +333,9 @@ Editor::Editor(Completer, int stop, const std::function<void()>& meanwhile)
 Editor::~Editor() = default;
 
 bool Editor::read(const std::string& prompt, std::string& line) {
-    if (::isatty(STDIN_FILENO)) print(prompt);
+    if (::isatty(STDIN_FILENO)) {
+        print(prompt);
+    }
     return state_->plain.read(line);
 }
 

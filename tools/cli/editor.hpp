@@ -11,7 +11,8 @@
 
 namespace hal::tools {
 
-/// Waits until `descriptor` or `stop` (-1: none) is readable. Returns false for `stop`. Calls `meanwhile` every 10 ms.
+/// Waits until `descriptor` or `stop` (-1: none) is readable. Returns false for `stop`. Calls
+/// `meanwhile` every 10 ms.
 bool wait_readable(int descriptor, int stop, const std::function<void()>& meanwhile = {});
 
 /// Reads lines of a descriptor as they arrive, without editing.
@@ -19,7 +20,8 @@ class LineReader {
 public:
     explicit LineReader(int descriptor, int stop = -1, std::function<void()> meanwhile = {})
         : descriptor_(descriptor), stop_(stop), meanwhile_(std::move(meanwhile)) {}
-    /// Returns false at the end of the input, or when `stop` became readable. A last line without end of line counts.
+    /// Returns false at the end of the input, or when `stop` became readable. A last line without
+    /// end of line counts.
     bool read(std::string& line);
     /// Returns true when the next line is buffered: read() does not wait.
     bool waiting() const { return waiting_.find('\n', begin_) != std::string::npos; }
@@ -36,12 +38,14 @@ class Editor {
 public:
     using Completer = std::function<Completion(std::string_view line, std::size_t cursor)>;
 
-    /// On a terminal the history is kept in $XDG_STATE_HOME/halcyon/history. `stop`, `meanwhile`: see wait_readable.
+    /// On a terminal the history is kept in $XDG_STATE_HOME/halcyon/history. `stop`, `meanwhile`:
+    /// see wait_readable.
     Editor(Completer complete, int stop, const std::function<void()>& meanwhile = {});
     ~Editor();
     Editor(const Editor&) = delete;
 
-    /// Ctrl-C returns an empty line; Ctrl-D on an empty line, the end of the input and `stop` return false.
+    /// Ctrl-C returns an empty line; Ctrl-D on an empty line, the end of the input and `stop`
+    /// return false.
     bool read(const std::string& prompt, std::string& line);
 
 private:
@@ -52,7 +56,8 @@ private:
 /// Returns the longest common prefix of the candidates.
 std::string common_prefix(const std::vector<Candidate>& candidates);
 
-/// Returns the list for an ambiguous completion: a candidate and its hint per column, as wide as the terminal.
+/// Returns the list for an ambiguous completion: a candidate and its hint per column, as wide as
+/// the terminal.
 std::string candidate_table(const std::vector<Candidate>& candidates, std::size_t columns);
 
 }  // namespace hal::tools

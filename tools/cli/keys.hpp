@@ -8,7 +8,19 @@
 
 namespace hal::tools {
 
-enum class Code { character, up, down, left, right, page_up, page_down, tab, enter, backspace, escape };
+enum class Code {
+    character,
+    up,
+    down,
+    left,
+    right,
+    page_up,
+    page_down,
+    tab,
+    enter,
+    backspace,
+    escape
+};
 
 struct Key {
     Code code = Code::character;
@@ -17,7 +29,8 @@ struct Key {
     bool operator==(const Key&) const = default;
 };
 
-/// Takes the complete keys from the beginning of `bytes`, as terminals send them (CSI and SS3 sequences), and skips unknown sequences.
+/// Takes the complete keys from the beginning of `bytes`, as terminals send them (CSI and SS3
+/// sequences), and skips unknown sequences.
 /// `complete`: no more bytes came for a while, so a lone Esc is the key Esc.
 std::vector<Key> take_keys(std::string& bytes, bool complete);
 

@@ -13,19 +13,29 @@ namespace hal::tools {
 namespace {
 
 bool is_whole(std::string_view text) {
-    if (text.starts_with('-') || text.starts_with('+')) text.remove_prefix(1);
+    if (text.starts_with('-') || text.starts_with('+')) {
+        text.remove_prefix(1);
+    }
     return !text.empty() && text.find_first_not_of("0123456789") == text.npos;
 }
 
 }  // namespace
 
-void DeclaredOption::in(int least, int most) { option_->check(CLI::Range(least, most).description(fmt::format("{}..{}", least, most))); }
+void DeclaredOption::in(int least, int most) {
+    option_->check(CLI::Range(least, most).description(fmt::format("{}..{}", least, most)));
+}
 void DeclaredOption::in(double least, double most) { option_->check(CLI::Range(least, most)); }
-void DeclaredOption::quietly_in(int least, int most) { option_->check(CLI::Range(least, most).description("")); }
+void DeclaredOption::quietly_in(int least, int most) {
+    option_->check(CLI::Range(least, most).description(""));
+}
 void DeclaredOption::not_negative() {
     option_->check([](const std::string& text) {
-        if (text.starts_with('-')) return fmt::format("{} is negative; use 0 or more", text);
-        return std::isnan(std::strtod(text.c_str(), nullptr)) ? fmt::format("{} is not a number; use 0 or more", text) : std::string();
+        if (text.starts_with('-')) {
+            return fmt::format("{} is negative; use 0 or more", text);
+        }
+        return std::isnan(std::strtod(text.c_str(), nullptr))
+                   ? fmt::format("{} is not a number; use 0 or more", text)
+                   : std::string();
     });
 }
 
@@ -40,12 +50,18 @@ OptionSet::~OptionSet() = default;
 
 void OptionSet::words(const char* name, const char* what, bool required) {
     CLI::Option* option = app_->add_option(name, options_.words, what);
-    if (required) option->required();
+    if (required) {
+        option->required();
+    }
 }
 
-void OptionSet::flag(const char* names, bool& to, const char* what) { app_->add_flag(names, to, what); }
+void OptionSet::flag(const char* names, bool& to, const char* what) {
+    app_->add_flag(names, to, what);
+}
 
-void OptionSet::flag(const char* names, const std::function<void()>& given, const char* what) { app_->add_flag_callback(names, given, what); }
+void OptionSet::flag(const char* names, const std::function<void()>& given, const char* what) {
+    app_->add_flag_callback(names, given, what);
+}
 
 template <class T>
 DeclaredOption OptionSet::value(const char* names, T& to, const char* type, const char* what) {
@@ -59,20 +75,27 @@ template DeclaredOption OptionSet::value(const char*, std::uint16_t&, const char
 template DeclaredOption OptionSet::value(const char*, std::uint64_t&, const char*, const char*);
 template DeclaredOption OptionSet::value(const char*, std::int64_t&, const char*, const char*);
 
-void OptionSet::values(const char* names, std::vector<std::string>& to, const char* type, const char* what) {
+void OptionSet::values(const char* names, std::vector<std::string>& to, const char* type,
+                       const char* what) {
     app_->add_option(names, to, what)->type_name(type)->allow_extra_args(false);
 }
 
-void OptionSet::duration(const char* name, std::int64_t& to, const char* what, std::int64_t least_ns, const char* examples) {
+void OptionSet::duration(const char* name, std::int64_t& to, const char* what,
+                         std::int64_t least_ns, const char* examples) {
     const auto take = [name, &to, least_ns, examples](const std::string& text) {
         const auto ns = parse_duration_ns(text);
-        if (!ns || *ns < least_ns) throw CLI::ValidationError(name, fmt::format("invalid duration '{}'; use {}", text, examples));
+        if (!ns || *ns < least_ns) {
+            throw CLI::ValidationError(
+                name, fmt::format("invalid duration '{}'; use {}", text, examples));
+        }
         to = *ns;
     };
     app_->add_option_function<std::string>(name, take, what)->type_name("TIME");
 }
 
-void OptionSet::for_how_long(std::int64_t& to, const char* what) { duration("--for", to, what, 0, "10s, 250ms or 2min"); }
+void OptionSet::for_how_long(std::int64_t& to, const char* what) {
+    duration("--for", to, what, 0, "10s, 250ms or 2min");
+}
 
 void OptionSet::keep_rest() { app_->prefix_command(); }
 
@@ -90,9 +113,14 @@ OptionSet::Reading OptionSet::read(std::vector<std::string> arguments) {
         reading.outcome = Outcome::bad;
         std::string& what = reading.problem = error.what();
         constexpr std::string_view unread = "Could not convert: ";  // --speed = fast
-        if (const auto equals = what.find(" = "); what.starts_with(unread) && equals != std::string::npos)
-            what = fmt::format("{}: '{}' is {}", what.substr(unread.size(), equals - unread.size()), what.substr(equals + 3),
-                               is_whole(std::string_view(what).substr(equals + 3)) ? "out of range" : "not a number");
+        if (const auto equals = what.find(" = ");
+            what.starts_with(unread) && equals != std::string::npos) {
+            what =
+                fmt::format("{}: '{}' is {}", what.substr(unread.size(), equals - unread.size()),
+                            what.substr(equals + 3),
+                            is_whole(std::string_view(what).substr(equals + 3)) ? "out of range"
+                                                                                : "not a number");
+        }
         std::replace(what.begin(), what.end(), '\n', ' ');
     }
     return reading;
@@ -100,14 +128,24 @@ OptionSet::Reading OptionSet::read(std::vector<std::string> arguments) {
 
 std::string OptionSet::help() const {
     std::string text;
-    for (const CLI::Option* option : std::as_const(*app_).get_options())
-        if (option->get_positional()) text += fmt::format("\n  {:24} {}", option->get_name(true), option->get_description());
+    for (const CLI::Option* option : std::as_const(*app_).get_options()) {
+        if (option->get_positional()) {
+            text += fmt::format("\n  {:24} {}", option->get_name(true), option->get_description());
+        }
+    }
     text += "\n";
-    for (const CLI::Option* option : std::as_const(*app_).get_options([](const CLI::Option* o) { return o->nonpositional(); })) {
-        const std::string value = option->get_expected_min() > 0 && !option->get_type_name().empty() ? " " + option->get_type_name() : "";
+    for (const CLI::Option* option : std::as_const(*app_).get_options(
+             [](const CLI::Option* o) { return o->nonpositional(); })) {
+        const std::string value = option->get_expected_min() > 0 && !option->get_type_name().empty()
+                                      ? " " + option->get_type_name()
+                                      : "";
         std::string names;
-        for (const std::string& name : option->get_snames()) names += (names.empty() ? "-" : ", -") + name;
-        for (const std::string& name : option->get_lnames()) names += (names.empty() ? "--" : ", --") + name;
+        for (const std::string& name : option->get_snames()) {
+            names += (names.empty() ? "-" : ", -") + name;
+        }
+        for (const std::string& name : option->get_lnames()) {
+            names += (names.empty() ? "--" : ", --") + name;
+        }
         text += fmt::format("  {:24} {}\n", names + value, option->get_description());
     }
     return text;
@@ -116,8 +154,12 @@ std::string OptionSet::help() const {
 std::vector<std::string> OptionSet::names() const {
     std::vector<std::string> names;
     for (const CLI::Option* option : std::as_const(*app_).get_options()) {
-        for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
-        for (const std::string& name : option->get_snames()) names.push_back("-" + name);
+        for (const std::string& name : option->get_lnames()) {
+            names.push_back("--" + name);
+        }
+        for (const std::string& name : option->get_snames()) {
+            names.push_back("-" + name);
+        }
     }
     return names;
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The options of one command: names, help, and what reading a command line does. Only the source of this header includes CLI11, which is slow to
-// compile.
+// The options of one command: names, help, and what reading a command line does. Only the source of
+// this header includes CLI11, which is slow to compile.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@
 namespace CLI {
 class App;
 class Option;
-}
+}  // namespace CLI
 
 namespace hal::tools {
 
@@ -22,9 +22,9 @@ namespace hal::tools {
 class DeclaredOption {
 public:
     explicit DeclaredOption(CLI::Option* option) : option_(option) {}
-    void in(int least, int most);            ///< the help shows the range
+    void in(int least, int most);  ///< the help shows the range
     void in(double least, double most);
-    void quietly_in(int least, int most);    ///< the help does not show it
+    void quietly_in(int least, int most);  ///< the help does not show it
     void not_negative();
 
 private:
@@ -43,13 +43,17 @@ public:
     void flag(const char* names, bool& to, const char* what);
     /// Declares a flag that calls `given` when it is typed.
     void flag(const char* names, const std::function<void()>& given, const char* what);
-    /// Declares an option with a value; `type` is the word for it in the help. Defined for strings and the number types in use.
+    /// Declares an option with a value; `type` is the word for it in the help. Defined for strings
+    /// and the number types in use.
     template <class T>
     DeclaredOption value(const char* names, T& to, const char* type, const char* what);
     /// Declares an option that takes one value and may be repeated.
-    void values(const char* names, std::vector<std::string>& to, const char* type, const char* what);
-    /// Declares an option that takes a duration in ns, at least `least_ns`. A message about an invalid one ends with `examples`.
-    void duration(const char* name, std::int64_t& to, const char* what, std::int64_t least_ns = 0, const char* examples = "10ms, 1s or 500us");
+    void values(const char* names, std::vector<std::string>& to, const char* type,
+                const char* what);
+    /// Declares an option that takes a duration in ns, at least `least_ns`. A message about an
+    /// invalid one ends with `examples`.
+    void duration(const char* name, std::int64_t& to, const char* what, std::int64_t least_ns = 0,
+                  const char* examples = "10ms, 1s or 500us");
     /// Declares --for TIME.
     void for_how_long(std::int64_t& to, const char* what);
     /// Treats everything from the first positional argument on as words, including options.
@@ -58,7 +62,7 @@ public:
     enum class Outcome { good, help, missing, bad };
     struct Reading {
         Outcome outcome = Outcome::good;
-        std::string problem;             ///< of `bad`
+        std::string problem;  ///< of `bad`
         std::vector<std::string> extra;  ///< arguments that match no declaration
     };
     /// Fills the members of the options.

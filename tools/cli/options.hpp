@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The parts common to all command lines. The options of a command are in its own header, a struct that derives from one of these; `declare`
-// sets their names and help.
+// The parts common to all command lines. The options of a command are in its own header, a struct
+// that derives from one of these; `declare` sets their names and help.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,8 @@ class OptionSet;
 
 struct Options {
     std::string program = "hal";         ///< how messages begin: "hal run", "halcmd"
-    std::vector<std::string> words;      ///< the positional arguments: files, a shell command, a component, a code
+    /// the positional arguments: files, a shell command, a component, a code
+    std::vector<std::string> words;
     std::vector<std::string> arguments;  ///< behind `--`: $1 $2 … and NAME=VALUE of the netlists
 
     Options() = default;
@@ -30,8 +31,11 @@ enum class Loudness { nothing, errors, results };  ///< halcmd's -Q, -q (the def
 struct ExecutionOptions : Options {
     std::string name;  ///< --name: of the instance; empty: not given
     std::string ini;
-    bool keep_going = false, script = false, echo = false;
-    bool from_file = false;  ///< -f: the first word is a file of commands; without one, standard input
+    bool keep_going = false;
+    bool script = false;
+    bool echo = false;
+    /// -f: the first word is a file of commands; without one, standard input
+    bool from_file = false;
     bool classic = false;    ///< under the name halrun or halcmd: as LinuxCNC does it
     Loudness loudness = Loudness::errors;
 };

@@ -23,22 +23,31 @@ std::string path_of(std::string_view name) {
 }
 
 /// The name that ./hal build knows: "tools" for hal-tools.
-std::string build_name(std::string_view name) { return std::string(name.substr(name.find('-') + 1)); }
+std::string build_name(std::string_view name) {
+    return std::string(name.substr(name.find('-') + 1));
+}
 
 int report_missing(std::string_view name, int error) {
-    const std::string problem = fmt::format("cannot start {}: {}; ", path_of(name), std::strerror(error));
-    if (name == "hal-panel")
-        return fail(Options{}, problem + "this Halcyon was built without libwebsockets or pugixml; type: sudo apt install "
-                                         "libwebsockets-dev libpugixml-dev, and build again (./hal build panel)");
-    return fail(Options{}, problem + fmt::format("it must be in the folder of hal: type ./hal build {} in the source tree, or reinstall Halcyon",
-                                                 build_name(name)));
+    const std::string problem =
+        fmt::format("cannot start {}: {}; ", path_of(name), std::strerror(error));
+    if (name == "hal-panel") {
+        return fail(
+            Options{},
+            problem +
+                "this Halcyon was built without libwebsockets or pugixml; type: sudo apt install "
+                "libwebsockets-dev libpugixml-dev, and build again (./hal build panel)");
+    }
+    return fail(Options{},
+                problem + fmt::format("it must be in the folder of hal: type ./hal build {} in the "
+                                      "source tree, or reinstall Halcyon",
+                                      build_name(name)));
 }
 
 /// Ignores SIGINT while it exists: Ctrl-C is for the other program.
 class IgnoredInterrupt {
 public:
     IgnoredInterrupt() {
-        struct sigaction ignore {};
+        struct sigaction ignore{};
         ignore.sa_handler = SIG_IGN;
         ::sigaction(SIGINT, &ignore, &before_);
     }
@@ -47,7 +56,7 @@ public:
     IgnoredInterrupt& operator=(const IgnoredInterrupt&) = delete;
 
 private:
-    struct sigaction before_ {};
+    struct sigaction before_{};
 };
 
 /// Starts a program with no signal blocked and SIGINT as usual. Returns 0 or an errno.
@@ -70,28 +79,37 @@ int spawn_with_default_signals(pid_t& child, const std::string& program, char** 
 }  // namespace
 
 int become_program(const char* name, char** argv) {
-    if (std::string_view(name) != "hal-panel") pass_on_capabilities();
+    if (std::string_view(name) != "hal-panel") {
+        pass_on_capabilities();
+    }
     const std::string program = path_of(name);
     ::execv(program.c_str(), argv);
-    if (errno == ENOENT && build_on_demand(build_name(name))) ::execv(program.c_str(), argv);
+    if (errno == ENOENT && build_on_demand(build_name(name))) {
+        ::execv(program.c_str(), argv);
+    }
     return report_missing(name, errno);
 }
 
 int run_tool(std::vector<std::string> arguments) {
     constexpr const char* name = "hal-tools";
     const std::string program = path_of(name);
-    if (::access(program.c_str(), X_OK) != 0) build_on_demand(build_name(name));
+    if (::access(program.c_str(), X_OK) != 0) {
+        build_on_demand(build_name(name));
+    }
     arguments.insert(arguments.begin(), "hal");
     std::vector<char*> argv;
-    for (std::string& argument : arguments) argv.push_back(argument.data());
+    for (std::string& argument : arguments) {
+        argv.push_back(argument.data());
+    }
     argv.push_back(nullptr);
     const IgnoredInterrupt meanwhile;
     pid_t child = 0;
     const int error = spawn_with_default_signals(child, program, argv.data());
     if (error != 0) return report_missing(name, error);
     int status = 0;
-    while (::waitpid(child, &status, 0) < 0)
+    while (::waitpid(child, &status, 0) < 0) {
         if (errno != EINTR) return report_missing(name, errno);
+    }
     if (WIFSIGNALED(status)) return 128 + WTERMSIG(status);
     return WEXITSTATUS(status);
 }

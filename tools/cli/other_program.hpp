@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The other programs of the tool box: hal-tools, hal-bus and hal-panel are beside `hal`, and built when they are first used.
+// The other programs of the tool box: hal-tools, hal-bus and hal-panel are beside `hal`, and built
+// when they are first used.
 #pragma once
 
 #include <string>
@@ -7,12 +8,13 @@
 
 namespace hal::tools {
 
-/// Replaces this process with the program of that name beside it, with the same arguments and capabilities; builds it first where
-/// build_on_demand() does that. Returns the exit status of the failure, after printing the reason. [setup]
+/// Replaces this process with the program of that name beside it, with the same arguments and
+/// capabilities; builds it first where build_on_demand() does that. Returns the exit status of the
+/// failure, after printing the reason. [setup]
 int become_program(const char* name, char** argv);
 
-/// Runs `hal-tools` with these arguments, the first of which is the name of a command, and waits for its end. Returns its exit status.
-/// [setup]
+/// Runs `hal-tools` with these arguments, the first of which is the name of a command, and waits
+/// for its end. Returns its exit status. [setup]
 int run_tool(std::vector<std::string> arguments);
 
 }  // namespace hal::tools

@@ -11,9 +11,9 @@
 #include <unistd.h>
 #include <utility>
 
+#include "cli/standard_streams.hpp"
 #include "hal/read_file.hpp"
 #include "hal/replace_file.hpp"
-#include "cli/standard_streams.hpp"
 
 namespace hal::tools {
 namespace {
@@ -37,19 +37,22 @@ int fail(const Options& options, std::string_view sentence) {
 
 bool print(std::string_view text) {
     if (write_all(STDOUT_FILENO, text)) return true;
-    if (errno != EPIPE && !std::exchange(output_lost, true) && std::ferror(stdout) == 0)
-        write_all(STDERR_FILENO, std::string("hal: cannot write to standard output: ") + std::strerror(errno) + "\n");
+    if (errno != EPIPE && !std::exchange(output_lost, true) && std::ferror(stdout) == 0) {
+        write_all(STDERR_FILENO, std::string("hal: cannot write to standard output: ") +
+                                     std::strerror(errno) + "\n");
+    }
     return false;
 }
 
 bool print_failed() { return output_lost; }
 
 void open_standard_streams() {
-    for (int file = ::open("/dev/null", O_RDWR); file >= 0; file = ::open("/dev/null", O_RDWR))
+    for (int file = ::open("/dev/null", O_RDWR); file >= 0; file = ::open("/dev/null", O_RDWR)) {
         if (file > STDERR_FILENO) {
             ::close(file);
             return;
         }
+    }
 }
 
 bool read_file(const std::string& path, std::string& text) {

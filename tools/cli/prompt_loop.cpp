@@ -11,8 +11,9 @@
 namespace hal::tools {
 
 int run_prompt_loop(LineExecutor& executor, const Prompt& prompt, int stop) {
-    Editor editor([&](std::string_view line, std::size_t cursor) { return executor.complete(line, cursor); }, stop,
-                  executor.meanwhile());
+    Editor editor([&](std::string_view line, std::size_t cursor) {
+        return executor.complete(line, cursor);
+    }, stop, executor.meanwhile());
     const bool person = ::isatty(STDIN_FILENO);
     int worst = 0;
     for (std::string line, more; !executor.over();) {

@@ -13,27 +13,40 @@ Raster::Raster(std::size_t columns, std::size_t rows, bool unicode)
       dots_(columns * rows),
       colours_(columns * rows) {}
 
-std::size_t Raster::cell(std::size_t x, std::size_t y) const { return unicode_ ? y / 4 * columns_ + x / 2 : y / 2 * columns_ + x; }
+std::size_t Raster::cell(std::size_t x, std::size_t y) const {
+    return unicode_ ? y / 4 * columns_ + x / 2 : y / 2 * columns_ + x;
+}
 
 void Raster::set(std::size_t x, std::size_t y, std::uint8_t colour) {
     if (x >= width_ || y >= height_) return;
-    static constexpr std::uint8_t bits[4][2] = {{0x01, 0x08}, {0x02, 0x10}, {0x04, 0x20}, {0x40, 0x80}};
+    static constexpr std::uint8_t bits[4][2] = {
+        {0x01, 0x08}, {0x02, 0x10}, {0x04, 0x20}, {0x40, 0x80}};
     const std::size_t at = cell(x, y);
     dots_[at] |= unicode_ ? bits[y % 4][x % 2] : static_cast<std::uint8_t>(1U << y % 2);
     colours_[at] = colour;
 }
 
-bool Raster::taken(std::size_t x, std::size_t y) const { return x < width_ && y < height_ && dots_[cell(x, y)] != 0; }
+bool Raster::taken(std::size_t x, std::size_t y) const {
+    return x < width_ && y < height_ && dots_[cell(x, y)] != 0;
+}
 
 void Raster::append(std::string& to, unsigned dots) const {
     static constexpr char marks[] = {' ', '\'', '.', ':'};
-    if (!unicode_) to += marks[dots & 3];
-    else to += {static_cast<char>(0xE2), static_cast<char>(0xA0 | dots >> 6), static_cast<char>(0x80 | (dots & 0x3F))};  // U+2800 + dots
+    if (!unicode_) {
+        to += marks[dots & 3];
+    }
+    // U+2800 + dots
+    else {
+        to += {static_cast<char>(0xE2), static_cast<char>(0xA0 | dots >> 6),
+               static_cast<char>(0x80 | (dots & 0x3F))};
+    }
 }
 
 std::vector<std::string> Raster::rows() const {
     std::vector<std::string> text(columns_ == 0 ? 0 : dots_.size() / columns_);
-    for (std::size_t i = 0; i < dots_.size(); ++i) append(text[i / columns_], dots_[i]);
+    for (std::size_t i = 0; i < dots_.size(); ++i) {
+        append(text[i / columns_], dots_[i]);
+    }
     return text;
 }
 
@@ -48,7 +61,9 @@ std::vector<std::string> Raster::coloured_rows() const {
             }
             append(text[row], dots_[i]);
         }
-        if (colour != 0) text[row] += "\033[39m";
+        if (colour != 0) {
+            text[row] += "\033[39m";
+        }
     }
     return text;
 }

@@ -8,7 +8,8 @@
 
 namespace hal::tools {
 
-/// Dots for the terminal: 2 x 4 per character (Braille), or 1 x 2 without Unicode. A character has one colour, that of its newest dot.
+/// Dots for the terminal: 2 x 4 per character (Braille), or 1 x 2 without Unicode. A character has
+/// one colour, that of its newest dot.
 class Raster {
 public:
     /// `columns` x `rows` characters.
@@ -16,7 +17,8 @@ public:
 
     std::size_t width() const { return width_; }    ///< in dots
     std::size_t height() const { return height_; }  ///< in dots
-    /// Sets a dot, x from the left, y from the top. `colour`: of the terminal's 256; 0: the default one. Outside: nothing.
+    /// Sets a dot, x from the left, y from the top. `colour`: of the terminal's 256; 0: the default
+    /// one. Outside: nothing.
     void set(std::size_t x, std::size_t y, std::uint8_t colour = 0);
     /// Returns true when a character has a dot already.
     bool taken(std::size_t x, std::size_t y) const;
@@ -32,7 +34,8 @@ private:
 
     std::size_t columns_, width_, height_;
     bool unicode_;
-    std::vector<std::uint8_t> dots_, colours_;  ///< per character: the bits of Braille, or 1 for the upper and 2 for the lower half
+    /// per character: the bits of Braille, or 1 for the upper and 2 for the lower half
+    std::vector<std::uint8_t> dots_, colours_;
 };
 
 }  // namespace hal::tools

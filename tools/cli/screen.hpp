@@ -10,8 +10,8 @@
 
 namespace hal::tools {
 
-/// The whole terminal during its lifetime: alternate screen, no cursor, keys without echo. Ctrl-C still sends SIGINT (use StopRequest);
-/// Ctrl-Z is off. The destructor restores the terminal.
+/// The whole terminal during its lifetime: alternate screen, no cursor, keys without echo. Ctrl-C
+/// still sends SIGINT (use StopRequest); Ctrl-Z is off. The destructor restores the terminal.
 class Screen {
 public:
     Screen();
@@ -22,15 +22,18 @@ public:
     bool measure();
     std::size_t columns() const { return columns_; }
     std::size_t rows() const { return rows_; }
-    /// Draws the lines that differ from the last frame, in one write. Returns false when the terminal is gone.
+    /// Draws the lines that differ from the last frame, in one write. Returns false when the
+    /// terminal is gone.
     bool draw(const std::vector<std::string>& lines);
-    /// Returns the keys typed so far; call it when standard input is readable, and after about 30 ms with nothing to read.
+    /// Returns the keys typed so far; call it when standard input is readable, and after about 30
+    /// ms with nothing to read.
     std::vector<Key> keys(bool readable);
 
 private:
     termios before_{};
     bool raw_ = false;
-    std::size_t columns_ = 0, rows_ = 0;
+    std::size_t columns_ = 0;
+    std::size_t rows_ = 0;
     std::vector<std::string> last_;
     std::string bytes_;
 };

@@ -24,23 +24,34 @@ namespace {
 sigset_t ending_signals() {
     sigset_t set;
     sigemptyset(&set);
-    for (const int number : {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGXCPU, SIGPWR}) sigaddset(&set, number);
+    for (const int number : {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGXCPU, SIGPWR}) {
+        sigaddset(&set, number);
+    }
     return set;
 }
 
-/// Nothing here uses these, and their default action ends the process. Programs that are started get the default action back.
+/// Nothing here uses these, and their default action ends the process. Programs that are started
+/// get the default action back.
 void ignore_unexpected() {
-    for (const int number : {SIGPIPE, SIGUSR1, SIGUSR2, SIGALRM, SIGVTALRM, SIGPROF, SIGIO, SIGSTKFLT, SIGXFSZ}) ::signal(number, SIG_IGN);
-    for (int number = SIGRTMIN; number <= SIGRTMAX; ++number) ::signal(number, SIG_IGN);
+    for (const int number :
+         {SIGPIPE, SIGUSR1, SIGUSR2, SIGALRM, SIGVTALRM, SIGPROF, SIGIO, SIGSTKFLT, SIGXFSZ}) {
+        ::signal(number, SIG_IGN);
+    }
+    for (int number = SIGRTMIN; number <= SIGRTMAX; ++number) {
+        ::signal(number, SIG_IGN);
+    }
 }
 
 }  // namespace
 
 std::string end_description(int status) {
     if (status == 0) return "ended";
-    if (status <= 128) return fmt::format("ended with exit status {}", status);
+    if (status <= 128) {
+        return fmt::format("ended with exit status {}", status);
+    }
     const char* const name = ::sigabbrev_np(status - 128);
-    return name ? fmt::format("was terminated by SIG{}", name) : fmt::format("was terminated by signal {}", status - 128);
+    return name ? fmt::format("was terminated by SIG{}", name)
+                : fmt::format("was terminated by signal {}", status - 128);
 }
 
 StopRequest::StopRequest() {
@@ -50,14 +61,18 @@ StopRequest::StopRequest() {
     event_ = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
     done_ = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
     signals_ = ::signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK);
-    if (event_ < 0 || done_ < 0 || signals_ < 0) throw std::system_error(errno, std::generic_category(), "cannot wait for signals");
+    if (event_ < 0 || done_ < 0 || signals_ < 0) {
+        throw std::system_error(errno, std::generic_category(), "cannot wait for signals");
+    }
     thread_ = std::thread([this] { serve(); });
 }
 
 void StopRequest::when_signalled(std::function<void()> told) {
     const std::lock_guard lock(mutex_);
     told_ = std::move(told);
-    if (signal() != 0 && told_) told_();
+    if (signal() != 0 && told_) {
+        told_();
+    }
 }
 
 void StopRequest::release() {
@@ -66,7 +81,8 @@ void StopRequest::release() {
     [[maybe_unused]] const ssize_t n = ::write(done_, &one, sizeof one);
     thread_.join();
     signalfd_siginfo info{};
-    while (::read(signals_, &info, sizeof info) == sizeof info) {  // a second Ctrl-C does not skip the clean-up
+    // a second Ctrl-C does not skip the clean-up
+    while (::read(signals_, &info, sizeof info) == sizeof info) {
     }
     sigset_t impatient;
     sigemptyset(&impatient);
@@ -76,13 +92,16 @@ void StopRequest::release() {
 
 StopRequest::~StopRequest() {
     release();
-    for (const int descriptor : {event_, done_, signals_}) ::close(descriptor);
+    for (const int descriptor : {event_, done_, signals_}) {
+        ::close(descriptor);
+    }
 }
 
 void StopRequest::request() noexcept {
     requested_.store(true, std::memory_order_release);
     const std::uint64_t one = 1;
-    [[maybe_unused]] const ssize_t n = ::write(event_, &one, sizeof one);  // an eventfd can only be full, and then it is readable
+    // an eventfd can only be full, and then it is readable
+    [[maybe_unused]] const ssize_t n = ::write(event_, &one, sizeof one);
 }
 
 void StopRequest::take_signals() {
@@ -93,7 +112,9 @@ void StopRequest::take_signals() {
             signal_.compare_exchange_strong(none, static_cast<int>(info.ssi_signo));
             request();
         }
-        if (told_) told_();
+        if (told_) {
+            told_();
+        }
     }
 }
 

@@ -7,7 +7,8 @@
 
 namespace hal::tools {
 
-/// Runs one instance a thousand cycles with random inputs and extreme parameters. Prints the findings; returns the exit code.
+/// Runs one instance a thousand cycles with random inputs and extreme parameters. Prints the
+/// findings; returns the exit code.
 int check_realtime(const Options& options, const BuiltPlugin& built, Language language);
 
 }  // namespace hal::tools

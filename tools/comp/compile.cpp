@@ -36,7 +36,10 @@ bool prepare_cpp(const Options&, const std::string&, PluginSource& source) {
 
 bool prepare_c(const Options& options, const std::string& path, PluginSource& source) {
     std::string text;
-    if (!read_file(path, text)) return fail(options, fmt::format("{}: {}", path, text)), false;
+    if (!read_file(path, text)) {
+        fail(options, fmt::format("{}: {}", path, text));
+        return false;
+    }
     source.language = Language::c;
     source.linuxcnc = true;
     source.program = comp::is_program(text);
@@ -45,12 +48,20 @@ bool prepare_c(const Options& options, const std::string& path, PluginSource& so
 
 bool prepare_comp(const Options& options, const std::string& path, PluginSource& source) {
     std::string text;
-    if (!read_file(path, text)) return fail(options, fmt::format("{}: {}", path, text)), false;
+    if (!read_file(path, text)) {
+        fail(options, fmt::format("{}: {}", path, text));
+        return false;
+    }
     Sources sources;
     Diagnostics diagnostics;
     auto made = comp::translate(sources, sources.add(path, std::move(text)), diagnostics);
     write_all(STDERR_FILENO, render(diagnostics, sources, colours(STDERR_FILENO)));
-    if (!made) return fail(options, fmt::format("'{}' has {}; nothing was installed", path, counted(diagnostics.errors(), "error"))), false;
+    if (!made) {
+        fail(options, fmt::format("'{}' has {}; nothing was installed", path,
+                                  counted(diagnostics.errors(), "error")));
+
+        return false;
+    }
     source.name = made->name;
     source.text = std::move(made->c);
     source.language = Language::c;
@@ -66,36 +77,51 @@ struct Kind {
     const char* extension;
     Prepare prepare;
 };
-constexpr Kind kinds[] = {{".cpp", prepare_cpp}, {".cc", prepare_cpp}, {".cxx", prepare_cpp}, {".c", prepare_c}, {".comp", prepare_comp}};
+constexpr Kind kinds[] = {{".cpp", prepare_cpp},
+                          {".cc", prepare_cpp},
+                          {".cxx", prepare_cpp},
+                          {".c", prepare_c},
+                          {".comp", prepare_comp}};
 
 /// The runtime looks into `folder` for plugins.
 bool searched(const std::string& folder) {
     std::error_code none;
     const auto wanted = fs::weakly_canonical(folder, none);
     const Plugins plugins;
-    return std::any_of(plugins.path().begin(), plugins.path().end(),
-                       [&](const std::string& one) { return fs::weakly_canonical(one, none) == wanted; });
+    return std::any_of(plugins.path().begin(), plugins.path().end(), [&](const std::string& one) {
+        return fs::weakly_canonical(one, none) == wanted;
+    });
 }
 
 std::string tilde(const std::string& path) {
     const char* home = std::getenv("HOME");
-    return home && *home && path.starts_with(std::string(home) + "/") ? "~" + path.substr(std::string(home).size()) : path;
+    return home && *home && path.starts_with(std::string(home) + "/")
+               ? "~" + path.substr(std::string(home).size())
+               : path;
 }
 
 void announce(const BuiltPlugin& built, bool program, bool elsewhere) {
     const std::string folder = fs::path(built.path).parent_path().string();
     if (program) {
-        print(fmt::format("{0}: a program; installed as {1}\nnext: in a netlist: loadusr -Wn {0} {2}\n", built.name, tilde(built.path),
-                          elsewhere ? built.path : built.name));
+        print(fmt::format(
+            "{0}: a program; installed as {1}\nnext: in a netlist: loadusr -Wn {0} {2}\n",
+            built.name, tilde(built.path), elsewhere ? built.path : built.name));
         return;
     }
     std::string text = fmt::format("{}: ", built.name);
-    if (built.needs.empty()) text += fmt::format("{}, {}; ", counted(built.pins, "pin"), counted(built.functions, "function"));
+    if (built.needs.empty()) {
+        text += fmt::format("{}, {}; ", counted(built.pins, "pin"),
+                            counted(built.functions, "function"));
+    }
     text += fmt::format("installed as {}\n", tilde(built.path));
     const std::string path = searched(folder) ? "" : fmt::format("HALCYON_PLUGIN_PATH={} ", folder);
     text += fmt::format("next: {}hal doc {}", path, built.name);
-    if (!built.needs.empty()) text += fmt::format("; it needs load arguments: {}", built.needs);
-    else if (!built.function.empty()) text += fmt::format(", or in a netlist: loadrt {}, then addf {} THREAD", built.name, built.function);
+    if (!built.needs.empty()) {
+        text += fmt::format("; it needs load arguments: {}", built.needs);
+    } else if (!built.function.empty()) {
+        text += fmt::format(", or in a netlist: loadrt {}, then addf {} THREAD", built.name,
+                            built.function);
+    }
     print(text + "\n");
 }
 
@@ -103,44 +129,67 @@ void announce(const BuiltPlugin& built, bool program, bool elsewhere) {
 
 int compile_file(const CompileOptions& options, const std::string& path) {
     const std::string extension = fs::path(path).extension().string();
-    const Kind* kind = std::find_if(std::begin(kinds), std::end(kinds), [&](const Kind& k) { return extension == k.extension; });
-    if (kind == std::end(kinds))
+    const Kind* kind = std::find_if(std::begin(kinds), std::end(kinds),
+                                    [&](const Kind& k) { return extension == k.extension; });
+    if (kind == std::end(kinds)) {
         return fail(options, fmt::format("unknown file type of '{}'; use .cpp, .c or .comp", path));
-    if (::access(path.c_str(), R_OK) != 0) return fail(options, fmt::format("{}: {}", path, std::strerror(errno)));
-    if (struct stat about{}; ::stat(path.c_str(), &about) == 0 && !S_ISREG(about.st_mode))  // a compiler would wait for the other end of a FIFO
-        return fail(options, fmt::format("'{}' cannot be compiled: {}", path, special_kind(about.st_mode)));
+    }
+    if (::access(path.c_str(), R_OK) != 0) {
+        return fail(options, fmt::format("{}: {}", path, std::strerror(errno)));
+    }
+    if (struct stat about{};
+        ::stat(path.c_str(), &about) == 0 &&
+        !S_ISREG(about.st_mode)) {  // a compiler would wait for the other end of a FIFO
+        return fail(options,
+                    fmt::format("'{}' cannot be compiled: {}", path, special_kind(about.st_mode)));
+    }
     PluginSource source;
     source.name = fs::path(path).stem().string();
     source.path = path;
     if (!kind->prepare(options, path, source)) return 1;
     source.program = source.program || (options.as_program && source.language == Language::c);
-    source.options.insert(source.options.end(), options.compile_args.begin(), options.compile_args.end());
+    source.options.insert(source.options.end(), options.compile_args.begin(),
+                          options.compile_args.end());
     source.options.insert(source.options.end(), options.link_args.begin(), options.link_args.end());
     BuildOptions build;
     build.folder = options.output;
-    if (options.keep) build.keep = source.name + (source.language == Language::cpp ? ".cpp" : ".c");
-    if (options.keep && !source.text)
-        return fail(options, fmt::format("--keep applies to .comp files only; '{}' is compiled directly", path));
+    if (options.keep) {
+        build.keep = source.name + (source.language == Language::cpp ? ".cpp" : ".c");
+    }
+    if (options.keep && !source.text) {
+        return fail(
+            options,
+            fmt::format("--keep applies to .comp files only; '{}' is compiled directly", path));
+    }
     bool printed = false;
     const auto print_messages = [&](const BuiltPlugin& built) {
-        if (!std::exchange(printed, true)) write_all(STDERR_FILENO, built.messages);
+        if (!std::exchange(printed, true)) {
+            write_all(STDERR_FILENO, built.messages);
+        }
     };
-    if (options.check_rt)
+    if (options.check_rt) {
         build.fit = [&](const BuiltPlugin& built) {
             print_messages(built);
             return check_realtime(options, built, source.language) == 0;
         };
+    }
     const BuiltPlugin built = build_plugin(source, build);
     print_messages(built);
     if (!built.good) return fail(options, built.problem);
-    if (!built.hint.empty()) write_all(STDERR_FILENO, fmt::format("{}: note: {}\n", options.program, built.hint));
-    if (!options.classic) announce(built, source.program, !options.output.empty());
+    if (!built.hint.empty()) {
+        write_all(STDERR_FILENO, fmt::format("{}: note: {}\n", options.program, built.hint));
+    }
+    if (!options.classic) {
+        announce(built, source.program, !options.output.empty());
+    }
     return 0;
 }
 
 int run_compile(const CompileOptions& options) {
     int worst = 0;
-    for (const std::string& path : options.words) worst = std::max(worst, compile_file(options, path));
+    for (const std::string& path : options.words) {
+        worst = std::max(worst, compile_file(options, path));
+    }
     return worst;
 }
 

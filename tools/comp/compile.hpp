@@ -10,16 +10,24 @@ namespace hal::tools {
 
 struct CompileOptions : Options {
     std::string output;  ///< the folder; empty: the user's
-    bool check_rt = false, keep = false;
-    std::vector<std::string> compile_args, link_args;  ///< halcompile: further words for the compiler
+    bool check_rt = false;
+    bool keep = false;
+    /// halcompile: further words for the compiler
+    std::vector<std::string> compile_args, link_args;
     bool as_program = false;                           ///< halcompile --userspace
     bool classic = false;                              ///< as halcompile: nothing is announced
 
     void declare(OptionSet& set) override {
-        set.words("FILE", "components: .cpp (hal/component.hpp), .comp (LinuxCNC's component language) or .c (LinuxCNC's hal.h)");
-        set.value("-o,--output", output, "DIR", "install here; default: ~/.local/share/halcyon/components");
-        set.flag("--check-rt", check_rt, "run 1000 cycles with random and extreme values and report violations of real time");
-        set.flag("--keep", keep, "keep the C code generated from a .comp file in the current folder");
+        set.words("FILE",
+                  "components: .cpp (hal/component.hpp), .comp (LinuxCNC's component language) or "
+                  ".c (LinuxCNC's hal.h)");
+        set.value("-o,--output", output, "DIR",
+                  "install here; default: ~/.local/share/halcyon/components");
+        set.flag(
+            "--check-rt", check_rt,
+            "run 1000 cycles with random and extreme values and report violations of real time");
+        set.flag("--keep", keep,
+                 "keep the C code generated from a .comp file in the current folder");
     }
 };
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// halcompile, with LinuxCNC's options: what it does beyond `hal compile` is the C text of a .comp file and a manual page as a file.
+// halcompile, with LinuxCNC's options: what it does beyond `hal compile` is the C text of a .comp
+// file and a manual page as a file.
 #include <algorithm>
 #include <cerrno>
 #include <cstdlib>
@@ -10,10 +11,10 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "comp/halcompile.hpp"
 #include "cli/output.hpp"
 #include "comp/comp.hpp"
 #include "comp/compile.hpp"
+#include "comp/halcompile.hpp"
 #include "comp/toolchain.hpp"
 #include "doc/page.hpp"
 #include "doc/page_asciidoc.hpp"
@@ -38,7 +39,8 @@ constexpr const char* usage =
     "Options:\n"
     "  -o, --outfile FILE           output file of the C code or the page\n"
     "  -u, --userspace              FILE.c is a program\n"
-    "  -P, --personalities N        accepted and ignored: the number of personalities is unlimited\n"
+    "  -P, --personalities N        accepted and ignored: the number of personalities is "
+    "unlimited\n"
     "      --extra-compile-args=ARGS, --extra-link-args=ARGS   further arguments for the compiler\n"
     "  -U, --unix                   accepted and ignored\n"
     "  -h, --help                   this\n"
@@ -49,15 +51,25 @@ enum Mode { preprocess, compile, install, document, asciidoc, view };
 std::string stem_of(const std::string& path) { return fs::path(path).stem().string(); }
 
 int to_c(const CompileOptions& options, const std::string& path) {
-    if (!path.ends_with(".comp")) return fail(options, fmt::format("'{}' is not a .comp file: there is nothing to preprocess", path));
+    if (!path.ends_with(".comp")) {
+        return fail(options,
+                    fmt::format("'{}' is not a .comp file: there is nothing to preprocess", path));
+    }
     std::string text;
-    if (!read_file(path, text)) return fail(options, fmt::format("{}: {}", path, text));
+    if (!read_file(path, text)) {
+        return fail(options, fmt::format("{}: {}", path, text));
+    }
     Sources sources;
     Diagnostics diagnostics;
     const auto made = comp::translate(sources, sources.add(path, std::move(text)), diagnostics);
     write_all(STDERR_FILENO, render(diagnostics, sources, colours(STDERR_FILENO)));
-    if (!made) return fail(options, fmt::format("'{}' has {}; nothing was written", path, counted(diagnostics.errors(), "error")));
-    const std::string problem = write_file(options.output.empty() ? fs::path(path).replace_extension(".c").string() : options.output, made->c);
+    if (!made) {
+        return fail(options, fmt::format("'{}' has {}; nothing was written", path,
+                                         counted(diagnostics.errors(), "error")));
+    }
+    const std::string problem = write_file(
+        options.output.empty() ? fs::path(path).replace_extension(".c").string() : options.output,
+        made->c);
     return problem.empty() ? 0 : fail(options, problem);
 }
 
@@ -68,8 +80,11 @@ int show(const Page& page, const TemporaryFolder& folder) {
     int status = 1;
     if (::isatty(STDOUT_FILENO) && write_file(file, as_man(page)).empty()) {
         const char* const words[] = {"man", "-l", file.c_str(), nullptr};
-        if (::posix_spawnp(&pid, words[0], nullptr, nullptr, const_cast<char* const*>(words), environ) == 0)
-            while (::waitpid(pid, &status, 0) < 0 && errno == EINTR) {}
+        if (::posix_spawnp(&pid, words[0], nullptr, nullptr, const_cast<char* const*>(words),
+                           environ) == 0) {
+            while (::waitpid(pid, &status, 0) < 0 && errno == EINTR) {
+            }
+        }
     }
     return status == 0 || print(as_text(page)) ? 0 : 1;
 }
@@ -83,15 +98,22 @@ int to_page(Mode mode, const CompileOptions& options, const std::string& path) {
     Diagnostics diagnostics;
     const Plugins plugins({temporary.path()});
     const std::string name = stem_of(path);
-    if (!fs::exists(temporary.file(name + ".so")))
-        return fail(options, fmt::format("'{}' is a program: its manual page cannot be made from its declarations", path));
+    if (!fs::exists(temporary.file(name + ".so"))) {
+        return fail(
+            options,
+            fmt::format("'{}' is a program: its manual page cannot be made from its declarations",
+                        path));
+    }
     const auto plugin = plugins.open(name, {}, diagnostics);
     Page page;
     std::string problem = plugin ? "" : "it cannot be opened";
-    if (!plugin || !gather(*plugin->component, page, problem)) return fail(options, fmt::format("'{}' has no manual page: {}", path, problem));
+    if (!plugin || !gather(*plugin->component, page, problem)) {
+        return fail(options, fmt::format("'{}' has no manual page: {}", path, problem));
+    }
     if (mode == view) return show(page, temporary);
     const bool adoc = mode == asciidoc;
-    problem = write_file(options.output.empty() ? name + (adoc ? ".adoc" : ".9") : options.output, adoc ? as_asciidoc(page) : as_man(page));
+    problem = write_file(options.output.empty() ? name + (adoc ? ".adoc" : ".9") : options.output,
+                         adoc ? as_asciidoc(page) : as_man(page));
     return problem.empty() ? 0 : fail(options, problem);
 }
 
@@ -110,22 +132,23 @@ int halcompile(int argc, char** argv) {
     options.classic = true;
     Mode mode = preprocess;
     enum { compile_args = 1000, link_args, modinc, adoc_word, view_word, install_doc };
-    static constexpr option words[] = {{"preprocess", no_argument, nullptr, 'p'},
-                                       {"compile", no_argument, nullptr, 'c'},
-                                       {"install", no_argument, nullptr, 'i'},
-                                       {"document", no_argument, nullptr, 'd'},
-                                       {"adoc", no_argument, nullptr, adoc_word},
-                                       {"view-doc", no_argument, nullptr, view_word},
-                                       {"install-doc", no_argument, nullptr, install_doc},
-                                       {"outfile", required_argument, nullptr, 'o'},
-                                       {"userspace", no_argument, nullptr, 'u'},
-                                       {"personalities", required_argument, nullptr, 'P'},
-                                       {"extra-compile-args", required_argument, nullptr, compile_args},
-                                       {"extra-link-args", required_argument, nullptr, link_args},
-                                       {"unix", no_argument, nullptr, 'U'},
-                                       {"print-modinc", no_argument, nullptr, modinc},
-                                       {"help", no_argument, nullptr, 'h'},
-                                       {nullptr, 0, nullptr, 0}};
+    static constexpr option words[] = {
+        {"preprocess", no_argument, nullptr, 'p'},
+        {"compile", no_argument, nullptr, 'c'},
+        {"install", no_argument, nullptr, 'i'},
+        {"document", no_argument, nullptr, 'd'},
+        {"adoc", no_argument, nullptr, adoc_word},
+        {"view-doc", no_argument, nullptr, view_word},
+        {"install-doc", no_argument, nullptr, install_doc},
+        {"outfile", required_argument, nullptr, 'o'},
+        {"userspace", no_argument, nullptr, 'u'},
+        {"personalities", required_argument, nullptr, 'P'},
+        {"extra-compile-args", required_argument, nullptr, compile_args},
+        {"extra-link-args", required_argument, nullptr, link_args},
+        {"unix", no_argument, nullptr, 'U'},
+        {"print-modinc", no_argument, nullptr, modinc},
+        {"help", no_argument, nullptr, 'h'},
+        {nullptr, 0, nullptr, 0}};
     for (int letter; (letter = ::getopt_long(argc, argv, "pcido:uP:Uh", words, nullptr)) != -1;) {
         switch (letter) {
         case 'p': mode = preprocess; break;
@@ -138,8 +161,11 @@ int halcompile(int argc, char** argv) {
         case 'u': options.as_program = true; break;
         case 'P': {
             char* end = nullptr;
-            if (const long number = std::strtol(::optarg, &end, 10); *::optarg == '\0' || *end != '\0' || number < 1)
-                return fail(options, fmt::format("--personalities={}: write a number from 1", ::optarg));
+            if (const long number = std::strtol(::optarg, &end, 10);
+                *::optarg == '\0' || *end != '\0' || number < 1) {
+                return fail(options,
+                            fmt::format("--personalities={}: write a number from 1", ::optarg));
+            }
             break;
         }
         case compile_args:
@@ -149,20 +175,36 @@ int halcompile(int argc, char** argv) {
             to.insert(to.end(), given.begin(), given.end());
             break;
         }
-        case modinc: return fail(options, "--print-modinc is for LinuxCNC's makefiles; build with --compile or --install");
-        case install_doc: return fail(options, "--install-doc is not needed: the page is in the plugin; --install it, then type: hal doc NAME");
+        case modinc:
+            return fail(
+                options,
+                "--print-modinc is for LinuxCNC's makefiles; build with --compile or --install");
+        case install_doc:
+            return fail(options,
+                        "--install-doc is not needed: the page is in the plugin; --install it, "
+                        "then type: hal doc NAME");
         case 'U': break;
         case 'h': return print(usage) ? 0 : 1;
         default: return 1;
         }
     }
     options.words.assign(argv + ::optind, argv + argc);
-    if (options.words.empty()) return fail(options, "missing file; type: halcompile --install FILE.comp; --help lists the options");
-    if (!options.output.empty() && (mode == compile || mode == install || mode == view))
-        return fail(options, "-o is for --preprocess, --document and --adoc; to build into another folder: hal compile --output DIR FILE");
-    if (!options.output.empty() && options.words.size() > 1) return fail(options, "-o takes one file");
+    if (options.words.empty()) {
+        return fail(options,
+                    "missing file; type: halcompile --install FILE.comp; --help lists the options");
+    }
+    if (!options.output.empty() && (mode == compile || mode == install || mode == view)) {
+        return fail(options,
+                    "-o is for --preprocess, --document and --adoc; to build into another folder: "
+                    "hal compile --output DIR FILE");
+    }
+    if (!options.output.empty() && options.words.size() > 1) {
+        return fail(options, "-o takes one file");
+    }
     int worst = 0;
-    for (const std::string& path : options.words) worst = std::max(worst, carry_out(mode, options, path));
+    for (const std::string& path : options.words) {
+        worst = std::max(worst, carry_out(mode, options, path));
+    }
     return worst;
 }
 

@@ -28,28 +28,43 @@ std::string inline_text(std::string_view line) {
                 const std::size_t end = which == '[' ? line.find(']', i) : i + 2;
                 font("");
                 i = std::min(end, line.size() - 1);
-            } else font(which == 'B' ? "**" : which == 'I' ? "*" : "");
+            } else {
+                font(which == 'B' ? "**" : which == 'I' ? "*" : "");
+            }
         } else if (c == '(' && i + 2 < line.size()) {
             const std::string_view name = line.substr(i + 1, 2);
             i += 2;
             static constexpr std::pair<std::string_view, const char*> characters[] = {
-                {"bu", "•"}, {"em", "—"}, {"en", "–"}, {"mu", "×"}, {"di", "÷"}, {"+-", "±"}, {"<=", "≤"},
-                {">=", "≥"}, {"!=", "≠"}, {"->", "→"}, {"<-", "←"}, {"de", "°"}, {"aq", "'"}, {"dq", "\""},
-                {"lq", "“"}, {"rq", "”"}, {"co", "©"}, {"mc", "µ"}, {"*p", "π"}, {"sr", "√"}};
-            for (const auto& [key, character] : characters)
-                if (key == name) out += character;
-        } else if (c == 'e' || c == '\\') out += '\\';
-        else if (c == '&' || c == '|' || c == '^' || c == '/' || c == ',' || c == 'c' || c == ':') continue;
-        else if (c == '"') break;  // a comment
-        else if (c == '~' || c == ' ' || c == '0') out += ' ';
-        else out += c;  // \- and the like
+                {"bu", "•"}, {"em", "—"}, {"en", "–"}, {"mu", "×"},  {"di", "÷"},
+                {"+-", "±"}, {"<=", "≤"}, {">=", "≥"}, {"!=", "≠"},  {"->", "→"},
+                {"<-", "←"}, {"de", "°"}, {"aq", "'"}, {"dq", "\""}, {"lq", "“"},
+                {"rq", "”"}, {"co", "©"}, {"mc", "µ"}, {"*p", "π"},  {"sr", "√"}};
+            for (const auto& [key, character] : characters) {
+                if (key == name) {
+                    out += character;
+                }
+            }
+        } else if (c == 'e' || c == '\\') {
+            out += '\\';
+        } else if (c == '&' || c == '|' || c == '^' || c == '/' || c == ',' || c == 'c' ||
+                   c == ':') {
+            continue;
+        } else if (c == '"') {
+            break;  // a comment
+        } else if (c == '~' || c == ' ' || c == '0') {
+            out += ' ';
+        } else {
+            out += c;  // \- and the like
+        }
     }
     return out + open;
 }
 
 std::string_view trimmed(std::string_view text) {
     const std::size_t begin = text.find_first_not_of(" \t\n");
-    return begin == std::string_view::npos ? std::string_view() : text.substr(begin, text.find_last_not_of(" \t\n") - begin + 1);
+    return begin == std::string_view::npos
+               ? std::string_view()
+               : text.substr(begin, text.find_last_not_of(" \t\n") - begin + 1);
 }
 
 // The arguments of a macro: words, or in quotes.
@@ -77,18 +92,26 @@ public:
             line(text.substr(at, end - at));
             at = end + 1;
         }
-        if (verbatim_) verbatim(false);
+        if (verbatim_) {
+            verbatim(false);
+        }
         return std::string(trimmed(out_));
     }
 
 private:
     void paragraph() {
-        while (out_.ends_with(' ')) out_.pop_back();
-        if (!out_.empty() && !out_.ends_with("\n\n")) out_ += out_.ends_with('\n') ? "\n" : "\n\n";
+        while (out_.ends_with(' ')) {
+            out_.pop_back();
+        }
+        if (!out_.empty() && !out_.ends_with("\n\n")) {
+            out_ += out_.ends_with('\n') ? "\n" : "\n\n";
+        }
     }
     void verbatim(bool on) {
         if (on == verbatim_) return;
-        if (on) paragraph();
+        if (on) {
+            paragraph();
+        }
         out_ += "```\n";
         verbatim_ = on;
     }
@@ -103,37 +126,62 @@ private:
     }
     void macro(std::string_view line) {
         const bool fonts = line.starts_with(".B") || line.starts_with(".I ");
-        if (fonts) tag_ = false;
+        if (fonts) {
+            tag_ = false;
+        }
         const std::size_t end = std::min(line.find_first_of(" \t", 1), line.size());
         const std::string_view name = line.substr(1, end - 1);
         std::vector<std::string> words = arguments(line.substr(end));
-        for (std::string& word : words) word = inline_text(word);
+        for (std::string& word : words) {
+            word = inline_text(word);
+        }
         std::string all;
-        for (const std::string& word : words) all += (all.empty() ? "" : " ") + word;
-        if (name == "nf" || name == "EX") verbatim(true);
-        else if (name == "fi" || name == "EE") verbatim(false);
-        else if (name == "P" || name == "PP" || name == "LP" || name == "sp" || name == "RS" || name == "RE") paragraph();
-        else if (name == "br") {
-            if (!out_.empty() && !verbatim_) out_ += out_.ends_with('\n') ? (out_.insert(out_.size() - 1, "\\"), "") : "\\\n";
-        } else if (name == "TP" || name == "TQ") paragraph(), tag_ = true;
-        else if (name == "IP" || name == "HP") {
+        for (const std::string& word : words) {
+            all += (all.empty() ? "" : " ") + word;
+        }
+        if (name == "nf" || name == "EX") {
+            verbatim(true);
+        } else if (name == "fi" || name == "EE") {
+            verbatim(false);
+        } else if (name == "P" || name == "PP" || name == "LP" || name == "sp" || name == "RS" ||
+                   name == "RE") {
+            paragraph();
+        } else if (name == "br") {
+            if (!out_.empty() && !verbatim_) {
+                out_ += out_.ends_with('\n') ? (out_.insert(out_.size() - 1, "\\"), "") : "\\\n";
+            }
+        } else if (name == "TP" || name == "TQ") {
+            paragraph();
+            tag_ = true;
+        } else if (name == "IP" || name == "HP") {
             paragraph();
             const std::string mark = words.empty() ? "" : plain(words[0]);
-            if (mark == "•" || mark == "-" || mark == "*" || mark == "o" || mark == "·") out_ += "- ";
-            else if (!mark.empty()) out_ += "**" + mark + "**\n";
-        } else if (name == "SH" || name == "SS") paragraph(), out_ += (name == "SH" ? "## " : "### ") + all + "\n\n";
-        else if (name == "B" || name == "SB") out_ += "**" + all + "**\n";
-        else if (name == "I") out_ += "*" + all + "*\n";
-        else if (name.size() == 2 && name.find_first_not_of("BIR") == std::string_view::npos) {  // fonts in turn, without blanks
+            if (mark == "•" || mark == "-" || mark == "*" || mark == "o" || mark == "·") {
+                out_ += "- ";
+            } else if (!mark.empty()) {
+                out_ += "**" + mark + "**\n";
+            }
+        } else if (name == "SH" || name == "SS") {
+            paragraph();
+            out_ += (name == "SH" ? "## " : "### ") + all + "\n\n";
+        } else if (name == "B" || name == "SB") {
+            out_ += "**" + all + "**\n";
+        } else if (name == "I") {
+            out_ += "*" + all + "*\n";
+        } else if (name.size() == 2 &&
+                   name.find_first_not_of("BIR") ==
+                       std::string_view::npos) {  // fonts in turn, without blanks
             for (std::size_t i = 0; i < words.size(); ++i) {
                 const std::string mark = name[i % 2] == 'B' ? "**" : name[i % 2] == 'I' ? "*" : "";
                 out_ += mark + words[i] + mark;
             }
             out_ += '\n';
-        } else if (name.empty() || name.starts_with("\\\"") || name == "TH" || name == "ft" || name == "ad" || name == "na" ||
-                   name == "in" || name == "ti")
+        } else if (name.empty() || name.starts_with("\\\"") || name == "TH" || name == "ft" ||
+                   name == "ad" || name == "na" || name == "in" || name == "ti") {
             return;
-        else (out_ += inline_text(line)) += '\n';  // not a macro after all: ".5 is a half"
+        } else {
+            (out_ += inline_text(line)) += '\n';  // not a macro after all: ".5 is a half"
+        }
     }
     static std::string plain(std::string text) {
         std::erase(text, '*');
@@ -142,14 +190,17 @@ private:
     static std::string raw_text(std::string_view line) { return plain(inline_text(line)); }
 
     std::string out_;
-    bool verbatim_ = false, tag_ = false;
+    bool verbatim_ = false;
+    bool tag_ = false;
 };
 
 std::string joined(const std::vector<Text>& texts, const char* between) {
     std::string all;
     for (const Text& text : texts) {
         const std::string converted = markdown_of(text.text);
-        if (!converted.empty()) all += (all.empty() ? "" : between) + converted;
+        if (!converted.empty()) {
+            all += (all.empty() ? "" : between) + converted;
+        }
     }
     return all;
 }
@@ -162,26 +213,37 @@ std::string line_of(std::string_view text) {
     std::string line;
     for (const char c : markdown_of(text)) {
         const bool blank = c == '\n' || c == ' ';
-        if (!blank || !line.ends_with(' ')) line += blank ? ' ' : c;
+        if (!blank || !line.ends_with(' ')) {
+            line += blank ? ' ' : c;
+        }
     }
     return std::string(trimmed(line));
 }
 
 std::string manual(const Tree& tree) {
     std::string all = joined(tree.description, "\n\n");
-    const auto section = [&](const char* title, const std::vector<Text>& texts, const char* between) {
-        if (const std::string text = joined(texts, between); !text.empty())
+    const auto section = [&](const char* title, const std::vector<Text>& texts,
+                             const char* between) {
+        if (const std::string text = joined(texts, between); !text.empty()) {
             all += (all.empty() ? "## " : "\n\n## ") + std::string(title) + "\n\n" + text;
+        }
     };
     // what an instance without load arguments does not show
     std::vector<Text> personal;
     for (const Item& item : tree.items) {
         if (!item.condition.given() && !item.count.given()) continue;
         static constexpr const char* dirs[] = {"in", "out", "io", "rw"};
-        std::string row = "- " + item.name.hal + " (" + name(item.type) + " " + dirs[static_cast<std::size_t>(item.dir)] + ")";
-        if (item.count.given()) row += ", as many as " + item.count.text + " and at most " + std::to_string(item.size);
-        if (item.condition.given()) row += ", if " + item.condition.text;
-        if (const std::string doc = line_of(item.doc.text); !doc.empty()) row += ": " + doc;
+        std::string row = "- " + item.name.hal + " (" + name(item.type) + " " +
+                          dirs[static_cast<std::size_t>(item.dir)] + ")";
+        if (item.count.given()) {
+            row += ", as many as " + item.count.text + " and at most " + std::to_string(item.size);
+        }
+        if (item.condition.given()) {
+            row += ", if " + item.condition.text;
+        }
+        if (const std::string doc = line_of(item.doc.text); !doc.empty()) {
+            row += ": " + doc;
+        }
         personal.push_back({row, item.name.span});
     }
     section("Pins that depend on the personality", personal, "\n");

@@ -7,7 +7,9 @@ namespace hal::comp {
 namespace {
 
 bool separates(char c) { return c == '.' || c == '_' || c == '-'; }
-bool is_word(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_'; }
+bool is_word(char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
+}
 
 // `code` from `at` on: behind the comment or the literal that starts there, or at itself.
 std::size_t behind_text(std::string_view code, std::size_t at) {
@@ -18,8 +20,11 @@ std::size_t behind_text(std::string_view code, std::size_t at) {
     }
     if (code[at] != '"' && code[at] != '\'') return at;
     const char quote = code[at];
-    for (++at; at < code.size() && code[at] != quote && code[at] != '\n'; ++at)
-        if (code[at] == '\\') ++at;
+    for (++at; at < code.size() && code[at] != quote && code[at] != '\n'; ++at) {
+        if (code[at] == '\\') {
+            ++at;
+        }
+    }
     return std::min(at + 1, code.size());
 }
 
@@ -30,13 +35,21 @@ Name spelled(Text written) {
     const std::string& text = written.text;
     name.hal = text;
     std::replace(name.hal.begin(), name.hal.end(), '_', '-');
-    while (!name.hal.empty() && (name.hal.back() == '-' || name.hal.back() == '.')) name.hal.pop_back();
+    while (!name.hal.empty() && (name.hal.back() == '-' || name.hal.back() == '.')) {
+        name.hal.pop_back();
+    }
     for (const char c : text) {
         if (c == '#') {
-            while (!name.c.empty() && separates(name.c.back())) name.c.pop_back();
+            while (!name.c.empty() && separates(name.c.back())) {
+                name.c.pop_back();
+            }
         } else if (separates(c)) {
-            if (!name.c.ends_with('_')) name.c += '_';
-        } else name.c += c;
+            if (!name.c.ends_with('_')) {
+                name.c += '_';
+            }
+        } else {
+            name.c += c;
+        }
     }
     static_cast<Text&>(name) = std::move(written);
     return name;
@@ -47,7 +60,9 @@ std::string numbered(const std::string& name, unsigned index) {
     if (at == std::string::npos) return name;
     const std::size_t width = std::min(name.find_first_not_of('#', at), name.size()) - at;
     std::string digits = std::to_string(index);
-    if (digits.size() < width) digits.insert(0, width - digits.size(), '0');
+    if (digits.size() < width) {
+        digits.insert(0, width - digits.size(), '0');
+    }
     return std::string(name).replace(at, width, digits);
 }
 
@@ -57,9 +72,13 @@ std::size_t find_word(std::string_view code, std::string_view word, std::size_t 
             at = behind;
         } else if (is_word(code[at])) {
             const std::size_t begin = at;
-            while (at < code.size() && is_word(code[at])) ++at;
+            while (at < code.size() && is_word(code[at])) {
+                ++at;
+            }
             if (code.substr(begin, at - begin) == word) return begin;
-        } else ++at;
+        } else {
+            ++at;
+        }
     }
     return std::string_view::npos;
 }

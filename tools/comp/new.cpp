@@ -24,36 +24,40 @@ namespace {
 namespace fs = std::filesystem;
 
 // @NAME@ is the component's name, @TYPE@ the same as a type, @PACKAGE@ where find_package looks.
-constexpr std::string_view source = R"CPP(// SPDX-License-Identifier: MIT
+constexpr std::string_view source =
+    R"CPP(// SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <cmath>
 
 #include "hal/component.hpp"
 
-namespace {
+          namespace {
 
-struct @TYPE@ : hal::Component {
-    using Component::Component;
+          struct @TYPE @ : hal::Component {
+              using Component::Component;
 
-    hal::In<double>    in{*this, "in", "target position of out"};
-    hal::In<bool>      hold{*this, "hold", "TRUE holds out at its position"};
-    hal::Out<double>   out{*this, "out", "follows in", {.finite = true}};
-    hal::Out<bool>     there{*this, "there", "TRUE while out is equal to in"};
-    hal::Param<double> max_speed{*this, "max-speed", "maximum speed of out", {.initial = 1.0, .unit = "1/s"}};
-    hal::Function      run{*this, "", &@TYPE@::update, "one step"};
+              hal::In<double> in{*this, "in", "target position of out"};
+              hal::In<bool> hold{*this, "hold", "TRUE holds out at its position"};
+              hal::Out<double> out{*this, "out", "follows in", {.finite = true}};
+              hal::Out<bool> there{*this, "there", "TRUE while out is equal to in"};
+              hal::Param<double> max_speed{
+                  *this, "max-speed", "maximum speed of out", {.initial = 1.0, .unit = "1/s"}};
+              hal::Function run { *this, "", &@TYPE @ ::update, "one step" };
 
     // Runs in every cycle: it must not allocate, lock, block, log or throw.
-    void update(hal::Cycle cycle) noexcept {
-        const double distance = in - out;
-        const double step = std::fabs(max_speed) * cycle.seconds();
-        if (!hold && std::isfinite(distance) && std::isfinite(step)) out = out + std::clamp(distance, -step, step);
-        there = out == in;
-    }
-};
+              void update(hal::Cycle cycle) noexcept {
+                  const double distance = in - out;
+                  const double step = std::fabs(max_speed) * cycle.seconds();
+                  if (!hold && std::isfinite(distance) && std::isfinite(step)) {
+                      out = out + std::clamp(distance, -step, step);
+                  }
+                  there = out == in;
+              }
+          };
 
-}  // namespace
+          }  // namespace
 
-HAL_COMPONENT(@TYPE@, "@NAME@", "Follows its input at a limited speed", R"(
+          HAL_COMPONENT(@TYPE @, "@NAME@", "Follows its input at a limited speed", R"(
 In each cycle `out` moves towards `in`, by at most `max-speed` times the period. While `in` is not a number `out` stays.
 
     loadrt @NAME@ names=slow
@@ -62,7 +66,7 @@ In each cycle `out` moves towards `in`, by at most `max-speed` times the period.
     net wanted => slow.in
     net moved  <= slow.out
 )")
-)CPP";
+    )CPP";
 
 constexpr std::string_view project = R"CMAKE(# SPDX-License-Identifier: MIT
 cmake_minimum_required(VERSION 3.25)
@@ -97,12 +101,18 @@ getp    it.out
 constexpr std::string_view expected = "0.2\nFALSE\n1\nTRUE\n1\n";
 
 constexpr std::string_view keywords[] = {
-    "alignas", "alignof", "and", "and_eq", "asm", "auto", "bitand", "bitor", "bool", "break", "case", "catch", "char", "class", "compl",
-    "concept", "const", "consteval", "constexpr", "constinit", "continue", "decltype", "default", "delete", "do", "double", "else", "enum",
-    "explicit", "export", "extern", "false", "float", "for", "friend", "goto", "if", "inline", "int", "long", "mutable", "namespace", "new",
-    "noexcept", "not", "not_eq", "nullptr", "operator", "or", "or_eq", "private", "protected", "public", "register", "requires", "return",
-    "short", "signed", "sizeof", "static", "struct", "switch", "template", "this", "throw", "true", "try", "typedef", "typeid", "typename",
-    "union", "unsigned", "using", "virtual", "void", "volatile", "while", "xor", "xor_eq"};
+    "alignas",  "alignof",  "and",       "and_eq",    "asm",       "auto",      "bitand",
+    "bitor",    "bool",     "break",     "case",      "catch",     "char",      "class",
+    "compl",    "concept",  "const",     "consteval", "constexpr", "constinit", "continue",
+    "decltype", "default",  "delete",    "do",        "double",    "else",      "enum",
+    "explicit", "export",   "extern",    "false",     "float",     "for",       "friend",
+    "goto",     "if",       "inline",    "int",       "long",      "mutable",   "namespace",
+    "new",      "noexcept", "not",       "not_eq",    "nullptr",   "operator",  "or",
+    "or_eq",    "private",  "protected", "public",    "register",  "requires",  "return",
+    "short",    "signed",   "sizeof",    "static",    "struct",    "switch",    "template",
+    "this",     "throw",    "true",      "try",       "typedef",   "typeid",    "typename",
+    "union",    "unsigned", "using",     "virtual",   "void",      "volatile",  "while",
+    "xor",      "xor_eq"};
 
 bool letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }
 bool digit(char c) { return c >= '0' && c <= '9'; }
@@ -111,29 +121,45 @@ bool digit(char c) { return c >= '0' && c <= '9'; }
 std::string repaired(const std::string& name) {
     std::string good;
     for (const char c : name) {
-        if (letter(c) || (digit(c) && !good.empty())) good += c;
-        else if (!good.empty() && good.back() != '-') good += c == '_' ? '_' : '-';
+        if (letter(c) || (digit(c) && !good.empty())) {
+            good += c;
+        } else if (!good.empty() && good.back() != '-') {
+            good += c == '_' ? '_' : '-';
+        }
     }
-    while (!good.empty() && !letter(good.back()) && !digit(good.back())) good.pop_back();
+    while (!good.empty() && !letter(good.back()) && !digit(good.back())) {
+        good.pop_back();
+    }
     return good.empty() ? "my-part" : good;
 }
 
 std::string problem_of(const std::string& name) {
-    const bool plain = std::all_of(name.begin(), name.end(), [](char c) { return letter(c) || digit(c) || c == '-' || c == '_'; });
+    const bool plain = std::all_of(name.begin(), name.end(), [](char c) {
+        return letter(c) || digit(c) || c == '-' || c == '_';
+    });
     constexpr std::size_t longest = 40;
-    if (!plain || name.empty() || !letter(name.front()) || name.back() == '-' || name.back() == '_')
+    if (!plain || name.empty() || !letter(name.front()) || name.back() == '-' ||
+        name.back() == '_') {
         return fmt::format(
-            "invalid component name '{}': use a letter, then letters, digits, - and _; try: hal new component {}",
+            "invalid component name '{}': use a letter, then letters, digits, - and _; try: hal "
+            "new component {}",
             name, repaired(name));
-    if (name.size() > longest) return fmt::format("the name has {} characters; the limit is {}", name.size(), longest);
+    }
+    if (name.size() > longest) {
+        return fmt::format("the name has {} characters; the limit is {}", name.size(), longest);
+    }
     std::string underlined = name;
     std::replace(underlined.begin(), underlined.end(), '-', '_');
-    if (std::find(std::begin(keywords), std::end(keywords), underlined) != std::end(keywords))
+    if (std::find(std::begin(keywords), std::end(keywords), underlined) != std::end(keywords)) {
         return fmt::format("'{0}' is a C++ keyword; try: hal new component my-{0}", name);
+    }
     for (const std::string& there : Plugins().available()) {
         std::string other = there;
         std::replace(other.begin(), other.end(), '-', '_');
-        if (other == underlined) return fmt::format("component '{0}' already exists (see: hal doc {0}); choose another name", there);
+        if (other == underlined) {
+            return fmt::format(
+                "component '{0}' already exists (see: hal doc {0}); choose another name", there);
+        }
     }
     return {};
 }
@@ -157,9 +183,12 @@ std::string filled(std::string_view text, const std::string& name, const std::st
     std::string result(text);
     const std::array<std::pair<std::string_view, std::string>, 3> words{
         {{"@NAME@", name}, {"@TYPE@", type_of(name)}, {"@PACKAGE@", package}}};
-    for (const auto& [word, value] : words)
-        for (std::size_t at = 0; (at = result.find(word, at)) != std::string::npos; at += value.size())
+    for (const auto& [word, value] : words) {
+        for (std::size_t at = 0; (at = result.find(word, at)) != std::string::npos;
+             at += value.size()) {
             result.replace(at, word.size(), value);
+        }
+    }
     return result;
 }
 
@@ -174,29 +203,40 @@ std::string formatted(std::string text) {
 bool has_package(const fs::path& prefix) {
     std::error_code none;
     if (fs::exists(prefix / "lib/cmake/Halcyon/HalcyonConfig.cmake", none)) return true;
-    for (const auto& folder : fs::directory_iterator(prefix / "lib", none))  // lib/x86_64-linux-gnu
+    for (const auto& folder :
+         fs::directory_iterator(prefix / "lib", none)) {  // lib/x86_64-linux-gnu
         if (fs::exists(folder.path() / "cmake/Halcyon/HalcyonConfig.cmake", none)) return true;
+    }
     return false;
 }
 
-/// The path that find_package needs: this program's installation or build tree, unless CMake finds one by itself
-/// (in the system's folders, and beside the folders of PATH).
+/// The path that find_package needs: this program's installation or build tree, unless CMake finds
+/// one by itself (in the system's folders, and beside the folders of PATH).
 std::string package_hint() {
     std::error_code none;
     std::vector<fs::path> found_anyway{"/usr", "/usr/local"};
     std::istringstream folders(std::getenv("PATH") ? std::getenv("PATH") : "");
-    for (std::string folder; std::getline(folders, folder, ':');)
-        if (const fs::path path(folder); path.filename() == "bin" || path.filename() == "sbin") found_anyway.push_back(path.parent_path());
-    if (std::any_of(found_anyway.begin(), found_anyway.end(), has_package)) return {};
+    for (std::string folder; std::getline(folders, folder, ':');) {
+        if (const fs::path path(folder); path.filename() == "bin" || path.filename() == "sbin") {
+            found_anyway.push_back(path.parent_path());
+        }
+    }
+    if (std::any_of(found_anyway.begin(), found_anyway.end(), has_package)) {
+        return {};
+    }
     const fs::path prefix = fs::read_symlink("/proc/self/exe", none).parent_path().parent_path();
     return has_package(prefix) ? prefix.string() : "";
 }
 
 std::string shell_word(const std::string& word) {
-    const bool plain = std::all_of(word.begin(), word.end(), [](char c) { return letter(c) || digit(c) || std::strchr("-_./+,=:@%", c); });
+    const bool plain = std::all_of(word.begin(), word.end(), [](char c) {
+        return letter(c) || digit(c) || std::strchr("-_./+,=:@%", c);
+    });
     if (plain) return word;
     std::string quoted = "'";
-    for (const char c : word) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
+    for (const char c : word) {
+        quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
+    }
     return quoted + "'";
 }
 
@@ -205,40 +245,59 @@ std::string shell_word(const std::string& word) {
 int run_new(const NewOptions& options) {
     const auto& words = options.words;
     if (words.empty() || words[0] != "component") {
-        const std::string hint =
-            words.size() == 1 && problem_of(words[0]).empty() ? "hal new component " + words[0] : "hal new component NAME";
-        return fail(options, fmt::format("missing kind: only components can be created; type: {}", hint));
+        const std::string hint = words.size() == 1 && problem_of(words[0]).empty()
+                                     ? "hal new component " + words[0]
+                                     : "hal new component NAME";
+        return fail(options,
+                    fmt::format("missing kind: only components can be created; type: {}", hint));
     }
-    if (words.size() != 2)
-        return fail(options, words.size() < 2
-                                 ? "missing name; type: hal new component NAME"
-                                 : fmt::format("expected one name, not {}; a name contains no blanks: hal new component {}",
-                                               words.size() - 1, repaired(words[1] + "-" + words[2])));
+    if (words.size() != 2) {
+        return fail(
+            options,
+            words.size() < 2
+                ? "missing name; type: hal new component NAME"
+                : fmt::format(
+                      "expected one name, not {}; a name contains no blanks: hal new component {}",
+                      words.size() - 1, repaired(words[1] + "-" + words[2])));
+    }
     const std::string& name = words[1];
     if (const std::string why = problem_of(name); !why.empty()) return fail(options, why);
 
     std::error_code problem;
     const fs::path folder = options.folder.empty() ? fs::path(name) : fs::path(options.folder);
     const bool there = fs::exists(fs::symlink_status(folder, problem));
-    if (there && !(fs::is_directory(folder, problem) && fs::is_empty(folder, problem)))
-        return fail(options, fmt::format("'{}' exists already; give the new component another folder: hal new component {} --folder DIR",
+    if (there && !(fs::is_directory(folder, problem) && fs::is_empty(folder, problem))) {
+        return fail(options, fmt::format("'{}' exists already; give the new component another "
+                                         "folder: hal new component {} --folder DIR",
                                          folder.string(), name));
+    }
     fs::create_directories(folder, problem);
-    if (problem) return fail(options, fmt::format("cannot create '{}': {}", folder.string(), problem.message()));
+    if (problem) {
+        return fail(options,
+                    fmt::format("cannot create '{}': {}", folder.string(), problem.message()));
+    }
 
     const std::string package = package_hint();
     const std::array<std::pair<std::string, std::string_view>, 4> files{
-        {{name + ".cpp", source}, {"CMakeLists.txt", project}, {"test.hal", netlist}, {"expected", expected}}};
+        {{name + ".cpp", source},
+         {"CMakeLists.txt", project},
+         {"test.hal", netlist},
+         {"expected", expected}}};
     for (const auto& [file, text] : files) {
-        const std::string content = filled(text, name, package.empty() ? "" : fmt::format(" HINTS \"{}\"", package));
-        if (const std::string why = write_file((folder / file).string(), file == "test.hal" ? formatted(content) : content); !why.empty())
+        const std::string content =
+            filled(text, name, package.empty() ? "" : fmt::format(" HINTS \"{}\"", package));
+        if (const std::string why = write_file((folder / file).string(),
+                                               file == "test.hal" ? formatted(content) : content);
+            !why.empty()) {
             return fail(options, why);
+        }
     }
     const std::string path = shell_word(folder.string());
     return print(fmt::format("{0}: {1}.cpp, CMakeLists.txt, test.hal and its expected output\n"
                              "  cd {0}\n"
                              "  cmake -B build && cmake --build build && ctest --test-dir build\n"
-                             "To load it: HALCYON_PLUGIN_PATH=build hal doc {1}; to install it: hal compile {1}.cpp\n",
+                             "To load it: HALCYON_PLUGIN_PATH=build hal doc {1}; to install it: "
+                             "hal compile {1}.cpp\n",
                              path, name))
                ? 0
                : 1;

@@ -12,7 +12,8 @@ struct NewOptions : Options {
 
     void declare(OptionSet& set) override {
         set.words("component NAME", "name for loadrt: letters, digits, - and _");
-        set.value("--folder", folder, "DIR", "folder to create (default: NAME in the current folder)");
+        set.value("--folder", folder, "DIR",
+                  "folder to create (default: NAME in the current folder)");
     }
 };
 

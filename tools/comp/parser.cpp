@@ -18,7 +18,9 @@ const std::vector<std::string>& type_names() {
         std::vector<std::string> all;
         for (const TypeRow& row : types) {
             all.push_back(row.name);
-            if (*row.newer) all.push_back(row.newer);
+            if (*row.newer) {
+                all.push_back(row.newer);
+            }
         }
         all.insert(all.end(), {"signed", "unsigned"});
         return all;
@@ -28,7 +30,8 @@ const std::vector<std::string>& type_names() {
 
 class Parser {
 public:
-    Parser(const Sources& sources, std::uint32_t source, Diagnostics& diagnostics) : in_(sources, source, diagnostics) {}
+    Parser(const Sources& sources, std::uint32_t source, Diagnostics& diagnostics)
+        : in_(sources, source, diagnostics) {}
     Tree parse();
 
 private:
@@ -54,7 +57,10 @@ private:
     bool array(Item& item);
     bool name(Name& name, const std::string& of);
     void doc(Text& doc);
-    bool fail(std::string message, std::string help = "") { return in_.error(in_.here(), std::move(message), "", std::move(help)), false; }
+    bool fail(std::string message, std::string help = "") {
+        in_.error(in_.here(), std::move(message), "", std::move(help));
+        return false;
+    }
 
     Scanner in_;
     Tree tree_;
@@ -79,40 +85,63 @@ const std::array<Parser::Keyword, 15> Parser::keywords{{
 }};
 
 Tree Parser::parse() {
-    while (!in_.at_code() && !in_.at_end())
-        if (!declaration()) in_.recover();
-    if (in_.at_code()) tree_.code = in_.take_code();
+    while (!in_.at_code() && !in_.at_end()) {
+        if (!declaration()) {
+            in_.recover();
+        }
+    }
+    if (in_.at_code()) {
+        tree_.code = in_.take_code();
+    }
     return std::move(tree_);
 }
 
 bool Parser::declaration() {
-    if (in_.take(';')) return true;  // an empty one
+    if (in_.take(';')) {
+        return true;  // an empty one
+    }
     const Text keyword = in_.word();
-    if (!keyword.given())
-        return fail("a declaration starts with a word: pin, param, function, …", "put C code after a line that consists of ;;");
+    if (!keyword.given()) {
+        return fail("a declaration starts with a word: pin, param, function, …",
+                    "put C code after a line that consists of ;;");
+    }
     const Keyword* found = nullptr;
     std::vector<std::string> all;
     for (const Keyword& row : keywords) {
-        if (keyword == row.name) found = &row;
+        if (keyword == row.name) {
+            found = &row;
+        }
         all.push_back(row.name);
     }
     if (!found) {
         std::string help = did_you_mean(keyword.text, all);
-        if (help.empty()) help = "declarations: " + listed(all, all.size()) + "; C code follows a line that consists of ;;";
-        return in_.error(keyword.span, "unknown declaration '" + keyword.text + "'", "", help), false;
+        if (help.empty()) {
+            help = "declarations: " + listed(all, all.size()) +
+                   "; C code follows a line that consists of ;;";
+        }
+        in_.error(keyword.span, "unknown declaration '" + keyword.text + "'", "", help);
+
+        return false;
     }
     const bool good = (this->*found->handler)(keyword);
     if (in_.take_broken() || !good) return false;
     if (!in_.at_code() && in_.take(';')) return true;
     const Span here = in_.at_code() ? in_.behind() : in_.here();
-    in_.error(here, "unexpected text in the declaration", here.end - here.begin <= 1 ? "missing ';'" : "missing ';' before this");
-    return in_.at_code() || std::find(all.begin(), all.end(), in_.peek_word()) != all.end();  // the next one can be read
+    in_.error(here, "unexpected text in the declaration",
+              here.end - here.begin <= 1 ? "missing ';'" : "missing ';' before this");
+    // the next one can be read
+    return in_.at_code() || std::find(all.begin(), all.end(), in_.peek_word()) != all.end();
 }
 
 bool Parser::component(const Text& keyword) {
-    if (tree_.name.given()) return in_.error(keyword.span, "duplicate component declaration"), false;
+    if (tree_.name.given()) {
+        in_.error(keyword.span, "duplicate component declaration");
+        return false;
+    }
     tree_.name = in_.word();
-    if (!tree_.name.given()) return fail("missing component name", "component NAME \"what it does\";");
+    if (!tree_.name.given()) {
+        return fail("missing component name", "component NAME \"what it does\";");
+    }
     doc(tree_.summary);
     return true;
 }
@@ -134,14 +163,26 @@ void Parser::doc(Text& doc) {
 bool Parser::type(Item& item) {
     const Text word = in_.word();
     std::optional<hal_type> type = type_named(word.text);
-    if (type && word != row(*type).name && word != row(*type).newer) type.reset();  // halcompile rejects BIT
-    if (word == "signed") type = HAL_TYPE_S32;
-    if (word == "unsigned") type = HAL_TYPE_U32;
+    // halcompile rejects BIT
+    if (type && word != row(*type).name && word != row(*type).newer) {
+        type.reset();
+    }
+    if (word == "signed") {
+        type = HAL_TYPE_S32;
+    }
+    if (word == "unsigned") {
+        type = HAL_TYPE_U32;
+    }
     if (!word.given() || !type) {
-        if (!word.given()) return fail("missing type", "types: " + listed(type_names(), type_names().size()));
+        if (!word.given()) {
+            return fail("missing type", "types: " + listed(type_names(), type_names().size()));
+        }
         std::string help = did_you_mean(word.text, type_names());
-        if (help.empty()) help = "types: " + listed(type_names(), type_names().size());
-        return in_.error(word.span, "unknown type '" + word.text + "'", "", help), false;
+        if (help.empty()) {
+            help = "types: " + listed(type_names(), type_names().size());
+        }
+        in_.error(word.span, "unknown type '" + word.text + "'", "", help);
+        return false;
     }
     item.type = *type;
     item.settable = word == row(*type).newer;
@@ -152,16 +193,21 @@ bool Parser::array(Item& item) {
     const Text size = in_.expression(":]");
     const auto end = size.text.data() + size.text.size();
     const bool hex = size.text.starts_with("0x") || size.text.starts_with("0X");
-    const auto read = std::from_chars(size.text.data() + (hex ? 2 : 0), end, item.size, hex ? 16 : 10);
-    if (!size.given() || read.ec != std::errc{} || read.ptr != end || item.size == 0 || item.size > largest_array) {
+    const auto read =
+        std::from_chars(size.text.data() + (hex ? 2 : 0), end, item.size, hex ? 16 : 10);
+    if (!size.given() || read.ec != std::errc{} || read.ptr != end || item.size == 0 ||
+        item.size > largest_array) {
         item.size = 1;
-        in_.error(size.given() ? size.span : in_.here(),
-                  "the size of an array must be an integer, 1.." + std::to_string(largest_array), "",
-                  "put the part that depends on the personality after it: [16 : personality & 0xff]");
+        in_.error(
+            size.given() ? size.span : in_.here(),
+            "the size of an array must be an integer, 1.." + std::to_string(largest_array), "",
+            "put the part that depends on the personality after it: [16 : personality & 0xff]");
     }
     if (in_.take(':')) {
         item.count = in_.expression("]");
-        if (!item.count.given()) return fail("missing number of elements", "[16 : personality & 0xff]");
+        if (!item.count.given()) {
+            return fail("missing number of elements", "[16 : personality & 0xff]");
+        }
     }
     return in_.take(']') || fail("'[' without ']'");
 }
@@ -174,8 +220,10 @@ bool Parser::item(const Text& keyword) {
         hal_dir dir;
         bool writable;
     };
-    static constexpr Direction of_pins[] = {{"in", HAL_DIR_IN, false}, {"out", HAL_DIR_OUT, true}, {"io", HAL_DIR_IO, true}};
-    static constexpr Direction of_parameters[] = {{"r", HAL_DIR_PARAM, true}, {"rw", HAL_DIR_PARAM, true}};
+    static constexpr Direction of_pins[] = {
+        {"in", HAL_DIR_IN, false}, {"out", HAL_DIR_OUT, true}, {"io", HAL_DIR_IO, true}};
+    static constexpr Direction of_parameters[] = {{"r", HAL_DIR_PARAM, true},
+                                                  {"rw", HAL_DIR_PARAM, true}};
     const Text word = in_.word();
     bool known = false;
     const auto look = [&](const Direction& row) {
@@ -185,13 +233,24 @@ bool Parser::item(const Text& keyword) {
         item.writable = row.writable;
         item.read_only = item.parameter && word == "r";
     };
-    if (item.parameter) for (const Direction& row : of_parameters) look(row);
-    else for (const Direction& row : of_pins) look(row);
+    if (item.parameter) {
+        for (const Direction& row : of_parameters) {
+            look(row);
+        }
+    } else {
+        for (const Direction& row : of_pins) {
+            look(row);
+        }
+    }
     if (!known) {
         const Span at = word.given() ? word.span : in_.here();
-        if (item.parameter)
-            in_.error(at, "invalid direction: a parameter is r (set by the component) or rw", "", "param rw float gain = 1.0 \"what it is\";");
-        else in_.error(at, "invalid direction: a pin is in, out or io", "", "pin in float angle \"what it is\";");
+        if (item.parameter) {
+            in_.error(at, "invalid direction: a parameter is r (set by the component) or rw", "",
+                      "param rw float gain = 1.0 \"what it is\";");
+        } else {
+            in_.error(at, "invalid direction: a pin is in, out or io", "",
+                      "pin in float angle \"what it is\";");
+        }
         return false;
     }
     if (!type(item) || !name(item.name, item.parameter ? "parameter" : "pin")) return false;
@@ -199,8 +258,14 @@ bool Parser::item(const Text& keyword) {
     while (in_.next() == '=' || in_.peek_word() == "if") {
         const bool start = in_.take('=');
         Text& part = start ? item.start : item.condition;
-        if (!start) in_.word();
-        if (part.given()) return in_.error(part.span, start ? "duplicate initial value" : "duplicate condition"), false;
+        if (!start) {
+            in_.word();
+        }
+        if (part.given()) {
+            in_.error(part.span, start ? "duplicate initial value" : "duplicate condition");
+
+            return false;
+        }
         part = in_.expression(start ? "" : "=");
         if (!part.given()) return fail(start ? "missing initial value" : "missing condition");
     }
@@ -212,7 +277,10 @@ bool Parser::item(const Text& keyword) {
 bool Parser::function(const Text&) {
     Function function;
     if (!name(function.name, "function")) return false;
-    if (in_.peek_word() == "fp" || in_.peek_word() == "nofp") in_.word();  // all functions may calculate
+    // all functions may calculate
+    if (in_.peek_word() == "fp" || in_.peek_word() == "nofp") {
+        in_.word();
+    }
     doc(function.doc);
     tree_.functions.push_back(std::move(function));
     return true;
@@ -222,23 +290,32 @@ bool Parser::variable(const Text&) {
     Variable variable;
     variable.type = in_.word();
     if (!variable.type.given()) return fail("missing type of the variable", "variable double old;");
-    while (in_.take('*')) variable.stars += '*';
+    while (in_.take('*')) {
+        variable.stars += '*';
+    }
     const Text written = in_.word();
-    if (!written.given())
-        return fail("missing name of the variable", "the type is one word: use a typedef for struct, long long, …");
+    if (!written.given()) {
+        return fail("missing name of the variable",
+                    "the type is one word: use a typedef for struct, long long, …");
+    }
     variable.name = spelled(written);
     variable.name.c = written.text;
     while (in_.take('[')) {  // several make a table
         const Text size = in_.expression("]");
         if (!size.given() || !in_.take(']')) return fail("missing size of the array");
-        if (!variable.size.given()) variable.size = size;
-        else variable.size.text += "][" + size.text;
+        if (!variable.size.given()) {
+            variable.size = size;
+        } else {
+            variable.size.text += "][" + size.text;
+        }
     }
     if (in_.take('=')) {
         if (const auto text = in_.string()) {
             variable.start = *text;
             variable.start.text.insert(0, 1, '"').push_back('"');
-        } else variable.start = in_.expression("");
+        } else {
+            variable.start = in_.expression("");
+        }
         if (!variable.start.given()) return fail("missing initial value");
     }
     Text ignored;
@@ -252,7 +329,9 @@ bool Parser::option(const Text&) {
     option.name = in_.word();
     if (!option.name.given()) return fail("missing name of the option");
     doc(option.value);
-    if (!option.value.given()) option.value = in_.expression("");
+    if (!option.value.given()) {
+        option.value = in_.expression("");
+    }
     tree_.options.push_back(std::move(option));
     return true;
 }
@@ -260,10 +339,13 @@ bool Parser::option(const Text&) {
 bool Parser::modparam(const Text&) {
     Parameter parameter;
     const Text type = in_.word();
-    if (!(type == "int") && !(type == "dummy"))
-        return in_.error(type.given() ? type.span : in_.here(), "a module parameter is int, or dummy when the C code declares it", "",
-                         "modparam int channels = 4 \"what it is\";"),
-               false;
+    if (!(type == "int") && !(type == "dummy")) {
+        in_.error(type.given() ? type.span : in_.here(),
+                  "a module parameter is int, or dummy when the C code declares it", "",
+                  "modparam int channels = 4 \"what it is\";");
+
+        return false;
+    }
     parameter.dummy = type == "dummy";
     parameter.name = in_.word();
     if (!parameter.name.given()) return fail("missing name of the parameter");
@@ -287,8 +369,10 @@ template <std::vector<Text> Tree::* list>
 bool Parser::prose(const Text& keyword) {
     Text text;
     doc(text);
-    if (!text.given())
-        return fail("missing text", keyword.text + " \"a line\"; or " + keyword.text + " \"\"\"several lines\"\"\";");
+    if (!text.given()) {
+        return fail("missing text", keyword.text + " \"a line\"; or " + keyword.text +
+                                        " \"\"\"several lines\"\"\";");
+    }
     (tree_.*list).push_back(std::move(text));
     return true;
 }
@@ -296,13 +380,17 @@ bool Parser::prose(const Text& keyword) {
 }  // namespace
 
 bool Option::on() const {
-    return value.text != "no" && value.text != "No" && value.text != "NO" && value.text != "0" && value.text != "false";
+    return value.text != "no" && value.text != "No" && value.text != "NO" && value.text != "0" &&
+           value.text != "false";
 }
 
 const Option* Tree::option(std::string_view wanted) const {
     const Option* found = nullptr;
-    for (const Option& option : options)
-        if (option.name == wanted) found = &option;
+    for (const Option& option : options) {
+        if (option.name == wanted) {
+            found = &option;
+        }
+    }
     return found;
 }
 
@@ -311,6 +399,8 @@ bool Tree::has(std::string_view wanted) const {
     return found && found->on();
 }
 
-Tree parse(const Sources& sources, std::uint32_t source, Diagnostics& diagnostics) { return Parser(sources, source, diagnostics).parse(); }
+Tree parse(const Sources& sources, std::uint32_t source, Diagnostics& diagnostics) {
+    return Parser(sources, source, diagnostics).parse();
+}
 
 }  // namespace hal::comp

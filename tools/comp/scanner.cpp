@@ -6,17 +6,22 @@
 namespace hal::comp {
 namespace {
 
-bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r' || c == '\f' || c == '\v'; }
+bool is_blank(char c) {
+    return c == ' ' || c == '\t' || c == '\n' || c == '\r' || c == '\f' || c == '\v';
+}
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; }
 bool is_hal(char c) { return is_letter(c) || is_digit(c) || c == '#' || c == '.' || c == '-'; }
 
 void append_utf8(std::string& to, unsigned long code) {
-    if (code < 0x80) to += static_cast<char>(code);
-    else if (code < 0x800) (to += static_cast<char>(0xC0 | (code >> 6))) += static_cast<char>(0x80 | (code & 0x3F));
-    else
-        ((to += static_cast<char>(0xE0 | (code >> 12))) += static_cast<char>(0x80 | ((code >> 6) & 0x3F))) +=
-            static_cast<char>(0x80 | (code & 0x3F));
+    if (code < 0x80) {
+        to += static_cast<char>(code);
+    } else if (code < 0x800) {
+        (to += static_cast<char>(0xC0 | (code >> 6))) += static_cast<char>(0x80 | (code & 0x3F));
+    } else {
+        ((to += static_cast<char>(0xE0 | (code >> 12))) +=
+         static_cast<char>(0x80 | ((code >> 6) & 0x3F))) += static_cast<char>(0x80 | (code & 0x3F));
+    }
 }
 
 // The escapes that C and Python have in common; any other backslash is one.
@@ -32,7 +37,8 @@ std::string unescaped(std::string_view raw) {
             unsigned long value = 0;
             std::size_t n = 0;
             for (; n < most && i < raw.size(); ++n, ++i) {
-                const char lower = raw[i] >= 'A' && raw[i] <= 'F' ? static_cast<char>(raw[i] + 32) : raw[i];
+                const char lower =
+                    raw[i] >= 'A' && raw[i] <= 'F' ? static_cast<char>(raw[i] + 32) : raw[i];
                 const std::size_t digit = digits.find(lower);
                 if (digit == std::string_view::npos) break;
                 value = value * base + digit;
@@ -44,14 +50,28 @@ std::string unescaped(std::string_view raw) {
         case 'n': text += '\n'; break;
         case 't': text += '\t'; break;
         case 'r': break;
-        case 'a': case 'b': case 'f': case 'v': text += ' '; break;
-        case '\\': case '"': case '\'': text += c; break;
+        case 'a':
+        case 'b':
+        case 'f':
+        case 'v': text += ' '; break;
+        case '\\':
+        case '"':
+        case '\'': text += c; break;
         case '\n': break;
-        case 'x': ++i; append_utf8(text, number("0123456789abcdef", 2, 16)); break;
-        case 'u': ++i; append_utf8(text, number("0123456789abcdef", 4, 16)); break;
+        case 'x':
+            ++i;
+            append_utf8(text, number("0123456789abcdef", 2, 16));
+            break;
+        case 'u':
+            ++i;
+            append_utf8(text, number("0123456789abcdef", 4, 16));
+            break;
         default:
-            if (c >= '0' && c <= '7') append_utf8(text, number("01234567", 3, 8));
-            else (text += '\\') += c;
+            if (c >= '0' && c <= '7') {
+                append_utf8(text, number("01234567", 3, 8));
+            } else {
+                (text += '\\') += c;
+            }
         }
     }
     return text;
@@ -61,22 +81,30 @@ std::string unescaped(std::string_view raw) {
 
 Span Scanner::span(std::size_t begin, std::size_t end) const {
     const std::size_t most = text_.size();
-    return {source_, static_cast<std::uint32_t>(std::min(begin, most)), static_cast<std::uint32_t>(std::min(end, most))};
+    return {source_, static_cast<std::uint32_t>(std::min(begin, most)),
+            static_cast<std::uint32_t>(std::min(end, most))};
 }
 
 void Scanner::error(Span at, std::string message, std::string label, std::string help) {
-    diagnostics_.error("bad-component-source", at, std::move(message), std::move(label), std::move(help));
+    diagnostics_.error("bad-component-source", at, std::move(message), std::move(label),
+                       std::move(help));
 }
 
 void Scanner::skip() {
     while (at_ < text_.size()) {
-        if (is_blank(text_[at_])) ++at_;
-        else if (starts("//")) at_ = std::min(text_.find('\n', at_), text_.size());
-        else if (starts("/*")) {
+        if (is_blank(text_[at_])) {
+            ++at_;
+        } else if (starts("//")) {
+            at_ = std::min(text_.find('\n', at_), text_.size());
+        } else if (starts("/*")) {
             const std::size_t end = text_.find("*/", at_ + 2);
-            if (end == std::string_view::npos) error(span(at_, at_ + 2), "unterminated comment", "", "end it with */");
+            if (end == std::string_view::npos) {
+                error(span(at_, at_ + 2), "unterminated comment", "", "end it with */");
+            }
             at_ = end == std::string_view::npos ? text_.size() : end + 2;
-        } else break;
+        } else {
+            break;
+        }
     }
 }
 
@@ -89,10 +117,12 @@ bool Scanner::take(char c) {
 bool Scanner::at_code() {
     skip();
     if (!starts(";;")) return false;
-    for (std::size_t i = at_; i > 0 && text_[i - 1] != '\n'; --i)
+    for (std::size_t i = at_; i > 0 && text_[i - 1] != '\n'; --i) {
         if (!is_blank(text_[i - 1])) return false;
-    for (std::size_t i = at_ + 2; i < text_.size() && text_[i] != '\n'; ++i)
+    }
+    for (std::size_t i = at_ + 2; i < text_.size() && text_[i] != '\n'; ++i) {
         if (!is_blank(text_[i])) return false;
+    }
     return true;
 }
 
@@ -109,14 +139,20 @@ Text Scanner::taken(std::size_t begin) {
 std::string_view Scanner::peek_word() {
     skip();
     std::size_t end = at_;
-    if (end < text_.size() && is_letter(text_[end]))
-        while (end < text_.size() && (is_letter(text_[end]) || is_digit(text_[end]))) ++end;
+    if (end < text_.size() && is_letter(text_[end])) {
+        while (end < text_.size() && (is_letter(text_[end]) || is_digit(text_[end]))) {
+            ++end;
+        }
+    }
     return text_.substr(at_, end - at_);
 }
 
 Text Scanner::word() {
-    const std::size_t length = peek_word().size(), begin = at_;
-    if (length == 0) return {};
+    const std::size_t length = peek_word().size();
+    const std::size_t begin = at_;
+    if (length == 0) {
+        return {};
+    }
     at_ += length;
     return taken(begin);
 }
@@ -124,33 +160,48 @@ Text Scanner::word() {
 Text Scanner::hal_name() {
     skip();
     const std::size_t begin = at_;
-    if (at_ < text_.size() && (is_letter(text_[at_]) || text_[at_] == '#' || text_[at_] == '.'))
-        while (at_ < text_.size() && is_hal(text_[at_])) ++at_;
+    if (at_ < text_.size() && (is_letter(text_[at_]) || text_[at_] == '#' || text_[at_] == '.')) {
+        while (at_ < text_.size() && is_hal(text_[at_])) {
+            ++at_;
+        }
+    }
     return at_ == begin ? Text{} : taken(begin);
 }
 
 // Where the opening quotes are; npos when no string comes next.
 std::size_t Scanner::string_start() const {
     std::size_t quote = at_;
-    if (quote < text_.size() && (text_[quote] == 'r' || text_[quote] == 'R')) ++quote;
+    if (quote < text_.size() && (text_[quote] == 'r' || text_[quote] == 'R')) {
+        ++quote;
+    }
     return quote < text_.size() && text_[quote] == '"' ? quote : std::string_view::npos;
 }
 
-bool Scanner::at_string() { return skip(), string_start() != std::string_view::npos; }
+bool Scanner::at_string() {
+    skip();
+    return string_start() != std::string_view::npos;
+}
 
 std::optional<Text> Scanner::string() {
     skip();
-    const std::size_t begin = at_, quote = string_start();
-    if (quote == std::string_view::npos) return {};
-    const bool raw = quote != at_, triple = text_.substr(quote).starts_with("\"\"\"");
+    const std::size_t begin = at_;
+    const std::size_t quote = string_start();
+    if (quote == std::string_view::npos) {
+        return {};
+    }
+    const bool raw = quote != at_;
+    const bool triple = text_.substr(quote).starts_with("\"\"\"");
     const std::string_view closing = triple ? "\"\"\"" : "\"";
     const std::size_t from = quote + closing.size();
     std::size_t end = from;
-    while (end < text_.size() && !text_.substr(end).starts_with(closing) && (triple || text_[end] != '\n'))
+    while (end < text_.size() && !text_.substr(end).starts_with(closing) &&
+           (triple || text_[end] != '\n')) {
         end += text_[end] == '\\' && end + 1 < text_.size() ? 2 : 1;
+    }
     if (end >= text_.size() || !text_.substr(end).starts_with(closing)) {
         error(span(begin, from), "unterminated string", "",
-              triple ? "end it with \"\"\"" : "end it with \"; text of several lines goes between \"\"\" and \"\"\"");
+              triple ? "end it with \"\"\""
+                     : "end it with \"; text of several lines goes between \"\"\" and \"\"\"");
         at_ = triple ? text_.size() : std::min(text_.find('\n', begin), text_.size());
         last_ = at_;
         broken_ = true;
@@ -158,7 +209,8 @@ std::optional<Text> Scanner::string() {
     }
     at_ = end + closing.size();
     Text text = taken(begin);
-    text.text = raw ? std::string(text_.substr(from, end - from)) : unescaped(text_.substr(from, end - from));
+    text.text = raw ? std::string(text_.substr(from, end - from))
+                    : unescaped(text_.substr(from, end - from));
     std::erase_if(text.text, [](char c) { return c == '\r' || c == '\0'; });
     return text;
 }
@@ -166,9 +218,14 @@ std::optional<Text> Scanner::string() {
 std::optional<Text> Scanner::header() {
     skip();
     const std::size_t begin = at_;
-    if (next() != '"' && next() != '<') return {};
+    if (next() != '"' && next() != '<') {
+        return {};
+    }
     const std::size_t end = text_.find(text_[at_] == '<' ? '>' : '"', at_ + 1);
-    if (end == std::string_view::npos || text_.substr(at_, end - at_).find('\n') != std::string_view::npos) return {};
+    if (end == std::string_view::npos ||
+        text_.substr(at_, end - at_).find('\n') != std::string_view::npos) {
+        return {};
+    }
     at_ = end + 1;
     return taken(begin);
 }
@@ -177,45 +234,71 @@ Text Scanner::expression(std::string_view stops) {
     skip();
     const std::size_t begin = at_;
     std::size_t end = at_;
-    int depth = 0, questions = 0;
+    int depth = 0;
+    int questions = 0;
     std::string text;
     while (at_ < text_.size()) {
         const char c = text_[at_];
         if (c == ';' || string_start() != std::string_view::npos) break;
         const char after = at_ + 1 < text_.size() ? text_[at_ + 1] : '\0';
         const bool comparison = c == '=' && after == '=';
-        if (depth == 0 && !comparison && stops.find(c) != std::string_view::npos && !(c == ':' && questions > 0)) break;
+        if (depth == 0 && !comparison && stops.find(c) != std::string_view::npos &&
+            !(c == ':' && questions > 0)) {
+            break;
+        }
         if (is_blank(c) || starts("//") || starts("/*")) {
             skip();
-            if (!text.empty()) text += ' ';
+            if (!text.empty()) {
+                text += ' ';
+            }
             continue;
         }
         std::size_t length = comparison || starts("!=") || starts("<=") || starts(">=") ? 2 : 1;
         if (is_letter(c) || is_digit(c)) {
             while (at_ + length < text_.size() &&
-                   (is_letter(text_[at_ + length]) || is_digit(text_[at_ + length]) || text_[at_ + length] == '.'))
+                   (is_letter(text_[at_ + length]) || is_digit(text_[at_ + length]) ||
+                    text_[at_ + length] == '.')) {
                 ++length;
+            }
             if (depth == 0 && text_.substr(at_, length) == "if") break;
         } else if (c == '\'') {
             const std::size_t close = text_.find('\'', at_ + 2);
-            if (close != std::string_view::npos && close < at_ + 6) length = close + 1 - at_;
+            if (close != std::string_view::npos && close < at_ + 6) {
+                length = close + 1 - at_;
+            }
         }
-        if (c == '?') ++questions;
-        if (c == ':') --questions;
-        if (c == '(') ++depth;
-        if (c == ')' && --depth < 0) break;
+        if (c == '?') {
+            ++questions;
+        }
+        if (c == ':') {
+            --questions;
+        }
+        if (c == '(') {
+            ++depth;
+        }
+        if (c == ')' && --depth < 0) {
+            break;
+        }
         text += text_.substr(at_, length);
         end = at_ += length;
     }
-    if (depth > 0) error(span(begin, end), "'(' without ')'");
-    while (text.ends_with(' ')) text.pop_back();
-    if (end > begin) last_ = end;
+    if (depth > 0) {
+        error(span(begin, end), "'(' without ')'");
+    }
+    while (text.ends_with(' ')) {
+        text.pop_back();
+    }
+    if (end > begin) {
+        last_ = end;
+    }
     return {std::move(text), end > begin ? span(begin, end) : Span{}};
 }
 
 void Scanner::recover() {
     while (at_ < text_.size()) {
-        if (at_code()) return;  // skips blanks and comments, too
+        if (at_code()) {
+            return;  // skips blanks and comments, too
+        }
         if (at_ >= text_.size()) return;
         if (text_[at_] == ';') {
             last_ = ++at_;
@@ -225,16 +308,24 @@ void Scanner::recover() {
             const std::size_t before = diagnostics_.errors();
             string();
             if (diagnostics_.errors() != before) return;
-        } else ++at_;
+        } else {
+            ++at_;
+        }
     }
 }
 
 Span Scanner::here() {
     skip();
-    if (at_ >= text_.size() || text_.substr(last_, at_ - last_).find('\n') != std::string_view::npos) return behind();
+    if (at_ >= text_.size() ||
+        text_.substr(last_, at_ - last_).find('\n') != std::string_view::npos) {
+        return behind();
+    }
     std::size_t end = at_ + 1;
-    if (is_hal(text_[at_]))
-        while (end < text_.size() && is_hal(text_[end])) ++end;
+    if (is_hal(text_[at_])) {
+        while (end < text_.size() && is_hal(text_[end])) {
+            ++end;
+        }
+    }
     return span(at_, end);
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The letters of a .comp file. What a `-` or a `.` means depends on what is expected, so the parser asks for it.
+// The letters of a .comp file. What a `-` or a `.` means depends on what is expected, so the parser
+// asks for it.
 #pragma once
 
 #include <optional>
@@ -17,7 +18,10 @@ public:
 
     /// Past blanks and comments.
     void skip();
-    bool at_end() { return skip(), at_ >= text_.size(); }
+    bool at_end() {
+        skip();
+        return at_ >= text_.size();
+    }
     char next() { return at_end() ? '\0' : text_[at_]; }
     /// True, and past it, when `c` comes next.
     bool take(char c);
@@ -59,7 +63,8 @@ private:
     std::string_view text_;
     std::uint32_t source_;
     Diagnostics& diagnostics_;
-    std::size_t at_ = 0, last_ = 0;
+    std::size_t at_ = 0;
+    std::size_t last_ = 0;
     bool broken_ = false;
 };
 

@@ -82,7 +82,8 @@ struct Tree {
 Tree parse(const Sources& sources, std::uint32_t source, Diagnostics& diagnostics);
 
 /// Checks a whole file: name clashes, missing parts, unsupported features.
-void check(const Tree& tree, const Sources& sources, std::uint32_t source, Diagnostics& diagnostics);
+void check(const Tree& tree, const Sources& sources, std::uint32_t source,
+           Diagnostics& diagnostics);
 
 /// Spells a written name for netlists and for C.
 Name spelled(Text written);

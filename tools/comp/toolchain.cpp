@@ -19,31 +19,43 @@ namespace fs = std::filesystem;
 TemporaryFolder::TemporaryFolder() {
     const char* parent = std::getenv("TMPDIR");
     std::string name = (parent && *parent ? std::string(parent) : "/tmp") + "/halcyon-XXXXXX";
-    if (::mkdtemp(name.data())) path_ = name;
-    else problem_ = fmt::format("no folder can be made in {}: {}", fs::path(name).parent_path().string(), std::strerror(errno));
+    if (::mkdtemp(name.data())) {
+        path_ = name;
+    } else {
+        problem_ = fmt::format("no folder can be made in {}: {}",
+                               fs::path(name).parent_path().string(), std::strerror(errno));
+    }
 }
 
 TemporaryFolder::~TemporaryFolder() {
     std::error_code ignored;
-    if (!path_.empty()) fs::remove_all(path_, ignored);
+    if (!path_.empty()) {
+        fs::remove_all(path_, ignored);
+    }
 }
 
 std::vector<std::string> split_words(const std::string& text) {
     std::istringstream in(text);
     std::vector<std::string> words;
-    for (std::string word; in >> word;) words.push_back(word);
+    for (std::string word; in >> word;) {
+        words.push_back(word);
+    }
     return words;
 }
 
 int finish_program(pid_t child, int descriptor, std::string& output) {
     char buffer[4096];
     for (ssize_t n; (n = ::read(descriptor, buffer, sizeof buffer)) != 0;) {
-        if (n > 0) output.append(buffer, static_cast<std::size_t>(n));
-        else if (errno != EINTR) break;
+        if (n > 0) {
+            output.append(buffer, static_cast<std::size_t>(n));
+        } else if (errno != EINTR) {
+            break;
+        }
     }
     ::close(descriptor);
     int status = 0;
-    while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {}
+    while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
+    }
     return status;
 }
 
@@ -51,7 +63,9 @@ int run_program(const std::vector<std::string>& words, std::string& output) {
     int ends[2];
     if (::pipe2(ends, O_CLOEXEC) != 0) return -1;
     std::vector<char*> argv;
-    for (const std::string& word : words) argv.push_back(const_cast<char*>(word.c_str()));
+    for (const std::string& word : words) {
+        argv.push_back(const_cast<char*>(word.c_str()));
+    }
     argv.push_back(nullptr);
     const pid_t child = ::fork();
     if (child == 0) {

@@ -34,7 +34,9 @@ std::string first_error(const std::string& text) {
     const auto at = text.find("error: ");
     if (at == std::string::npos) return "it gave no reason";
     std::string line = text.substr(at + 7, text.find('\n', at) - at - 7);
-    if (const auto code = line.rfind(" ["); code != std::string::npos && line.ends_with(']')) line.resize(code);
+    if (const auto code = line.rfind(" ["); code != std::string::npos && line.ends_with(']')) {
+        line.resize(code);
+    }
     return line;
 }
 
@@ -49,51 +51,83 @@ SessionOptions alone(bool check) {
 /// Returns the option of a pin that has no effect, or "".
 std::string mistake_of(const Pin& pin, const std::string& own) {
     const bool output = pin.dir == HAL_DIR_OUT;
-    if (!*pin.doc) return fmt::format("pin '{}' has no documentation; describe it in a few words after its name", own);
-    if ((pin.flags & HAL_PIN_SAFE) && (pin.dir == HAL_DIR_IN || pin.dir == HAL_DIR_PARAM))
-        return fmt::format("pin '{}' is an {} and has .safe, which applies to outputs only: the value they take when the machine stops", own,
-                           pin.dir == HAL_DIR_IN ? "input" : "parameter");
-    if ((pin.flags & HAL_PIN_FINITE) && pin.type != HAL_TYPE_FLOAT)
+    if (!*pin.doc) {
+        return fmt::format(
+            "pin '{}' has no documentation; describe it in a few words after its name", own);
+    }
+    if ((pin.flags & HAL_PIN_SAFE) && (pin.dir == HAL_DIR_IN || pin.dir == HAL_DIR_PARAM)) {
+        return fmt::format(
+            "pin '{}' is an {} and has .safe, which applies to outputs only: the value they take "
+            "when the machine stops",
+            own, pin.dir == HAL_DIR_IN ? "input" : "parameter");
+    }
+    if ((pin.flags & HAL_PIN_FINITE) && pin.type != HAL_TYPE_FLOAT) {
         return fmt::format("pin '{}' has .finite, which applies to pins of type double only", own);
-    if ((pin.flags & HAL_PIN_FINITE) && !output && pin.dir != HAL_DIR_IO)
+    }
+    if ((pin.flags & HAL_PIN_FINITE) && !output && pin.dir != HAL_DIR_IO) {
         return fmt::format("pin '{}' has .finite, which applies to outputs only", own);
+    }
     return {};
 }
 
-/// Everything that is tried. What goes wrong is in "problem", the pin or function it is about in "subject".
+/// Everything that is tried. What goes wrong is in "problem", the pin or function it is about in
+/// "subject".
 class Trial {
 public:
     /// What a line of a netlist can name in loadrt and unload.
     static bool can_be_loaded(std::string_view name) {
         const auto letter = [](char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); };
-        const auto good = [&](char c) { return letter(c) || (c >= '0' && c <= '9') || c == '_' || c == '-' || c == '.'; };
-        return !name.empty() && letter(name[0]) && std::all_of(name.begin(), name.end(), good) && name != "threads" && name != "all";
+        const auto good = [&](char c) {
+            return letter(c) || (c >= '0' && c <= '9') || c == '_' || c == '-' || c == '.';
+        };
+        return !name.empty() && letter(name[0]) && std::all_of(name.begin(), name.end(), good) &&
+               name != "threads" && name != "all";
     }
 
-    Trial(const std::string& name, int descriptor, bool author) : name_(name), descriptor_(descriptor), author_(author) {}
+    Trial(const std::string& name, int descriptor, bool author)
+        : name_(name), descriptor_(descriptor), author_(author) {}
 
     void run() {
         Diagnostics diagnostics;
         const Plugins plugins;
         const auto plugin = plugins.open(name_, {}, diagnostics);
         if (!plugin) {
-            std::string why = diagnostics.all().empty() ? "it cannot be opened" : diagnostics.all().front().message;
-            if (const auto at = why.find("is not a usable component: "); at != std::string::npos) why.erase(0, at + 27);
+            std::string why = diagnostics.all().empty() ? "it cannot be opened"
+                                                        : diagnostics.all().front().message;
+            if (const auto at = why.find("is not a usable component: "); at != std::string::npos) {
+                why.erase(0, at + 27);
+            }
             return bad("no-component", why);
         }
-        if (const std::string_view own = plugin->component->name; !can_be_loaded(own))
-            return bad("name", fmt::format("'{}' cannot be a component's name: it is made of letters, digits, underscores, hyphens and dots, begins with "
-                                           "a letter, and is neither threads nor all", own));
+        if (const std::string_view own = plugin->component->name; !can_be_loaded(own)) {
+            return bad("name",
+                       fmt::format("'{}' cannot be a component's name: it is made of letters, "
+                                   "digits, underscores, hyphens and dots, begins with "
+                                   "a letter, and is neither threads nor all",
+                                   own));
+        }
         Page page;
         std::string needs;
-        if (!gather(*plugin->component, page, needs)) page.functions.clear(), page.pins.clear();
+        if (!gather(*plugin->component, page, needs)) {
+            page.functions.clear();
+            page.pins.clear();
+        }
         const bool arguments = !page.arguments.empty();
         std::string function = page.functions.empty() ? "" : page.full_name(page.functions.front());
-        if (const auto n = function.find(".N"); n != std::string::npos) function.replace(n, 2, ".0");
-        answer_ = {{"name", plugin->component->name}, {"summary", page.summary}, {"pins", page.pins.size()},
-                   {"functions", page.functions.size()}, {"function", function}, {"needs", ""}};
-        const bool starts = plugin->component->abi_minor < 1 || (plugin->component->flags & HAL_COMPONENT_STARTS);
-        if (!construct(arguments) || !answer_["needs"].get<std::string>().empty() || starts) return finish();
+        if (const auto n = function.find(".N"); n != std::string::npos) {
+            function.replace(n, 2, ".0");
+        }
+        answer_ = {{"name", plugin->component->name},
+                   {"summary", page.summary},
+                   {"pins", page.pins.size()},
+                   {"functions", page.functions.size()},
+                   {"function", function},
+                   {"needs", ""}};
+        const bool starts =
+            plugin->component->abi_minor < 1 || (plugin->component->flags & HAL_COMPONENT_STARTS);
+        if (!construct(arguments) || !answer_["needs"].get<std::string>().empty() || starts) {
+            return finish();
+        }
         stage("run");
         cycles();
         finish();
@@ -114,25 +148,37 @@ private:
         TextOutput output;
         if (shell.run_text("compile", "loadrt " + name_ + "\n", output) != 0) {
             const std::string why = first_error(output.err_text);
-            const bool authors = why.find("declare") != std::string::npos || why.find("virtual") != std::string::npos;
+            const bool authors = why.find("declare") != std::string::npos ||
+                                 why.find("virtual") != std::string::npos;
             answer_[arguments && !authors ? "needs" : "problem"] = why;
             return arguments && !authors;
         }
         if (!author_) return true;
-        for (const auto& component : session.model().components)
+        for (const auto& component : session.model().components) {
             for (const auto& instance : component->instances) {
                 const Pin* of_all = nullptr;
                 for (const auto& pin : instance->pins) {
-                    const std::string own =
-                        pin->name.starts_with(instance->name + ".") ? pin->name.substr(instance->name.size() + 1) : pin->name;
-                    if (const std::string why = mistake_of(*pin, own); !why.empty()) return answer_["problem"] = why, false;
-                    if (!pin->function && !of_all) of_all = pin.get();
+                    const std::string own = pin->name.starts_with(instance->name + ".")
+                                                ? pin->name.substr(instance->name.size() + 1)
+                                                : pin->name;
+                    if (const std::string why = mistake_of(*pin, own); !why.empty()) {
+                        answer_["problem"] = why;
+                        return false;
+                    }
+                    if (!pin->function && !of_all) {
+                        of_all = pin.get();
+                    }
                 }
-                if (of_all && instance->functions.size() > 1)
-                    answer_["hint"] = fmt::format("its {} functions share pin '{}' and others that name no function, so they have to run in one thread; for pins "
-                                                  "of one function name it: {{*this, FUNCTION, \"{}\", ...}}",
-                                                  instance->functions.size(), of_all->name, of_all->name.substr(instance->name.size() + 1));
+                if (of_all && instance->functions.size() > 1) {
+                    answer_["hint"] = fmt::format(
+                        "its {} functions share pin '{}' and others that name no function, so they "
+                        "have to run in one thread; for pins "
+                        "of one function name it: {{*this, FUNCTION, \"{}\", ...}}",
+                        instance->functions.size(), of_all->name,
+                        of_all->name.substr(instance->name.size() + 1));
+                }
             }
+        }
         return true;
     }
 
@@ -140,12 +186,20 @@ private:
         Session session(alone(false));
         Shell shell(session, ShellOptions{});
         TextOutput output;
-        std::string text = "loadrt threads name1=hal-compile period1=1000000\nloadrt " + name_ + "\n";
-        if (shell.run_text("compile", text, output) != 0) return void(answer_["problem"] = first_error(output.err_text));
+        std::string text =
+            "loadrt threads name1=hal-compile period1=1000000\nloadrt " + name_ + "\n";
+        if (shell.run_text("compile", text, output) != 0) {
+            return void(answer_["problem"] = first_error(output.err_text));
+        }
         text.clear();
-        for (const auto& component : session.model().components)
-            for (const auto& function : component->functions) text += "addf " + function->name + " hal-compile\n";
-        if (shell.run_text("compile", text + "start\nadvance 3 cycles\n", output) != 0) return void(answer_["problem"] = first_error(output.err_text));
+        for (const auto& component : session.model().components) {
+            for (const auto& function : component->functions) {
+                text += "addf " + function->name + " hal-compile\n";
+            }
+        }
+        if (shell.run_text("compile", text + "start\nadvance 3 cycles\n", output) != 0) {
+            return void(answer_["problem"] = first_error(output.err_text));
+        }
         for (const FaultRecord& fault : session.reports().faults()) {
             std::string what = fault.sentence.substr(fault.sentence.find(": ") + 2);
             what = what.substr(0, what.find(';'));
@@ -165,26 +219,35 @@ std::vector<std::string> lines_of(const PluginSource& source) {
     std::vector<std::string> lines;
     if (!read_file(source.path, text)) return lines;
     std::istringstream in(text);
-    for (std::string line; std::getline(in, line);) lines.push_back(line);
+    for (std::string line; std::getline(in, line);) {
+        lines.push_back(line);
+    }
     return lines;
 }
 
-/// "FILE:LINE: " of what a problem is about: the last line that has the name it quotes in double quotes (of a duplicate, the second).
+/// "FILE:LINE: " of what a problem is about: the last line that has the name it quotes in double
+/// quotes (of a duplicate, the second).
 std::string place_of(const std::string& problem, const PluginSource& source) {
     const std::vector<std::string> lines = lines_of(source);
     const auto found = [&](const std::string& text) {
-        for (std::size_t i = lines.size(); i-- > 0;)
-            if (lines[i].find(text) != std::string::npos && lines[i].find("HAL_COMPONENT") == std::string::npos) return i + 1;
+        for (std::size_t i = lines.size(); i-- > 0;) {
+            if (lines[i].find(text) != std::string::npos &&
+                lines[i].find("HAL_COMPONENT") == std::string::npos) {
+                return i + 1;
+            }
+        }
         return std::size_t{0};
     };
-    std::size_t line = problem.find("must not be virtual") != std::string::npos ? found("virtual ") : 0;
+    std::size_t line =
+        problem.find("must not be virtual") != std::string::npos ? found("virtual ") : 0;
     for (std::size_t at = 0; line == 0 && (at = problem.find('\'', at)) != std::string::npos;) {
         const auto end = problem.find('\'', at + 1);
         if (end == std::string::npos) break;
         std::string name = problem.substr(at + 1, end - at - 1);
         at = end + 1;
         line = found("\"" + name + "\"");
-        for (auto dot = name.find('.'); line == 0 && dot != std::string::npos; dot = name.find('.')) {
+        for (auto dot = name.find('.'); line == 0 && dot != std::string::npos;
+             dot = name.find('.')) {
             name.erase(0, dot + 1);
             line = found("\"" + name + "\"");
         }
@@ -194,7 +257,8 @@ std::string place_of(const std::string& problem, const PluginSource& source) {
 
 }  // namespace
 
-bool try_plugin(const std::string& folder, const std::string& name, const PluginSource& source, BuiltPlugin& built) {
+bool try_plugin(const std::string& folder, const std::string& name, const PluginSource& source,
+                BuiltPlugin& built) {
     int ends[2];
     if (::pipe2(ends, O_CLOEXEC) != 0) return false;
     const pid_t child = ::fork();
@@ -205,7 +269,8 @@ bool try_plugin(const std::string& folder, const std::string& name, const Plugin
         std::signal(SIGALRM, SIG_DFL);
         ::alarm(longest_s);
         const char* const path = std::getenv("HALCYON_PLUGIN_PATH");
-        ::setenv("HALCYON_PLUGIN_PATH", (folder + (path && *path ? ":" + std::string(path) : "")).c_str(), 1);
+        ::setenv("HALCYON_PLUGIN_PATH",
+                 (folder + (path && *path ? ":" + std::string(path) : "")).c_str(), 1);
         Trial(name, ends[1], source.language == Language::cpp).run();
         ::_exit(0);  // what the plugin would do at exit is not asked for
     }
@@ -222,25 +287,37 @@ bool try_plugin(const std::string& folder, const std::string& name, const Plugin
     for (std::string line; std::getline(lines, line);) {
         const Json one = Json::parse(line, nullptr, false);
         if (!one.is_object()) continue;
-        if (one.contains("stage")) running = true;
-        else answer = one;
+        if (one.contains("stage")) {
+            running = true;
+        } else {
+            answer = one;
+        }
     }
     const auto word = [&](const char* key) { return answer.value(key, std::string()); };
     if (answer.empty() || WIFSIGNALED(status)) {
         const int number = WIFSIGNALED(status) ? WTERMSIG(status) : 0;
-        if (number == SIGALRM)
-            built.problem = fmt::format("{} does not return within {} s", running ? "a function of it" : "its constructor", longest_s);
-        else if (running)
-            built.problem = fmt::format("a function of it crashes with the initial values of its pins ({})", number ? ::strsignal(number) : "it ends the process");
-        else
-            built.problem = fmt::format("it crashes when an instance is made ({}): its constructor, or that of a static object",
-                                        number ? ::strsignal(number) : "it ends the process");
+        if (number == SIGALRM) {
+            built.problem =
+                fmt::format("{} does not return within {} s",
+                            running ? "a function of it" : "its constructor", longest_s);
+        } else if (running) {
+            built.problem =
+                fmt::format("a function of it crashes with the initial values of its pins ({})",
+                            number ? ::strsignal(number) : "it ends the process");
+        } else {
+            built.problem = fmt::format(
+                "it crashes when an instance is made ({}): its constructor, or that of a static "
+                "object",
+                number ? ::strsignal(number) : "it ends the process");
+        }
         return false;
     }
     if (const std::string problem = word("problem"); !problem.empty()) {
         built.problem = problem;
         built.loads = word("kind") != "no-component";
-        if (built.loads) built.problem = place_of(problem, source) + problem;
+        if (built.loads) {
+            built.problem = place_of(problem, source) + problem;
+        }
         return false;
     }
     built.name = word("name");
@@ -254,23 +331,34 @@ bool try_plugin(const std::string& folder, const std::string& name, const Plugin
 }
 
 std::string without_false_hint(const std::string& messages, const PluginSource& source) {
-    static const std::regex line_there(R"(using\s+(hal::)?Component::Component)"), leads_in(R"(: In instantiation of|required from|^In file included from|^ +from )");
+    static const std::regex line_there(R"(using\s+(hal::)?Component::Component)"),
+        leads_in(R"(: In instantiation of|required from|^In file included from|^ +from )");
     const std::vector<std::string> text = lines_of(source);
-    if (std::none_of(text.begin(), text.end(), [](const std::string& line) { return std::regex_search(line, line_there); })) return messages;
+    if (std::none_of(text.begin(), text.end(),
+                     [](const std::string& line) { return std::regex_search(line, line_there); })) {
+        return messages;
+    }
     std::vector<std::string> kept;
     std::istringstream in(messages);
     bool dropping = false;
     for (std::string line; std::getline(in, line);) {
-        if (line.find("static assertion failed") != std::string::npos && line.find("missing line in the component: using") != std::string::npos) {
-            while (!kept.empty() && std::regex_search(kept.back(), leads_in)) kept.pop_back();
+        if (line.find("static assertion failed") != std::string::npos &&
+            line.find("missing line in the component: using") != std::string::npos) {
+            while (!kept.empty() && std::regex_search(kept.back(), leads_in)) {
+                kept.pop_back();
+            }
             dropping = true;
             continue;
         }
         dropping = dropping && (line.starts_with(' ') || line.find("note: ") != std::string::npos);
-        if (!dropping) kept.push_back(line);
+        if (!dropping) {
+            kept.push_back(line);
+        }
     }
     std::string all;
-    for (const std::string& line : kept) all += line + "\n";
+    for (const std::string& line : kept) {
+        all += line + "\n";
+    }
     return all;
 }
 

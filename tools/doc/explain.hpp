@@ -7,7 +7,9 @@ namespace hal::tools {
 
 struct ExplainOptions : Options {
     void declare(OptionSet& set) override {
-        set.words("CODE", "the code in [brackets] at the end of a message; without it: list all codes", false);
+        set.words("CODE",
+                  "the code in [brackets] at the end of a message; without it: list all codes",
+                  false);
     }
 };
 

@@ -17,12 +17,24 @@ namespace {
 /// "V; initial 1; safe 0; used by encoder.update-counters"
 std::string remarks(const Page::Pin& pin, bool several_functions) {
     std::string text;
-    const auto add = [&](const std::string& remark) { text += (text.empty() ? "" : "; ") + remark; };
-    if (!pin.unit.empty()) add(pin.unit);
-    if (pin.type != HAL_TYPE_PORT && pin.initial.raw != 0) add("initial " + format_value(pin.type, pin.initial));
-    if (pin.has_safe) add("safe " + format_value(pin.type, pin.safe));
-    if (pin.finite) add("finite");
-    if (several_functions && !pin.function.empty()) add("used by " + pin.function);
+    const auto add = [&](const std::string& remark) {
+        text += (text.empty() ? "" : "; ") + remark;
+    };
+    if (!pin.unit.empty()) {
+        add(pin.unit);
+    }
+    if (pin.type != HAL_TYPE_PORT && pin.initial.raw != 0) {
+        add("initial " + format_value(pin.type, pin.initial));
+    }
+    if (pin.has_safe) {
+        add("safe " + format_value(pin.type, pin.safe));
+    }
+    if (pin.finite) {
+        add("finite");
+    }
+    if (several_functions && !pin.function.empty()) {
+        add("used by " + pin.function);
+    }
     return text;
 }
 
@@ -40,43 +52,72 @@ std::string without_number(const std::string& doc, const std::string& number) {
     std::string text = doc;
     for (std::size_t at = 0; (at = text.find(number, at)) != text.npos; ++at) {
         const std::size_t end = at + number.size();
-        const bool part = (at != 0 && (digit(text[at - 1]) || text[at - 1] == '.')) || (end < text.size() && digit(text[end]));
-        if (!part) text.replace(at, number.size(), "#");
+        const bool part = (at != 0 && (digit(text[at - 1]) || text[at - 1] == '.')) ||
+                          (end < text.size() && digit(text[end]));
+        if (!part) {
+            text.replace(at, number.size(), "#");
+        }
     }
     return text;
 }
 
-/// The two names differ in one number only, and the second's is one more; their docs differ at most in that number. `doc` is that of both.
+/// The two names differ in one number only, and the second's is one more; their docs differ at most
+/// in that number. `doc` is that of both.
 bool follows(const Page::Pin& a, const Page::Pin& b, std::string& doc) {
-    if (a.type != b.type || a.dir != b.dir || a.read_only != b.read_only || a.unit != b.unit || a.function != b.function ||
-        a.initial.raw != b.initial.raw)
+    if (a.type != b.type || a.dir != b.dir || a.read_only != b.read_only || a.unit != b.unit ||
+        a.function != b.function || a.initial.raw != b.initial.raw) {
         return false;
+    }
     std::size_t from = 0;
-    while (from < a.name.size() && from < b.name.size() && a.name[from] == b.name[from]) ++from;
-    while (from > 0 && digit(a.name[from - 1])) --from;
-    std::size_t a_end = from, b_end = from;
-    while (a_end < a.name.size() && digit(a.name[a_end])) ++a_end;
-    while (b_end < b.name.size() && digit(b.name[b_end])) ++b_end;
+    while (from < a.name.size() && from < b.name.size() && a.name[from] == b.name[from]) {
+        ++from;
+    }
+    while (from > 0 && digit(a.name[from - 1])) {
+        --from;
+    }
+    std::size_t a_end = from;
+    std::size_t b_end = from;
+    while (a_end < a.name.size() && digit(a.name[a_end])) {
+        ++a_end;
+    }
+    while (b_end < b.name.size() && digit(b.name[b_end])) {
+        ++b_end;
+    }
     constexpr std::size_t longest = 9;
-    if (a_end == from || b_end == from || a_end - from > longest || b_end - from > longest || a.name.substr(a_end) != b.name.substr(b_end))
+    if (a_end == from || b_end == from || a_end - from > longest || b_end - from > longest ||
+        a.name.substr(a_end) != b.name.substr(b_end)) {
         return false;
-    const std::string first = a.name.substr(from, a_end - from), second = b.name.substr(from, b_end - from);
+    }
+    const std::string first = a.name.substr(from, a_end - from);
+
+    const std::string second = b.name.substr(from, b_end - from);
     if (std::stoul(first) + 1 != std::stoul(second)) return false;
-    if (a.doc == b.doc) return doc = a.doc, true;
+    if (a.doc == b.doc) {
+        doc = a.doc;
+        return true;
+    }
     doc = without_number(a.doc, std::to_string(std::stoul(first)));
     return doc == without_number(b.doc, std::to_string(std::stoul(second)));
 }
 
 std::vector<Row> rows_of(const Page& page, bool parameters) {
     std::vector<const Page::Pin*> pins;
-    for (const Page::Pin& pin : page.pins)
-        if ((pin.dir == HAL_DIR_PARAM) == parameters) pins.push_back(&pin);
+    for (const Page::Pin& pin : page.pins) {
+        if ((pin.dir == HAL_DIR_PARAM) == parameters) {
+            pins.push_back(&pin);
+        }
+    }
     std::vector<Row> rows;
     for (std::size_t i = 0; i < pins.size();) {
         std::size_t last = i;
         std::string doc, next;
-        while (last + 1 < pins.size() && follows(*pins[last], *pins[last + 1], next) && (last == i || next == doc)) ++last, doc = next;
-        const std::string name = page.whole_names ? pins[i]->name : page.instance() + "." + pins[i]->name;
+        while (last + 1 < pins.size() && follows(*pins[last], *pins[last + 1], next) &&
+               (last == i || next == doc)) {
+            ++last;
+            doc = next;
+        }
+        const std::string name =
+            page.whole_names ? pins[i]->name : page.instance() + "." + pins[i]->name;
         if (last >= i + 2) {
             rows.push_back({name + " … " + pins[last]->name, pins[i], doc});
             i = last + 1;
@@ -92,18 +133,26 @@ bool several(const Page& page) { return page.functions.size() > 1; }
 
 std::string synopsis(const Page& page) {
     std::string line = "loadrt " + page.name;
-    if (!page.singleton) line += " [count=N | names=NAME,…]";
-    for (const auto& argument : page.arguments) line += fmt::format(" [{}={}]", argument.name, argument.per_instance ? "VALUE,…" : "VALUE");
+    if (!page.singleton) {
+        line += " [count=N | names=NAME,…]";
+    }
+    for (const auto& argument : page.arguments) {
+        line += fmt::format(" [{}={}]", argument.name, argument.per_instance ? "VALUE,…" : "VALUE");
+    }
     return line;
 }
 
 std::string described(const Page::Argument& argument) {
     std::string text = argument.doc;
-    if (argument.per_instance) text += ", one per instance";
-    return argument.fallback.empty() ? text : fmt::format("{} (default {})", text, argument.fallback);
+    if (argument.per_instance) {
+        text += ", one per instance";
+    }
+    return argument.fallback.empty() ? text
+                                     : fmt::format("{} (default {})", text, argument.fallback);
 }
 
-constexpr const char* times_sentence = "Each function also has .time, .tmax (ns) and .tmax-increased.";
+constexpr const char* times_sentence =
+    "Each function also has .time, .tmax (ns) and .tmax-increased.";
 
 }  // namespace
 
@@ -116,19 +165,25 @@ void walk(const Page& page, PageWriter& to) {
         to.table(rows);
     };
     std::vector<std::vector<std::string>> rows;
-    for (const auto& argument : page.arguments) rows.push_back({argument.name + "=", described(argument)});
+    for (const auto& argument : page.arguments) {
+        rows.push_back({argument.name + "=", described(argument)});
+    }
     table("Arguments", rows);
     rows.clear();
-    for (const auto& function : page.functions)
-        rows.push_back({page.full_name(function), function.doc + (function.shared ? " (one for all instances)" : "")});
+    for (const auto& function : page.functions) {
+        rows.push_back({page.full_name(function),
+                        function.doc + (function.shared ? " (one for all instances)" : "")});
+    }
     table("Functions", rows);
-    if (!rows.empty()) to.prose(times_sentence);
+    if (!rows.empty()) {
+        to.prose(times_sentence);
+    }
     for (const bool parameters : {false, true}) {
         rows.clear();
         for (const Row& row : rows_of(page, parameters)) {
             const std::string more = remarks(*row.pin, several(page));
-            rows.push_back(
-                {row.name, name(row.pin->type), direction(*row.pin), row.doc + (more.empty() ? "" : " (" + more + ")")});
+            rows.push_back({row.name, name(row.pin->type), direction(*row.pin),
+                            row.doc + (more.empty() ? "" : " (" + more + ")")});
         }
         table(parameters ? "Parameters" : "Pins", rows);
     }

@@ -7,12 +7,16 @@ namespace hal::tools {
 
 struct DoctorOptions : Options {
     double seconds = 2.0;  ///< of each measurement
-    bool json = false, fix = false, yes = false;
+    bool json = false;
+    bool fix = false;
+    bool yes = false;
 
     void declare(OptionSet& set) override {
-        set.value("--seconds", seconds, "S", "duration of each measurement (default 2)").in(0.0, 3600.0);
+        set.value("--seconds", seconds, "S", "duration of each measurement (default 2)")
+            .in(0.0, 3600.0);
         set.flag("--json", json, "as JSON");
-        set.flag("--fix", fix, "carry out the commands it suggests, each after asking; no measurement");
+        set.flag("--fix", fix,
+                 "carry out the commands it suggests, each after asking; no measurement");
         set.flag("--yes", yes, "with --fix: without asking");
     }
 };

@@ -13,13 +13,16 @@ namespace {
 
 constexpr const char* type_colours[] = {"#b03030", "#2060a0", "#207040", "#507020",
                                         "#206868", "#6a5a10", "#703080"};  // in hal_type's order
-constexpr const char* thread_colours[] = {"#cfe3ff", "#ffe2b8", "#d8f0c8", "#f3d0ee", "#fff3a8", "#d5d5f5", "#c8efe9", "#f7cfc8"};
+constexpr const char* thread_colours[] = {"#cfe3ff", "#ffe2b8", "#d8f0c8", "#f3d0ee",
+                                          "#fff3a8", "#d5d5f5", "#c8efe9", "#f7cfc8"};
 constexpr const char* centre_colour = " bgcolor=\"#fff2a8\"";
 
 std::string dot_text(std::string_view text) {
     std::string out = "\"";
     for (const char c : text) {
-        if (c == '"' || c == '\\') out += '\\';
+        if (c == '"' || c == '\\') {
+            out += '\\';
+        }
         out += c;
     }
     return out + '"';
@@ -27,24 +30,34 @@ std::string dot_text(std::string_view text) {
 
 /// Returns the part after the instance's name and dot; the whole name when it has another form.
 std::string_view below(const std::string& name, const std::string& owner) {
-    if (name.size() > owner.size() + 1 && name.starts_with(owner) && name[owner.size()] == '.')
+    if (name.size() > owner.size() + 1 && name.starts_with(owner) && name[owner.size()] == '.') {
         return std::string_view(name).substr(owner.size() + 1);
+    }
     return name;
 }
 
 class Drawing {
 public:
-    Drawing(const Model& model, const GraphView& view, const std::string& title) : model_(model), view_(view) {
+    Drawing(const Model& model, const GraphView& view, const std::string& title)
+        : model_(model), view_(view) {
         text_ = fmt::format(
-            "digraph {} {{\n    graph [rankdir=LR, fontname=\"sans-serif\", ranksep=1.2, nodesep=0.3, newrank=true];\n"
-            "    node [shape=plain, fontname=\"sans-serif\", fontsize=10];\n    edge [fontname=\"sans-serif\", fontsize=9, "
+            "digraph {} {{\n    graph [rankdir=LR, fontname=\"sans-serif\", ranksep=1.2, "
+            "nodesep=0.3, newrank=true];\n"
+            "    node [shape=plain, fontname=\"sans-serif\", fontsize=10];\n    edge "
+            "[fontname=\"sans-serif\", fontsize=9, "
             "arrowsize=0.6];\n",
             dot_text(title));
-        for (const auto& thread : model.threads)
-            colours_.emplace(thread.get(), thread_colours[colours_.size() % std::size(thread_colours)]);
+        for (const auto& thread : model.threads) {
+            colours_.emplace(thread.get(),
+                             thread_colours[colours_.size() % std::size(thread_colours)]);
+        }
         legend();
-        for (const auto& [name, instances] : view.clusters()) cluster(name, instances);
-        for (const Signal* item : view.signals()) signal(*item);
+        for (const auto& [name, instances] : view.clusters()) {
+            cluster(name, instances);
+        }
+        for (const Signal* item : view.signals()) {
+            signal(*item);
+        }
         text_ += "}\n";
     }
     std::string text() && { return std::move(text_); }
@@ -60,21 +73,33 @@ private:
 
     void legend() {
         if (model_.threads.empty()) return;
-        text_ += "    threads [label=<<table border=\"0\" cellborder=\"1\" cellspacing=\"0\" color=\"#808080\">";
-        for (const auto& thread : model_.threads)
-            text_ += fmt::format("<tr><td bgcolor=\"{}\">{}, {}</td></tr>", colours_.at(thread.get()), xml_escape(thread->name),
+        text_ +=
+            "    threads [label=<<table border=\"0\" cellborder=\"1\" cellspacing=\"0\" "
+            "color=\"#808080\">";
+        for (const auto& thread : model_.threads) {
+            text_ += fmt::format("<tr><td bgcolor=\"{}\">{}, {}</td></tr>",
+                                 colours_.at(thread.get()), xml_escape(thread->name),
                                  format_duration(static_cast<double>(thread->options.period_ns)));
-        text_ += "<tr><td>dashed, z⁻¹: one cycle old<br/>dotted: from another thread</td></tr></table>>];\n";
+        }
+        text_ +=
+            "<tr><td>dashed, z⁻¹: one cycle old<br/>dotted: from another "
+            "thread</td></tr></table>>];\n";
     }
 
     void cluster(const std::string& name, const std::vector<const Instance*>& instances) {
-        if (!name.empty())
+        if (!name.empty()) {
             text_ += fmt::format(
-                "    subgraph {} {{\n    graph [label={}, labeljust=l, style=\"filled,rounded\", color=\"#b0b0b0\", "
+                "    subgraph {} {{\n    graph [label={}, labeljust=l, style=\"filled,rounded\", "
+                "color=\"#b0b0b0\", "
                 "fillcolor=\"#f6f6f6\"];\n    node [style=filled, fillcolor=white];\n",
                 dot_text("cluster " + name), dot_text(name));
-        for (const Instance* item : instances) instance(*item);
-        if (!name.empty()) text_ += "    }\n";
+        }
+        for (const Instance* item : instances) {
+            instance(*item);
+        }
+        if (!name.empty()) {
+            text_ += "    }\n";
+        }
     }
 
     void instance(const Instance& item) {
@@ -91,18 +116,20 @@ private:
             (pin->dir == HAL_DIR_OUT ? right : left).push_back(pin.get());
         }
         text_ += fmt::format(
-            "    {} [label=<<table border=\"0\" cellborder=\"1\" cellspacing=\"0\" color=\"#808080\">"
+            "    {} [label=<<table border=\"0\" cellborder=\"1\" cellspacing=\"0\" "
+            "color=\"#808080\">"
             "<tr><td colspan=\"2\"{}><b>{}</b>{}</td></tr>",
             node, view_.centre(item) ? centre_colour : "", xml_escape(item.name),
             item.component->name == item.name ? "" : " (" + xml_escape(item.component->name) + ")");
         for (const LoadedFunction* function : item.functions) {
             const std::size_t order = place(*function);
-            const std::string where = order != 0       ? fmt::format("{}. in {}", order, xml_escape(function->thread->name))
-                                      : function->init ? fmt::format("once in {}", xml_escape(function->thread->name))
-                                                       : "in no thread";
+            const std::string where =
+                order != 0 ? fmt::format("{}. in {}", order, xml_escape(function->thread->name))
+                : function->init ? fmt::format("once in {}", xml_escape(function->thread->name))
+                                 : "in no thread";
             text_ += fmt::format("<tr><td colspan=\"2\" bgcolor=\"{}\">{}: {}</td></tr>",
-                                 function->thread ? colours_.at(function->thread) : "#f4f4f4", xml_escape(below(function->name, item.name)),
-                                 where);
+                                 function->thread ? colours_.at(function->thread) : "#f4f4f4",
+                                 xml_escape(below(function->name, item.name)), where);
         }
         for (std::size_t i = 0; i < std::max(left.size(), right.size()); ++i) {
             text_ += "<tr>";
@@ -110,13 +137,16 @@ private:
             cell(item, right, i, "right");
             text_ += "</tr>";
         }
-        if (unlinked > 0)
-            text_ += fmt::format("<tr><td colspan=\"2\"><font color=\"#707070\">{} unlinked pin{}</font></td></tr>", unlinked,
-                                 unlinked == 1 ? "" : "s");
+        if (unlinked > 0) {
+            text_ += fmt::format(
+                "<tr><td colspan=\"2\"><font color=\"#707070\">{} unlinked pin{}</font></td></tr>",
+                unlinked, unlinked == 1 ? "" : "s");
+        }
         text_ += "</table>>];\n";
     }
 
-    void cell(const Instance& item, const std::vector<const Pin*>& pins, std::size_t i, const char* align) {
+    void cell(const Instance& item, const std::vector<const Pin*>& pins, std::size_t i,
+              const char* align) {
         if (i >= pins.size()) {
             text_ += "<td></td>";
             return;
@@ -126,30 +156,42 @@ private:
         ids_.emplace(&pin, ids_.at(&item) + ":" + port);
         const std::string label = net_label(pin);
         text_ +=
-            fmt::format("<td port=\"{}\" align=\"{}\"{}><font color=\"{}\">{}{}</font></td>", port, align,
-                        view_.centre(pin) ? centre_colour : "", pin.signal ? type_colours[static_cast<std::size_t>(pin.type)] : "#a0a0a0",
-                        xml_escape(below(pin.name, item.name)), label.empty() ? "" : "  <i>" + xml_escape(label) + "</i>");
+            fmt::format("<td port=\"{}\" align=\"{}\"{}><font color=\"{}\">{}{}</font></td>", port,
+                        align, view_.centre(pin) ? centre_colour : "",
+                        pin.signal ? type_colours[static_cast<std::size_t>(pin.type)] : "#a0a0a0",
+                        xml_escape(below(pin.name, item.name)),
+                        label.empty() ? "" : "  <i>" + xml_escape(label) + "</i>");
     }
 
-    /// Returns the text at a pin for what is not drawn as an edge: a signal with many readers, an end outside of the neighbourhood.
+    /// Returns the text at a pin for what is not drawn as an edge: a signal with many readers, an
+    /// end outside of the neighbourhood.
     std::string net_label(const Pin& pin) const {
         if (!pin.signal) return "";
         const Signal& signal = *pin.signal;
         const Pin* const source = source_of(signal);
         if (source == &pin) {
             const auto hidden =
-                std::count_if(signal.pins.begin(), signal.pins.end(), [&](const Pin* other) { return !view_.shows(*other); });
-            if (is_hub(signal)) return fmt::format("→ {} ({} readers)", signal.name, signal.pins.size() - 1);
+                std::count_if(signal.pins.begin(), signal.pins.end(),
+                              [&](const Pin* other) { return !view_.shows(*other); });
+            if (is_hub(signal)) {
+                return fmt::format("→ {} ({} readers)", signal.name, signal.pins.size() - 1);
+            }
             return hidden > 0 ? fmt::format("→ {} +{}", signal.name, hidden) : "";
         }
-        if (is_hub(signal)) return fmt::format("← {}{}", signal.name, source ? age(*source, pin) : "");
-        return source && !view_.shows(*source) ? fmt::format("← {}{}", source->name, age(*source, pin)) : "";
+        if (is_hub(signal)) {
+            return fmt::format("← {}{}", signal.name, source ? age(*source, pin) : "");
+        }
+        return source && !view_.shows(*source)
+                   ? fmt::format("← {}{}", source->name, age(*source, pin))
+                   : "";
     }
 
     /// Returns what a net label has in place of the line's style.
     static std::string age(const Pin& from, const Pin& to) {
         const std::string_view line = style(from, to);
-        return line == "dashed" ? " z⁻¹" : line == "dotted" ? fmt::format(" from {}", thread_of(from)->name) : "";
+        return line == "dashed"   ? " z⁻¹"
+               : line == "dotted" ? fmt::format(" from {}", thread_of(from)->name)
+                                  : "";
     }
 
     /// A pin of a thread or of a function's times is a small node of its own.
@@ -157,22 +199,28 @@ private:
         if (const auto known = ids_.find(&pin); known != ids_.end()) return known->second;
         const std::string node = fmt::format("t{}", ids_.size());
         ids_.emplace(&pin, node);
-        text_ += fmt::format("    {} [shape=box, height=0.2, margin=0.05, label={}];\n", node, dot_text(pin.name));
+        text_ += fmt::format("    {} [shape=box, height=0.2, margin=0.05, label={}];\n", node,
+                             dot_text(pin.name));
         return node;
     }
 
     /// First and last place of the functions that may use the pin, in its thread.
     static std::pair<std::size_t, std::size_t> places(const Pin& pin) {
-        std::size_t first = 0, last = 0;
+        std::size_t first = 0;
+        std::size_t last = 0;
         const auto count = [&](const LoadedFunction& function) {
             const std::size_t at = place(function);
             if (at == 0) return;
             first = first == 0 ? at : std::min(first, at);
             last = std::max(last, at);
         };
-        if (pin.function) count(*pin.function);
-        else if (pin.instance)
-            for (const LoadedFunction* function : pin.instance->functions) count(*function);
+        if (pin.function) {
+            count(*pin.function);
+        } else if (pin.instance) {
+            for (const LoadedFunction* function : pin.instance->functions) {
+                count(*function);
+            }
+        }
         return {first, last};
     }
 
@@ -184,39 +232,52 @@ private:
         return places(to).first <= places(from).second ? "dashed" : "solid";
     }
 
-    void edge(const std::string& from, const std::string& to, const Signal& signal, const char* style, bool labelled, bool both) {
-        // A value that is one cycle old runs against the order of execution: it does not count for the ranks.
-        text_ += fmt::format("    {} -> {} [color=\"{}\", style={}, tooltip={}{}{}{}];\n", from, to,
-                             type_colours[static_cast<std::size_t>(signal.type)], style, dot_text(signal.name),
-                             labelled ? ", label=" + dot_text(signal.name) : "", both ? ", dir=both" : "",
-                             std::string_view(style) == "dashed" ? ", headlabel=\"z⁻¹\", constraint=false" : "");
+    void edge(const std::string& from, const std::string& to, const Signal& signal,
+              const char* style, bool labelled, bool both) {
+        // A value that is one cycle old runs against the order of execution: it does not count for
+        // the ranks.
+        text_ += fmt::format(
+            "    {} -> {} [color=\"{}\", style={}, tooltip={}{}{}{}];\n", from, to,
+            type_colours[static_cast<std::size_t>(signal.type)], style, dot_text(signal.name),
+            labelled ? ", label=" + dot_text(signal.name) : "", both ? ", dir=both" : "",
+            std::string_view(style) == "dashed" ? ", headlabel=\"z⁻¹\", constraint=false" : "");
     }
 
     /// A signal without a source, or without readers, is a node of its own.
     std::string node_of(const Signal& item) {
         const std::string node = fmt::format("s{}", ids_.size());
         ids_.emplace(&item, node);
-        text_ += fmt::format("    {} [shape=ellipse, style=dashed, height=0.2, margin=0.03, label={}];\n", node, dot_text(item.name));
+        text_ += fmt::format(
+            "    {} [shape=ellipse, style=dashed, height=0.2, margin=0.03, label={}];\n", node,
+            dot_text(item.name));
         return node;
     }
 
     void signal(const Signal& item) {
-        if (is_hub(item)) return;  // net labels
+        if (is_hub(item)) {
+            return;  // net labels
+        }
         const Pin* const source = source_of(item);
         if (!source) {
             const std::string node = node_of(item);
-            for (const Pin* pin : item.pins)
-                if (view_.shows(*pin)) edge(node, node_of(*pin), item, "solid", false, false);
+            for (const Pin* pin : item.pins) {
+                if (view_.shows(*pin)) {
+                    edge(node, node_of(*pin), item, "solid", false, false);
+                }
+            }
             return;
         }
         if (!view_.shows(*source)) return;
-        const std::string from = node_of(*source) + (source->dir == HAL_DIR_OUT && source->instance ? ":e" : "");
-        if (item.pins.size() == 1) edge(from, node_of(item), item, "solid", false, false);
+        const std::string from =
+            node_of(*source) + (source->dir == HAL_DIR_OUT && source->instance ? ":e" : "");
+        if (item.pins.size() == 1) {
+            edge(from, node_of(item), item, "solid", false, false);
+        }
         bool first = true;
         for (const Pin* pin : item.pins) {
             if (pin == source || !view_.shows(*pin)) continue;
-            edge(from, node_of(*pin) + (pin->instance ? ":w" : ""), item, style(*source, *pin), first,
-                 source->dir == HAL_DIR_IO && pin->dir == HAL_DIR_IO);
+            edge(from, node_of(*pin) + (pin->instance ? ":w" : ""), item, style(*source, *pin),
+                 first, source->dir == HAL_DIR_IO && pin->dir == HAL_DIR_IO);
             first = false;
         }
     }
@@ -224,12 +285,15 @@ private:
     const Model& model_;
     const GraphView& view_;
     std::string text_;
-    std::map<const void*, std::string> ids_;  // of instances, pins and signals, as the drawing names them
+    // of instances, pins and signals, as the drawing names them
+    std::map<const void*, std::string> ids_;
     std::map<const Thread*, const char*> colours_;
 };
 
 }  // namespace
 
-std::string as_dot(const Model& model, const GraphView& view, const std::string& title) { return Drawing(model, view, title).text(); }
+std::string as_dot(const Model& model, const GraphView& view, const std::string& title) {
+    return Drawing(model, view, title).text();
+}
 
 }  // namespace hal::tools

@@ -10,25 +10,34 @@ namespace hal::tools {
 
 namespace {
 
-constexpr std::size_t most_with_all_pins = 40;  // instances of a drawing that shows unlinked pins unasked
+// instances of a drawing that shows unlinked pins unasked
+constexpr std::size_t most_with_all_pins = 40;
 
 std::string unknown_name(const Model& model, const std::string& name) {
     std::vector<std::string> names;
-    for (const auto& [key, item] : model.instance) names.emplace_back(key);
-    for (const auto& [key, item] : model.pin) names.emplace_back(key);
-    for (const auto& [key, item] : model.signal) names.emplace_back(key);
+    for (const auto& [key, item] : model.instance) {
+        names.emplace_back(key);
+    }
+    for (const auto& [key, item] : model.pin) {
+        names.emplace_back(key);
+    }
+    for (const auto& [key, item] : model.signal) {
+        names.emplace_back(key);
+    }
     std::sort(names.begin(), names.end());
     names.erase(std::unique(names.begin(), names.end()), names.end());
     const std::string hint = did_you_mean(name, names);
-    return fmt::format("no pin, signal or instance '{}'; {}", name, hint.empty() ? "--around takes a name of the netlist" : hint);
+    return fmt::format("no pin, signal or instance '{}'; {}", name,
+                       hint.empty() ? "--around takes a name of the netlist" : hint);
 }
 
 }  // namespace
 
 const Pin* source_of(const Signal& signal) {
     if (signal.writer) return signal.writer;
-    for (const Pin* pin : signal.pins)
+    for (const Pin* pin : signal.pins) {
         if (pin->dir == HAL_DIR_IO) return pin;
+    }
     return nullptr;
 }
 
@@ -36,29 +45,44 @@ bool is_hub(const Signal& signal) { return signal.pins.size() > most_edges + 1; 
 
 GraphView::GraphView(const Model& model, const Sources& sources, const GraphWish& wish) {
     const bool whole = wish.around.empty();
-    if (whole)
-        for (const auto& component : model.components)
-            for (const auto& item : component->instances) shown_.insert(item.get());
-    else select_around(model, wish);
+    if (whole) {
+        for (const auto& component : model.components) {
+            for (const auto& item : component->instances) {
+                shown_.insert(item.get());
+            }
+        }
+    } else {
+        select_around(model, wish);
+    }
     if (!problem_.empty()) return;
     all_pins_ = wish.all_pins.value_or(whole && shown_.size() <= most_with_all_pins);
     select_signals(model, whole);
     make_clusters(model, sources, wish.cluster);
 }
 
-bool GraphView::shows(const Pin& pin) const { return pin.instance ? shows(*pin.instance) : pin.signal != nullptr; }
+bool GraphView::shows(const Pin& pin) const {
+    return pin.instance ? shows(*pin.instance) : pin.signal != nullptr;
+}
 
-// A breadth-first search over instances. A step follows all signals of an instance, the first one only the named signal.
+// A breadth-first search over instances. A step follows all signals of an instance, the first one
+// only the named signal.
 void GraphView::select_around(const Model& model, const GraphWish& wish) {
     std::vector<const Instance*> border;
     const auto reach = [&](const Signal& signal) {
-        for (const Pin* pin : signal.pins)
-            if (pin->instance && shown_.insert(pin->instance).second) border.push_back(pin->instance);
+        for (const Pin* pin : signal.pins) {
+            if (pin->instance && shown_.insert(pin->instance).second) {
+                border.push_back(pin->instance);
+            }
+        }
     };
     const auto follow = [&](const std::vector<const Instance*>& from) {
-        for (const Instance* instance : from)
-            for (const auto& pin : instance->pins)
-                if (pin->signal && !is_hub(*pin->signal)) reach(*pin->signal);
+        for (const Instance* instance : from) {
+            for (const auto& pin : instance->pins) {
+                if (pin->signal && !is_hub(*pin->signal)) {
+                    reach(*pin->signal);
+                }
+            }
+        }
     };
     std::size_t steps = wish.depth;
     if (const Instance* const instance = model.find_instance(wish.around)) {
@@ -67,11 +91,15 @@ void GraphView::select_around(const Model& model, const GraphWish& wish) {
         border.push_back(instance);
     } else if (const Pin* const pin = model.find_pin(wish.around)) {
         centre_ = pin;
-        if (pin->instance) shown_.insert(pin->instance);
+        if (pin->instance) {
+            shown_.insert(pin->instance);
+        }
         if (pin->signal && steps > 0) {
             reach(*pin->signal);
             --steps;
-            if (pin->instance) border.push_back(pin->instance);
+            if (pin->instance) {
+                border.push_back(pin->instance);
+            }
         }
     } else if (const Signal* const signal = model.find_signal(wish.around)) {
         centre_ = signal;
@@ -87,9 +115,12 @@ void GraphView::select_around(const Model& model, const GraphWish& wish) {
 }
 
 void GraphView::select_signals(const Model& model, bool whole) {
-    for (const Signal* signal : model.sorted_signals())
-        if (whole || std::any_of(signal->pins.begin(), signal->pins.end(), [&](const Pin* pin) { return pin->instance && shows(*pin); }))
+    for (const Signal* signal : model.sorted_signals()) {
+        if (whole || std::any_of(signal->pins.begin(), signal->pins.end(),
+                                 [&](const Pin* pin) { return pin->instance && shows(*pin); })) {
             signals_.push_back(signal);
+        }
+    }
 }
 
 void GraphView::make_clusters(const Model& model, const Sources& sources, Cluster cluster) {
@@ -99,20 +130,24 @@ void GraphView::make_clusters(const Model& model, const Sources& sources, Cluste
         case Cluster::component: return item.component->name;
         case Cluster::file: return item.loaded.known() ? sources.get(item.loaded.source).name : "";
         case Cluster::thread:
-            for (const LoadedFunction* function : item.functions)
+            for (const LoadedFunction* function : item.functions) {
                 if (function->thread) return function->thread->name;
+            }
             break;
         }
         return "";
     };
     std::map<std::string, std::size_t> known;
-    for (const auto& component : model.components)
+    for (const auto& component : model.components) {
         for (const auto& item : component->instances) {
             if (!shows(*item)) continue;
             const auto [at, fresh] = known.emplace(name(*item), clusters_.size());
-            if (fresh) clusters_.emplace_back(at->first, std::vector<const Instance*>{});
+            if (fresh) {
+                clusters_.emplace_back(at->first, std::vector<const Instance*>{});
+            }
             clusters_[at->second].second.push_back(item.get());
         }
+    }
 }
 
 }  // namespace hal::tools

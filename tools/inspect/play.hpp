@@ -7,7 +7,10 @@ namespace hal::tools {
 
 struct PlayOptions : StreamOptions {
     void declare(OptionSet& set) override {
-        set.words("CHANNEL FILE", "number of the streamer (default 0), then the file to read (default: standard input)", false);
+        set.words(
+            "CHANNEL FILE",
+            "number of the streamer (default 0), then the file to read (default: standard input)",
+            false);
         set.value("-c,--channel", channel, "CHANNEL", "a streamer, by number or by instance name");
         set.value("-N,--name", name, "NAME", "the instance to feed");
     }

@@ -22,49 +22,72 @@ namespace {
 using nlohmann::json;
 
 double real_of(const json& value) {
-    return value.is_string() ? std::strtod(value.get_ref<const std::string&>().c_str(), nullptr) : value.get<double>();
+    return value.is_string() ? std::strtod(value.get_ref<const std::string&>().c_str(), nullptr)
+                             : value.get<double>();
 }
 
 /// LinuxCNC's form: bits 0 and 1, floats with six decimals, a blank after each value.
 void append_plain(std::string& to, hal_type type, const json& value) {
-    if (type == HAL_TYPE_BIT) to += value.get<bool>() ? "1 " : "0 ";
-    else if (type == HAL_TYPE_FLOAT) to += fmt::format("{:f} ", real_of(value));
-    else to += value.dump() + " ";
+    if (type == HAL_TYPE_BIT) {
+        to += value.get<bool>() ? "1 " : "0 ";
+    } else if (type == HAL_TYPE_FLOAT) {
+        to += fmt::format("{:f} ", real_of(value));
+    } else {
+        to += value.dump() + " ";
+    }
 }
 
 /// Formats floats with the digits needed to read the same value again.
 void append_csv(std::string& to, hal_type type, const json& value) {
-    if (type == HAL_TYPE_BIT) to += value.get<bool>() ? "1" : "0";
-    else if (type == HAL_TYPE_FLOAT) to += fmt::format("{}", real_of(value));
-    else to += value.dump();
+    if (type == HAL_TYPE_BIT) {
+        to += value.get<bool>() ? "1" : "0";
+    } else if (type == HAL_TYPE_FLOAT) {
+        to += fmt::format("{}", real_of(value));
+    } else {
+        to += value.dump();
+    }
 }
 
 std::string csv_field(const std::string& text) {
     if (text.find_first_of(",\"\n") == std::string::npos) return text;
     std::string quoted = "\"";
-    for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+    for (const char c : text) {
+        quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+    }
     return quoted + '"';
 }
 
 /// The signals linked to the columns, or the pins' own names.
 std::string csv_header(Stream& stream, bool tag) {
     std::vector<std::string> names(stream.types.size());
-    for (std::size_t i = 0; i < names.size(); ++i) names[i] = fmt::format("{}.pin.{}", stream.name, i);
-    const json pins = stream.client->request({{"describe", "pin"}, {"patterns", json::array({stream.name + ".pin."})}});
-    for (const json& pin : pins.value("objects", json::array()))
-        if (const auto at = std::find(names.begin(), names.end(), pin.value("name", "")); at != names.end() && pin.contains("signal"))
+    for (std::size_t i = 0; i < names.size(); ++i) {
+        names[i] = fmt::format("{}.pin.{}", stream.name, i);
+    }
+    const json pins = stream.client->request(
+        {{"describe", "pin"}, {"patterns", json::array({stream.name + ".pin."})}});
+    for (const json& pin : pins.value("objects", json::array())) {
+        if (const auto at = std::find(names.begin(), names.end(), pin.value("name", ""));
+            at != names.end() && pin.contains("signal")) {
             *at = pin["signal"];
+        }
+    }
     std::string line = tag ? "sample" : "";
-    if (stream.timed) line += line.empty() ? "time_s" : ",time_s";
-    for (const std::string& name : names) line += (line.empty() ? "" : ",") + csv_field(name);
+    if (stream.timed) {
+        line += line.empty() ? "time_s" : ",time_s";
+    }
+    for (const std::string& name : names) {
+        line += (line.empty() ? "" : ",") + csv_field(name);
+    }
     return line + "\n";
 }
 
 class Lines {
 public:
-    Lines(const Stream& stream, const RecordOptions& options) : types_(stream.types), csv_(options.csv), tag_(options.tag), timed_(stream.timed) {}
+    Lines(const Stream& stream, const RecordOptions& options)
+        : types_(stream.types), csv_(options.csv), tag_(options.tag), timed_(stream.timed) {}
 
-    /// Writes the records of a reply as lines. A line `overrun` marks lost records; CSV shows them by its times only.
+    /// Writes the records of a reply as lines. A line `overrun` marks lost records; CSV shows them
+    /// by its times only.
     bool write(const json& reply, RecordFile& file) {
         const json& records = reply.at("records");
         const json losses = reply.value("lost_before", json::array());
@@ -72,16 +95,23 @@ public:
             const auto number = reply.at("numbers").at(i).get<std::int64_t>();
             const std::uint64_t lost = i < losses.size() ? losses[i].get<std::uint64_t>() : 0;
             std::string text;
-            if (!csv_ && known_ && lost != lost_) text += "overrun\n";
+            if (!csv_ && known_ && lost != lost_) {
+                text += "overrun\n";
+            }
             known_ = true;
             lost_ = lost;
-            if (tag_) text += fmt::format("{}{}", number, csv_ ? "" : " ");
+            if (tag_) {
+                text += fmt::format("{}{}", number, csv_ ? "" : " ");
+            }
             if (csv_ && timed_) {
                 const auto ns = reply.at("times_ns").at(i).get<std::int64_t>();
-                text += fmt::format("{}{}.{:09}", tag_ ? "," : "", ns / 1'000'000'000, ns % 1'000'000'000);
+                text += fmt::format("{}{}.{:09}", tag_ ? "," : "", ns / 1'000'000'000,
+                                    ns % 1'000'000'000);
             }
             for (std::size_t c = 0; c < types_.size(); ++c) {
-                if (csv_ && (tag_ || timed_ || c > 0)) text += ',';
+                if (csv_ && (tag_ || timed_ || c > 0)) {
+                    text += ',';
+                }
                 (csv_ ? append_csv : append_plain)(text, types_[c], records[i].at(c));
             }
             text += '\n';
@@ -103,22 +133,28 @@ int follow(Stream& stream, const RecordOptions& options, RecordFile& file) {
     const auto lost = [&] {
         if (file.error() == EPIPE) return 1;
         const std::size_t records = file.records() - std::min(file.records(), headers);
-        return fail(options, fmt::format("cannot write{}: {}; what was written ends with a whole line, after {} record{}",
-                                         stream.file.empty() ? "" : " '" + stream.file + "'", std::strerror(file.error()), records,
-                                         records == 1 ? "" : "s"));
+        return fail(
+            options,
+            fmt::format(
+                "cannot write{}: {}; what was written ends with a whole line, after {} record{}",
+                stream.file.empty() ? "" : " '" + stream.file + "'", std::strerror(file.error()),
+                records, records == 1 ? "" : "s"));
     };
     if (options.csv && !(file.put(csv_header(stream, options.tag)) && file.flush())) return lost();
     Lines lines(stream, options);
     std::uint64_t taken = 0;
     while (!stop.requested() && (options.count == 0 || taken < options.count)) {
         constexpr std::uint64_t at_once = 4096;
-        const std::uint64_t wanted = options.count == 0 ? at_once : std::min(at_once, options.count - taken);
+        const std::uint64_t wanted =
+            options.count == 0 ? at_once : std::min(at_once, options.count - taken);
         const json reply = stream.client->request({{"stream", stream.name}, {"take", wanted}});
-        if (!reply.value("ok", false)) { return fail(options, stream.lost()); }
+        if (!reply.value("ok", false)) return fail(options, stream.lost());
         const std::size_t got = reply.at("records").size();
         if (!lines.write(reply, file)) return lost();
         taken += got;
-        if (got == 0) stop.wait_ns(poll_ns);
+        if (got == 0) {
+            stop.wait_ns(poll_ns);
+        }
     }
     return file.close() ? 0 : lost();
 }
@@ -128,11 +164,15 @@ int follow(Stream& stream, const RecordOptions& options, RecordFile& file) {
 int run_record(const RecordOptions& options) {
     const std::vector<std::string>& words = options.words;
     const bool channel = !words.empty() && parse_natural(words[0]);
-    const bool named = !words.empty() && !channel && (words[0].ends_with(".mcap") || words.size() > 1);
+    const bool named =
+        !words.empty() && !channel && (words[0].ends_with(".mcap") || words.size() > 1);
     if (!options.classic && (named || options.values.asked())) {
         if (words.empty()) return fail(options, "missing file: hal record FILE.mcap NAMES");
-        if (options.csv || options.tag || options.count != 0 || !options.channel.empty())
-            return fail(options, "--csv, --tag, --count and --channel are for a sampler; the ending of the file chooses the format, --for the end");
+        if (options.csv || options.tag || options.count != 0 || !options.channel.empty()) {
+            return fail(options,
+                        "--csv, --tag, --count and --channel are for a sampler; the ending of the "
+                        "file chooses the format, --for the end");
+        }
         Recording what = options.values;
         what.file = words[0];
         what.names.assign(words.begin() + 1, words.end());
@@ -145,7 +185,10 @@ int run_record(const RecordOptions& options) {
         return follow(stream, options, out);
     }
     RecordFile file(stream.file);
-    if (file.error() != 0) return fail(options, fmt::format("cannot write '{}': {}", stream.file, std::strerror(file.error())));
+    if (file.error() != 0) {
+        return fail(options,
+                    fmt::format("cannot write '{}': {}", stream.file, std::strerror(file.error())));
+    }
     return follow(stream, options, file);
 }
 

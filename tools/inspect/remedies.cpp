@@ -19,7 +19,10 @@ bool found_in_path(const std::string& program) {
     std::string folders = path ? path : "";
     for (std::size_t begin = 0; begin <= folders.size();) {
         const std::size_t end = std::min(folders.find(':', begin), folders.size());
-        if (end > begin && ::access((folders.substr(begin, end - begin) + "/" + program).c_str(), X_OK) == 0) return true;
+        if (end > begin &&
+            ::access((folders.substr(begin, end - begin) + "/" + program).c_str(), X_OK) == 0) {
+            return true;
+        }
         begin = end + 1;
     }
     return false;
@@ -27,7 +30,9 @@ bool found_in_path(const std::string& program) {
 
 /// Returns the command as root types it.
 std::string without_sudo(std::string command) {
-    for (std::size_t at = 0; (at = command.find("sudo ", at)) != std::string::npos;) command.erase(at, 5);
+    for (std::size_t at = 0; (at = command.find("sudo ", at)) != std::string::npos;) {
+        command.erase(at, 5);
+    }
     return command;
 }
 
@@ -35,20 +40,25 @@ std::string without_sudo(std::string command) {
 std::string for_this_user(std::string command) {
     const passwd* const user = ::getpwuid(::getuid());
     const std::string variable = "$USER";
-    for (std::size_t at = 0; user && (at = command.find(variable, at)) != std::string::npos;)
+    for (std::size_t at = 0; user && (at = command.find(variable, at)) != std::string::npos;) {
         command.replace(at, variable.size(), user->pw_name);
+    }
     return command;
 }
 
 /// Adds what remains to be done to the list `later`, unless it is there.
 void add_later(std::string& later, const Remedy& remedy) {
-    if (!remedy.then.empty() && later.find(remedy.then) == std::string::npos) later += (later.empty() ? "" : ", and ") + remedy.then;
+    if (!remedy.then.empty() && later.find(remedy.then) == std::string::npos) {
+        later += (later.empty() ? "" : ", and ") + remedy.then;
+    }
 }
 
 /// Reads a line of standard input. Returns true for y or yes.
 bool agreed() {
     std::string line;
-    for (int c = std::getchar(); c != EOF && c != '\n'; c = std::getchar()) line += static_cast<char>(c);
+    for (int c = std::getchar(); c != EOF && c != '\n'; c = std::getchar()) {
+        line += static_cast<char>(c);
+    }
     return line == "y" || line == "Y" || line == "yes";
 }
 
@@ -64,11 +74,13 @@ int carry_out(const DoctorOptions& options, const std::vector<Remedy>& remedies)
             text += "  " + for_this_user(without_sudo(remedy.command)) + "\n";
             add_later(later, remedy);
         }
-        print(text + (later.empty() ? "" : fmt::format("for the change to take effect: {}\n", later)));
+        print(text +
+              (later.empty() ? "" : fmt::format("for the change to take effect: {}\n", later)));
         return fail(options, "the fixes need root");
     }
     // $USER of the commands is the user who operates the machine, also under sudo and su.
-    const std::string user = root ? "USER=${SUDO_USER:-$(logname 2>/dev/null || id -un)}; " : "USER=${USER:-$(id -un)}; ";
+    const std::string user = root ? "USER=${SUDO_USER:-$(logname 2>/dev/null || id -un)}; "
+                                  : "USER=${USER:-$(id -un)}; ";
     int status = 0;
     std::string later;
     for (const Remedy& remedy : remedies) {
@@ -84,10 +96,14 @@ int carry_out(const DoctorOptions& options, const std::vector<Remedy>& remedies)
             print("done\n");
             add_later(later, remedy);
         } else {
-            status = fail(options, fmt::format("failed with status {}: {}", WIFEXITED(result) ? WEXITSTATUS(result) : result, command));
+            status = fail(options,
+                          fmt::format("failed with status {}: {}",
+                                      WIFEXITED(result) ? WEXITSTATUS(result) : result, command));
         }
     }
-    if (!later.empty()) print(fmt::format("\nfor the change to take effect: {}\n", later));
+    if (!later.empty()) {
+        print(fmt::format("\nfor the change to take effect: {}\n", later));
+    }
     return status;
 }
 

@@ -15,7 +15,8 @@ struct Remedy {
     bool operator==(const Remedy&) const = default;
 };
 
-/// Shows each command, asks, and runs it; root needs no sudo. Returns the exit code: 0 when nothing that was agreed to has failed. [setup]
+/// Shows each command, asks, and runs it; root needs no sudo. Returns the exit code: 0 when nothing
+/// that was agreed to has failed. [setup]
 int carry_out(const DoctorOptions&, const std::vector<Remedy>&);
 
 }  // namespace hal::tools

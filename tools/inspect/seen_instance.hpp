@@ -12,7 +12,8 @@ namespace hal::tools {
 struct SeenThread {
     std::string name;
     std::int64_t period_ns = 0;
-    std::uint64_t cycles = 0, missed = 0;
+    std::uint64_t cycles = 0;
+    std::uint64_t missed = 0;
     bool faulted = false;
 };
 
@@ -26,7 +27,9 @@ struct SeenInstance {
     std::string fault;              ///< the newest, a sentence
     double silent_s = 0;            ///< since its last status
 
-    bool same(const SeenInstance& other) const { return pid == other.pid && instance == other.instance && host == other.host; }
+    bool same(const SeenInstance& other) const {
+        return pid == other.pid && instance == other.instance && host == other.host;
+    }
 };
 
 /// Parses a status text. Returns false when it is invalid.

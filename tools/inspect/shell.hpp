@@ -14,7 +14,8 @@ struct RemoteShellOptions : ExecutionOptions {
 
     void declare(OptionSet& set) override {
         set.value("-N,--name", name, "NAME", "the instance; required when several are running");
-        set.flag("-f,--file", from_file, "read commands from the file given as the first word, or from standard input");
+        set.flag("-f,--file", from_file,
+                 "read commands from the file given as the first word, or from standard input");
         set.values("-e,--execute", execute, "COMMAND", "execute this command; may be repeated");
         set.value("-i,--ini", ini, "FILE", "INI file for [SECTION]KEY, with -f");
         set.flag("-k,--keep-going", keep_going, "continue after an error");
@@ -23,7 +24,8 @@ struct RemoteShellOptions : ExecutionOptions {
         set.flag("--echo", echo, "echo each command on stderr");
         set.flag("-q", [this] { loudness = Loudness::errors; }, "print errors only (the default)");
         set.flag("-Q", [this] { loudness = Loudness::nothing; }, "print nothing, not even errors");
-        set.flag("-v", [this] { loudness = Loudness::results; }, "print the result of each command");
+        set.flag("-v", [this] { loudness = Loudness::results; },
+                 "print the result of each command");
         set.keep_rest();
     }
 };

@@ -20,10 +20,12 @@ struct Stream {
     bool timed = false;           ///< its records carry the time of their cycle
     std::string file;             ///< the words' file; empty: standard input or output
 
-    /// Reads CHANNEL and FILE from the words, connects, and requests the columns. Returns false after printing the error.
+    /// Reads CHANNEL and FILE from the words, connects, and requests the columns. Returns false
+    /// after printing the error.
     /// `component`: "sampler" or "streamer"; a channel that is a number belongs to it.
     bool open(const StreamOptions& options, const char* component);
-    /// Registers this process as a component, as LinuxCNC's programs do, so that `loadusr -Wn NAME` sees that it is ready.
+    /// Registers this process as a component, as LinuxCNC's programs do, so that `loadusr -Wn NAME`
+    /// sees that it is ready.
     bool announce(const StreamOptions& options) const;
     /// Returns the reason of a lost stream.
     std::string lost() const;

@@ -20,31 +20,43 @@ using nlohmann::json;
 using Clock = std::chrono::steady_clock;
 
 constexpr std::uint64_t usual_count = 4;
-constexpr std::int64_t pause_ns = 200'000'000, look_ns = 2'000'000;
-constexpr auto reply_timeout = std::chrono::seconds(30);  // the component times out long before, unless its thread stalls
+constexpr std::int64_t pause_ns = 200'000'000;
+constexpr std::int64_t look_ns = 2'000'000;
+// the component times out long before, unless its thread stalls
+constexpr auto reply_timeout = std::chrono::seconds(30);
 
-enum class Outcome { none, answered, unanswered, no_room, no_address, not_running };  // of the pin ping-result
+// of the pin ping-result
+enum class Outcome { none, answered, unanswered, no_room, no_address, not_running };
 
 std::string names_of(const StationPins& pins) {
     std::string names;
     constexpr std::string_view marker = ".online";
-    for (const auto& [name, value] : pins)
-        if (name.ends_with(marker)) names += (names.empty() ? "" : ", ") + name.substr(0, name.size() - marker.size());
+    for (const auto& [name, value] : pins) {
+        if (name.ends_with(marker)) {
+            names += (names.empty() ? "" : ", ") + name.substr(0, name.size() - marker.size());
+        }
+    }
     return names;
 }
 
 class Pinger {
 public:
     Pinger(Client& client, std::string instance, std::string station)
-        : client_(client), instance_(std::move(instance)), station_(std::move(station)), pin_(instance_ + "." + station_ + ".ping") {}
+        : client_(client),
+          instance_(std::move(instance)),
+          station_(std::move(station)),
+          pin_(instance_ + "." + station_ + ".ping") {}
 
     /// Returns the outcome of a ping; none: no more can be sent, and `problem` is the reason.
     Outcome ask(const StopRequest& stop, std::string& problem) {
         if (!look(problem)) return Outcome::none;
         const auto wish = static_cast<std::uint32_t>(number(pins_, "ping")) + 1;
-        if (const auto answer = client_.run({"setp", pin_, fmt::format("{}", wish)}); answer.status != 0) {
+        if (const auto answer = client_.run({"setp", pin_, fmt::format("{}", wish)});
+            answer.status != 0) {
             problem = answer.err;
-            while (!problem.empty() && problem.back() == '\n') problem.pop_back();
+            while (!problem.empty() && problem.back() == '\n') {
+                problem.pop_back();
+            }
             return Outcome::none;
         }
         const auto until = Clock::now() + reply_timeout;
@@ -52,15 +64,20 @@ public:
             if (stop.wait_ns(look_ns)) return Outcome::none;
             if (!look(problem)) return Outcome::none;
             if (static_cast<std::uint32_t>(number(pins_, "ping-done")) == wish) {
-                if (!look(problem)) return Outcome::none;  // now all of them are of that ping
+                if (!look(problem)) {
+                    return Outcome::none;  // now all of them are of that ping
+                }
                 return static_cast<Outcome>(static_cast<int>(number(pins_, "ping-result")));
             }
             if (static_cast<std::uint32_t>(number(pins_, "ping")) != wish) {
-                problem = fmt::format("another client is pinging {} ({} is set); try again", station_, pin_);
+                problem = fmt::format("another client is pinging {} ({} is set); try again",
+                                      station_, pin_);
                 return Outcome::none;
             }
         }
-        problem = fmt::format("{} did not accept the ping request; check that the thread of {}.receive runs", instance_, instance_);
+        problem = fmt::format(
+            "{} did not accept the ping request; check that the thread of {}.receive runs",
+            instance_, instance_);
         return Outcome::none;
     }
     double time() const { return number(pins_, "ping-time"); }
@@ -69,12 +86,19 @@ public:
 
 private:
     bool look(std::string& problem) {
-        const json reply = client_.request({{"describe", "pin"}, {"patterns", json::array({pin_ + "*"})}});
-        if (!reply.value("ok", false)) return problem = reply.value("error", "no answer"), false;
+        const json reply =
+            client_.request({{"describe", "pin"}, {"patterns", json::array({pin_ + "*"})}});
+        if (!reply.value("ok", false)) {
+            problem = reply.value("error", "no answer");
+            return false;
+        }
         const std::string before = instance_ + "." + station_ + ".";
-        for (const json& pin : reply.value("objects", json::array()))
-            if (const std::string name = pin.value("name", ""); name.starts_with(before) && pin.contains("value"))
+        for (const json& pin : reply.value("objects", json::array())) {
+            if (const std::string name = pin.value("name", "");
+                name.starts_with(before) && pin.contains("value")) {
                 pins_[name.substr(before.size())] = pin["value"];
+            }
+        }
         if (pins_.contains("ping")) return true;
         problem = fmt::format("pin {} was removed", pin_);
         return false;
@@ -86,18 +110,29 @@ private:
 };
 
 /// Returns the reason when no ping was answered.
-std::string explanation(Outcome last, const StationPins& pins, const std::string& instance, const std::string& station) {
+std::string explanation(Outcome last, const StationPins& pins, const std::string& instance,
+                        const std::string& station) {
     switch (last) {
     case Outcome::no_room:
-        return fmt::format("{} sent nothing: other frames fill its slots, or it has none; increase a SIZE in the schedule",
-                           instance);
+        return fmt::format(
+            "{} sent nothing: other frames fill its slots, or it has none; increase a SIZE in the "
+            "schedule",
+            instance);
     case Outcome::no_address:
-        return fmt::format("{} has received no frame from {} and does not know its address; add its mac to the schedule", instance, station);
-    case Outcome::not_running: return fmt::format("{} has no permission to send; see: hal tdma status", instance);
+        return fmt::format(
+            "{} has received no frame from {} and does not know its address; add its mac to the "
+            "schedule",
+            instance, station);
+    case Outcome::not_running:
+        return fmt::format("{} has no permission to send; see: hal tdma status", instance);
     default: break;
     }
-    if (is_on(pins, station + ".online"))
-        return fmt::format("{} is online but does not answer pings; earlier versions of Halcyon and RTnet stations do not support them", station);
+    if (is_on(pins, station + ".online")) {
+        return fmt::format(
+            "{} is online but does not answer pings; earlier versions of Halcyon and RTnet "
+            "stations do not support them",
+            station);
+    }
     return fmt::format("{} is offline; check its power and its cable", station);
 }
 
@@ -111,19 +146,24 @@ const char* to_string(Outcome outcome) {
     }
 }
 
-/// Returns the instance that has this station among the others, with its pins; empty: sets `problem`.
-std::string instance_with(const std::map<std::string, StationPins>& instances, const TdmaPingOptions& options, std::string& problem) {
+/// Returns the instance that has this station among the others, with its pins; empty: sets
+/// `problem`.
+std::string instance_with(const std::map<std::string, StationPins>& instances,
+                          const TdmaPingOptions& options, std::string& problem) {
     const std::string& station = options.words.front();
     std::string known;
     for (const auto& [instance, pins] : instances) {
         if (!options.from.empty() && instance != options.from) continue;
         if (pins.contains(station + ".ping")) return instance;
         const std::string names = names_of(pins);
-        known += fmt::format("; {}{}", instance, names.empty() ? " knows no other station" : " knows " + names);
+        known += fmt::format("; {}{}", instance,
+                             names.empty() ? " knows no other station" : " knows " + names);
     }
     if (known.empty()) {
         std::string all;
-        for (const auto& [instance, pins] : instances) all += (all.empty() ? "" : ", ") + instance;
+        for (const auto& [instance, pins] : instances) {
+            all += (all.empty() ? "" : ", ") + instance;
+        }
         problem = fmt::format("unknown station '{}' in --from; use {}", options.from, all);
     } else {
         problem = fmt::format("unknown station '{}'{}", station, known);
@@ -134,19 +174,25 @@ std::string instance_with(const std::map<std::string, StationPins>& instances, c
 }  // namespace
 
 int run_tdma_ping(const TdmaPingOptions& options) {
-    if (options.words.size() != 1) return fail(options, "exactly one station is required: hal tdma ping STATION");
+    if (options.words.size() != 1) {
+        return fail(options, "exactly one station is required: hal tdma ping STATION");
+    }
     StopRequest stop;
     std::string problem;
     const auto client = Client::connect(instance_wanted(options.name), problem);
     if (!client) return fail(options, problem);
     const auto instances = stations_of(*client, problem);
     if (!problem.empty()) return fail(options, problem);
-    if (instances.empty()) return fail(options, fmt::format("instance '{}' has no station of a segment (loadrt tdma)", client->instance()));
+    if (instances.empty()) {
+        return fail(options, fmt::format("instance '{}' has no station of a segment (loadrt tdma)",
+                                         client->instance()));
+    }
     const std::string instance = instance_with(instances, options, problem);
     if (instance.empty()) return fail(options, problem);
     const std::string& station = options.words.front();
-    if (!is_on(instances.at(instance), "running"))
+    if (!is_on(instances.at(instance), "running")) {
         return fail(options, fmt::format("{} is not running; see: hal tdma status", instance));
+    }
 
     Pinger pinger(*client, instance, station);
     std::vector<double> times;
@@ -161,27 +207,37 @@ int run_tdma_ping(const TdmaPingOptions& options) {
         std::string line = fmt::format("{} {}: {}\n", station, done, to_string(last));
         if (last == Outcome::answered) {
             times.push_back(pinger.time());
-            line = fmt::format("{} {}: {:.2f} us, {:.2f} cycles; {:.2f} us of it at {}, {:.2f} us each way\n", station, done, pinger.time(),
-                               pinger.cycles(), pinger.held(), station, (pinger.time() - pinger.held()) / 2);
+            line = fmt::format(
+                "{} {}: {:.2f} us, {:.2f} cycles; {:.2f} us of it at {}, {:.2f} us each way\n",
+                station, done, pinger.time(), pinger.cycles(), pinger.held(), station,
+                (pinger.time() - pinger.held()) / 2);
         }
         if (!print(line)) return 1;
     }
     if (!problem.empty()) return fail(options, problem);
-    if (done == 0) return 1;  // Ctrl-C
+    if (done == 0) {
+        return 1;  // Ctrl-C
+    }
     const std::uint64_t lost = done - times.size();
-    std::string text = fmt::format("{} ping{} from {}, {} answered, {} lost ({:.0f} %)", done, done == 1 ? "" : "s", instance, times.size(),
-                                   lost, 100.0 * static_cast<double>(lost) / static_cast<double>(done));
+    std::string text = fmt::format("{} ping{} from {}, {} answered, {} lost ({:.0f} %)", done,
+                                   done == 1 ? "" : "s", instance, times.size(), lost,
+                                   100.0 * static_cast<double>(lost) / static_cast<double>(done));
     if (!times.empty()) {
         const auto [least, most] = std::minmax_element(times.begin(), times.end());
         double sum = 0;
-        for (const double t : times) sum += t;
-        text += fmt::format("; min {:.2f}, mean {:.2f}, max {:.2f} us", *least, sum / static_cast<double>(times.size()), *most);
+        for (const double t : times) {
+            sum += t;
+        }
+        text += fmt::format("; min {:.2f}, mean {:.2f}, max {:.2f} us", *least,
+                            sum / static_cast<double>(times.size()), *most);
     }
     if (!print(text + "\n")) return 1;
     if (!times.empty()) return 0;
     const auto now = stations_of(*client, problem);
     const auto pins = now.find(instance);
-    return fail(options, explanation(last, pins == now.end() ? instances.at(instance) : pins->second, instance, station));
+    return fail(options,
+                explanation(last, pins == now.end() ? instances.at(instance) : pins->second,
+                            instance, station));
 }
 
 }  // namespace hal::tools

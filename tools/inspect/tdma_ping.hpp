@@ -16,7 +16,8 @@ struct TdmaPingOptions : Options {
     void declare(OptionSet& set) override {
         set.words("STATION", "its name in the schedule");
         set.value("-c,--count", count, "COUNT", "number of pings (default 4)").in(1, 1'000'000);
-        set.value("--from", from, "COMPONENT", "the station to ping from, when the instance has several: tdma.1");
+        set.value("--from", from, "COMPONENT",
+                  "the station to ping from, when the instance has several: tdma.1");
         set.value("-N,--name", name, "NAME", "the instance; required when several are running");
     }
 };

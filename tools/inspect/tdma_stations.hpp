@@ -10,7 +10,8 @@
 
 namespace hal::tools {
 
-using StationPins = std::map<std::string, nlohmann::json>;  ///< of one instance of `tdma`, by the rest of their names
+/// of one instance of `tdma`, by the rest of their names
+using StationPins = std::map<std::string, nlohmann::json>;
 
 /// By the names of the instances: tdma.0 …; sets `problem` when the machine did not report it.
 std::map<std::string, StationPins> stations_of(Client&, std::string& problem);

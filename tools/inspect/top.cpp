@@ -27,14 +27,18 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 constexpr auto status_period = std::chrono::milliseconds(500);
-constexpr double silent_after_s = 2, gone_after_s = 30;
-constexpr std::size_t most_instances = 1000;  // a publisher that floods the topic does not fill the memory
+constexpr double silent_after_s = 2;
+constexpr double gone_after_s = 30;
+// a publisher that floods the topic does not fill the memory
+constexpr std::size_t most_instances = 1000;
 
 std::vector<std::string_view> words_of(std::string_view text) {
     std::vector<std::string_view> words;
     while (!text.empty()) {
         const std::size_t end = std::min(text.find(' '), text.size());
-        if (end > 0) words.push_back(text.substr(0, end));
+        if (end > 0) {
+            words.push_back(text.substr(0, end));
+        }
         text.remove_prefix(std::min(end + 1, text.size()));
     }
     return words;
@@ -54,7 +58,9 @@ std::string clean(std::string_view text) { return printable(text.substr(0, 300))
 class Network {
 public:
     ~Network() {
-        if (ear_ != nullptr) close_(ear_);
+        if (ear_ != nullptr) {
+            close_(ear_);
+        }
     }
     bool absent() const { return absent_; }
     /// Returns false and sets `problem` to the reason.
@@ -62,17 +68,27 @@ public:
         // Beside the program, as it was built; else where the loader looks.
         // (Under the address sanitizer that does not know whose path counts.)
         std::error_code unknown;
-        const auto programs = std::filesystem::read_symlink("/proc/self/exe", unknown).parent_path();
+        const auto programs =
+            std::filesystem::read_symlink("/proc/self/exe", unknown).parent_path();
         void* library = nullptr;
-        for (const auto& folder : {programs / "../lib", programs / paths::libraries_from_programs})
-            if (library == nullptr) library = ::dlopen((folder / "libhalcyon_dds.so").c_str(), RTLD_NOW | RTLD_LOCAL);
-        if (library == nullptr) library = ::dlopen("libhalcyon_dds.so", RTLD_NOW | RTLD_LOCAL);
+        for (const auto& folder :
+             {programs / "../lib", programs / paths::libraries_from_programs}) {
+            if (library == nullptr) {
+                library = ::dlopen((folder / "libhalcyon_dds.so").c_str(), RTLD_NOW | RTLD_LOCAL);
+            }
+        }
+        if (library == nullptr) {
+            library = ::dlopen("libhalcyon_dds.so", RTLD_NOW | RTLD_LOCAL);
+        }
         if (library == nullptr) {
             absent_ = true;
-            problem = "this Halcyon was built without DDS; type: sudo apt install libfastrtps-dev, and build again";
+            problem =
+                "this Halcyon was built without DDS; type: sudo apt install libfastrtps-dev, and "
+                "build again";
             return false;
         }
-        using Open = void* (*)(const char*, void (*)(void*, const char*, std::size_t), void*, char*);
+        using Open =
+            void* (*)(const char*, void (*)(void*, const char*, std::size_t), void*, char*);
         const auto open = reinterpret_cast<Open>(::dlsym(library, "halcyon_status_open"));
         close_ = reinterpret_cast<void (*)(void*)>(::dlsym(library, "halcyon_status_close"));
         if (open == nullptr || close_ == nullptr) {
@@ -87,7 +103,9 @@ public:
     std::vector<SeenInstance> all() {
         const std::lock_guard lock(mutex_);
         std::vector<SeenInstance> list;
-        std::erase_if(seen_, [](const Seen& one) { return std::chrono::duration<double>(Clock::now() - one.when).count() > gone_after_s; });
+        std::erase_if(seen_, [](const Seen& one) {
+            return std::chrono::duration<double>(Clock::now() - one.when).count() > gone_after_s;
+        });
         for (const Seen& one : seen_) {
             list.push_back(one.what);
             list.back().silent_s = std::chrono::duration<double>(Clock::now() - one.when).count();
@@ -105,9 +123,13 @@ private:
         SeenInstance seen;
         if (!read_status({text, length}, seen)) return;
         const std::lock_guard lock(self.mutex_);
-        const auto known = std::find_if(self.seen_.begin(), self.seen_.end(), [&](const Seen& one) { return one.what.same(seen); });
-        if (known != self.seen_.end()) *known = {std::move(seen), Clock::now()};
-        else if (self.seen_.size() < most_instances) self.seen_.push_back({std::move(seen), Clock::now()});
+        const auto known = std::find_if(self.seen_.begin(), self.seen_.end(),
+                                        [&](const Seen& one) { return one.what.same(seen); });
+        if (known != self.seen_.end()) {
+            *known = {std::move(seen), Clock::now()};
+        } else if (self.seen_.size() < most_instances) {
+            self.seen_.push_back({std::move(seen), Clock::now()});
+        }
     }
 
     std::mutex mutex_;
@@ -123,15 +145,19 @@ std::vector<SeenInstance> local_instances() {
         std::string problem;
         const auto client = Client::connect(name, problem);
         SeenInstance seen;
-        if (client && read_status(client->run("status instance").out, seen)) all.push_back(std::move(seen));
+        if (client && read_status(client->run("status instance").out, seen)) {
+            all.push_back(std::move(seen));
+        }
     }
     return all;
 }
 
 std::vector<SeenInstance> everybody(Network* network) {
-    std::vector<SeenInstance> all = network != nullptr ? network->all() : std::vector<SeenInstance>{};
+    std::vector<SeenInstance> all =
+        network != nullptr ? network->all() : std::vector<SeenInstance>{};
     for (SeenInstance& local : local_instances()) {
-        const auto known = std::find_if(all.begin(), all.end(), [&](const SeenInstance& one) { return one.same(local); });
+        const auto known = std::find_if(all.begin(), all.end(),
+                                        [&](const SeenInstance& one) { return one.same(local); });
         if (known == all.end()) {
             all.push_back(std::move(local));
             continue;
@@ -141,7 +167,8 @@ std::vector<SeenInstance> everybody(Network* network) {
         *known = std::move(local);
     }
     std::sort(all.begin(), all.end(), [](const SeenInstance& a, const SeenInstance& b) {
-        return std::tie(a.cell, a.node, a.host, a.instance, a.pid) < std::tie(b.cell, b.node, b.host, b.instance, b.pid);
+        return std::tie(a.cell, a.node, a.host, a.instance, a.pid) <
+               std::tie(b.cell, b.node, b.host, b.instance, b.pid);
     });
     return all;
 }
@@ -154,19 +181,31 @@ bool read_status(std::string_view text, SeenInstance& seen) {
         const std::string_view line = text.substr(0, end);
         text.remove_prefix(std::min(end + 1, text.size()));
         const std::size_t blank = std::min(line.find(' '), line.size());
-        const std::string_view key = line.substr(0, blank), value = line.substr(std::min(blank + 1, line.size()));
-        if (key == "instance") seen.instance = clean(value);
-        else if (key == "host") seen.host = clean(value);
-        else if (key == "pid") seen.pid = number<std::int64_t>(value);
-        else if (key == "running") seen.running = value == "1";
-        else if (key == "cell") seen.cell = clean(value);
-        else if (key == "node") seen.node = clean(value);
-        else if (key == "faults") seen.faults = number<std::uint64_t>(value);
-        else if (key == "fault") seen.fault = clean(value);
-        else if (key == "thread" && seen.threads.size() < 100) {
-            if (const auto words = words_of(value); words.size() >= 5)
-                seen.threads.push_back({clean(words[0]), number<std::int64_t>(words[1]), number<std::uint64_t>(words[2]),
+        const std::string_view key = line.substr(0, blank);
+
+        const std::string_view value = line.substr(std::min(blank + 1, line.size()));
+        if (key == "instance") {
+            seen.instance = clean(value);
+        } else if (key == "host") {
+            seen.host = clean(value);
+        } else if (key == "pid") {
+            seen.pid = number<std::int64_t>(value);
+        } else if (key == "running") {
+            seen.running = value == "1";
+        } else if (key == "cell") {
+            seen.cell = clean(value);
+        } else if (key == "node") {
+            seen.node = clean(value);
+        } else if (key == "faults") {
+            seen.faults = number<std::uint64_t>(value);
+        } else if (key == "fault") {
+            seen.fault = clean(value);
+        } else if (key == "thread" && seen.threads.size() < 100) {
+            if (const auto words = words_of(value); words.size() >= 5) {
+                seen.threads.push_back({clean(words[0]), number<std::int64_t>(words[1]),
+                                        number<std::uint64_t>(words[2]),
                                         number<std::uint64_t>(words[3]), words[4] == "1"});
+            }
         }
     }
     return !seen.instance.empty();
@@ -174,24 +213,30 @@ bool read_status(std::string_view text, SeenInstance& seen) {
 
 std::string top_table(const std::vector<SeenInstance>& all) {
     if (all.empty()) return "no instance is running; start one: hal run FILE.hal\n";
-    std::string text = fmt::format("{:<16} {:<12} {:<20} {:<14} {:>9} {:>12} {:>8} {:>6}\n", "INSTANCE", "HOST", "NODE", "THREAD", "PERIOD",
-                                   "CYCLES", "MISSED", "FAULTS");
+    std::string text =
+        fmt::format("{:<16} {:<12} {:<20} {:<14} {:>9} {:>12} {:>8} {:>6}\n", "INSTANCE", "HOST",
+                    "NODE", "THREAD", "PERIOD", "CYCLES", "MISSED", "FAULTS");
     for (const SeenInstance& one : all) {
         const std::string node = one.node.empty() ? "" : one.cell + "/" + one.node;
         const bool silent = one.silent_s > silent_after_s;
         for (std::size_t i = 0; i < std::max<std::size_t>(one.threads.size(), 1); ++i) {
-            const SeenThread thread = i < one.threads.size() ? one.threads[i] : SeenThread{"-", 0, 0, 0, false};
-            const std::string state = i != 0        ? ""
-                                      : silent      ? fmt::format("  offline for {:.0f} s", one.silent_s)
+            const SeenThread thread =
+                i < one.threads.size() ? one.threads[i] : SeenThread{"-", 0, 0, 0, false};
+            const std::string state = i != 0   ? ""
+                                      : silent ? fmt::format("  offline for {:.0f} s", one.silent_s)
                                       : one.running ? ""
                                                     : "  stopped";
-            text +=
-                fmt::format("{:<16} {:<12} {:<20} {:<14} {:>9} {:>12} {:>8} {:>6}{}{}\n", i == 0 ? one.instance : "",
-                            i == 0 ? one.host : "", i == 0 ? node : "", thread.name,
-                            thread.period_ns == 0 ? "-" : format_duration(static_cast<double>(thread.period_ns)), thread.cycles,
-                            thread.missed, i == 0 ? std::to_string(one.faults) : "", thread.faulted ? "  stopped by a fault" : "", state);
+            text += fmt::format(
+                "{:<16} {:<12} {:<20} {:<14} {:>9} {:>12} {:>8} {:>6}{}{}\n",
+                i == 0 ? one.instance : "", i == 0 ? one.host : "", i == 0 ? node : "", thread.name,
+                thread.period_ns == 0 ? "-"
+                                      : format_duration(static_cast<double>(thread.period_ns)),
+                thread.cycles, thread.missed, i == 0 ? std::to_string(one.faults) : "",
+                thread.faulted ? "  stopped by a fault" : "", state);
         }
-        if (!one.fault.empty()) text += fmt::format("{:<16} newest fault: {}\n", "", one.fault);
+        if (!one.fault.empty()) {
+            text += fmt::format("{:<16} newest fault: {}\n", "", one.fault);
+        }
     }
     return text;
 }
@@ -200,12 +245,13 @@ std::string top_json(const std::vector<SeenInstance>& all) {
     nlohmann::json list = nlohmann::json::array();
     for (const SeenInstance& one : all) {
         nlohmann::json threads = nlohmann::json::array();
-        for (const SeenThread& thread : one.threads)
+        for (const SeenThread& thread : one.threads) {
             threads.push_back({{"name", thread.name},
                                {"period_ns", thread.period_ns},
                                {"cycles", thread.cycles},
                                {"missed", thread.missed},
                                {"faulted", thread.faulted}});
+        }
         list.push_back({{"instance", one.instance},
                         {"host", one.host},
                         {"pid", one.pid},
@@ -222,15 +268,24 @@ std::string top_json(const std::vector<SeenInstance>& all) {
 
 int run_top(const TopOptions& options) {
     std::string settings = options.dds, problem;
-    if (const char* const usual = std::getenv("HALCYON_DDS"); settings.empty() && usual != nullptr) settings = usual;
+    if (const char* const usual = std::getenv("HALCYON_DDS");
+        settings.empty() && usual != nullptr) {
+        settings = usual;
+    }
     Network network;
     const bool there = network.open(settings, problem);
     if (!there && (!network.absent() || !options.dds.empty())) return fail(options, problem);
     Network* const over = there ? &network : nullptr;
     const bool live = ::isatty(STDOUT_FILENO) != 0 && !options.json && !options.once;
-    if (there && !live) std::this_thread::sleep_for(3 * status_period);  // every instance has published its status by then
-    if (!live) return print(options.json ? top_json(everybody(over)) : top_table(everybody(over))) ? 0 : 1;
-    const auto end = options.for_ns >= 0 ? Clock::now() + std::chrono::nanoseconds(options.for_ns) : Clock::time_point::max();
+    // every instance has published its status by then
+    if (there && !live) {
+        std::this_thread::sleep_for(3 * status_period);
+    }
+    if (!live) {
+        return print(options.json ? top_json(everybody(over)) : top_table(everybody(over))) ? 0 : 1;
+    }
+    const auto end = options.for_ns >= 0 ? Clock::now() + std::chrono::nanoseconds(options.for_ns)
+                                         : Clock::time_point::max();
     while (Clock::now() < end) {
         if (!print("\x1b[H\x1b[2J" + top_table(everybody(over)) + "\nCtrl-C ends this\n")) return 1;
         std::this_thread::sleep_for(status_period);

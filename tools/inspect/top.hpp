@@ -11,13 +11,17 @@ namespace hal::tools {
 struct TopOptions : Options {
     std::int64_t for_ns = -1;  ///< -1: not given
     std::string dds;           ///< arguments of the DDS participant
-    bool once = false, json = false;
+    bool once = false;
+    bool json = false;
 
     void declare(OptionSet& set) override {
         set.for_how_long(for_ns, "end after 10s … in a terminal; default: run until Ctrl-C");
-        set.flag("--once", once, "print the table once (the default when the output is not a terminal)");
+        set.flag("--once", once,
+                 "print the table once (the default when the output is not a terminal)");
         set.flag("--json", json, "print once, as JSON");
-        set.value("--dds", dds, "SETTINGS", "DDS discovery: interfaces=ADDRESS domain=N peers=… (default: this machine only)");
+        set.value(
+            "--dds", dds, "SETTINGS",
+            "DDS discovery: interfaces=ADDRESS domain=N peers=… (default: this machine only)");
     }
 };
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What an INI file and the installation of LinuxCNC determine of a machine: its programs, modules, netlists and folders.
+// What an INI file and the installation of LinuxCNC determine of a machine: its programs, modules,
+// netlists and folders.
 #pragma once
 
 #include <cstdint>
@@ -23,19 +24,24 @@ struct Configuration {
 
     Installation linuxcnc;
     std::string nml;     ///< NML configuration
-    Words task, io, halui, bridge, display;  ///< programs with their arguments; io, halui and bridge may be empty
+    /// programs with their arguments; io, halui and bridge may be empty
+    Words task, io, halui, bridge, display;
     Words planner, homing;           ///< modules with their parameters
     std::vector<Words> applications;
     std::int64_t applications_delay_ns = 0;
     std::string shutdown;            ///< [HAL]SHUTDOWN; may be empty
-    std::int64_t task_timeout_ns = 0;  ///< [HALCYON]TASK_TIMEOUT: longest time between two cycles of task; 0: not watched
-    std::int64_t max_gap_ns = 0, max_gap_realtime_ns = 0;  ///< [HALCYON]MAX_CPU_GAP, of SessionOptions
+    /// [HALCYON]TASK_TIMEOUT: longest time between two cycles of task; 0: not watched
+    std::int64_t task_timeout_ns = 0;
+    /// [HALCYON]MAX_CPU_GAP, of SessionOptions
+    std::int64_t max_gap_ns = 0;
+    std::int64_t max_gap_realtime_ns = 0;
 
     /// A name, as the messages have it: "machine.ini".
     std::string given;
 };
 
-/// Reads the INI file and checks what must be there before anything starts. Prints the errors and returns nothing.
+/// Reads the INI file and checks what must be there before anything starts. Prints the errors and
+/// returns nothing.
 std::optional<Configuration> read_configuration(const LinuxcncOptions&);
 
 /// Sets the variables that LinuxCNC's programs read, before anything else runs.

@@ -44,12 +44,21 @@ std::string ask_version(Installation& of) {
         const std::string program = folder + "/linuxcnc_var";
         if (::access(program.c_str(), X_OK) != 0) continue;
         std::string text;
-        if (run_program({program, "LINUXCNCVERSION"}, text) != 0) return {};
-        while (text.ends_with('\n')) text.pop_back();
+        if (run_program({program, "LINUXCNCVERSION"}, text) != 0) {
+            return {};
+        }
+        while (text.ends_with('\n')) {
+            text.pop_back();
+        }
         ::setenv("LINUXCNCVERSION", text.c_str(), 1);
-        const std::string series = text.substr(0, text.find('.', text.find('.') + 1));  // 2.10.0~pre1: 2.10
-        if (series != "2.9" && series != "2.10")
-            return fmt::format("LinuxCNC in {} is version {}; 2.9 and 2.10 are supported: LINUXCNC_HOME names another installation", of.home, text);
+        // 2.10.0~pre1: 2.10
+        const std::string series = text.substr(0, text.find('.', text.find('.') + 1));
+        if (series != "2.9" && series != "2.10") {
+            return fmt::format(
+                "LinuxCNC in {} is version {}; 2.9 and 2.10 are supported: LINUXCNC_HOME names "
+                "another installation",
+                of.home, text);
+        }
         of.version = series == "2.10" ? LinuxcncVersion::v2_10 : LinuxcncVersion::v2_9;
         return {};
     }

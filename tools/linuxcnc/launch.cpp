@@ -29,7 +29,8 @@ Words with_ini(const Words& program, const std::string& ini) {
 
 }  // namespace
 
-Launch::Launch(const LinuxcncOptions& options, const Configuration& configuration, HostedMachine& machine, MachineLock& lock)
+Launch::Launch(const LinuxcncOptions& options, const Configuration& configuration,
+               HostedMachine& machine, MachineLock& lock)
     : options_(options),
       configuration_(configuration),
       machine_(machine),
@@ -47,9 +48,13 @@ int Launch::run() {
     const bool newer = c.linuxcnc.version == LinuxcncVersion::v2_10;
     const bool started =
         check() && start_server() &&
-        (newer ? modules() && component("[TASK]TASK", "inihal", c.task) && component("[HAL]HALUI", "halui", c.halui) &&
-                     (c.bridge.empty() || start_component("[HAL]HALBRIDGE", "bridge", c.bridge, false)) && load_netlists() && start_threads() && task_knows_motion()
-               : component("[EMCIO]EMCIO", "iocontrol", c.io) && component("[HAL]HALUI", "halui", c.halui) && modules() && load_netlists() &&
+        (newer ? modules() && component("[TASK]TASK", "inihal", c.task) &&
+                     component("[HAL]HALUI", "halui", c.halui) &&
+                     (c.bridge.empty() ||
+                      start_component("[HAL]HALBRIDGE", "bridge", c.bridge, false)) &&
+                     load_netlists() && start_threads() && task_knows_motion()
+               : component("[EMCIO]EMCIO", "iocontrol", c.io) &&
+                     component("[HAL]HALUI", "halui", c.halui) && modules() && load_netlists() &&
                      start_task()) &&
         start_applications() && start_display();
     if (started) {
@@ -57,16 +62,21 @@ int Launch::run() {
         watch();
         end();
     } else {
-        if (machine_.stop.requested()) status_ = 0;
+        if (machine_.stop.requested()) {
+            status_ = 0;
+        }
         end();
     }
-    if (const int signal = machine_.stop.signal(); signal != 0 && signal != SIGINT)
+    if (const int signal = machine_.stop.signal(); signal != 0 && signal != SIGINT) {
         print(fmt::format("ended by SIG{}\n", ::sigabbrev_np(signal)));
+    }
     return status_;
 }
 
 bool Launch::step(const std::string& sentence) {
-    if (options_.verbose) print(sentence + "\n");
+    if (options_.verbose) {
+        print(sentence + "\n");
+    }
     return !machine_.stop.requested();
 }
 
@@ -77,9 +87,14 @@ bool Launch::command(const Words& words, const std::string& source) {
 bool Launch::check() {
     if (machine_.shell.read_ini(configuration_.given, output_) != 0) return false;
     Words checker{"linuxcnc_check_ini", configuration_.file};
-    if (configuration_.linuxcnc.version == LinuxcncVersion::v2_9) checker = {"tclsh", configuration_.linuxcnc.hallib + "/check_config.tcl", configuration_.file};
-    if (find_program(configuration_, checker[0]).empty() || (checker.size() > 2 && !std::filesystem::exists(checker[1])))
+    if (configuration_.linuxcnc.version == LinuxcncVersion::v2_9) {
+        checker = {"tclsh", configuration_.linuxcnc.hallib + "/check_config.tcl",
+                   configuration_.file};
+    }
+    if (find_program(configuration_, checker[0]).empty() ||
+        (checker.size() > 2 && !std::filesystem::exists(checker[1]))) {
         return step("check the configuration: left out");
+    }
     if (!step("check the configuration")) return false;
     const pid_t pid = start(std::filesystem::path(checker[checker.size() - 2]).filename(), checker);
     const auto status = pid == 0 ? std::optional(1) : wait_for(pid, -1);
@@ -90,21 +105,33 @@ bool Launch::start_server() {
     if (!step("start linuxcncsvr")) return false;
     const pid_t pid = start("linuxcncsvr", {"linuxcncsvr", "-ini", configuration_.file});
     if (pid == 0) return false;
-    const auto status = wait_for(pid, 10'000'000'000);  // it ends once its successor, adopted by this process, has the buffers ready
+    // it ends once its successor, adopted by this process, has the buffers ready
+    const auto status = wait_for(pid, 10'000'000'000);
     if (machine_.stop.requested()) return false;
-    if (status && *status != 0)
-        return fail(options_, fmt::format("linuxcncsvr {}: another one may be using its TCP port or NML buffers", end_description(*status))),
-               false;
+    if (status && *status != 0) {
+        fail(options_,
+             fmt::format("linuxcncsvr {}: another one may be using its TCP port or NML buffers",
+                         end_description(*status)));
+
+        return false;
+    }
     const auto running = servers();
-    if (running.empty()) return fail(options_, "linuxcncsvr has ended; the NML buffers need it"), false;
-    lock_.note_server(running.front());  // now: this program may be killed at any time, and the next one ends the server
+    if (running.empty()) {
+        fail(options_, "linuxcncsvr has ended; the NML buffers need it");
+        return false;
+    }
+    // now: this program may be killed at any time, and the next one ends the server
+    lock_.note_server(running.front());
     return true;
 }
 
-bool Launch::start_component(const char* key, const char* component, const Words& program, bool reads_ini) {
+bool Launch::start_component(const char* key, const char* component, const Words& program,
+                             bool reads_ini) {
     if (!step(fmt::format("start {}", program[0]))) return false;
     Words words{"loadusr", "-Wn", component};
-    for (const std::string& word : reads_ini ? with_ini(program, configuration_.file) : program) words.push_back(word);
+    for (const std::string& word : reads_ini ? with_ini(program, configuration_.file) : program) {
+        words.push_back(word);
+    }
     if (!command(words, fmt::format("{} {}", configuration_.given, key))) return false;
     components_.emplace_back(component, program[0]);
     return true;
@@ -125,9 +152,14 @@ bool Launch::load_netlists() {
 
 bool Launch::start_threads() {
     std::string commands;
-    for (const std::string& line : configuration_.ini.all("HAL", "HALCMD")) commands += line + "\n";
-    if (!commands.empty() && machine_.shell.run_text(configuration_.given + " [HAL]HALCMD", commands, output_) != 0 && !options_.keep_going)
+    for (const std::string& line : configuration_.ini.all("HAL", "HALCMD")) {
+        commands += line + "\n";
+    }
+    if (!commands.empty() &&
+        machine_.shell.run_text(configuration_.given + " [HAL]HALCMD", commands, output_) != 0 &&
+        !options_.keep_going) {
         return false;
+    }
     if (!step("start the threads")) return false;
     machine_.start_threads();
     return !machine_.stop.requested();
@@ -137,7 +169,11 @@ bool Launch::start_threads() {
 bool Launch::task_knows_motion() {
     for (int waited_ms = 0; waited_ms < 10'000 && !machine_.stop.requested(); waited_ms += 10) {
         TextOutput text;
-        if (machine_.shell.execute(Words{"getp", "ini.traj_max_velocity"}, text, "<linuxcnc>") != 0 || std::strtod(text.out_text.c_str(), nullptr) != 0) break;
+        if (machine_.shell.execute(Words{"getp", "ini.traj_max_velocity"}, text, "<linuxcnc>") !=
+                0 ||
+            std::strtod(text.out_text.c_str(), nullptr) != 0) {
+            break;
+        }
         machine_.stop.wait_ns(10'000'000);
     }
     return !machine_.stop.requested();
@@ -150,7 +186,9 @@ bool Launch::start_task() {
     std::atomic<bool> waited{false};
     int task = 1;
     Words words{"loadusr", "-Wn", "inihal"};
-    for (const std::string& word : with_ini(configuration_.task, configuration_.file)) words.push_back(word);
+    for (const std::string& word : with_ini(configuration_.task, configuration_.file)) {
+        words.push_back(word);
+    }
     std::thread waiting([&] {
         ProcessOutput output;
         task = sibling.execute(words, output, configuration_.given + " [TASK]TASK");
@@ -158,11 +196,15 @@ bool Launch::start_task() {
     });
     const bool good = start_threads();
     while (!waited) {
-        if (!good || machine_.stop.requested()) sibling.cancel();
+        if (!good || machine_.stop.requested()) {
+            sibling.cancel();
+        }
         std::this_thread::sleep_for(5ms);
     }
     waiting.join();
-    if (task == 0) components_.emplace_back("inihal", configuration_.task[0]);
+    if (task == 0) {
+        components_.emplace_back("inihal", configuration_.task[0]);
+    }
     return good && task == 0 && !machine_.stop.requested();
 }
 
@@ -183,9 +225,12 @@ bool Launch::start_display() {
     Words words = configuration_.display;
     display_.name = words[0];
     if (!step(fmt::format("start the display {}", words[0]))) return false;
-    if (!configuration_.ini.all("HAL", "POSTGUI_HALFILE").empty() && (words[0] == "linuxcncrsh" || words[0] == "dummy"))
-        write_all(STDERR_FILENO, fmt::format("{}: note: [HAL]POSTGUI_HALFILE is loaded by the display, and '{}' does not load it\n",
+    if (!configuration_.ini.all("HAL", "POSTGUI_HALFILE").empty() &&
+        (words[0] == "linuxcncrsh" || words[0] == "dummy")) {
+        write_all(STDERR_FILENO, fmt::format("{}: note: [HAL]POSTGUI_HALFILE is loaded by the "
+                                             "display, and '{}' does not load it\n",
                                              options_.program, words[0]));
+    }
     if (words[0] == "dummy") {
         print("press Enter to end the machine\n");
         return true;
@@ -193,7 +238,9 @@ bool Launch::start_display() {
     const std::string program = find_program(configuration_, words[0]);
     const Words arguments(words.begin() + 1, words.end());
     words.resize(1);
-    if (program.ends_with(".tcl") && words[0].find('/') == std::string::npos) words[0] = program;
+    if (program.ends_with(".tcl") && words[0].find('/') == std::string::npos) {
+        words[0] = program;
+    }
     const bool server = words[0] == "linuxcncrsh";  // its own options come first
     if (server) {
         words.insert(words.end(), arguments.begin(), arguments.end());
@@ -216,23 +263,34 @@ void Launch::watch() {
         if (machine_.stop.requested()) return void(status_ = 0);
         if (display_.pid != 0) {
             if (const auto status = ended(display_.pid)) {
-                // What ends all its programs, such as Ctrl-C in the terminal, is about to arrive here too.
+                // What ends all its programs, such as Ctrl-C in the terminal, is about to arrive
+                // here too.
                 if (*status > 128 && machine_.stop.wait_ns(200'000'000)) return void(status_ = 0);
                 status_ = *status;
-                if (*status != 0) fail(options_, fmt::format("the display '{}' {}", display_.name, end_description(*status)));
+                if (*status != 0) {
+                    fail(options_, fmt::format("the display '{}' {}", display_.name,
+                                               end_description(*status)));
+                }
                 return;
             }
         } else if (line_typed()) {
             return void(status_ = 0);
         }
-        if (++looks % 5 == 0) report_gaps();
+        if (++looks % 5 == 0) {
+            report_gaps();
+        }
         if (found.sentence.empty()) {
             found = failure(looks % 5 == 0);
             since = std::chrono::steady_clock::now();
         } else if (std::chrono::steady_clock::now() - since > 200ms) {
-            if (!found.task_works) stop_threads();
+            if (!found.task_works) {
+                stop_threads();
+            }
             status_ = 1;
-            fail(options_, found.sentence + (found.task_works ? "; the machine ends" : "; the outputs have their safe values, the machine ends"));
+            fail(options_,
+                 found.sentence + (found.task_works
+                                       ? "; the machine ends"
+                                       : "; the outputs have their safe values, the machine ends"));
             return;
         }
         machine_.stop.wait_ns(20'000'000);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// One run of a configuration: starts everything in LinuxCNC's order, waits for the end, ends everything in the reverse order.
+// One run of a configuration: starts everything in LinuxCNC's order, waits for the end, ends
+// everything in the reverse order.
 #pragma once
 
 #include <chrono>
@@ -29,18 +30,22 @@ private:
         pid_t pid = 0;
     };
 
-    // The steps, in order. Each returns false after printing why it failed, or when the end was requested.
+    // The steps, in order. Each returns false after printing why it failed, or when the end was
+    // requested.
     bool check();
     bool start_server();
-    bool start_component(const char* key, const char* component, const Words& program, bool reads_ini = true);
+    bool start_component(const char* key, const char* component, const Words& program,
+                         bool reads_ini = true);
     bool load_module(const Words& module);
     bool load_netlists();
     bool start_threads();  ///< after the commands of [HAL]HALCMD
-    bool task_knows_motion();  ///< 2.10: waits until task has given motion the limits of the INI file
-    bool start_task();     ///< of 2.9, with the threads
+    /// 2.10: waits until task has given motion the limits of the INI file
+    bool task_knows_motion();
+    bool start_task();  ///< of 2.9, with the threads
     bool start_applications();
     bool start_display();
-    /// Waits for the first of: the display ends, a program dies or hangs, a fault stops a thread, the end is requested. Sets status_.
+    /// Waits for the first of: the display ends, a program dies or hangs, a fault stops a thread,
+    /// the end is requested. Sets status_.
     void watch();
     /// What ends the machine: the sentence, and whether task still commands motion until the end.
     struct Failure {
@@ -51,7 +56,8 @@ private:
     void report_gaps();  ///< the times without CPU that did not stop a thread
     void end();
 
-    bool step(const std::string& sentence);  ///< prints it with -v; false when the end was requested
+    /// prints it with -v; false when the end was requested
+    bool step(const std::string& sentence);
     bool command(const Words& words, const std::string& source);
     /// Starts a program that is not a component. Returns 0 after printing why it failed.
     pid_t start(const std::string& key, const Words& words, bool terminal = false);
@@ -61,7 +67,8 @@ private:
     /// Returns the sentence about a death among the programs that the machine needs, or "".
     std::string death();
     std::string death_of(const std::string& component, const std::string& program);
-    /// Returns the sentence about a program that a signal has stopped, or a task whose heartbeat is missing, or "".
+    /// Returns the sentence about a program that a signal has stopped, or a task whose heartbeat is
+    /// missing, or "".
     std::string hang(bool& of_task);
     /// Returns the sentence about a thread that a fault has stopped, or "".
     std::string stopped_thread();
@@ -83,13 +90,16 @@ private:
     ProcessOutput output_;
     Program display_{};
     std::vector<Program> applications_;
-    std::vector<std::pair<std::string, std::string>> components_;  ///< name and program of those that must not die
+    /// name and program of those that must not die
+    std::vector<std::pair<std::string, std::string>> components_;
     int status_ = 1;
     std::chrono::steady_clock::time_point looked_{};  ///< when death() last looked for linuxcncsvr
     TaskWatch task_watch_;
-    std::map<std::string, int> stopped_looks_;  ///< by component: looks in a row that found its program stopped
+    /// by component: looks in a row that found its program stopped
+    std::map<std::string, int> stopped_looks_;
     std::map<std::string, std::uint64_t> gaps_;  ///< by thread: gaps that were reported
-    MessageLog gap_log_{"hal linuxcnc", [](const std::string& line) { write_all(STDERR_FILENO, line); }};
+    MessageLog gap_log_{"hal linuxcnc",
+                        [](const std::string& line) { write_all(STDERR_FILENO, line); }};
 };
 
 }  // namespace hal::tools

@@ -33,7 +33,9 @@ pid_t Launch::start(const std::string& key, const Words& words, bool terminal) {
     std::string problem;
     const auto lock = machine_.session.lock();
     const pid_t pid = machine_.session.programs().start(how, true, problem);
-    if (pid == 0) fail(options_, fmt::format("{}: '{}' cannot be started: {}", key, words[0], problem));
+    if (pid == 0) {
+        fail(options_, fmt::format("{}: '{}' cannot be started: {}", key, words[0], problem));
+    }
     return pid;
 }
 
@@ -52,7 +54,9 @@ std::optional<int> Launch::wait_for(pid_t pid, std::int64_t ns) {
             machine_.session.programs().collect(pid);
             return status;
         }
-        if ((ns >= 0 && std::chrono::steady_clock::now() >= until) || machine_.stop.requested()) return std::nullopt;
+        if ((ns >= 0 && std::chrono::steady_clock::now() >= until) || machine_.stop.requested()) {
+            return std::nullopt;
+        }
         machine_.stop.wait_ns(5'000'000);
     }
 }
@@ -64,9 +68,15 @@ std::vector<pid_t> Launch::servers() {
         again = false;
         for (const Child& child : children()) {
             if (child.name != "linuxcncsvr") continue;
-            const auto* const entry = machine_.session.programs().find(child.pid);  // then the machine reaps it
-            if (entry ? !entry->ended : !child.ended) all.push_back(child.pid);
-            else if (!entry && reap(child.pid)) again = true;  // its successor may be newer than the list of processes
+            // then the machine reaps it
+            const auto* const entry = machine_.session.programs().find(child.pid);
+            if (entry ? !entry->ended : !child.ended) {
+                all.push_back(child.pid);
+            }
+            // its successor may be newer than the list of processes
+            else if (!entry && reap(child.pid)) {
+                again = true;
+            }
         }
     }
     return all;
@@ -81,18 +91,27 @@ bool Launch::runs(const std::string& component) {
 std::string Launch::death_of(const std::string& component, const std::string& program) {
     const auto lock = machine_.session.lock();
     const auto* const entry = machine_.session.programs().find(component);
-    if (entry && !entry->dead()) return {};
-    const std::string who = component == program ? fmt::format("'{}'", program) : fmt::format("'{}' (component {})", program, component);
+    if (entry && !entry->dead()) {
+        return {};
+    }
+    const std::string who = component == program
+                                ? fmt::format("'{}'", program)
+                                : fmt::format("'{}' (component {})", program, component);
     std::string when = entry ? entry->end_report : "";  // "since 12:34:56 (SIGKILL)"
-    if (when.starts_with("since ")) when.replace(0, 5, "at");
+    if (when.starts_with("since ")) {
+        when.replace(0, 5, "at");
+    }
     return when.empty() ? who + " died" : who + " died " + when;
 }
 
 std::string Launch::death() {
-    for (const auto& [component, program] : components_)
+    for (const auto& [component, program] : components_) {
         if (std::string found = death_of(component, program); !found.empty()) return found;
+    }
     const auto now = std::chrono::steady_clock::now();
-    if (now - looked_ < 500ms) return {};  // reading all of /proc is not for every 20 ms
+    if (now - looked_ < 500ms) {
+        return {};  // reading all of /proc is not for every 20 ms
+    }
     looked_ = now;
     return servers().empty() ? "'linuxcncsvr' died" : "";
 }
@@ -104,29 +123,41 @@ std::string Launch::hang(bool& of_task) {
         {
             const auto lock = machine_.session.lock();
             const auto* const entry = machine_.session.programs().find(component);
-            if (entry && !entry->dead()) pid = entry->pid;
+            if (entry && !entry->dead()) {
+                pid = entry->pid;
+            }
         }
         int& looks = stopped_looks_[component];
         looks = pid != 0 && state_of(pid) == 'T' ? looks + 1 : 0;
         if (looks < most_looks) continue;
         of_task = component == "inihal";
-        return fmt::format("'{}' (component {}, process {}) is stopped by a signal for 1 s", program, component, pid);
+        return fmt::format("'{}' (component {}, process {}) is stopped by a signal for 1 s",
+                           program, component, pid);
     }
     const std::int64_t silent_ns = task_watch_.silent_ns();
-    if (silent_ns == 0) return {};
+    if (silent_ns == 0) {
+        return {};
+    }
     of_task = true;
-    return fmt::format("'{}' has ended no cycle for {} ([HALCYON]TASK_TIMEOUT {})", configuration_.task[0],
-                       format_duration(static_cast<double>(silent_ns)), format_duration(static_cast<double>(configuration_.task_timeout_ns)));
+    return fmt::format("'{}' has ended no cycle for {} ([HALCYON]TASK_TIMEOUT {})",
+                       configuration_.task[0], format_duration(static_cast<double>(silent_ns)),
+                       format_duration(static_cast<double>(configuration_.task_timeout_ns)));
 }
 
 std::string Launch::stopped_thread() {
     const auto lock = machine_.session.lock();
-    if (!machine_.session.threads().running()) return {};
+    if (!machine_.session.threads().running()) {
+        return {};
+    }
     for (const ThreadReport& report : machine_.session.reports().threads()) {
         if (!report.faulted && !report.hung) continue;
         const std::vector<FaultRecord> faults = machine_.session.reports().faults();
-        const auto newest = std::find_if(faults.rbegin(), faults.rend(), [&](const FaultRecord& fault) { return fault.thread == report.name; });
-        if (newest == faults.rend()) return fmt::format("thread '{}' is stopped by a fault", report.name);
+        const auto newest =
+            std::find_if(faults.rbegin(), faults.rend(),
+                         [&](const FaultRecord& fault) { return fault.thread == report.name; });
+        if (newest == faults.rend()) {
+            return fmt::format("thread '{}' is stopped by a fault", report.name);
+        }
         return newest->sentence.substr(0, newest->sentence.find("; "));
     }
     return {};
@@ -143,7 +174,9 @@ Launch::Failure Launch::failure(bool look_at_threads) {
         found.task_works = !of_task;
         return found;
     }
-    if (look_at_threads) found.sentence = stopped_thread();
+    if (look_at_threads) {
+        found.sentence = stopped_thread();
+    }
     found.task_works = found.sentence.empty();
     return found;
 }
@@ -160,8 +193,10 @@ void Launch::report_gaps() {
         if (report.gaps == seen) continue;
         seen = report.gaps;
         gap_log_.print(report.name,
-                       fmt::format("{}: no CPU time for {}; the machine goes on ([HALCYON]MAX_CPU_GAP {}); see: hal doctor", report.name,
-                                   format_duration(static_cast<double>(report.gap_ns)), format_duration(static_cast<double>(configuration_.max_gap_ns))),
+                       fmt::format("{}: no CPU time for {}; the machine goes on "
+                                   "([HALCYON]MAX_CPU_GAP {}); see: hal doctor",
+                                   report.name, format_duration(static_cast<double>(report.gap_ns)),
+                                   format_duration(static_cast<double>(configuration_.max_gap_ns))),
                        now_ns);
     }
     gap_log_.flush(now_ns);
@@ -170,16 +205,19 @@ void Launch::report_gaps() {
 bool Launch::line_typed() {
     pollfd input{STDIN_FILENO, POLLIN, 0};
     char c = 0;
-    while (::poll(&input, 1, 0) > 0)
+    while (::poll(&input, 1, 0) > 0) {
         if (::read(STDIN_FILENO, &c, 1) <= 0 || c == '\n') return true;
+    }
     return false;
 }
 
 void Launch::stop_threads() {
     const auto lock = machine_.session.lock();
     Diagnostics diagnostics;
-    if (!machine_.session.threads().stop(&diagnostics))
-        write_all(STDERR_FILENO, render(diagnostics, machine_.session.sources, colours(STDERR_FILENO)));
+    if (!machine_.session.threads().stop(&diagnostics)) {
+        write_all(STDERR_FILENO,
+                  render(diagnostics, machine_.session.sources, colours(STDERR_FILENO)));
+    }
 }
 
 /// SIGTERM, and SIGKILL when that has no effect in time.
@@ -195,15 +233,22 @@ void Launch::end_program(Program& program) {
         if (gone()) break;
         ::kill(program.pid, number);
         ::kill(program.pid, SIGCONT);
-        for (std::int64_t waited = 0; waited < end_timeout_ns && !gone(); waited += 5'000'000) ::usleep(5000);
+        for (std::int64_t waited = 0; waited < end_timeout_ns && !gone(); waited += 5'000'000) {
+            ::usleep(5000);
+        }
     }
     program.pid = 0;
 }
 
 void Launch::end_server() {
     for (const int number : {SIGTERM, SIGKILL}) {
-        for (const pid_t pid : servers()) ::kill(pid, number);
-        for (std::int64_t waited = 0; waited < end_timeout_ns && !servers().empty(); waited += 5'000'000) ::usleep(5000);
+        for (const pid_t pid : servers()) {
+            ::kill(pid, number);
+        }
+        for (std::int64_t waited = 0; waited < end_timeout_ns && !servers().empty();
+             waited += 5'000'000) {
+            ::usleep(5000);
+        }
     }
 }
 
@@ -216,11 +261,17 @@ void Launch::end_component(const std::string& name) {
     for (int attempt = 0; attempt < 2; ++attempt) {
         auto* there = programs.find_number(number);
         if (!there) return;
-        if (attempt == 0) programs.terminate(*there);
-        else if (there->child && !there->ended) ::kill(there->pid, SIGKILL);
-        const auto until = std::chrono::steady_clock::now() + std::chrono::nanoseconds(end_timeout_ns);
-        while ((there = programs.find_number(number)) && there->child && !there->ended && std::chrono::steady_clock::now() < until)
+        if (attempt == 0) {
+            programs.terminate(*there);
+        } else if (there->child && !there->ended) {
+            ::kill(there->pid, SIGKILL);
+        }
+        const auto until =
+            std::chrono::steady_clock::now() + std::chrono::nanoseconds(end_timeout_ns);
+        while ((there = programs.find_number(number)) && there->child && !there->ended &&
+               std::chrono::steady_clock::now() < until) {
             programs.wait(lock, 50ms);
+        }
     }
 }
 
@@ -232,17 +283,25 @@ void Launch::end_orphans() {
     };
     for (const int number : {SIGTERM, SIGKILL}) {
         bool any = true;
-        if (number == SIGTERM)
-            for (const Child& child : children())
-                if (!ours(child.pid)) ::kill(child.pid, number);
+        if (number == SIGTERM) {
+            for (const Child& child : children()) {
+                if (!ours(child.pid)) {
+                    ::kill(child.pid, number);
+                }
+            }
+        }
         for (int waited = 0; any && waited < (number == SIGTERM ? 200 : 100); ++waited) {
             any = false;
             for (const Child& child : children()) {
                 if (ours(child.pid) || reap(child.pid)) continue;
                 any = true;
-                if (number == SIGKILL) ::kill(child.pid, number);
+                if (number == SIGKILL) {
+                    ::kill(child.pid, number);
+                }
             }
-            if (any) ::usleep(10'000);
+            if (any) {
+                ::usleep(10'000);
+            }
         }
         if (!any) return;
     }
@@ -250,23 +309,39 @@ void Launch::end_orphans() {
 
 void Launch::end() {
     machine_.shell.cancel(false);
-    if (!runs("inihal")) stop_threads();  // nobody commands motion
-    if (display_.pid != 0) step("end the display");
+    if (!runs("inihal")) {
+        stop_threads();  // nobody commands motion
+    }
+    if (display_.pid != 0) {
+        step("end the display");
+    }
     end_program(display_);
-    for (Program& application : applications_) end_program(application);
-    // In the place of motmod, for tests: what task of 2.9 sends while it ends does not belong to the log.
-    if (configuration_.linuxcnc.version == LinuxcncVersion::v2_9) end_component("motion-logger");
-    if (runs("inihal")) step(fmt::format("end {}", configuration_.task[0]));
+    for (Program& application : applications_) {
+        end_program(application);
+    }
+    // In the place of motmod, for tests: what task of 2.9 sends while it ends does not belong to
+    // the log.
+    if (configuration_.linuxcnc.version == LinuxcncVersion::v2_9) {
+        end_component("motion-logger");
+    }
+    if (runs("inihal")) {
+        step(fmt::format("end {}", configuration_.task[0]));
+    }
     end_component("inihal");
     end_component("motion-logger");
-    if (!servers().empty()) step("end linuxcncsvr");
+    if (!servers().empty()) {
+        step("end linuxcncsvr");
+    }
     end_server();
     if (!configuration_.shutdown.empty()) {
         step(fmt::format("run {}", configuration_.shutdown));
         std::string path, text, problem;
-        if (read_netlist(configuration_.shutdown, configuration_.folder, path, text, problem))
+        if (read_netlist(configuration_.shutdown, configuration_.folder, path, text, problem)) {
             machine_.shell.run_text(path, std::move(text), output_);
-        else fail(options_, fmt::format("[HAL]SHUTDOWN is '{}', which cannot be read: {}", configuration_.shutdown, problem));
+        } else {
+            fail(options_, fmt::format("[HAL]SHUTDOWN is '{}', which cannot be read: {}",
+                                       configuration_.shutdown, problem));
+        }
     }
     step("stop the threads");
     stop_threads();
@@ -274,9 +349,11 @@ void Launch::end() {
     machine_.shell.execute(Words{"unload", "all"}, output_, "<linuxcnc>");
     {
         auto lock = machine_.session.lock();
-        const auto until = std::chrono::steady_clock::now() + std::chrono::nanoseconds(end_timeout_ns);
-        while (!machine_.session.programs().idle() && std::chrono::steady_clock::now() < until)
+        const auto until =
+            std::chrono::steady_clock::now() + std::chrono::nanoseconds(end_timeout_ns);
+        while (!machine_.session.programs().idle() && std::chrono::steady_clock::now() < until) {
             machine_.session.programs().wait(lock, 50ms);
+        }
     }
     machine_.shut_down();
     end_orphans();

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What belongs to the computer and not to one process: the lock file of LinuxCNC, System V segments, processes that others have left behind.
+// What belongs to the computer and not to one process: the lock file of LinuxCNC, System V
+// segments, processes that others have left behind.
 #pragma once
 
 #include <string>
@@ -13,7 +14,8 @@ namespace hal::tools {
 /// A variable in the environment of all programs of a machine: the process ID of its launcher.
 inline constexpr const char* launcher_variable = "HALCYON_LAUNCHER";
 
-/// LinuxCNC's lock file, linuxcnc.lock in the temporary folder: NML allows one machine per computer. Removed with the object.
+/// LinuxCNC's lock file, linuxcnc.lock in the temporary folder: NML allows one machine per
+/// computer. Removed with the object.
 class MachineLock {
 public:
     MachineLock();
@@ -33,7 +35,8 @@ private:
     bool took_over_ = false;
 };
 
-/// Removes the shared memory of motion and the NML buffers, with their semaphores, that no process of this user has open any more.
+/// Removes the shared memory of motion and the NML buffers, with their semaphores, that no process
+/// of this user has open any more.
 void remove_segments(const Configuration&);
 
 struct Child {
@@ -42,7 +45,8 @@ struct Child {
     bool ended = false;
 };
 
-/// Returns the state of a process as /proc prints it: 'R', 'S', 'T' when a signal has stopped it, 'Z'; 0 when there is none.
+/// Returns the state of a process as /proc prints it: 'R', 'S', 'T' when a signal has stopped it,
+/// 'Z'; 0 when there is none.
 char state_of(pid_t pid);
 /// Has processes whose parent ends become children of this one, so that it can end them.
 void adopt_orphans();

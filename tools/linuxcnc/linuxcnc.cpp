@@ -15,8 +15,12 @@ namespace {
 int run_locked(const LinuxcncOptions& options, const Configuration& configuration) {
     MachineLock lock;
     if (!lock.problem().empty()) return fail(options, lock.problem());
-    if (lock.took_over()) remove_segments(configuration);
-    if (::chdir(configuration.folder.c_str()) != 0) return fail(options, "cannot enter " + configuration.folder);
+    if (lock.took_over()) {
+        remove_segments(configuration);
+    }
+    if (::chdir(configuration.folder.c_str()) != 0) {
+        return fail(options, "cannot enter " + configuration.folder);
+    }
     export_configuration(configuration, options);
     adopt_orphans();
     int status = 1;

@@ -36,7 +36,9 @@ bool ControlLink::retry() {
     lws_sock_file_fd_type descriptor{};
     descriptor.sockfd = fd;
     wsi_ = lws_adopt_descriptor_vhost(host_, LWS_ADOPT_SOCKET, descriptor, "control", nullptr);
-    if (!wsi_) return false;  // it has closed the socket
+    if (!wsi_) {
+        return false;  // it has closed the socket
+    }
     lws_set_opaque_user_data(wsi_, this);
     lws_set_timeout(wsi_, NO_PENDING_TIMEOUT, 0);
     in_.clear();
@@ -67,14 +69,17 @@ bool ControlLink::received(std::string_view bytes) {
 
 bool ControlLink::take_lines() {
     std::size_t taken = 0;
-    for (std::size_t end; (end = in_.find('\n', std::max(taken, searched_))) != std::string::npos;) {
+    for (std::size_t end;
+         (end = in_.find('\n', std::max(taken, searched_))) != std::string::npos;) {
         const std::string_view line = std::string_view(in_).substr(taken, end - taken);
         std::size_t bytes = 0;
         if (line.starts_with("{\"event\":\"samples\"")) {
             const auto head = nlohmann::json::parse(line, nullptr, false);
             bytes = head.is_object() ? head.value("bytes", std::size_t{0}) : 0;
             if (bytes > longest_line) return false;
-            if (in_.size() < end + 1 + bytes) break;  // its payload is not complete
+            if (in_.size() < end + 1 + bytes) {
+                break;  // its payload is not complete
+            }
         }
         if (!greeted_) {
             greeted_ = true;
@@ -94,9 +99,13 @@ bool ControlLink::writeable() {
     const std::size_t size = std::min<std::size_t>(out_.size(), 65536);
     std::vector<unsigned char> buffer(LWS_PRE + size);
     std::copy_n(out_.begin(), size, buffer.begin() + LWS_PRE);
-    if (lws_write(wsi_, buffer.data() + LWS_PRE, size, LWS_WRITE_RAW) < static_cast<int>(size)) return false;
+    if (lws_write(wsi_, buffer.data() + LWS_PRE, size, LWS_WRITE_RAW) < static_cast<int>(size)) {
+        return false;
+    }
     out_.erase(0, size);
-    if (!out_.empty()) lws_callback_on_writable(wsi_);
+    if (!out_.empty()) {
+        lws_callback_on_writable(wsi_);
+    }
     return true;
 }
 
@@ -104,7 +113,9 @@ void ControlLink::closed() {
     const bool was = greeted_;
     wsi_ = nullptr;
     greeted_ = false;
-    if (was) user_.machine_down();
+    if (was) {
+        user_.machine_down();
+    }
 }
 
 }  // namespace hal::tools

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A connection to the control socket of an instance within the event loop: lines in, lines out, reconnecting. docs/protocol.md.
+// A connection to the control socket of an instance within the event loop: lines in, lines out,
+// reconnecting. docs/protocol.md.
 #pragma once
 
 #include <cstddef>
@@ -24,11 +25,13 @@ public:
         virtual void machine_line(std::string_view line, std::string_view payload) = 0;
     };
 
-    ControlLink(lws_vhost* host, std::string instance, User& user) : host_(host), instance_(std::move(instance)), user_(user) {}
+    ControlLink(lws_vhost* host, std::string instance, User& user)
+        : host_(host), instance_(std::move(instance)), user_(user) {}
     ~ControlLink();
     ControlLink(const ControlLink&) = delete;
 
-    /// Tries to connect when the link is down. Call it every half second. Returns false when no instance answers.
+    /// Tries to connect when the link is down. Call it every half second. Returns false when no
+    /// instance answers.
     bool retry();
     bool up() const { return greeted_; }
     /// Queues a line, without its end. Returns false when the link is down or too much is waiting.
@@ -42,14 +45,18 @@ public:
     void closed();
 
 private:
-    static constexpr std::size_t most_waiting = 1 << 20, longest_line = 64 << 20;
+    static constexpr std::size_t most_waiting = 1 << 20;
+
+private:
+    static constexpr std::size_t longest_line = 64 << 20;
     bool take_lines();
 
     lws_vhost* host_;
     std::string instance_;
     User& user_;
     lws* wsi_ = nullptr;
-    bool greeted_ = false, paused_ = false;
+    bool greeted_ = false;
+    bool paused_ = false;
     std::string in_, out_;
     std::size_t searched_ = 0;
 };

@@ -12,12 +12,19 @@
 namespace hal::tools {
 
 void EventLog::add(std::string_view kind, std::string_view text) {
-    const auto unix_ms = std::chrono::duration_cast<std::chrono::milliseconds>(std::chrono::system_clock::now().time_since_epoch()).count();
-    entries_.push_back(nlohmann::json{{"event", "log"}, {"unix_ms", unix_ms}, {"kind", kind}, {"text", text}}.dump(
-        -1, ' ', false, nlohmann::json::error_handler_t::replace));
-    if (entries_.size() > most) entries_.pop_front();
+    const auto unix_ms = std::chrono::duration_cast<std::chrono::milliseconds>(
+                             std::chrono::system_clock::now().time_since_epoch())
+                             .count();
+    entries_.push_back(
+        nlohmann::json{{"event", "log"}, {"unix_ms", unix_ms}, {"kind", kind}, {"text", text}}.dump(
+            -1, ' ', false, nlohmann::json::error_handler_t::replace));
+    if (entries_.size() > most) {
+        entries_.pop_front();
+    }
     write_all(STDERR_FILENO, fmt::format("hal panel: {}\n", printable(text)));
-    if (on_entry) on_entry(entries_.back());
+    if (on_entry) {
+        on_entry(entries_.back());
+    }
 }
 
 }  // namespace hal::tools

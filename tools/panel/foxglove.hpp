@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Foxglove's WebSocket protocol (foxglove.sdk.v1, foxglove.websocket.v1): a channel per signal and unlinked output, parameters, the connection graph.
+// Foxglove's WebSocket protocol (foxglove.sdk.v1, foxglove.websocket.v1): a channel per signal and
+// unlinked output, parameters, the connection graph.
 #pragma once
 
 #include <cstdint>
@@ -51,14 +52,18 @@ private:
     };
     PanelServer& server_;
     ControlLink link_;
-    bool by_token_ = false, admitted_ = false, full_ = false;
-    std::int64_t retried_ms_ = 0, unix_offset_ns_ = 0;
+    bool by_token_ = false;
+    bool admitted_ = false;
+    bool full_ = false;
+    std::int64_t retried_ms_ = 0;
+    std::int64_t unix_offset_ns_ = 0;
     std::vector<Channel> channels_;  ///< channel id - 1
     std::map<std::uint32_t, std::size_t> subscriptions_;  ///< Foxglove's number -> channel
     std::vector<std::uint32_t> followed_;  ///< Foxglove's numbers, in the order of the values
     std::int64_t subscription_ = 0;  ///< of the control socket; 0: none
     std::vector<std::string> parameters_;  ///< all names
-    std::vector<std::pair<std::vector<std::string>, std::string>> asked_;  ///< names and id of get requests under way
+    /// names and id of get requests under way
+    std::vector<std::pair<std::vector<std::string>, std::string>> asked_;
 };
 
 }  // namespace hal::tools

@@ -30,7 +30,8 @@ struct HttpAnswer {
 /// Answers a request. Returns the value for the library's callback.
 int answer_http(PanelServer& server, lws* wsi, std::string_view path, HttpAnswer& answer);
 /// Sends a text as the whole answer. Returns the value for the library's callback.
-int answer_text(lws* wsi, unsigned status, std::string_view type, std::string text, HttpAnswer& answer);
+int answer_text(lws* wsi, unsigned status, std::string_view type, std::string text,
+                HttpAnswer& answer);
 /// Sends the next part of an answer. Returns the value for the library's callback.
 int continue_http(lws* wsi, HttpAnswer& answer);
 /// Returns a header of the request; empty when it is missing or too long.

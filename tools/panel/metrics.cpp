@@ -24,9 +24,14 @@ constexpr std::array edges_ns{1e3, 2e3, 5e3, 1e4, 2e4, 5e4, 1e5, 2e5, 5e5, 1e6, 
 std::string label(std::string_view text) {
     std::string out;
     for (const char c : text) {
-        if (c == '\\' || c == '"') out += '\\';
-        if (c == '\n') out += "\\n";
-        else out += c;
+        if (c == '\\' || c == '"') {
+            out += '\\';
+        }
+        if (c == '\n') {
+            out += "\\n";
+        } else {
+            out += c;
+        }
     }
     return out;
 }
@@ -36,17 +41,22 @@ void family(std::string& to, std::string_view name, std::string_view kind, std::
 }
 
 /// One sample per thread.
-void per_thread(std::string& to, const Json& threads, std::string_view name, std::string_view kind, std::string_view help,
-                const char* member, double factor = 1) {
+void per_thread(std::string& to, const Json& threads, std::string_view name, std::string_view kind,
+                std::string_view help, const char* member, double factor = 1) {
     family(to, name, kind, help);
-    for (const Json& thread : threads)
-        if (thread.contains(member) && thread[member].is_number())
-            to += fmt::format("halcyon_{}{{thread=\"{}\"}} {}\n", name, label(thread.value("name", "")),
-                              thread[member].get<double>() * factor);
+    for (const Json& thread : threads) {
+        if (thread.contains(member) && thread[member].is_number()) {
+            to +=
+                fmt::format("halcyon_{}{{thread=\"{}\"}} {}\n", name,
+                            label(thread.value("name", "")), thread[member].get<double>() * factor);
+        }
+    }
 }
 
-/// Pairs of lower edge (ns) and count as cumulative buckets. A fine bucket counts below the first edge that is not less than its upper end.
-void histogram(std::string& to, const Json& histograms, std::string_view name, std::string_view help, const char* member) {
+/// Pairs of lower edge (ns) and count as cumulative buckets. A fine bucket counts below the first
+/// edge that is not less than its upper end.
+void histogram(std::string& to, const Json& histograms, std::string_view name,
+               std::string_view help, const char* member) {
     family(to, name, "histogram", help);
     for (const auto& [thread, both] : histograms.items()) {
         std::array<std::uint64_t, edges_ns.size() + 1> counts{};
@@ -56,19 +66,24 @@ void histogram(std::string& to, const Json& histograms, std::string_view name, s
         for (std::size_t i = 0; i + 1 < pairs.size(); i += 2) {
             const auto edge = pairs[i].get<double>();
             const auto count = pairs[i + 1].get<std::uint64_t>();
-            const double end = edge < 8 ? edge + 1 : edge * 1.125, middle = (edge + end) / 2;
+            const double end = edge < 8 ? edge + 1 : edge * 1.125;
+            const double middle = (edge + end) / 2;
             std::size_t bucket = 0;
-            while (bucket < edges_ns.size() && edges_ns[bucket] < middle) ++bucket;
+            while (bucket < edges_ns.size() && edges_ns[bucket] < middle) {
+                ++bucket;
+            }
             counts[bucket] += count;
             sum_ns += middle * static_cast<double>(count);
             total += count;
         }
         std::uint64_t below = 0;
-        for (std::size_t i = 0; i < edges_ns.size(); ++i)
-            to += fmt::format("halcyon_{}_bucket{{thread=\"{}\",le=\"{}\"}} {}\n", name, label(thread), edges_ns[i] / 1e9,
-                              below += counts[i]);
+        for (std::size_t i = 0; i < edges_ns.size(); ++i) {
+            to += fmt::format("halcyon_{}_bucket{{thread=\"{}\",le=\"{}\"}} {}\n", name,
+                              label(thread), edges_ns[i] / 1e9, below += counts[i]);
+        }
         to += fmt::format(
-            "halcyon_{0}_bucket{{thread=\"{1}\",le=\"+Inf\"}} {2}\nhalcyon_{0}_sum{{thread=\"{1}\"}} "
+            "halcyon_{0}_bucket{{thread=\"{1}\",le=\"+Inf\"}} "
+            "{2}\nhalcyon_{0}_sum{{thread=\"{1}\"}} "
             "{3}\nhalcyon_{0}_count{{thread=\"{1}\"}} {2}\n",
             name, label(thread), total, sum_ns / 1e9);
     }
@@ -85,12 +100,16 @@ std::string metrics_text(const Json& reply, bool up) {
     if (!up) return text;
     const Json threads = reply.value("objects", Json::array());
     const Json histograms = reply.value("histograms", Json::object());
-    per_thread(text, threads, "thread_period_seconds", "gauge", "nominal period", "period_ns", 1e-9);
+    per_thread(text, threads, "thread_period_seconds", "gauge", "nominal period", "period_ns",
+               1e-9);
     per_thread(text, threads, "thread_cycles_total", "counter", "finished cycles", "cycles");
     per_thread(text, threads, "thread_missed_cycles_total", "counter", "missed periods", "missed");
-    per_thread(text, threads, "thread_overruns_total", "counter", "cycles that took longer than the period", "overruns");
-    per_thread(text, threads, "thread_page_faults_total", "counter", "page faults in cycles", "page_faults");
-    histogram(text, histograms, "thread_wakeup_latency_seconds", "wake-up latency of the cycles", "wakeup");
+    per_thread(text, threads, "thread_overruns_total", "counter",
+               "cycles that took longer than the period", "overruns");
+    per_thread(text, threads, "thread_page_faults_total", "counter", "page faults in cycles",
+               "page_faults");
+    histogram(text, histograms, "thread_wakeup_latency_seconds", "wake-up latency of the cycles",
+              "wakeup");
     histogram(text, histograms, "thread_execution_seconds", "execution time of the cycles", "busy");
     return text;
 }
@@ -98,12 +117,16 @@ std::string metrics_text(const Json& reply, bool up) {
 int Metrics::ask(lws* wsi, HttpAnswer& answer) {
     link_.retry();
     waiting_[next_] = {wsi, &answer, now_ms()};
-    if (link_.up()) request(next_);
+    if (link_.up()) {
+        request(next_);
+    }
     ++next_;
     return 0;
 }
 
-void Metrics::request(std::uint64_t id) { link_.send(fmt::format(R"({{"id":{},"describe":"thread","histograms":true}})", id)); }
+void Metrics::request(std::uint64_t id) {
+    link_.send(fmt::format(R"({{"id":{},"describe":"thread","histograms":true}})", id));
+}
 
 void Metrics::forget(lws* wsi) {
     std::erase_if(waiting_, [&](const auto& one) { return one.second.wsi == wsi; });
@@ -123,7 +146,9 @@ void Metrics::tick(std::int64_t now) {
 }
 
 void Metrics::machine_up(std::string_view) {
-    for (const auto& [id, one] : waiting_) request(id);
+    for (const auto& [id, one] : waiting_) {
+        request(id);
+    }
 }
 
 void Metrics::machine_down() {}

@@ -17,7 +17,8 @@ class Metrics : ControlLink::User {
 public:
     Metrics(lws_vhost* host, std::string instance) : link_(host, std::move(instance), *this) {}
 
-    /// Begins an answer, which is sent when the machine has answered. Returns the value for the library's callback.
+    /// Begins an answer, which is sent when the machine has answered. Returns the value for the
+    /// library's callback.
     int ask(lws* wsi, HttpAnswer& answer);
     /// The connection is closed.
     void forget(lws* wsi);

@@ -23,11 +23,17 @@ struct PanelOptions : Options {
         set.value("-N,--name", name, "NAME", "the instance to show");
         set.value("-p,--port", port, "PORT", "TCP port (default: 8080; 0: any free port)");
         set.flag("--write", write, "allow clients with the token to set values");
-        set.value("--listen", listen, "ADDRESS", "listen on this IPv4 address instead of 127.0.0.1; all clients then need the token");
-        set.values("--host", hosts, "NAME", "further host name of this computer in the address bar of a browser; may be repeated");
+        set.value(
+            "--listen", listen, "ADDRESS",
+            "listen on this IPv4 address instead of 127.0.0.1; all clients then need the token");
+        set.values(
+            "--host", hosts, "NAME",
+            "further host name of this computer in the address bar of a browser; may be repeated");
         set.values("--allow-origin", origins, "ORIGIN",
-                   "page that may connect as a Foxglove client: https://app.foxglove.dev; may be repeated");
-        set.value("-c,--component", component, "NAME", "name of the user panel's component (default: from its file)");
+                   "page that may connect as a Foxglove client: https://app.foxglove.dev; may be "
+                   "repeated");
+        set.value("-c,--component", component, "NAME",
+                  "name of the user panel's component (default: from its file)");
         set.for_how_long(for_ns, "end after 10s … (default: run until Ctrl-C)");
     }
 };

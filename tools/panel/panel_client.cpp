@@ -16,11 +16,14 @@ using Json = nlohmann::json;
 
 namespace {
 
-constexpr std::int64_t retry_ms = 500, hello_ms = 10'000;
+constexpr std::int64_t retry_ms = 500;
+constexpr std::int64_t hello_ms = 10'000;
 constexpr std::size_t pause_above = 256 << 10;
 constexpr std::size_t most_writes = 100;  // requests under way
 
-std::string text_of(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
+std::string text_of(const Json& json) {
+    return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
 
 }  // namespace
 
@@ -36,7 +39,9 @@ PanelClient::~PanelClient() { server_.release(*this); }
 
 void PanelClient::tick(std::int64_t now) {
     if (!welcome_) {
-        if (now - opened_ms_ > hello_ms) close(1008, "no hello");
+        if (now - opened_ms_ > hello_ms) {
+            close(1008, "no hello");
+        }
         return;
     }
     if (beat_ms_ != 0 && server_.panel() && now - beat_ms_ > server_.panel()->timeout_ms()) {
@@ -45,7 +50,9 @@ void PanelClient::tick(std::int64_t now) {
     }
     if (link_.up() || now - retried_ms_ < retry_ms) return;
     retried_ms_ = now;
-    if (!link_.retry() && !down_sent_) machine_down();
+    if (!link_.retry() && !down_sent_) {
+        machine_down();
+    }
 }
 
 void PanelClient::machine_up(std::string_view hello) {
@@ -63,18 +70,27 @@ void PanelClient::machine_down() {
 
 void PanelClient::machine_line(std::string_view line, std::string_view payload) {
     if (own_reply(line)) return;
-    if (!writes_.empty()) finish_write(line);
+    if (!writes_.empty()) {
+        finish_write(line);
+    }
     send(line);
-    if (!payload.empty()) send(payload, true);
-    if (waiting() > pause_above) link_.pause(true);
+    if (!payload.empty()) {
+        send(payload, true);
+    }
+    if (waiting() > pause_above) {
+        link_.pause(true);
+    }
 }
 
 bool PanelClient::own_reply(std::string_view line) {
     constexpr std::string_view own = R"({"id":"panel:)";
     if (!line.starts_with(own)) return false;
     const Json reply = Json::parse(line, nullptr, false);
-    if (line.substr(own.size()).starts_with("old:") && !writes_.empty() && reply.is_object())
-        for (const Json& value : reply.value("values", Json::array())) writes_.back().before.push_back(text_of(value));
+    if (line.substr(own.size()).starts_with("old:") && !writes_.empty() && reply.is_object()) {
+        for (const Json& value : reply.value("values", Json::array())) {
+            writes_.back().before.push_back(text_of(value));
+        }
+    }
     return true;
 }
 
@@ -84,13 +100,17 @@ void PanelClient::finish_write(std::string_view line) {
     writes_.pop_front();
     const Json reply = Json::parse(line, nullptr, false);
     const bool good = reply.is_object() && reply.value("ok", false);
-    for (std::size_t i = 0; i < write.names.size(); ++i)
+    for (std::size_t i = 0; i < write.names.size(); ++i) {
         server_.log().add("write", fmt::format("client {}: {}: {} -> {}{}", number_, write.names[i],
-                                               i < write.before.size() ? write.before[i] : "?", write.values[i], good ? "" : " failed"));
+                                               i < write.before.size() ? write.before[i] : "?",
+                                               write.values[i], good ? "" : " failed"));
+    }
 }
 
 void PanelClient::reject(const Json& request, std::string_view problem) {
-    send(text_of({{"id", request.contains("id") ? request["id"] : Json()}, {"ok", false}, {"error", problem}}));
+    send(text_of({{"id", request.contains("id") ? request["id"] : Json()},
+                  {"ok", false},
+                  {"error", problem}}));
 }
 
 void PanelClient::message(std::string_view text, bool binary) {
@@ -105,23 +125,37 @@ void PanelClient::message(std::string_view text, bool binary) {
     const RequestKind kind = check_request(request, problem);
     if (kind == RequestKind::rejected) return reject(request, problem);
     if (kind == RequestKind::writes) {
-        if (!server_.access().write) return reject(request, "read-only: the panel was started without --write");
-        if (!by_token_) return reject(request, "read-only: open the address with the token that hal panel printed");
-        if (!server_.controls(*this)) return reject(request, "read-only: another page has control; take control first");
+        if (!server_.access().write) {
+            return reject(request, "read-only: the panel was started without --write");
+        }
+        if (!by_token_) {
+            return reject(request,
+                          "read-only: open the address with the token that hal panel printed");
+        }
+        if (!server_.controls(*this)) {
+            return reject(request, "read-only: another page has control; take control first");
+        }
         if (request.contains("set")) return write(std::move(request));
         server_.log().add("write", fmt::format("client {}: {}", number_, text_of(request["run"])));
     }
-    if (!link_.send(text_of(request))) reject(request, link_.up() ? "too many requests are waiting" : "the machine is not running");
+    if (!link_.send(text_of(request))) {
+        reject(request,
+               link_.up() ? "too many requests are waiting" : "the machine is not running");
+    }
 }
 
 void PanelClient::greet(const Json& hello) {
     if (welcome_ || !hello.is_object()) return close(1008, "invalid hello");
     const Json token = hello.value("token", Json());
     if (token.is_string()) {
-        if (!is_token(server_.access(), token.get_ref<const std::string&>())) return close(1008, "wrong token");
+        if (!is_token(server_.access(), token.get_ref<const std::string&>())) {
+            return close(1008, "wrong token");
+        }
         by_token_ = true;
     }
-    if (!by_token_ && (!browser_ || !server_.access().open)) return close(1008, "this connection needs the token that hal panel printed");
+    if (!by_token_ && (!browser_ || !server_.access().open)) {
+        return close(1008, "this connection needs the token that hal panel printed");
+    }
     if (!server_.admit(*this)) return close(1013, "too many pages are connected");
     welcome_ = true;
     Json answer{{"event", "welcome"},
@@ -129,48 +163,68 @@ void PanelClient::greet(const Json& hello) {
                 {"write", server_.access().write},
                 {"token", by_token_},
                 {"client", number_}};
-    if (const UserPanel* const panel = server_.panel()) answer["panel"] = Json::parse(panel->layout());
+    if (const UserPanel* const panel = server_.panel()) {
+        answer["panel"] = Json::parse(panel->layout());
+    }
     send(text_of(answer));
-    for (const std::string& entry : server_.log().entries()) send(entry);
-    if (by_token_ && server_.access().write) server_.offer_control(*this);
+    for (const std::string& entry : server_.log().entries()) {
+        send(entry);
+    }
+    if (by_token_ && server_.access().write) {
+        server_.offer_control(*this);
+    }
     send_control();
-    if (const UserPanel* const panel = server_.panel()) send(panel->values());
-    server_.log().add("client", fmt::format("client {} connected{}", number_, by_token_ ? " with the token" : ""));
+    if (const UserPanel* const panel = server_.panel()) {
+        send(panel->values());
+    }
+    server_.log().add("client", fmt::format("client {} connected{}", number_,
+                                            by_token_ ? " with the token" : ""));
     tick(now_ms());
 }
 
 void PanelClient::send_control() {
     const PanelClient* const holder = server_.controller();
-    send(text_of({{"event", "control"}, {"held", holder == this}, {"holder", holder ? Json(holder->number()) : Json()}}));
+    send(text_of({{"event", "control"},
+                  {"held", holder == this},
+                  {"holder", holder ? Json(holder->number()) : Json()}}));
 }
 
 void PanelClient::write(Json request) {
     const Json& values = request["set"];
-    if (!values.is_object() || values.size() > 100 || !request.contains("id"))
+    if (!values.is_object() || values.size() > 100 || !request.contains("id")) {
         return reject(request, "set needs an id and an object of at most 100 values");
+    }
     if (writes_.size() >= most_writes) return reject(request, "too many requests are waiting");
     Write write{request["id"].get<std::uint64_t>(), {}, {}, {}};
     for (const auto& [name, value] : values.items()) {
         write.names.push_back(name);
         write.values.push_back(text_of(value));
     }
-    const std::string read = text_of({{"id", fmt::format("panel:old:{}", write.id)}, {"read", write.names}});
-    if (!link_.send(read) || !link_.send(text_of(request))) return reject(request, "the machine is not running");
+    const std::string read =
+        text_of({{"id", fmt::format("panel:old:{}", write.id)}, {"read", write.names}});
+    if (!link_.send(read) || !link_.send(text_of(request))) {
+        return reject(request, "the machine is not running");
+    }
     writes_.push_back(std::move(write));
 }
 
 void PanelClient::panel_request(const Json& request) {
     UserPanel* const panel = server_.panel();
     if (!panel) return reject(request, "no user panel is loaded");
-    if (!server_.controls(*this)) return reject(request, "read-only: this page does not have control");
+    if (!server_.controls(*this)) {
+        return reject(request, "read-only: this page does not have control");
+    }
     const Json& body = request["panel"];
     if (!body.is_object()) return reject(request, "panel must be an object");
     beat_ms_ = now_ms();
     panel->page_active();
     const Json values = body.value("write", Json::object());
     if (!values.is_object()) return reject(request, "write must be an object");
-    for (const auto& [name, value] : values.items())
-        if (const std::string problem = panel->write(name, value); !problem.empty()) return reject(request, problem);
+    for (const auto& [name, value] : values.items()) {
+        if (const std::string problem = panel->write(name, value); !problem.empty()) {
+            return reject(request, problem);
+        }
+    }
     panel->flush();
 }
 

@@ -16,9 +16,13 @@ public:
     explicit PanelErrors(Code code) : code_(code) {}
 
     /// Adds a file and returns its number for spans.
-    std::uint32_t add_file(std::string name, std::string text) { return sources_.add(std::move(name), std::move(text)); }
+    std::uint32_t add_file(std::string name, std::string text) {
+        return sources_.add(std::move(name), std::move(text));
+    }
     void add(Span at, std::string sentence, std::string help = "") {
-        if (found_.errors() <= text::most_errors) found_.error(code_, at, std::move(sentence), "", std::move(help));
+        if (found_.errors() <= text::most_errors) {
+            found_.error(code_, at, std::move(sentence), "", std::move(help));
+        }
     }
     /// Returns all of them as they are printed, in the order of their places.
     std::string text(bool colours) const { return render(found_, sources_, colours); }

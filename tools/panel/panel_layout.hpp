@@ -15,8 +15,12 @@ struct PanelPin {
     std::string type;          ///< bit, float, s32, u32
     bool output = false;       ///< set by the page
     nlohmann::json initial;    ///< null: 0
-    nlohmann::json safe;       ///< value of an output without a page, and before the first one; null: keeps its value
-    double least = -std::numeric_limits<double>::infinity(), most = std::numeric_limits<double>::infinity();  ///< what a page may set
+    /// value of an output without a page, and before the first one; null: keeps its value
+    nlohmann::json safe;
+    /// what a page may set
+    double least = -std::numeric_limits<double>::infinity();
+
+    double most = std::numeric_limits<double>::infinity();
     std::string unit, doc;
 };
 
@@ -27,9 +31,11 @@ struct PanelLayout {
     nlohmann::json root;            ///< {"widget":"vbox","children":[…]}
 };
 
-/// Reads a `.panel` text or, when it begins with `<`, a PyVCP file; files that it includes are relative to its folder.
+/// Reads a `.panel` text or, when it begins with `<`, a PyVCP file; files that it includes are
+/// relative to its folder.
 /// `component`: the name of the component; empty: by the file. Appends errors as they are printed to `errors`.
-PanelLayout read_panel_file(const std::string& path, const std::string& component, std::string& errors);
+PanelLayout read_panel_file(const std::string& path, const std::string& component,
+                            std::string& errors);
 /// The same for a text. `name` is the file in messages.
 PanelLayout read_panel_text(const std::string& text, const std::string& name, std::string& errors);
 PanelLayout read_pyvcp(const std::string& text, const std::string& name, std::string& errors);

@@ -55,7 +55,8 @@ constexpr Kind kinds[] = {
 
 constexpr const char* number_keys[] = {"min", "max", "step", "warn", "alarm", "seconds", "digits"};
 
-/// Splits a line at blanks; "…" keeps blanks together, also behind `key=`. `open`: a quotation mark without its second.
+/// Splits a line at blanks; "…" keeps blanks together, also behind `key=`. `open`: a quotation mark
+/// without its second.
 std::vector<Word> words_of_line(const Word& line, bool& open) {
     std::vector<Word> words;
     const std::string& text = line.text;
@@ -69,8 +70,11 @@ std::vector<Word> words_of_line(const Word& line, bool& open) {
         bool quoted = false;
         const std::size_t begin = i;
         for (; i < text.size() && (quoted || (text[i] != ' ' && text[i] != '\t')); ++i) {
-            if (text[i] == '"') quoted = !quoted;
-            else word.text += text[i];
+            if (text[i] == '"') {
+                quoted = !quoted;
+            } else {
+                word.text += text[i];
+            }
         }
         open = quoted;
         word.at.length = static_cast<std::uint32_t>(i - begin);
@@ -82,7 +86,9 @@ std::vector<Word> words_of_line(const Word& line, bool& open) {
 std::optional<double> number_of(std::string_view text) {
     double value = 0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (error != std::errc{} || end != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;
+    if (error != std::errc{} || end != text.data() + text.size() || !std::isfinite(value)) {
+        return std::nullopt;
+    }
     return value;
 }
 
@@ -96,10 +102,15 @@ public:
         for (text::Lines lines(whole, "#"); auto line = lines.next();) {
             bool open = false;
             const auto words = words_of_line(*line, open);
-            if (open) error(words.back().at, "this quotation mark has no second one in its line");
-            else if (!words.empty()) this->line(words);
+            if (open) {
+                error(words.back().at, "this quotation mark has no second one in its line");
+            } else if (!words.empty()) {
+                this->line(words);
+            }
         }
-        if (open_.size() > 1) error(opened_.back(), "this container has no end", "add a line: end");
+        if (open_.size() > 1) {
+            error(opened_.back(), "this container has no end", "add a line: end");
+        }
         printed += errors_.text(colours(STDERR_FILENO));
         return std::move(layout_);
     }
@@ -119,32 +130,47 @@ private:
             return;
         }
         if (first == "end") {
-            if (open_.size() == 1) return error(words[0].at, "'end' without an open row, column or frame");
+            if (open_.size() == 1) {
+                return error(words[0].at, "'end' without an open row, column or frame");
+            }
             open_.pop_back();
             opened_.pop_back();
             return;
         }
         if (first == "row" || first == "column" || first == "frame") return container(words);
-        const auto kind = std::find_if(std::begin(kinds), std::end(kinds), [&](const Kind& k) { return first == k.name; });
+        const auto kind = std::find_if(std::begin(kinds), std::end(kinds),
+                                       [&](const Kind& k) { return first == k.name; });
         if (kind != std::end(kinds)) return widget(*kind, words);
-        std::vector<std::string> names{"component", "timeout", "title", "row", "column", "frame", "end"};
-        for (const Kind& k : kinds) names.emplace_back(k.name);
-        error(words[0].at, fmt::format("unknown word '{}'", first.substr(0, 60)), suggestion(first, names, "the words are"));
+        std::vector<std::string> names{"component", "timeout", "title", "row",
+                                       "column",    "frame",   "end"};
+        for (const Kind& k : kinds) {
+            names.emplace_back(k.name);
+        }
+        error(words[0].at, fmt::format("unknown word '{}'", first.substr(0, 60)),
+              suggestion(first, names, "the words are"));
     }
 
     void setting(const std::vector<Word>& words, std::string& to) {
-        if (words.size() != 2)
-            return error(words[0].at, fmt::format("'{}' takes one word", words[0].text), "write names with blanks in quotation marks");
-        if (!to.empty()) error(words[0].at, fmt::format("a second '{}'", words[0].text), "a panel has one");
+        if (words.size() != 2) {
+            return error(words[0].at, fmt::format("'{}' takes one word", words[0].text),
+                         "write names with blanks in quotation marks");
+        }
+        if (!to.empty()) {
+            error(words[0].at, fmt::format("a second '{}'", words[0].text), "a panel has one");
+        }
         to = words[1].text;
-        if (words[0].text == "component" && !good_instance_name(to))
-            error(words[1].at, fmt::format("'{}' is not a valid name of a component", to.substr(0, 60)));
+        if (words[0].text == "component" && !good_instance_name(to)) {
+            error(words[1].at,
+                  fmt::format("'{}' is not a valid name of a component", to.substr(0, 60)));
+        }
     }
 
     void timeout(const std::vector<Word>& words) {
         const auto ns = words.size() == 2 ? parse_duration_ns(words[1].text) : std::nullopt;
-        if (!ns || *ns < 100'000'000 || *ns > 60'000'000'000)
-            return error(words.back().at, "the timeout must be 100ms to 60s", "write: timeout 500ms");
+        if (!ns || *ns < 100'000'000 || *ns > 60'000'000'000) {
+            return error(words.back().at, "the timeout must be 100ms to 60s",
+                         "write: timeout 500ms");
+        }
         layout_.timeout_ms = *ns / 1'000'000;
     }
 
@@ -156,16 +182,23 @@ private:
 
     void container(const std::vector<Word>& words) {
         const bool frame = words[0].text == "frame";
-        if (words.size() > 2) return error(words[2].at, "a container has at most a title", "write titles with blanks in quotation marks");
-        if (open_.size() > deepest) return error(words[0].at, "containers are nested more than 30 deep");
-        Json node{{"widget", words[0].text == "row" ? "hbox" : "vbox"}, {"children", Json::array()}};
+        if (words.size() > 2) {
+            return error(words[2].at, "a container has at most a title",
+                         "write titles with blanks in quotation marks");
+        }
+        if (open_.size() > deepest) {
+            return error(words[0].at, "containers are nested more than 30 deep");
+        }
+        Json node{{"widget", words[0].text == "row" ? "hbox" : "vbox"},
+                  {"children", Json::array()}};
         if (words.size() == 2 || frame) {
             node["widget"] = "labelframe";
             node["horizontal"] = words[0].text == "row";
             node["options"] = {{"text", words.size() == 2 ? words[1].text : ""}};
         }
         containers_.push_back(std::make_unique<Json>(std::move(node)));
-        // The node is filled in place: pointers into the array of its parent do not survive the next widget.
+        // The node is filled in place: pointers into the array of its parent do not survive the
+        // next widget.
         Json& placed = add(Json());
         placed = {{"index", containers_.size() - 1}};
         open_.push_back(containers_.back().get());
@@ -173,15 +206,20 @@ private:
     }
 
     void widget(const Kind& kind, const std::vector<Word>& words);
-    void pin(const Kind& kind, const std::vector<Word>& words, const std::map<std::string, Word>& given, Json& options, Json& node);
+    void pin(const Kind& kind, const std::vector<Word>& words,
+             const std::map<std::string, Word>& given, Json& options, Json& node);
     std::optional<Json> value_of(const Kind& kind, const Word& word);
 
 public:
     /// Puts the containers where they belong.
     void assemble(Json& node) {
         for (Json& child : node["children"]) {
-            if (child.contains("index")) child = std::move(*containers_[child["index"].get<std::size_t>()]);
-            if (child.contains("children")) assemble(child);
+            if (child.contains("index")) {
+                child = std::move(*containers_[child["index"].get<std::size_t>()]);
+            }
+            if (child.contains("children")) {
+                assemble(child);
+            }
         }
     }
 
@@ -200,7 +238,8 @@ std::optional<Json> Reader::value_of(const Kind& kind, const Word& word) {
     if (std::string_view(kind.type) == "bit") {
         if (word.text == "TRUE" || word.text == "1" || word.text == "true") return Json(true);
         if (word.text == "FALSE" || word.text == "0" || word.text == "false") return Json(false);
-        error(word.at, fmt::format("'{}' is not a bit", word.text.substr(0, 60)), "write TRUE or FALSE");
+        error(word.at, fmt::format("'{}' is not a bit", word.text.substr(0, 60)),
+              "write TRUE or FALSE");
         return std::nullopt;
     }
     if (const auto number = number_of(word.text)) return Json(*number);
@@ -208,81 +247,132 @@ std::optional<Json> Reader::value_of(const Kind& kind, const Word& word) {
     return std::nullopt;
 }
 
-void Reader::pin(const Kind& kind, const std::vector<Word>& words, const std::map<std::string, Word>& given, Json& options, Json& node) {
+void Reader::pin(const Kind& kind, const std::vector<Word>& words,
+                 const std::map<std::string, Word>& given, Json& options, Json& node) {
     PanelPin pin;
     pin.name = words[1].text;
     pin.type = kind.type;
     pin.output = kind.output;
-    const bool good = !pin.name.empty() && pin.name.size() <= 100 && std::all_of(pin.name.begin(), pin.name.end(), [](unsigned char c) {
-        return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_' || c == '.';
+    const bool good = !pin.name.empty() && pin.name.size() <= 100 &&
+                      std::all_of(pin.name.begin(), pin.name.end(), [](unsigned char c) {
+        return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+               c == '-' || c == '_' || c == '.';
     });
-    if (!good)
-        return error(words[1].at, fmt::format("'{}' is not a valid name of a pin", pin.name.substr(0, 60)),
+    if (!good) {
+        return error(words[1].at,
+                     fmt::format("'{}' is not a valid name of a pin", pin.name.substr(0, 60)),
                      "use letters, digits, '-', '_' and '.'");
-    if (std::any_of(layout_.pins.begin(), layout_.pins.end(), [&](const PanelPin& other) { return other.name == pin.name; }))
-        return error(words[1].at, fmt::format("duplicate pin '{}'", pin.name), "each pin of a panel needs a name of its own");
-    if (kind.output && std::string_view(kind.name) == "button") pin.safe = false;
-    if (kind.output) pin.least = options.value("min", pin.least), pin.most = options.value("max", pin.most);
+    }
+    if (std::any_of(layout_.pins.begin(), layout_.pins.end(),
+                    [&](const PanelPin& other) { return other.name == pin.name; })) {
+        return error(words[1].at, fmt::format("duplicate pin '{}'", pin.name),
+                     "each pin of a panel needs a name of its own");
+    }
+    if (kind.output && std::string_view(kind.name) == "button") {
+        pin.safe = false;
+    }
+    if (kind.output) {
+        pin.least = options.value("min", pin.least);
+        pin.most = options.value("max", pin.most);
+    }
     for (const auto& [key, word] : given) {
         if (key != "initial" && key != "safe") continue;
         const auto value = value_of(kind, word);
         if (!value) continue;
-        if (value->is_number() && (value->get<double>() < pin.least || value->get<double>() > pin.most))
-            error(word.at, fmt::format("{}={} is outside {:g}..{:g}", key, word.text.substr(0, 60), pin.least, pin.most));
+        if (value->is_number() &&
+            (value->get<double>() < pin.least || value->get<double>() > pin.most)) {
+            error(word.at, fmt::format("{}={} is outside {:g}..{:g}", key, word.text.substr(0, 60),
+                                       pin.least, pin.most));
+        }
         (key == "initial" ? pin.initial : pin.safe) = *value;
     }
-    if (kind.output && pin.initial.is_null() && pin.safe.is_null() && (pin.least > 0 || pin.most < 0))
+    if (kind.output && pin.initial.is_null() && pin.safe.is_null() &&
+        (pin.least > 0 || pin.most < 0)) {
         pin.initial = pin.least > 0 ? pin.least : pin.most;
-    if (given.contains("unit")) pin.unit = given.at("unit").text;
-    if (given.contains("doc")) pin.doc = given.at("doc").text;
-    if (!pin.initial.is_null()) node["initial"] = pin.initial;
-    if (!options.contains("text")) options["text"] = pin.name;
+    }
+    if (given.contains("unit")) {
+        pin.unit = given.at("unit").text;
+    }
+    if (given.contains("doc")) {
+        pin.doc = given.at("doc").text;
+    }
+    if (!pin.initial.is_null()) {
+        node["initial"] = pin.initial;
+    }
+    if (!options.contains("text")) {
+        options["text"] = pin.name;
+    }
     node["pin"] = pin.name;
     layout_.pins.push_back(std::move(pin));
 }
 
 void Reader::widget(const Kind& kind, const std::vector<Word>& words) {
-    if (++widgets_ > most_widgets) return widgets_ == most_widgets + 1 ? error(words[0].at, "more than 2000 widgets") : void();
-    if (words.size() < 2)
-        return error(words[0].at, fmt::format("missing {} of '{}'", kind.type ? "pin" : "text", kind.name),
+    if (++widgets_ > most_widgets) {
+        return widgets_ == most_widgets + 1 ? error(words[0].at, "more than 2000 widgets") : void();
+    }
+    if (words.size() < 2) {
+        return error(words[0].at,
+                     fmt::format("missing {} of '{}'", kind.type ? "pin" : "text", kind.name),
                      fmt::format("write: {} NAME", kind.name));
+    }
     std::map<std::string, Word> given;
     const std::string keys = std::string("label doc unit ") + kind.keys;
     for (std::size_t i = 2; i < words.size(); ++i) {
         const std::size_t equals = words[i].text.find('=');
         const std::string key = words[i].text.substr(0, equals);
-        if (equals == std::string::npos || (" " + keys).find(" " + key + " ") == std::string::npos) {
-            error(words[i].at, fmt::format("'{}' is not an option of '{}'", key.substr(0, 60), kind.name),
+        if (equals == std::string::npos ||
+            (" " + keys).find(" " + key + " ") == std::string::npos) {
+            error(words[i].at,
+                  fmt::format("'{}' is not an option of '{}'", key.substr(0, 60), kind.name),
                   fmt::format("the options are: {}", keys.substr(0, keys.size() - 1)));
             continue;
         }
         given[key] = {words[i].text.substr(equals + 1), words[i].at};
     }
-    Json options = Json::object(), node{{"widget", kind.widget}, {"kind", kind.name}};
+    Json options = Json::object();
+    Json node{{"widget", kind.widget}, {"kind", kind.name}};
     for (const auto& [key, word] : given) {
-        if (std::find(std::begin(number_keys), std::end(number_keys), key) != std::end(number_keys)) {
-            if (const auto number = number_of(word.text)) options[key] = *number;
-            else error(word.at, fmt::format("{} must be a number, not '{}'", key, word.text.substr(0, 60)));
+        if (std::find(std::begin(number_keys), std::end(number_keys), key) !=
+            std::end(number_keys)) {
+            if (const auto number = number_of(word.text)) {
+                options[key] = *number;
+            } else {
+                error(word.at,
+                      fmt::format("{} must be a number, not '{}'", key, word.text.substr(0, 60)));
+            }
         } else if (key == "on" || key == "off" || key == "unit") {
             options[key] = word.text;
             if (key == "unit" || is_css_colour(word.text)) continue;
-            const std::string similar = did_you_mean(word.text, {css_colours.begin(), css_colours.end()});
+            const std::string similar =
+                did_you_mean(word.text, {css_colours.begin(), css_colours.end()});
             error(word.at, fmt::format("{}: unknown colour '{}'", key, word.text.substr(0, 60)),
                   similar.empty() ? "write a name like green, or #rrggbb" : similar);
         }
     }
-    if (options.contains("min") && options.contains("max") && options["min"].get<double>() >= options["max"].get<double>())
+    if (options.contains("min") && options.contains("max") &&
+        options["min"].get<double>() >= options["max"].get<double>()) {
         error(given["min"].at, "min must be less than max");
-    if (options.contains("seconds") && options["seconds"].get<double>() <= 0) error(given["seconds"].at, "seconds must be positive");
-    if (options.contains("digits") && !(options["digits"].get<double>() >= 0 && options["digits"].get<double>() <= 15))
+    }
+    if (options.contains("seconds") && options["seconds"].get<double>() <= 0) {
+        error(given["seconds"].at, "seconds must be positive");
+    }
+    if (options.contains("digits") &&
+        !(options["digits"].get<double>() >= 0 && options["digits"].get<double>() <= 15)) {
         error(given["digits"].at, "digits must be 0 to 15");
-    if (options.contains("step") && options["step"].get<double>() <= 0) error(given["step"].at, "step must be positive");
-    if (given.contains("label")) options["text"] = given["label"].text;
+    }
+    if (options.contains("step") && options["step"].get<double>() <= 0) {
+        error(given["step"].at, "step must be positive");
+    }
+    if (given.contains("label")) {
+        options["text"] = given["label"].text;
+    }
     if (!kind.type) {
         options["text"] = words[1].text;
     } else if (given.contains("of")) {  // shows a value that exists, without a pin of its own
         node["of"] = given["of"].text;
-        if (!options.contains("text")) options["text"] = words[1].text;
+        if (!options.contains("text")) {
+            options["text"] = words[1].text;
+        }
     } else {
         pin(kind, words, given, options, node);
     }
@@ -299,19 +389,27 @@ PanelLayout read_panel_text(const std::string& text, const std::string& name, st
     return layout;
 }
 
-PanelLayout read_panel_file(const std::string& path, const std::string& component, std::string& errors) {
+PanelLayout read_panel_file(const std::string& path, const std::string& component,
+                            std::string& errors) {
     std::string text;
     if (!read_file(path, text)) {
         errors += fmt::format("cannot read '{}': {}\n", path, text);
         return {};
     }
     const std::size_t begin = text.find_first_not_of(" \t\r\n");
-    const bool xml = begin != std::string::npos && (text[begin] == '<' || static_cast<unsigned char>(text[begin]) == 0xEF);
+    const bool xml = begin != std::string::npos &&
+                     (text[begin] == '<' || static_cast<unsigned char>(text[begin]) == 0xEF);
     PanelLayout layout = xml ? read_pyvcp(text, path, errors) : read_panel_text(text, path, errors);
-    if (!component.empty()) layout.component = component;
-    else if (layout.component.empty()) layout.component = xml ? "pyvcp" : std::filesystem::path(path).stem().string();
-    if (!good_instance_name(layout.component))
-        errors += fmt::format("'{}' is not a valid name of a component; choose one: --component NAME\n", layout.component);
+    if (!component.empty()) {
+        layout.component = component;
+    } else if (layout.component.empty()) {
+        layout.component = xml ? "pyvcp" : std::filesystem::path(path).stem().string();
+    }
+    if (!good_instance_name(layout.component)) {
+        errors +=
+            fmt::format("'{}' is not a valid name of a component; choose one: --component NAME\n",
+                        layout.component);
+    }
     return layout;
 }
 

@@ -14,8 +14,9 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr std::array<std::string_view, 27> constants{
-    "FLAT", "SUNKEN", "RAISED", "GROOVE", "RIDGE", "SOLID", "HORIZONTAL", "VERTICAL", "LEFT", "RIGHT", "CENTER", "TOP",      "BOTTOM", "N",
-    "S",    "E",      "W",      "NE",     "NW",    "SE",    "SW",         "NS",       "EW",   "NSEW",  "NORMAL", "DISABLED", "BOTH"};
+    "FLAT",  "SUNKEN", "RAISED", "GROOVE", "RIDGE", "SOLID", "HORIZONTAL", "VERTICAL", "LEFT",
+    "RIGHT", "CENTER", "TOP",    "BOTTOM", "N",     "S",     "E",          "W",        "NE",
+    "NW",    "SE",     "SW",     "NS",     "EW",    "NSEW",  "NORMAL",     "DISABLED", "BOTH"};
 
 class Literal {
 public:
@@ -32,7 +33,10 @@ private:
     static constexpr int deepest = 20;
 
     void skip() {
-        while (at_ < text_.size() && (text_[at_] == ' ' || text_[at_] == '\t' || text_[at_] == '\n' || text_[at_] == '\r')) ++at_;
+        while (at_ < text_.size() && (text_[at_] == ' ' || text_[at_] == '\t' ||
+                                      text_[at_] == '\n' || text_[at_] == '\r')) {
+            ++at_;
+        }
     }
     bool take(char c) {
         skip();
@@ -45,7 +49,8 @@ private:
         return at_ < text_.size() ? text_[at_] : '\0';
     }
 
-    /// Values separated by commas up to `end`; one without a comma is itself, unless it is in brackets [ ].
+    /// Values separated by commas up to `end`; one without a comma is itself, unless it is in
+    /// brackets [ ].
     std::optional<Json> sequence(char end) {
         Json all = Json::array();
         bool comma = false;
@@ -90,11 +95,17 @@ private:
 
     static std::optional<Json> calculate(const Json& left, const Json& right, char sign) {
         if (!left.is_number() || !right.is_number()) return std::nullopt;
-        const double a = left.get<double>(), b = right.get<double>();
-        const double result = sign == '+' ? a + b : sign == '-' ? a - b : sign == '*' ? a * b : a / b;
+        const double a = left.get<double>();
+        const double b = right.get<double>();
+        const double result = sign == '+'   ? a + b
+                              : sign == '-' ? a - b
+                              : sign == '*' ? a * b
+                                            : a / b;
         if (!std::isfinite(result)) return std::nullopt;
-        if (left.is_number_integer() && right.is_number_integer() && sign != '/' && std::abs(result) < 1e15)
+        if (left.is_number_integer() && right.is_number_integer() && sign != '/' &&
+            std::abs(result) < 1e15) {
             return Json(static_cast<std::int64_t>(result));
+        }
         return Json(result);
     }
 
@@ -107,7 +118,9 @@ private:
 
     std::optional<Json> plain_value() {
         const char c = next();
-        if (take('(')) return sequence(')');
+        if (take('(')) {
+            return sequence(')');
+        }
         if (take('[')) return sequence(']');
         if (take('{')) return dict();
         if (take('-')) {
@@ -142,9 +155,13 @@ private:
                 char c = text_[at_++];
                 if (c == '\\' && at_ < text_.size()) {
                     c = text_[at_++];
-                    if (c == 'n') c = '\n';
-                    else if (c == 't') c = '\t';
-                    else if (c != '\\' && c != '"' && c != '\'') all += '\\';
+                    if (c == 'n') {
+                        c = '\n';
+                    } else if (c == 't') {
+                        c = '\t';
+                    } else if (c != '\\' && c != '"' && c != '\'') {
+                        all += '\\';
+                    }
                 }
                 all += c;
             }
@@ -161,24 +178,31 @@ private:
         if (error != std::errc{} || !std::isfinite(real)) return std::nullopt;
         const std::string_view digits(begin, static_cast<std::size_t>(stop - begin));
         at_ += digits.size();
-        if (at_ < text_.size() && text_[at_] == '.' && digits.find_first_of(".eE") == digits.npos) {  // 1.
+        if (at_ < text_.size() && text_[at_] == '.' &&
+            digits.find_first_of(".eE") == digits.npos) {  // 1.
             ++at_;
             return Json(real);
         }
-        if (digits.find_first_of(".eE") == digits.npos && real < 1e15) return Json(static_cast<std::int64_t>(real));
+        if (digits.find_first_of(".eE") == digits.npos && real < 1e15) {
+            return Json(static_cast<std::int64_t>(real));
+        }
         return Json(real);
     }
 
     std::optional<Json> word() {
         const std::size_t begin = at_;
         while (at_ < text_.size() &&
-               ((text_[at_] >= 'A' && text_[at_] <= 'Z') || (text_[at_] >= 'a' && text_[at_] <= 'z') || text_[at_] == '_'))
+               ((text_[at_] >= 'A' && text_[at_] <= 'Z') ||
+                (text_[at_] >= 'a' && text_[at_] <= 'z') || text_[at_] == '_')) {
             ++at_;
+        }
         const std::string_view name = text_.substr(begin, at_ - begin);
         if (name == "True") return Json(true);
         if (name == "False") return Json(false);
         if (name == "None") return Json();
-        if (std::find(constants.begin(), constants.end(), name) != constants.end()) return Json(std::string(name));
+        if (std::find(constants.begin(), constants.end(), name) != constants.end()) {
+            return Json(std::string(name));
+        }
         return std::nullopt;
     }
 
@@ -189,6 +213,8 @@ private:
 
 }  // namespace
 
-std::optional<nlohmann::json> python_literal(std::string_view text) { return Literal(text).whole(); }
+std::optional<nlohmann::json> python_literal(std::string_view text) {
+    return Literal(text).whole();
+}
 
 }  // namespace hal::tools

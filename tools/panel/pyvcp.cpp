@@ -26,9 +26,20 @@ namespace {
 
 constexpr std::array<std::string_view, 4> containers{"vbox", "hbox", "labelframe", "tabs"};
 constexpr std::array<std::string_view, 3> invisible{"title", "option", "axisoptions"};
-constexpr std::array<std::string_view, 14> colour_options{
-    "fg",        "bg",      "foreground", "background", "activebackground", "activeforeground", "on_color", "off_color", "disabled_color",
-    "fillcolor", "bgcolor", "dialcolor",  "edgecolor",  "dotcolor"};
+constexpr std::array<std::string_view, 14> colour_options{"fg",
+                                                          "bg",
+                                                          "foreground",
+                                                          "background",
+                                                          "activebackground",
+                                                          "activeforeground",
+                                                          "on_color",
+                                                          "off_color",
+                                                          "disabled_color",
+                                                          "fillcolor",
+                                                          "bgcolor",
+                                                          "dialcolor",
+                                                          "edgecolor",
+                                                          "dotcolor"};
 constexpr int deepest = 60;
 constexpr std::size_t most_widgets = 5000;
 
@@ -37,14 +48,18 @@ bool one_of(std::string_view name, const Names& names) {
     return std::find(names.begin(), names.end(), name) != names.end();
 }
 
-/// An attribute is Python only when it begins like a tuple, list, dict or string; else a number or a text.
+/// An attribute is Python only when it begins like a tuple, list, dict or string; else a number or
+/// a text.
 Json attribute_value(std::string_view text) {
-    if (!text.empty() && std::string_view("{[(\"'").find(text[0]) != std::string_view::npos)
+    if (!text.empty() && std::string_view("{[(\"'").find(text[0]) != std::string_view::npos) {
         if (auto value = python_literal(text)) return *value;
+    }
     double number = 0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-    if (error == std::errc{} && end == text.data() + text.size())
-        return text.find_first_of(".eE") == text.npos ? Json(static_cast<std::int64_t>(number)) : Json(number);
+    if (error == std::errc{} && end == text.data() + text.size()) {
+        return text.find_first_of(".eE") == text.npos ? Json(static_cast<std::int64_t>(number))
+                                                      : Json(number);
+    }
     return std::string(text);
 }
 
@@ -57,21 +72,31 @@ bool read_bytes(const std::string& path, std::size_t most, std::string& bytes) {
 }
 
 std::string base64(std::string_view bytes) {
-    constexpr std::string_view digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    constexpr std::string_view digits =
+        "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     std::string text;
     for (std::size_t i = 0; i < bytes.size(); i += 3) {
         unsigned bits = 0;
-        for (std::size_t k = 0; k < 3; ++k) bits = bits << 8 | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0U);
-        for (std::size_t k = 0; k < 4; ++k) text += i + k > bytes.size() ? '=' : digits[bits >> (18 - 6 * k) & 63];
+        for (std::size_t k = 0; k < 3; ++k) {
+            bits =
+                bits << 8 | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0U);
+        }
+        for (std::size_t k = 0; k < 4; ++k) {
+            text += i + k > bytes.size() ? '=' : digits[bits >> (18 - 6 * k) & 63];
+        }
     }
     return text;
 }
 
 void to_css(Json& options) {
     for (auto& [key, value] : options.items()) {
-        if (value.is_string() && one_of(key, colour_options)) value = css_colour(value.get<std::string>());
+        if (value.is_string() && one_of(key, colour_options)) {
+            value = css_colour(value.get<std::string>());
+        }
         const bool range = key.starts_with("range") || key.starts_with("region");
-        if (range && value.is_array() && value.size() == 3 && value[2].is_string()) value[2] = css_colour(value[2].get<std::string>());
+        if (range && value.is_array() && value.size() == 3 && value[2].is_string()) {
+            value[2] = css_colour(value[2].get<std::string>());
+        }
     }
 }
 
@@ -88,10 +113,14 @@ public:
         Json root{{"widget", "vbox"}, {"children", Json::array()}};
         pugi::xml_document document;
         const pugi::xml_parse_result result = document.load_buffer(text.data(), text.size());
-        if (!result)
-            error(result.offset, 1, fmt::format("invalid XML: {}", result.description()), "check the tags and quotation marks here");
-        else if (const pugi::xml_node top = document.child("pyvcp")) children(top, root, true);
-        else error(0, 1, "missing element <pyvcp>", "a PyVCP file begins with <pyvcp>");
+        if (!result) {
+            error(result.offset, 1, fmt::format("invalid XML: {}", result.description()),
+                  "check the tags and quotation marks here");
+        } else if (const pugi::xml_node top = document.child("pyvcp")) {
+            children(top, root, true);
+        } else {
+            error(0, 1, "missing element <pyvcp>", "a PyVCP file begins with <pyvcp>");
+        }
         name_ = outer_name;
         source_ = outer_source;
         size_ = outer_size;
@@ -100,35 +129,49 @@ public:
 
 private:
     /// `length`: of what is marked from that byte on.
-    void error(std::ptrdiff_t offset, std::size_t length, const std::string& sentence, const std::string& help = "") {
-        const std::size_t at = std::min(static_cast<std::size_t>(std::max<std::ptrdiff_t>(offset, 0)), size_);
-        errors_.add({source_, static_cast<std::uint32_t>(at), static_cast<std::uint32_t>(std::min(at + length, size_))}, sentence, help);
+    void error(std::ptrdiff_t offset, std::size_t length, const std::string& sentence,
+               const std::string& help = "") {
+        const std::size_t at =
+            std::min(static_cast<std::size_t>(std::max<std::ptrdiff_t>(offset, 0)), size_);
+        errors_.add({source_, static_cast<std::uint32_t>(at),
+                     static_cast<std::uint32_t>(std::min(at + length, size_))},
+                    sentence, help);
     }
     void error(pugi::xml_node element, const std::string& sentence, const std::string& help = "") {
         error(element.offset_debug(), std::string_view(element.name()).size(), sentence, help);
     }
 
     void attributes(pugi::xml_node element, Json& options) {
-        for (const pugi::xml_attribute attribute : element.attributes()) options[attribute.name()] = attribute_value(attribute.value());
+        for (const pugi::xml_attribute attribute : element.attributes()) {
+            options[attribute.name()] = attribute_value(attribute.value());
+        }
     }
 
     /// Children that are neither widgets nor containers are options, whose text is Python.
     void option(pugi::xml_node child, std::string_view owner, Json& options) {
-        const bool nested = child.find_child([](pugi::xml_node node) { return node.type() == pugi::node_element; });
-        if (nested) return error(child, fmt::format("unknown element <{}> in <{}>", child.name(), owner), suggestion(child.name()));
+        const bool nested =
+            child.find_child([](pugi::xml_node node) { return node.type() == pugi::node_element; });
+        if (nested) {
+            return error(child, fmt::format("unknown element <{}> in <{}>", child.name(), owner),
+                         suggestion(child.name()));
+        }
         const auto value = python_literal(child.text().get());
-        if (!value)
-            return error(
-                child, fmt::format("invalid value of option '{}': '{}'", child.name(), std::string_view(child.text().get()).substr(0, 60)),
-                "use a string in quotation marks, a number, a list or a constant of Tk");
+        if (!value) {
+            return error(child,
+                         fmt::format("invalid value of option '{}': '{}'", child.name(),
+                                     std::string_view(child.text().get()).substr(0, 60)),
+                         "use a string in quotation marks, a number, a list or a constant of Tk");
+        }
         options[child.name()] = *value;
     }
 
     static std::string suggestion(std::string_view name) {
         static const std::vector<std::string> known{
-            "vbox",    "hbox",        "labelframe",  "table",    "tabs",    "label",     "multilabel", "led", "rectled",
-            "button",  "checkbutton", "radiobutton", "number",   "u32",     "s32",       "timer",      "bar", "meter",
-            "spinbox", "scale",       "dial",        "jogwheel", "include", "image_bit", "image_u32"};
+            "vbox",        "hbox",        "labelframe", "table",     "tabs",
+            "label",       "multilabel",  "led",        "rectled",   "button",
+            "checkbutton", "radiobutton", "number",     "u32",       "s32",
+            "timer",       "bar",         "meter",      "spinbox",   "scale",
+            "dial",        "jogwheel",    "include",    "image_bit", "image_u32"};
         return did_you_mean(std::string(name), known);
     }
 
@@ -140,23 +183,40 @@ private:
         }
         const std::string_view owner = element.name();
         const bool horizontal = owner == "hbox";
-        Json pack{{"fill", top ? "both" : horizontal ? "y" : "x"}, {"expand", true}, {"anchor", "center"}};
-        Json options = Json::object(), cell = Json::object();
-        if (!top) attributes(element, options);
+        Json pack{{"fill", top          ? "both"
+                           : horizontal ? "y"
+                                        : "x"},
+                  {"expand", true},
+                  {"anchor", "center"}};
+        Json options = Json::object();
+        Json cell = Json::object();
+        if (!top) {
+            attributes(element, options);
+        }
         std::string sticky = "ne";
         for (const pugi::xml_node child : element.children()) {
             if (child.type() != pugi::node_element) continue;
             const std::string_view name = child.name();
-            if (name == "boxfill") pack["fill"] = child.attribute("fill").as_string("none");
-            else if (name == "boxanchor") pack["anchor"] = child.attribute("anchor").as_string("center");
-            else if (name == "boxexpand") pack["expand"] = std::string_view(child.attribute("expand").as_string("yes")) == "yes";
-            else if (name == "tablerow") node["children"].push_back({{"widget", "tablerow"}});
-            else if (name == "tablespan")
-                cell = {{"rows", child.attribute("rows").as_int(1)}, {"columns", child.attribute("columns").as_int(1)}};
-            else if (name == "tablesticky") sticky = child.attribute("sticky").as_string("ne");
-            else if (name == "image") picture(child);
-            else if (one_of(name, invisible)) continue;
-            else if (is_pyvcp_widget(name) || one_of(name, containers) || name == "table" || name == "include") {
+            if (name == "boxfill") {
+                pack["fill"] = child.attribute("fill").as_string("none");
+            } else if (name == "boxanchor") {
+                pack["anchor"] = child.attribute("anchor").as_string("center");
+            } else if (name == "boxexpand") {
+                pack["expand"] =
+                    std::string_view(child.attribute("expand").as_string("yes")) == "yes";
+            } else if (name == "tablerow") {
+                node["children"].push_back({{"widget", "tablerow"}});
+            } else if (name == "tablespan") {
+                cell = {{"rows", child.attribute("rows").as_int(1)},
+                        {"columns", child.attribute("columns").as_int(1)}};
+            } else if (name == "tablesticky") {
+                sticky = child.attribute("sticky").as_string("ne");
+            } else if (name == "image") {
+                picture(child);
+            } else if (one_of(name, invisible)) {
+                continue;
+            } else if (is_pyvcp_widget(name) || one_of(name, containers) || name == "table" ||
+                       name == "include") {
                 Json one = name == "include" ? include(child) : widget(child);
                 if (one.is_null()) continue;
                 if (owner == "table") {
@@ -167,17 +227,24 @@ private:
                     one["pack"] = pack;
                 }
                 node["children"].push_back(std::move(one));
-            } else if (top) continue;  // as in PyVCP, which uses it as an option of the window
-            else option(child, owner, options);
+            } else if (top) {
+                continue;  // as in PyVCP, which uses it as an option of the window
+            } else {
+                option(child, owner, options);
+            }
         }
         to_css(options);
-        if (!options.empty()) node["options"] = std::move(options);
+        if (!options.empty()) {
+            node["options"] = std::move(options);
+        }
         --depth_;
     }
 
     Json widget(pugi::xml_node element) {
         if (++widgets_ > most_widgets) {
-            if (widgets_ == most_widgets + 1) error(element, "more than 5000 widgets");
+            if (widgets_ == most_widgets + 1) {
+                error(element, "more than 5000 widgets");
+            }
             return {};
         }
         const std::string name = element.name();
@@ -189,11 +256,17 @@ private:
         }
         Json options = Json::object();
         attributes(element, options);
-        for (const pugi::xml_node child : element.children())
-            if (child.type() == pugi::node_element) option(child, name, options);
-        if (const std::string problem = pins_.declare(name, options, node); !problem.empty())
+        for (const pugi::xml_node child : element.children()) {
+            if (child.type() == pugi::node_element) {
+                option(child, name, options);
+            }
+        }
+        if (const std::string problem = pins_.declare(name, options, node); !problem.empty()) {
             error(element, problem, "each pin of a panel needs a name of its own");
-        if (name.starts_with("image_")) pictures(options, node);
+        }
+        if (name.starts_with("image_")) {
+            pictures(options, node);
+        }
         to_css(options);
         node["options"] = std::move(options);
         return node;
@@ -202,12 +275,23 @@ private:
     /// Reads an image of the file for the page: its name and data URI.
     void picture(pugi::xml_node element) {
         constexpr std::size_t largest = 200'000;
-        const std::string file = element.attribute("file").as_string(), name = element.attribute("name").as_string();
+        const std::string file = element.attribute("file").as_string();
+
+        const std::string name = element.attribute("name").as_string();
         std::string bytes;
-        if (!read_bytes((std::filesystem::path(name_).parent_path() / file).string(), largest, bytes) || images_.size() >= 100)
-            return error(element, fmt::format("cannot read the image '{}' (at most 100 images of 200 kB)", file));
-        const std::string kind = bytes.starts_with("GIF8") ? "gif" : bytes.starts_with("\x89PNG") ? "png" : "";
-        if (kind.empty()) return error(element, fmt::format("the image '{}' is neither GIF nor PNG", file));
+        if (!read_bytes((std::filesystem::path(name_).parent_path() / file).string(), largest,
+                        bytes) ||
+            images_.size() >= 100) {
+            return error(
+                element,
+                fmt::format("cannot read the image '{}' (at most 100 images of 200 kB)", file));
+        }
+        const std::string kind = bytes.starts_with("GIF8")      ? "gif"
+                                 : bytes.starts_with("\x89PNG") ? "png"
+                                                                : "";
+        if (kind.empty()) {
+            return error(element, fmt::format("the image '{}' is neither GIF nor PNG", file));
+        }
         images_[name] = "data:image/" + kind + ";base64," + base64(bytes);
     }
 
@@ -215,11 +299,16 @@ private:
     void pictures(const Json& options, Json& node) {
         const Json given = options.value("images", Json());
         Json names = Json::array();
-        if (given.is_array()) names = given;
-        else if (given.is_string())
-            for (const text::Word& word : text::words_of({given.get<std::string>(), {}})) names.push_back(word.text);
+        if (given.is_array()) {
+            names = given;
+        } else if (given.is_string()) {
+            for (const text::Word& word : text::words_of({given.get<std::string>(), {}})) {
+                names.push_back(word.text);
+            }
+        }
         for (const Json& name : names) {
-            const auto at = name.is_string() ? images_.find(name.get<std::string>()) : images_.end();
+            const auto at =
+                name.is_string() ? images_.find(name.get<std::string>()) : images_.end();
             node["sources"].push_back(at == images_.end() ? "" : at->second);
         }
         node["names"] = std::move(names);
@@ -234,11 +323,14 @@ private:
             return {};
         }
         if (source.empty() || !read_file(path, text)) {
-            error(element, fmt::format("cannot read the included file '{}'{}{}", source, text.empty() ? "" : ": ", text));
+            error(element, fmt::format("cannot read the included file '{}'{}{}", source,
+                                       text.empty() ? "" : ": ", text));
             return {};
         }
         const std::string outer = pins_.prefix;
-        if (const auto prefix = element.attribute("prefix")) pins_.prefix = outer + prefix.as_string() + std::string(".");
+        if (const auto prefix = element.attribute("prefix")) {
+            pins_.prefix = outer + prefix.as_string() + std::string(".");
+        }
         Json node = file(text, path);
         pins_.prefix = outer;
         return node;
@@ -251,7 +343,8 @@ private:
     std::uint32_t source_ = 0;
     std::size_t size_ = 0;
     int depth_ = 0;
-    std::size_t widgets_ = 0, includes_ = 0;
+    std::size_t widgets_ = 0;
+    std::size_t includes_ = 0;
     std::map<std::string, std::string> images_;
 };
 

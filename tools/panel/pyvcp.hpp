@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The widgets of PyVCP: what each has as options and pins. Facts: LinuxCNC's manual and its behaviour.
+// The widgets of PyVCP: what each has as options and pins. Facts: LinuxCNC's manual and its
+// behaviour.
 #pragma once
 
 #include <map>
@@ -17,13 +18,17 @@ public:
     explicit PyvcpPins(PanelLayout& layout) : layout_(layout) {}
     std::string prefix;  ///< of included files
 
-    /// Declares the pins of a widget `kind` with these options and adds them to the node. Returns a sentence when that is impossible.
+    /// Declares the pins of a widget `kind` with these options and adds them to the node. Returns a
+    /// sentence when that is impossible.
     std::string declare(std::string_view kind, const nlohmann::json& options, nlohmann::json& node);
 
 private:
-    std::string add(const std::string& name, const char* type, bool output, nlohmann::json initial = nullptr);
-    std::string base(std::string_view counter, const nlohmann::json& options, std::string_view end = "");
-    void parameter(std::string_view kind, unsigned n, const nlohmann::json& options, nlohmann::json& node, bool always);
+    std::string add(const std::string& name, const char* type, bool output,
+                    nlohmann::json initial = nullptr);
+    std::string base(std::string_view counter, const nlohmann::json& options,
+                     std::string_view end = "");
+    void parameter(std::string_view kind, unsigned n, const nlohmann::json& options,
+                   nlohmann::json& node, bool always);
     nlohmann::json limited(const nlohmann::json& options, double low, double high) const;
 
     PanelLayout& layout_;

@@ -14,11 +14,14 @@ using Json = nlohmann::json;
 namespace {
 
 constexpr std::array<std::string_view, 20> widgets{
-    "label", "multilabel", "led",   "rectled", "button", "checkbutton", "radiobutton", "number",    "u32",       "s32",
-    "timer", "bar",        "meter", "spinbox", "scale",  "dial",        "jogwheel",    "image_bit", "image_u32", "axis_image"};
+    "label",  "multilabel", "led",      "rectled",   "button",    "checkbutton", "radiobutton",
+    "number", "u32",        "s32",      "timer",     "bar",       "meter",       "spinbox",
+    "scale",  "dial",       "jogwheel", "image_bit", "image_u32", "axis_image"};
 
 bool truth(const Json& value) {
-    return value.is_boolean() ? value.get<bool>() : value.is_number() ? value.get<double>() != 0 : !value.is_null() && !value.empty();
+    return value.is_boolean()  ? value.get<bool>()
+           : value.is_number() ? value.get<double>() != 0
+                               : !value.is_null() && !value.empty();
 }
 
 double real(const Json& options, const char* key, double otherwise) {
@@ -37,11 +40,16 @@ std::string css_colour(std::string_view name) {
     for (const char c : name) {
         if (c == ' ') continue;
         const char low = c >= 'A' && c <= 'Z' ? static_cast<char>(c + ('a' - 'A')) : c;
-        if (!((low >= 'a' && low <= 'z') || (low >= '0' && low <= '9') || (low == '#' && text.empty()))) return "";
+        if (!((low >= 'a' && low <= 'z') || (low >= '0' && low <= '9') ||
+              (low == '#' && text.empty()))) {
+            return "";
+        }
         text += low;
     }
     if (text.starts_with('#')) {  // #rrrrggggbbbb has 16 bits per colour
-        if (text.size() == 13) return "#" + text.substr(1, 2) + text.substr(5, 2) + text.substr(9, 2);
+        if (text.size() == 13) {
+            return "#" + text.substr(1, 2) + text.substr(5, 2) + text.substr(9, 2);
+        }
         return text.size() == 4 || text.size() == 7 ? text : "";
     }
     const std::size_t digit = text.find_first_of("0123456789");
@@ -49,10 +57,13 @@ std::string css_colour(std::string_view name) {
     int number = 0;
     std::from_chars(text.data() + digit, text.data() + text.size(), number);
     const std::string colour = text.substr(0, digit);
-    if (colour == "gray" || colour == "grey") return number <= 100 ? fmt::format("rgb({0},{0},{0})", std::lround(number * 2.55)) : "";
+    if (colour == "gray" || colour == "grey") {
+        return number <= 100 ? fmt::format("rgb({0},{0},{0})", std::lround(number * 2.55)) : "";
+    }
     constexpr std::array shares{100.0, 93.2, 80.4, 54.5};  // red1 … red4
     if (number < 1 || number > 4) return "";
-    return fmt::format("color-mix(in srgb, {} {}%, black)", colour, shares[static_cast<std::size_t>(number - 1)]);
+    return fmt::format("color-mix(in srgb, {} {}%, black)", colour,
+                       shares[static_cast<std::size_t>(number - 1)]);
 }
 
 std::string PyvcpPins::add(const std::string& name, const char* type, bool output, Json initial) {
@@ -61,8 +72,10 @@ std::string PyvcpPins::add(const std::string& name, const char* type, bool outpu
     pin.type = type;
     pin.output = output;
     pin.initial = std::move(initial);
-    if (std::any_of(layout_.pins.begin(), layout_.pins.end(), [&](const PanelPin& other) { return other.name == pin.name; }))
+    if (std::any_of(layout_.pins.begin(), layout_.pins.end(),
+                    [&](const PanelPin& other) { return other.name == pin.name; })) {
         problem_ = fmt::format("duplicate pin '{}'", pin.name);
+    }
     layout_.pins.push_back(std::move(pin));
     return layout_.pins.back().name;
 }
@@ -71,28 +84,38 @@ std::string PyvcpPins::base(std::string_view counter, const Json& options, std::
     const auto given = options.find("halpin");
     if (given != options.end() && given->is_string()) return given->get<std::string>();
     auto at = counts_.find(counter);
-    if (at == counts_.end()) at = counts_.emplace(std::string(counter), 0).first;
+    if (at == counts_.end()) {
+        at = counts_.emplace(std::string(counter), 0).first;
+    }
     return fmt::format("{}.{}{}", counter, at->second++, end);
 }
 
-void PyvcpPins::parameter(std::string_view kind, unsigned n, const Json& options, Json& node, bool always) {
+void PyvcpPins::parameter(std::string_view kind, unsigned n, const Json& options, Json& node,
+                          bool always) {
     const auto name = options.find("halparam");
     const bool named = name != options.end() && name->is_string();
     if (!always && !truth(options.value("param_pin", Json(0)))) return;
-    node["param"] =
-        add(named ? name->get<std::string>() : fmt::format("{}.{}.param_pin", kind, n), "float", false, node.value("initial", 0.0));
+    node["param"] = add(named ? name->get<std::string>() : fmt::format("{}.{}.param_pin", kind, n),
+                        "float", false, node.value("initial", 0.0));
 }
 
 Json PyvcpPins::limited(const Json& options, double low, double high) const {
-    const double least = real(options, "min_", low), most = real(options, "max_", high), wanted = real(options, "initval", 0);
-    if (least > most) return least;  // an inverted scale starts at its first end
+    const double least = real(options, "min_", low);
+    const double most = real(options, "max_", high);
+
+    const double wanted = real(options, "initval", 0);
+    if (least > most) {
+        return least;  // an inverted scale starts at its first end
+    }
     return std::clamp(wanted, least, most);
 }
 
 std::string PyvcpPins::declare(std::string_view kind, const Json& options, Json& node) {
     problem_.clear();
     const auto disable = [&](const std::string& name) {
-        if (truth(options.value("disable_pin", Json(false)))) node["disable"] = add(name + ".disable", "bit", false);
+        if (truth(options.value("disable_pin", Json(false)))) {
+            node["disable"] = add(name + ".disable", "bit", false);
+        }
     };
     const auto counted = [&](const char* counter) {  // counts named ones, too
         const unsigned n = counts_[counter]++;
@@ -100,17 +123,21 @@ std::string PyvcpPins::declare(std::string_view kind, const Json& options, Json&
     };
     const auto name_or = [&](std::string automatic) {
         const auto given = options.find("halpin");
-        return given != options.end() && given->is_string() ? given->get<std::string>() : std::move(automatic);
+        return given != options.end() && given->is_string() ? given->get<std::string>()
+                                                            : std::move(automatic);
     };
     if (kind == "label") {
-        if (truth(options.value("disable_pin", Json(false)))) disable(base("label", options));
+        if (truth(options.value("disable_pin", Json(false)))) {
+            disable(base("label", options));
+        }
     } else if (kind == "multilabel") {
         const std::string name = base("multilabel", options);
         const Json legends = options.value("legends", Json::array());
         const auto first = static_cast<std::size_t>(std::max(0.0, real(options, "initval", 0)));
         Json pins = Json::array();
-        for (std::size_t i = 0; legends.is_array() && i < legends.size() && i < 6; ++i)
+        for (std::size_t i = 0; legends.is_array() && i < legends.size() && i < 6; ++i) {
             pins.push_back(add(fmt::format("{}.legend{}", name, i), "bit", false, i == first));
+        }
         node["pins"] = pins;
         disable(name);
     } else if (kind == "led" || kind == "rectled") {
@@ -131,12 +158,19 @@ std::string PyvcpPins::declare(std::string_view kind, const Json& options, Json&
         const Json choices = options.value("choices", Json::array());
         const auto first = static_cast<std::size_t>(std::max(0.0, real(options, "initval", 0)));
         Json pins = Json::array();
-        for (std::size_t i = 0; choices.is_array() && i < choices.size(); ++i)
-            pins.push_back(
-                add(name + "." + (choices[i].is_string() ? choices[i].get<std::string>() : choices[i].dump()), "bit", true, i == first));
+        for (std::size_t i = 0; choices.is_array() && i < choices.size(); ++i) {
+            pins.push_back(add(
+                name + "." +
+                    (choices[i].is_string() ? choices[i].get<std::string>() : choices[i].dump()),
+                "bit", true, i == first));
+        }
         node["pins"] = pins;
     } else if (kind == "number" || kind == "u32" || kind == "s32") {
-        node["pin"] = add(base("number", options), kind == "number" ? "float" : kind == "u32" ? "u32" : "s32", false);
+        node["pin"] = add(base("number", options),
+                          kind == "number" ? "float"
+                          : kind == "u32"  ? "u32"
+                                           : "s32",
+                          false);
     } else if (kind == "image_bit" || kind == "image_u32") {
         node["pin"] = add(base("number", options), kind == "image_bit" ? "bit" : "u32", false);
     } else if (kind == "timer") {
@@ -156,9 +190,12 @@ std::string PyvcpPins::declare(std::string_view kind, const Json& options, Json&
         const unsigned n = counted("scale");
         const std::string name = name_or(fmt::format("scale.{}", n));
         double initial = limited(options, 0, 10).get<double>();
-        if (const double step = real(options, "resolution", 1); step > 0) initial = std::round(initial / step) * step;
+        if (const double step = real(options, "resolution", 1); step > 0) {
+            initial = std::round(initial / step) * step;
+        }
         node["initial"] = initial;
-        node["integer"] = add(name + "-i", "s32", true, static_cast<std::int64_t>(std::clamp(initial, -2e9, 2e9)));
+        node["integer"] = add(name + "-i", "s32", true,
+                              static_cast<std::int64_t>(std::clamp(initial, -2e9, 2e9)));
         node["pin"] = add(name + "-f", "float", true, initial);
         parameter(kind, n, options, node, false);
     } else if (kind == "dial") {
@@ -170,8 +207,12 @@ std::string PyvcpPins::declare(std::string_view kind, const Json& options, Json&
         const bool named = options.contains("halpin");
         const std::string name = base("jogwheel", options);
         node["pin"] = add(named ? name : name + ".count", "float", true);
-        if (truth(options.value("clear_pin", Json(0)))) node["reset"] = add(name + ".reset", "bit", false);
-        if (truth(options.value("scale_pin", Json(0)))) node["scale"] = add(name + ".scale", "float", false, 1.0);
+        if (truth(options.value("clear_pin", Json(0)))) {
+            node["reset"] = add(name + ".reset", "bit", false);
+        }
+        if (truth(options.value("scale_pin", Json(0)))) {
+            node["scale"] = add(name + ".scale", "float", false, 1.0);
+        }
     }
     return problem_;
 }

@@ -35,7 +35,10 @@ const Verb verbs[] = {
 /// Of the command language a page may use what only reads, and the acknowledgement of faults.
 RequestKind check_command(const Json& words) {
     if (!words.is_array() || words.empty() || words.size() > 8) return RequestKind::rejected;
-    if (!std::all_of(words.begin(), words.end(), [](const Json& word) { return word.is_string(); })) return RequestKind::rejected;
+    if (!std::all_of(words.begin(), words.end(),
+                     [](const Json& word) { return word.is_string(); })) {
+        return RequestKind::rejected;
+    }
     if (words == Json{"fault", "clear"}) return RequestKind::writes;
     return words[0] == "show" || words[0] == "status" ? RequestKind::reads : RequestKind::rejected;
 }
@@ -44,26 +47,39 @@ RequestKind check_command(const Json& words) {
 
 RequestKind check_request(Json& request, std::string& problem) {
     const Verb* verb = nullptr;
-    for (const Verb& row : verbs)
-        if (request.contains(row.name)) verb = verb ? nullptr : &row;
+    for (const Verb& row : verbs) {
+        if (request.contains(row.name)) {
+            verb = verb ? nullptr : &row;
+        }
+    }
     if (!verb) {
-        problem = "a request has exactly one of the verbs read, subscribe, unsubscribe, list, describe, complete, probe, unprobe, run, set";
+        problem =
+            "a request has exactly one of the verbs read, subscribe, unsubscribe, list, describe, "
+            "complete, probe, unprobe, run, set";
         return RequestKind::rejected;
     }
     for (const auto& [key, value] : request.items()) {
-        if (key == verb->name || std::find(verb->members.begin(), verb->members.end(), key) != verb->members.end()) continue;
+        if (key == verb->name ||
+            std::find(verb->members.begin(), verb->members.end(), key) != verb->members.end()) {
+            continue;
+        }
         if (key == "id" && value.is_number_unsigned()) continue;
-        problem = "'" + key.substr(0, 60) + "' is not a valid member of a request to " + std::string(verb->name);
+        problem = "'" + key.substr(0, 60) + "' is not a valid member of a request to " +
+                  std::string(verb->name);
         return RequestKind::rejected;
     }
     RequestKind kind = verb->kind;
     if (verb->name == "run") {
         kind = check_command(request["run"]);
-        if (kind == RequestKind::rejected) problem = "this command is not available in the panel; use: hal shell";
+        if (kind == RequestKind::rejected) {
+            problem = "this command is not available in the panel; use: hal shell";
+        }
     }
-    for (const char* const period : {"every_ms", "batch_ms"})
-        if (request.contains(period) && request[period].is_number_integer())
+    for (const char* const period : {"every_ms", "batch_ms"}) {
+        if (request.contains(period) && request[period].is_number_integer()) {
             request[period] = std::max(request[period].get<std::int64_t>(), least_period_ms);
+        }
+    }
     return kind;
 }
 

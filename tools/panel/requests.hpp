@@ -9,8 +9,8 @@ namespace hal::tools {
 
 enum class RequestKind { rejected, reads, writes };
 
-/// Checks a request of a page: exactly one verb that the page uses, its size and its rates. When it is rejected sets `problem` to a sentence.
-/// Adjusts what must be limited.
+/// Checks a request of a page: exactly one verb that the page uses, its size and its rates. When it
+/// is rejected sets `problem` to a sentence. Adjusts what must be limited.
 RequestKind check_request(nlohmann::json& request, std::string& problem);
 
 }  // namespace hal::tools

@@ -26,9 +26,12 @@ std::string host_name() {
 }
 
 Access access_for(const PanelOptions& options) {
-    Access access{{"localhost", loopback}, false, options.origins, random_token(), true, options.write};
+    Access access{{"localhost", loopback}, false, options.origins,
+                  random_token(),          true,  options.write};
     for (std::string name : options.hosts) {
-        for (char& c : name) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c + ('a' - 'A')) : c;
+        for (char& c : name) {
+            c = c >= 'A' && c <= 'Z' ? static_cast<char>(c + ('a' - 'A')) : c;
+        }
         access.hosts.push_back(std::move(name));
     }
     if (options.listen.empty()) return access;
@@ -39,33 +42,48 @@ Access access_for(const PanelOptions& options) {
 }
 
 /// What a start prints.
-std::string announcement(const PanelOptions& options, const Access& access, const std::string& instance, int port) {
+std::string announcement(const PanelOptions& options, const Access& access,
+                         const std::string& instance, int port) {
     std::string text;
     const bool all = options.listen == "0.0.0.0";
-    const std::string host = options.listen.empty() ? "localhost" : all ? host_name() : options.listen;
-    if (!options.listen.empty())
+    const std::string host = options.listen.empty() ? "localhost"
+                             : all                  ? host_name()
+                                                    : options.listen;
+    if (!options.listen.empty()) {
         text += fmt::format(
-            "warning: listening on {}, port {}: every computer that reaches it and has the token can read all values of instance '{}'{}.\n"
-            "The connection is not encrypted: use it on a network of the machine only, or through an SSH tunnel without --listen.\n",
-            all ? "all network interfaces" : options.listen, port, instance, options.write ? " and set them" : "");
+            "warning: listening on {}, port {}: every computer that reaches it and has the token "
+            "can read all values of instance '{}'{}.\n"
+            "The connection is not encrypted: use it on a network of the machine only, or through "
+            "an SSH tunnel without --listen.\n",
+            all ? "all network interfaces" : options.listen, port, instance,
+            options.write ? " and set them" : "");
+    }
     const bool token = options.write || !access.open;
     text += fmt::format("http://{}:{}/{}\n", host, port, token ? "#t=" + access.token : "");
     text += fmt::format("programs and Foxglove: ws://{}:{}/?t={}\n", host, port, access.token);
-    if (!options.write) text += "read-only; with --write, values can be set\n";
+    if (!options.write) {
+        text += "read-only; with --write, values can be set\n";
+    }
     return text;
 }
 
 }  // namespace
 
 int run_panel(const PanelOptions& options) {
-    if (options.words.size() > 1) return fail(options, fmt::format("unexpected argument '{}'; see: hal help panel", options.words[1]));
-    in_addr address{};
-    if (!options.listen.empty() && ::inet_pton(AF_INET, options.listen.c_str(), &address) != 1)
+    if (options.words.size() > 1) {
         return fail(options,
-                    fmt::format("--listen: '{}' is not an IPv4 address; use the address of a network interface, or 0.0.0.0 for all",
-                                options.listen));
+                    fmt::format("unexpected argument '{}'; see: hal help panel", options.words[1]));
+    }
+    in_addr address{};
+    if (!options.listen.empty() && ::inet_pton(AF_INET, options.listen.c_str(), &address) != 1) {
+        return fail(options, fmt::format("--listen: '{}' is not an IPv4 address; use the address "
+                                         "of a network interface, or 0.0.0.0 for all",
+                                         options.listen));
+    }
     const std::string instance = instance_wanted(options.name);
-    if (!good_instance_name(instance)) return fail(options, fmt::format("'{}' is not a valid instance name", instance));
+    if (!good_instance_name(instance)) {
+        return fail(options, fmt::format("'{}' is not a valid instance name", instance));
+    }
     PanelLayout layout;
     if (!options.words.empty()) {
         std::string errors;
@@ -80,12 +98,19 @@ int run_panel(const PanelOptions& options) {
     const Access access = access_for(options);
     StopRequest stop;
     PanelServer server(access, instance);
-    if (const std::string problem = server.open(options.listen.empty() ? loopback : options.listen, options.port); !problem.empty())
+    if (const std::string problem =
+            server.open(options.listen.empty() ? loopback : options.listen, options.port);
+        !problem.empty()) {
         return fail(options, problem);
-    if (!options.words.empty()) server.load(std::move(layout));
-    if (!std::filesystem::exists(socket_path(instance)))
-        write_all(STDERR_FILENO,
-                  fmt::format("hal panel: no instance '{}' is running yet; the page shows it as soon as it runs\n", instance));
+    }
+    if (!options.words.empty()) {
+        server.load(std::move(layout));
+    }
+    if (!std::filesystem::exists(socket_path(instance))) {
+        write_all(STDERR_FILENO, fmt::format("hal panel: no instance '{}' is running yet; the page "
+                                             "shows it as soon as it runs\n",
+                                             instance));
+    }
     if (!print(announcement(options, access, instance, server.port()))) return 1;
     std::thread ending([&] {
         stop.wait_ns(options.for_ns);

@@ -25,14 +25,18 @@ namespace {
 
 constexpr lws_usec_t tick_us = 50'000;
 
-PanelServer& server_of(lws* wsi) { return *static_cast<PanelServer*>(lws_context_user(lws_get_context(wsi))); }
+PanelServer& server_of(lws* wsi) {
+    return *static_cast<PanelServer*>(lws_context_user(lws_get_context(wsi)));
+}
 
 /// HTTP, and clients that ask for no subprotocol of ours, which are rejected.
 int on_http(lws* wsi, lws_callback_reasons reason, void* user, void* in, std::size_t length) {
     auto* const answer = static_cast<HttpAnswer**>(user);
     switch (reason) {
     case LWS_CALLBACK_HTTP:
-        if (!*answer) *answer = new HttpAnswer;
+        if (!*answer) {
+            *answer = new HttpAnswer;
+        }
         return answer_http(server_of(wsi), wsi, {static_cast<const char*>(in), length}, **answer);
     case LWS_CALLBACK_HTTP_WRITEABLE: return answer && *answer ? continue_http(wsi, **answer) : 0;
     case LWS_CALLBACK_CLOSED_HTTP:
@@ -49,18 +53,24 @@ int on_http(lws* wsi, lws_callback_reasons reason, void* user, void* in, std::si
     }
 }
 
-/// WebSockets. `make` returns the client of an accepted handshake; `foreign`: pages of other origins in the list may connect, too.
+/// WebSockets. `make` returns the client of an accepted handshake; `foreign`: pages of other
+/// origins in the list may connect, too.
 template <class Make>
-int on_web_socket(lws* wsi, lws_callback_reasons reason, void* user, void* in, std::size_t length, bool foreign, Make make) {
+int on_web_socket(lws* wsi, lws_callback_reasons reason, void* user, void* in, std::size_t length,
+                  bool foreign, Make make) {
     auto* const client = static_cast<WebClient**>(user);
     switch (reason) {
     case LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION: {
         PanelServer& server = server_of(wsi);
-        const std::string host = http_header(wsi, WSI_TOKEN_HOST), origin = http_header(wsi, WSI_TOKEN_ORIGIN);
+        const std::string host = http_header(wsi, WSI_TOKEN_HOST);
+
+        const std::string origin = http_header(wsi, WSI_TOKEN_ORIGIN);
         const auto& origins = server.access().origins;
-        const bool listed = foreign && std::find(origins.begin(), origins.end(), origin) != origins.end();
+        const bool listed =
+            foreign && std::find(origins.begin(), origins.end(), origin) != origins.end();
         const bool absent = lws_hdr_total_length(wsi, WSI_TOKEN_ORIGIN) == 0;  // not a browser
-        const bool good = host_allowed(server.access(), host) && (absent || own_origin(origin, host) || listed);
+        const bool good =
+            host_allowed(server.access(), host) && (absent || own_origin(origin, host) || listed);
         return good && server.make_space() ? 0 : -1;
     }
     case LWS_CALLBACK_ESTABLISHED: {
@@ -71,13 +81,18 @@ int on_web_socket(lws* wsi, lws_callback_reasons reason, void* user, void* in, s
     }
     case LWS_CALLBACK_RECEIVE:
         if (!*client) return -1;
-        return (*client)->received({static_cast<const char*>(in), length},
-                                   lws_is_final_fragment(wsi) && lws_remaining_packet_payload(wsi) == 0, lws_frame_is_binary(wsi), now_ms())
+        return (*client)->received(
+                   {static_cast<const char*>(in), length},
+                   lws_is_final_fragment(wsi) && lws_remaining_packet_payload(wsi) == 0,
+                   lws_frame_is_binary(wsi), now_ms())
                    ? 0
                    : -1;
     case LWS_CALLBACK_SERVER_WRITEABLE: return *client && (*client)->writeable() ? 0 : -1;
     case LWS_CALLBACK_CLOSED:
-        if (*client) server_of(wsi).remove(*client);  // a connection that the filter rejects is closed without a client
+        // a connection that the filter rejects is closed without a client
+        if (*client) {
+            server_of(wsi).remove(*client);
+        }
         *client = nullptr;
         return 0;
     default: return 0;
@@ -85,15 +100,18 @@ int on_web_socket(lws* wsi, lws_callback_reasons reason, void* user, void* in, s
 }
 
 int on_panel(lws* wsi, lws_callback_reasons reason, void* user, void* in, std::size_t length) {
-    return on_web_socket(wsi, reason, user, in, length, false, [](PanelServer& server, lws* socket, bool browser) {
+    return on_web_socket(wsi, reason, user, in, length, false,
+                         [](PanelServer& server, lws* socket, bool browser) {
         return std::make_unique<PanelClient>(server, socket, browser, server.next_number());
     });
 }
 
 int on_foxglove(lws* wsi, lws_callback_reasons reason, void* user, void* in, std::size_t length) {
-    return on_web_socket(wsi, reason, user, in, length, true, [](PanelServer& server, lws* socket, bool browser) {
+    return on_web_socket(wsi, reason, user, in, length, true,
+                         [](PanelServer& server, lws* socket, bool browser) {
         std::array<char, 80> token{};
-        const char* const given = lws_get_urlarg_by_name(socket, "t=", token.data(), static_cast<int>(token.size()));
+        const char* const given =
+            lws_get_urlarg_by_name(socket, "t=", token.data(), static_cast<int>(token.size()));
         return std::make_unique<FoxgloveClient>(server, socket, browser, given ? given : "");
     });
 }
@@ -102,10 +120,13 @@ int on_control(lws* wsi, lws_callback_reasons reason, void*, void* in, std::size
     auto* const link = static_cast<ControlLink*>(lws_get_opaque_user_data(wsi));
     switch (reason) {
     case LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION: return -1;  // for connections to the machine only
-    case LWS_CALLBACK_RAW_RX: return link && link->received({static_cast<const char*>(in), length}) ? 0 : -1;
+    case LWS_CALLBACK_RAW_RX:
+        return link && link->received({static_cast<const char*>(in), length}) ? 0 : -1;
     case LWS_CALLBACK_RAW_WRITEABLE: return link && link->writeable() ? 0 : -1;
     case LWS_CALLBACK_RAW_CLOSE:
-        if (link) link->closed();
+        if (link) {
+            link->closed();
+        }
         lws_set_opaque_user_data(wsi, nullptr);
         return 0;
     default: return 0;
@@ -121,7 +142,8 @@ const std::array<lws_protocols, 6> protocols{{
     {"control", on_control, 0, 65536, 0, nullptr, 65536},
     {nullptr, nullptr, 0, 0, 0, nullptr, 0},
 }};
-const lws_retry_bo_t pings{nullptr, 0, 0, 10, 25, 0};  // pings an idle client after 10 s, closes it after 25 s
+// pings an idle client after 10 s, closes it after 25 s
+const lws_retry_bo_t pings{nullptr, 0, 0, 10, 25, 0};
 
 /// Returns why nothing can listen there, "" if it can. The library does not report it.
 std::string obstacle(const std::string& address, int port) {
@@ -132,13 +154,19 @@ std::string obstacle(const std::string& address, int port) {
     at.sin_port = htons(static_cast<std::uint16_t>(port));
     ::inet_pton(AF_INET, address.c_str(), &at.sin_addr);
     ::setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
-    const bool good = ::bind(socket, reinterpret_cast<const sockaddr*>(&at), sizeof at) == 0 && ::listen(socket, 1) == 0;
+    const bool good = ::bind(socket, reinterpret_cast<const sockaddr*>(&at), sizeof at) == 0 &&
+                      ::listen(socket, 1) == 0;
     const int error = errno;
     ::close(socket);
     if (good) return "";
     if (error == EADDRINUSE) return "another program uses it; choose another with --port";
-    if (error == EADDRNOTAVAIL) return "this host does not have the address; to list them: ip address";
-    if (error == EACCES) return "ports below 1024 need the capability CAP_NET_BIND_SERVICE; choose another with --port";
+    if (error == EADDRNOTAVAIL) {
+        return "this host does not have the address; to list them: ip address";
+    }
+    if (error == EACCES) {
+        return "ports below 1024 need the capability CAP_NET_BIND_SERVICE; choose another with "
+               "--port";
+    }
     return std::strerror(error);
 }
 
@@ -158,10 +186,16 @@ struct EventLoop {
 };
 
 PanelServer::PanelServer(Access access, std::string instance)
-    : access_(std::move(access)), instance_(std::move(instance)), loop_(std::make_unique<EventLoop>()) {
+    : access_(std::move(access)),
+      instance_(std::move(instance)),
+      loop_(std::make_unique<EventLoop>()) {
     log_.on_entry = [this](const std::string& entry) {
-        for (const auto& client : clients_)
-            if (auto* const page = dynamic_cast<PanelClient*>(client.get()); page && page->admitted()) page->send(entry, false, true);
+        for (const auto& client : clients_) {
+            if (auto* const page = dynamic_cast<PanelClient*>(client.get());
+                page && page->admitted()) {
+                page->send(entry, false, true);
+            }
+        }
     };
 }
 
@@ -169,7 +203,9 @@ PanelServer::~PanelServer() {
     panel_.reset();
     metrics_.reset();
     log_.on_entry = nullptr;
-    if (context_) lws_context_destroy(context_);
+    if (context_) {
+        lws_context_destroy(context_);
+    }
 }
 
 std::string PanelServer::open(const std::string& address, int port) {
@@ -187,10 +223,14 @@ std::string PanelServer::open(const std::string& address, int port) {
     info.timeout_secs = 10;
     info.retry_and_idle_policy = &pings;
     info.options = LWS_SERVER_OPTION_DISABLE_IPV6 | LWS_SERVER_OPTION_FAIL_UPON_UNABLE_TO_BIND;
-    if (const std::string why = obstacle(address, port); !why.empty())
+    if (const std::string why = obstacle(address, port); !why.empty()) {
         return "cannot listen on " + address + " port " + std::to_string(port) + ": " + why;
+    }
     context_ = lws_create_context(&info);
-    if (!context_) return "cannot listen on " + address + " port " + std::to_string(port) + "; choose another with --port";
+    if (!context_) {
+        return "cannot listen on " + address + " port " + std::to_string(port) +
+               "; choose another with --port";
+    }
     host_ = lws_get_vhost_by_name(context_, "default");
     metrics_ = std::make_unique<Metrics>(host_, instance_);
     loop_->server = this;
@@ -204,13 +244,18 @@ int PanelServer::port() const { return lws_get_vhost_listen_port(host_); }
 void PanelServer::load(PanelLayout layout) {
     panel_ = std::make_unique<UserPanel>(host_, instance_, std::move(layout), log_);
     panel_->on_values = [this](const std::string& event) {
-        for (const auto& client : clients_)
-            if (auto* const page = dynamic_cast<PanelClient*>(client.get()); page && page->admitted()) page->send(event, false, true);
+        for (const auto& client : clients_) {
+            if (auto* const page = dynamic_cast<PanelClient*>(client.get());
+                page && page->admitted()) {
+                page->send(event, false, true);
+            }
+        }
     };
 }
 
 void PanelServer::run() {
-    while (!stop_ && lws_service(context_, 0) >= 0) {}
+    while (!stop_ && lws_service(context_, 0) >= 0) {
+    }
 }
 
 void PanelServer::interrupt() noexcept {
@@ -220,32 +265,45 @@ void PanelServer::interrupt() noexcept {
 
 void PanelServer::tick() {
     const std::int64_t now = now_ms();
-    for (std::size_t i = 0; i < clients_.size(); ++i) clients_[i]->tick(now);
-    if (panel_) panel_->tick(now);
+    for (std::size_t i = 0; i < clients_.size(); ++i) {
+        clients_[i]->tick(now);
+    }
+    if (panel_) {
+        panel_->tick(now);
+    }
     metrics_->tick(now);
 }
 
 void PanelServer::tell_control() {
-    for (const auto& client : clients_)
-        if (auto* const page = dynamic_cast<PanelClient*>(client.get()); page && page->admitted()) page->send_control();
+    for (const auto& client : clients_) {
+        if (auto* const page = dynamic_cast<PanelClient*>(client.get()); page && page->admitted()) {
+            page->send_control();
+        }
+    }
 }
 
 void PanelServer::take_control(PanelClient& client) {
     if (!access_.write || !client.by_token() || controller_ == &client) return;
-    if (panel_ && controller_) panel_->page_lost();
+    if (panel_ && controller_) {
+        panel_->page_lost();
+    }
     controller_ = &client;
     log_.add("client", "client " + std::to_string(client.number()) + " has control");
     tell_control();
 }
 
 void PanelServer::offer_control(PanelClient& client) {
-    if (!controller_) take_control(client);
+    if (!controller_) {
+        take_control(client);
+    }
 }
 
 void PanelServer::release(PanelClient& client) {
     if (controller_ != &client) return;
     controller_ = nullptr;
-    if (panel_) panel_->page_lost();
+    if (panel_) {
+        panel_->page_lost();
+    }
     log_.add("client", "client " + std::to_string(client.number()) + " released control");
     tell_control();
 }
@@ -253,7 +311,8 @@ void PanelServer::release(PanelClient& client) {
 bool PanelServer::admit(WebClient& client) {
     if (clients_.size() <= most_clients) return true;
     if (!client.by_token()) return false;
-    const auto viewer = std::find_if(clients_.begin(), clients_.end(), [](const auto& one) { return !one->by_token(); });
+    const auto viewer = std::find_if(clients_.begin(), clients_.end(),
+                                     [](const auto& one) { return !one->by_token(); });
     if (viewer == clients_.end()) return false;
     (*viewer)->close(1013, "displaced by a client with the token");
     return true;
@@ -263,14 +322,19 @@ bool PanelServer::make_space() {
     if (clients_.size() < most_connections) return true;
     const auto silent = [](const auto& one) { return !one->by_token() && !one->admitted(); };
     auto oldest = std::find_if(clients_.begin(), clients_.end(), silent);
-    if (oldest == clients_.end()) oldest = std::find_if(clients_.begin(), clients_.end(), [](const auto& one) { return !one->by_token(); });
+    if (oldest == clients_.end()) {
+        oldest = std::find_if(clients_.begin(), clients_.end(),
+                              [](const auto& one) { return !one->by_token(); });
+    }
     if (oldest == clients_.end()) return false;
     (*oldest)->drop();
-    return clients_.size() < 2 * most_connections;  // a dropped one is removed when the library has closed it
+    // a dropped one is removed when the library has closed it
+    return clients_.size() < 2 * most_connections;
 }
 
 void PanelServer::remove(WebClient* client) {
-    const auto at = std::find_if(clients_.begin(), clients_.end(), [&](const auto& one) { return one.get() == client; });
+    const auto at = std::find_if(clients_.begin(), clients_.end(),
+                                 [&](const auto& one) { return one.get() == client; });
     if (at == clients_.end()) return;
     const auto gone = std::move(*at);
     clients_.erase(at);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The web server of `hal panel`: one event loop, one thread. HTTP for the page and metrics, WebSockets for pages and Foxglove.
+// The web server of `hal panel`: one event loop, one thread. HTTP for the page and metrics,
+// WebSockets for pages and Foxglove.
 #pragma once
 
 #include <cstdint>
@@ -50,9 +51,11 @@ public:
     void take_control(PanelClient& client);
     void offer_control(PanelClient& client);
     void release(PanelClient& client);
-    /// Returns false when too many clients are connected. One with the token displaces the oldest one without it.
+    /// Returns false when too many clients are connected. One with the token displaces the oldest
+    /// one without it.
     bool admit(WebClient& client);
-    /// Makes space for one more connection: drops the oldest one that is not admitted yet, else the oldest without the token.
+    /// Makes space for one more connection: drops the oldest one that is not admitted yet, else the
+    /// oldest without the token.
     bool make_space();
 
     // Called by the event loop.
@@ -61,7 +64,8 @@ public:
     std::uint64_t next_number() { return ++numbers_; }
     void tick();
 
-    static constexpr std::size_t most_clients = 32, most_connections = 48;
+    static constexpr std::size_t most_clients = 32;
+    static constexpr std::size_t most_connections = 48;
 
 private:
     void tell_control();

@@ -15,11 +15,16 @@ using Json = nlohmann::json;
 
 namespace {
 
-constexpr std::int64_t exchange_ms = 50, retry_ms = 500;
+constexpr std::int64_t exchange_ms = 50;
+constexpr std::int64_t retry_ms = 500;
 
-std::string text_of(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
+std::string text_of(const Json& json) {
+    return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
 
-Json zero_of(const PanelPin& pin) { return pin.type == "bit" ? Json(false) : pin.type == "float" ? Json(0.0) : Json(0); }
+Json zero_of(const PanelPin& pin) {
+    return pin.type == "bit" ? Json(false) : pin.type == "float" ? Json(0.0) : Json(0);
+}
 
 /// Converts a value to the type of a pin. Returns false when it does not fit.
 bool convert(const PanelPin& pin, const Json& value, Json& to) {
@@ -30,46 +35,72 @@ bool convert(const PanelPin& pin, const Json& value, Json& to) {
     }
     if (!value.is_number() || !std::isfinite(value.get<double>())) return false;
     const double real = value.get<double>();
-    if (pin.type == "float") to = real;
-    else if (pin.type == "s32" && std::abs(real) < 2147483648.0) to = static_cast<std::int64_t>(real);
-    else if (pin.type == "u32" && real >= 0 && real < 4294967296.0) to = static_cast<std::uint64_t>(real);
-    else return false;
+    if (pin.type == "float") {
+        to = real;
+    } else if (pin.type == "s32" && std::abs(real) < 2147483648.0) {
+        to = static_cast<std::int64_t>(real);
+    } else if (pin.type == "u32" && real >= 0 && real < 4294967296.0) {
+        to = static_cast<std::uint64_t>(real);
+    } else {
+        return false;
+    }
     return true;
 }
 
 }  // namespace
 
-UserPanel::UserPanel(lws_vhost* host, const std::string& instance, PanelLayout layout, EventLog& log)
+UserPanel::UserPanel(lws_vhost* host, const std::string& instance, PanelLayout layout,
+                     EventLog& log)
     : layout_(std::move(layout)), log_(log), link_(host, instance, *this) {
     Json pins = Json::object();
     for (std::size_t i = 0; i < layout_.pins.size(); ++i) {
         const PanelPin& pin = layout_.pins[i];
-        shown_.push_back(text_of(pin.output && !pin.safe.is_null() ? pin.safe : pin.initial.is_null() ? zero_of(pin) : pin.initial));
-        if (!pin.output) inputs_.push_back(i);
-        pins[pin.name] = {
-            {"type", pin.type}, {"output", pin.output}, {"unit", pin.unit}, {"doc", pin.doc}, {"value", Json::parse(shown_.back())}};
+        shown_.push_back(text_of(pin.output && !pin.safe.is_null() ? pin.safe
+                                 : pin.initial.is_null()           ? zero_of(pin)
+                                                                   : pin.initial));
+        if (!pin.output) {
+            inputs_.push_back(i);
+        }
+        pins[pin.name] = {{"type", pin.type},
+                          {"output", pin.output},
+                          {"unit", pin.unit},
+                          {"doc", pin.doc},
+                          {"value", Json::parse(shown_.back())}};
     }
-    text_ = text_of({{"component", layout_.component}, {"timeout_ms", layout_.timeout_ms}, {"pins", pins}, {"root", layout_.root}});
+    text_ = text_of({{"component", layout_.component},
+                     {"timeout_ms", layout_.timeout_ms},
+                     {"pins", pins},
+                     {"root", layout_.root}});
 }
 
 std::string UserPanel::values() const {
     std::string text = "{\"event\":\"panel\",\"ready\":";
     text += registered_ ? "true,\"values\":{" : "false,\"values\":{";
-    for (std::size_t i = 0; i < shown_.size(); ++i)
+    for (std::size_t i = 0; i < shown_.size(); ++i) {
         text += fmt::format("{}{}:{}", i == 0 ? "" : ",", text_of(layout_.pins[i].name), shown_[i]);
+    }
     return text + "}}";
 }
 
 std::string UserPanel::write(std::string_view name, const Json& value) {
-    const auto at = std::find_if(layout_.pins.begin(), layout_.pins.end(), [&](const PanelPin& pin) { return pin.name == name; });
+    const auto at = std::find_if(layout_.pins.begin(), layout_.pins.end(),
+                                 [&](const PanelPin& pin) { return pin.name == name; });
     Json converted;
-    if (at == layout_.pins.end() || !at->output) return fmt::format("'{}' is not an output pin of the panel", name.substr(0, 60));
-    if (!convert(*at, value, converted)) return fmt::format("the value of '{}' is not a {}", name, at->type);
-    if (converted.is_number() && !(converted.get<double>() >= at->least && converted.get<double>() <= at->most))
+    if (at == layout_.pins.end() || !at->output) {
+        return fmt::format("'{}' is not an output pin of the panel", name.substr(0, 60));
+    }
+    if (!convert(*at, value, converted)) {
+        return fmt::format("the value of '{}' is not a {}", name, at->type);
+    }
+    if (converted.is_number() &&
+        !(converted.get<double>() >= at->least && converted.get<double>() <= at->most)) {
         return fmt::format("the value of '{}' is outside {:g}..{:g}", name, at->least, at->most);
+    }
     const auto i = static_cast<std::size_t>(at - layout_.pins.begin());
     shown_[i] = text_of(converted);
-    if (std::find(changed_.begin(), changed_.end(), i) == changed_.end()) changed_.push_back(i);
+    if (std::find(changed_.begin(), changed_.end(), i) == changed_.end()) {
+        changed_.push_back(i);
+    }
     return "";
 }
 
@@ -82,7 +113,9 @@ void UserPanel::page_active() {
         write(pin.name, pin.initial);
         any = true;
     }
-    if (any && on_values) on_values(values());
+    if (any && on_values) {
+        on_values(values());
+    }
 }
 
 void UserPanel::page_lost() {
@@ -90,19 +123,27 @@ void UserPanel::page_lost() {
     active_ = false;
     for (std::size_t i = 0; i < layout_.pins.size(); ++i) {
         const PanelPin& pin = layout_.pins[i];
-        if (pin.output && !pin.safe.is_null()) write(pin.name, pin.safe);
+        if (pin.output && !pin.safe.is_null()) {
+            write(pin.name, pin.safe);
+        }
     }
     flush();
     log_.add("panel", "no page controls the panel; its pins are set to their safe values");
-    if (on_values) on_values(values());
+    if (on_values) {
+        on_values(values());
+    }
 }
 
 void UserPanel::flush() {
     if (!registered_ || changed_.empty()) return;
-    std::string request = fmt::format("{{\"id\":2,\"exchange\":{},\"write\":[", text_of(layout_.component));
-    for (std::size_t i = 0; i < changed_.size(); ++i)
+    std::string request =
+        fmt::format("{{\"id\":2,\"exchange\":{},\"write\":[", text_of(layout_.component));
+    for (std::size_t i = 0; i < changed_.size(); ++i) {
         request += fmt::format("{}{},{}", i == 0 ? "" : ",", changed_[i], shown_[changed_[i]]);
-    if (link_.send(request + "]}")) changed_.clear();
+    }
+    if (link_.send(request + "]}")) {
+        changed_.clear();
+    }
 }
 
 void UserPanel::tick(std::int64_t now) {
@@ -114,7 +155,8 @@ void UserPanel::tick(std::int64_t now) {
     }
     if (!registered_ || waiting_) return;
     flush();
-    waiting_ = link_.send(fmt::format("{{\"id\":3,\"exchange\":{},\"read\":true}}", text_of(layout_.component)));
+    waiting_ = link_.send(
+        fmt::format("{{\"id\":3,\"exchange\":{},\"read\":true}}", text_of(layout_.component)));
 }
 
 void UserPanel::machine_up(std::string_view) {
@@ -122,10 +164,19 @@ void UserPanel::machine_up(std::string_view) {
     Json pins = Json::array();
     for (std::size_t i = 0; i < layout_.pins.size(); ++i) {
         const PanelPin& pin = layout_.pins[i];
-        Json one{{"name", pin.name}, {"type", pin.type}, {"dir", pin.output ? "out" : "in"}, {"value", Json::parse(shown_[i])}};
-        if (!pin.safe.is_null()) one["safe"] = pin.safe;
-        if (!pin.unit.empty()) one["unit"] = pin.unit;
-        if (!pin.doc.empty()) one["doc"] = pin.doc;
+        Json one{{"name", pin.name},
+                 {"type", pin.type},
+                 {"dir", pin.output ? "out" : "in"},
+                 {"value", Json::parse(shown_[i])}};
+        if (!pin.safe.is_null()) {
+            one["safe"] = pin.safe;
+        }
+        if (!pin.unit.empty()) {
+            one["unit"] = pin.unit;
+        }
+        if (!pin.doc.empty()) {
+            one["doc"] = pin.doc;
+        }
         pins.push_back(std::move(one));
     }
     link_.send(text_of({{"id", 1},
@@ -138,24 +189,35 @@ void UserPanel::machine_up(std::string_view) {
 
 void UserPanel::machine_down() {
     registered_ = waiting_ = false;
-    if (on_values) on_values(values());
+    if (on_values) {
+        on_values(values());
+    }
 }
 
 void UserPanel::machine_line(std::string_view line, std::string_view) {
     const Json reply = Json::parse(line, nullptr, false);
     if (!reply.is_object() || !reply.contains("id")) return;
     const bool good = reply.value("ok", false);
-    if (!good) log_.add("panel", "the machine rejects the panel's component: " + reply.value("error", ""));
+    if (!good) {
+        log_.add("panel", "the machine rejects the panel's component: " + reply.value("error", ""));
+    }
     if (reply["id"] == 1 && good) {
         registered_ = true;
         changed_.clear();
-        for (std::size_t i = 0; i < layout_.pins.size(); ++i)
-            if (layout_.pins[i].output) changed_.push_back(i);
-        if (on_values) on_values(values());
+        for (std::size_t i = 0; i < layout_.pins.size(); ++i) {
+            if (layout_.pins[i].output) {
+                changed_.push_back(i);
+            }
+        }
+        if (on_values) {
+            on_values(values());
+        }
     }
     if (reply["id"] == 3) {
         waiting_ = false;
-        if (good) inputs(reply.value("values", Json::array()));
+        if (good) {
+            inputs(reply.value("values", Json::array()));
+        }
     }
 }
 
@@ -166,9 +228,12 @@ void UserPanel::inputs(const Json& values) {
         std::string now = text_of(values[k]);
         if (now == shown) continue;
         shown = std::move(now);
-        event += fmt::format("{}{}:{}", event.empty() ? "" : ",", text_of(layout_.pins[inputs_[k]].name), shown);
+        event += fmt::format("{}{}:{}", event.empty() ? "" : ",",
+                             text_of(layout_.pins[inputs_[k]].name), shown);
     }
-    if (!event.empty() && on_values) on_values("{\"event\":\"panel\",\"ready\":true,\"values\":{" + event + "}}");
+    if (!event.empty() && on_values) {
+        on_values("{\"event\":\"panel\",\"ready\":true,\"values\":{" + event + "}}");
+    }
 }
 
 }  // namespace hal::tools

@@ -52,7 +52,9 @@ private:
     std::vector<std::string> shown_;   ///< the newest value of each pin, as JSON
     std::vector<std::size_t> inputs_;  ///< the pins that exchange reads, in order
     std::vector<std::size_t> changed_; ///< outputs that the machine does not have yet
-    bool registered_ = false, waiting_ = false, active_ = false;
+    bool registered_ = false;
+    bool waiting_ = false;
+    bool active_ = false;
     bool begun_ = false;  ///< a page had control
     std::int64_t retried_ms_ = 0;
 };

@@ -29,16 +29,20 @@ void WebClient::close(int code, std::string_view reason) {
     lws_callback_on_writable(wsi_);
 }
 
-void WebClient::drop() { lws_set_timeout(wsi_, PENDING_TIMEOUT_KILLED_BY_PARENT, LWS_TO_KILL_ASYNC); }
+void WebClient::drop() {
+    lws_set_timeout(wsi_, PENDING_TIMEOUT_KILLED_BY_PARENT, LWS_TO_KILL_ASYNC);
+}
 
 bool WebClient::closing() {
-    lws_close_reason(wsi_, static_cast<lws_close_status>(close_code_), reinterpret_cast<unsigned char*>(close_reason_.data()),
-                     close_reason_.size());
+    lws_close_reason(wsi_, static_cast<lws_close_status>(close_code_),
+                     reinterpret_cast<unsigned char*>(close_reason_.data()), close_reason_.size());
     return false;
 }
 
 bool WebClient::received(std::string_view part, bool last, bool binary, std::int64_t now_ms) {
-    if (close_code_ != 0) return true;  // on its way out
+    if (close_code_ != 0) {
+        return true;  // on its way out
+    }
     if (part_.size() + part.size() > longest_message) {
         close_code_ = 1009;
         close_reason_ = "a message has at most 65536 bytes";
@@ -46,7 +50,10 @@ bool WebClient::received(std::string_view part, bool last, bool binary, std::int
     }
     part_.append(part);
     if (!last) return true;
-    if (counted_ms_ != 0) allowance_ = std::min(burst, allowance_ + static_cast<double>(now_ms - counted_ms_) * messages_per_s / 1000);
+    if (counted_ms_ != 0) {
+        allowance_ = std::min(
+            burst, allowance_ + static_cast<double>(now_ms - counted_ms_) * messages_per_s / 1000);
+    }
     counted_ms_ = now_ms;
     if (--allowance_ < 0) {
         close_code_ = 1008;
@@ -66,9 +73,16 @@ bool WebClient::writeable() {
     const std::size_t size = message.bytes.size() - LWS_PRE;
     waiting_ -= size;
     auto* const bytes = reinterpret_cast<unsigned char*>(message.bytes.data()) + LWS_PRE;
-    if (lws_write(wsi_, bytes, size, message.binary ? LWS_WRITE_BINARY : LWS_WRITE_TEXT) < static_cast<int>(size)) return false;
-    if (!queue_.empty() || close_code_ != 0) lws_callback_on_writable(wsi_);
-    if (waiting_ < most_live / 4) drained();
+    if (lws_write(wsi_, bytes, size, message.binary ? LWS_WRITE_BINARY : LWS_WRITE_TEXT) <
+        static_cast<int>(size)) {
+        return false;
+    }
+    if (!queue_.empty() || close_code_ != 0) {
+        lws_callback_on_writable(wsi_);
+    }
+    if (waiting_ < most_live / 4) {
+        drained();
+    }
     return true;
 }
 

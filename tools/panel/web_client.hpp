@@ -18,10 +18,12 @@ public:
     virtual ~WebClient() = default;
     WebClient(const WebClient&) = delete;
 
-    /// Queues a message. A live message is dropped when the client reads too slowly; others close the connection then. Returns false for a dropped one.
+    /// Queues a message. A live message is dropped when the client reads too slowly; others close
+    /// the connection then. Returns false for a dropped one.
     bool send(std::string_view text, bool binary = false, bool live = false);
     std::size_t waiting() const { return waiting_; }
-    /// Closes the connection after what is queued, with a code of RFC 6455 section 7.4 and a reason.
+    /// Closes the connection after what is queued, with a code of RFC 6455 section 7.4 and a
+    /// reason.
     void close(int code, std::string_view reason);
     /// Ends the connection without waiting for the client.
     void drop();
@@ -47,8 +49,12 @@ private:
         std::string bytes;  ///< behind LWS_PRE bytes for the library
         bool binary;
     };
-    static constexpr std::size_t longest_message = 64 << 10, most_live = 1 << 20, most_waiting = 96 << 20;
-    static constexpr double messages_per_s = 200, burst = 400;
+    static constexpr std::size_t longest_message = 64 << 10;
+    static constexpr std::size_t most_live = 1 << 20;
+
+    static constexpr std::size_t most_waiting = 96 << 20;
+    static constexpr double messages_per_s = 200;
+    static constexpr double burst = 400;
     bool closing();
 
     lws* wsi_;

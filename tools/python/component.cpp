@@ -26,17 +26,20 @@ Json checked(Json reply) {
     return reply;
 }
 
-/// All components of this process: flushed before another process is started, and ended with the program.
+/// All components of this process: flushed before another process is started, and ended with the
+/// program.
 struct Registry {
     std::mutex mutex;
     std::set<Component*> components;
 };
 Registry& registry() {
-    static Registry* const one = new Registry;  // never destroyed: outlives every component in any order of Python's clean-up
+    // never destroyed: outlives every component in any order of Python's clean-up
+    static Registry* const one = new Registry;
     return *one;
 }
 
-std::atomic<Component*> last_writer{nullptr};  // among the components; compared only, and used while it is registered
+// among the components; compared only, and used while it is registered
+std::atomic<Component*> last_writer{nullptr};
 
 template <class Action>
 void for_all(Action action) {
@@ -59,10 +62,17 @@ std::unique_ptr<hal::Client> connect_to_instance() {
     return client;
 }
 
-std::string dump(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
+std::string dump(const Json& json) {
+    return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
 
-Component::Component(std::string name, std::string prefix, Json timeout, long every_ms, bool ends_when_lost)
-    : name_(std::move(name)), prefix_(std::move(prefix)), timeout_(std::move(timeout)), every_ms_(every_ms), ends_when_lost_(ends_when_lost) {
+Component::Component(std::string name, std::string prefix, Json timeout, long every_ms,
+                     bool ends_when_lost)
+    : name_(std::move(name)),
+      prefix_(std::move(prefix)),
+      timeout_(std::move(timeout)),
+      every_ms_(every_ms),
+      ends_when_lost_(ends_when_lost) {
     {
         const py::gil_scoped_release release_gil;
         client_ = connect_to_instance();
@@ -87,12 +97,18 @@ Component::~Component() {
     registry().components.erase(this);
     Component* here = this;
     last_writer.compare_exchange_strong(here, nullptr);
-    if (forked_) new std::thread(std::move(flusher_));  // the thread exists in the parent only and cannot be joined
+    // the thread exists in the parent only and cannot be joined
+    if (forked_) {
+        new std::thread(std::move(flusher_));
+    }
 }
 
-std::size_t Component::add(const std::string& name, int type, const std::string& dir, const std::string& more) {
+std::size_t Component::add(const std::string& name, int type, const std::string& dir,
+                           const std::string& more) {
     std::unique_lock lock(mutex_, std::defer_lock);
-    Item item{name, prefix_ + "." + name, hal::row(static_cast<hal_type>(type)), dir, Json::object(), {}, false};
+    Item item{name, prefix_ + "." + name, hal::row(static_cast<hal_type>(type)),
+              dir,  Json::object(),       {},
+              false};
     item.declared = Json::parse(more);
     item.declared.update(Json{{"name", name}, {"type", item.type.name}, {"dir", dir}});
     item.value = initial_value(item.type.type);
@@ -100,11 +116,17 @@ std::size_t Component::add(const std::string& name, int type, const std::string&
     {
         const py::gil_scoped_release release_gil;
         acquire(lock);
-        if (index_.contains(name)) throw Problem("component '" + name_ + "': duplicate pin or parameter '" + name + "'");
-        reply = checked(client_->request({{"component", name_}, {"prefix", prefix_}, {"pins", Json::array({item.declared})}}));
+        if (index_.contains(name)) {
+            throw Problem("component '" + name_ + "': duplicate pin or parameter '" + name + "'");
+        }
+        reply = checked(client_->request(
+            {{"component", name_}, {"prefix", prefix_}, {"pins", Json::array({item.declared})}}));
     }
     // under the GIL and the mutex: look-ups hold only the GIL, the flusher only the mutex
-    if (item.type.type != HAL_TYPE_PORT) item.value = reply.at("values").at(0);  // the current value of a pin that a dead predecessor left
+    // the current value of a pin that a dead predecessor left
+    if (item.type.type != HAL_TYPE_PORT) {
+        item.value = reply.at("values").at(0);
+    }
     prefixes_.push_back(prefix_);
     items_.push_back(std::move(item));
     index_.emplace(name, items_.size() - 1);
@@ -131,7 +153,9 @@ py::object Component::get(std::size_t i) {
     if (!lock || stale(items_[i])) {
         const py::gil_scoped_release release_gil;
         acquire(lock);
-        if (stale(items_[i])) exchange(true);
+        if (stale(items_[i])) {
+            exchange(true);
+        }
     }
     check_usable();
     return to_python(items_[i]);
@@ -144,7 +168,9 @@ void Component::send_earlier_writes() {
     for_all([before](Component& component) {
         if (&component != before || component.forked_) return;
         const std::scoped_lock lock(component.mutex_);
-        if (component.dirty_ && !component.left_ && component.lost_.empty()) component.exchange(false);
+        if (component.dirty_ && !component.left_ && component.lost_.empty()) {
+            component.exchange(false);
+        }
     });
 }
 
@@ -160,7 +186,9 @@ void Component::set(std::size_t i, const py::object& value) {
     Item& item = items_[i];
     item.value = std::move(wanted);
     item.dirty = true;
-    if (!std::exchange(dirty_, true)) changed_.notify_one();
+    if (!std::exchange(dirty_, true)) {
+        changed_.notify_one();
+    }
 }
 
 std::string Component::request(const std::string& text) {
@@ -177,14 +205,18 @@ void Component::flush() {
     if (forked_) return;
     const std::scoped_lock lock(mutex_);
     fetched_ = {};
-    if (dirty_ && !left_) exchange(false);
+    if (dirty_ && !left_) {
+        exchange(false);
+    }
 }
 
 void Component::alive() {
     const py::gil_scoped_release release_gil;
     std::unique_lock lock(mutex_, std::defer_lock);
     acquire(lock);
-    if (client_->connected()) client_->request({{"exchange", name_}});
+    if (client_->connected()) {
+        client_->request({{"exchange", name_}});
+    }
 }
 
 void Component::invalidate() {
@@ -195,12 +227,17 @@ void Component::invalidate() {
 }
 
 void Component::leave(bool clean) {
-    if (forked_) return;  // another thread of the parent may have held the mutex
+    if (forked_) {
+        return;  // another thread of the parent may have held the mutex
+    }
     {
         const std::scoped_lock lock(mutex_);
         if (left_) return;
-        if (clean && client_->connected()) client_->request({{"exit", name_}});
-        else if (client_->connected()) exchange(false);
+        if (clean && client_->connected()) {
+            client_->request({{"exit", name_}});
+        } else if (client_->connected()) {
+            exchange(false);
+        }
         client_.reset();
         left_ = true;
         changed_.notify_one();
@@ -217,19 +254,29 @@ bool Component::is_connected() {
 
 Json Component::announcement() const {
     Json body{{"component", name_}, {"prefix", prefix_}, {"ready", false}};
-    if (!timeout_.is_null()) body["timeout_ms"] = timeout_;
-    if (every_ms_ > 0) body["every_ms"] = every_ms_;
+    if (!timeout_.is_null()) {
+        body["timeout_ms"] = timeout_;
+    }
+    if (every_ms_ > 0) {
+        body["every_ms"] = every_ms_;
+    }
     return body;
 }
 
 void Component::acquire(std::unique_lock<std::mutex>& lock) const {
     check_process();
-    if (!lock) lock.lock();
+    if (!lock) {
+        lock.lock();
+    }
     check_usable();
 }
 
 void Component::check_process() const {
-    if (forked_) throw Problem("component '" + name_ + "' belongs to the parent process; create a component of its own in the child");
+    if (forked_) {
+        throw Problem(
+            "component '" + name_ +
+            "' belongs to the parent process; create a component of its own in the child");
+    }
 }
 
 void Component::check_usable() const {
@@ -255,10 +302,14 @@ void Component::exchange(bool read) {
         }
         dirty_ = false;
     }
-    if (read) body["read"] = true;
+    if (read) {
+        body["read"] = true;
+    }
     const Json reply = client_->request(std::move(body));
     if (!client_->connected()) {  // the values stay as they are until the component reconnects
-        for (Item& item : items_) item.dirty = item.own() && item.type.type != HAL_TYPE_PORT;
+        for (Item& item : items_) {
+            item.dirty = item.own() && item.type.type != HAL_TYPE_PORT;
+        }
         dirty_ = true;
         changed_.notify_one();
         return;
@@ -270,8 +321,11 @@ void Component::exchange(bool read) {
     if (!read) return;
     const Json& values = reply.at("values");
     std::size_t k = 0;
-    for (Item& item : items_)
-        if (!item.own()) item.value = values.at(k++);
+    for (Item& item : items_) {
+        if (!item.own()) {
+            item.value = values.at(k++);
+        }
+    }
     loops_ = reply.value("loops", false);
     fetched_ = Clock::now();
 }
@@ -281,7 +335,9 @@ void Component::run_flusher() {
     while (!left_) {
         if (!client_->look()) {
             reconnect();
-            if (!client_->connected()) changed_.wait_for(lock, 200ms);
+            if (!client_->connected()) {
+                changed_.wait_for(lock, 200ms);
+            }
             continue;
         }
         if (!dirty_) {
@@ -292,7 +348,9 @@ void Component::run_flusher() {
         std::this_thread::sleep_for(500us);  // collects the writes that follow
         lock.lock();
         try {
-            if (!left_ && lost_.empty()) exchange(false);
+            if (!left_ && lost_.empty()) {
+                exchange(false);
+            }
         } catch (const std::exception&) {
             dirty_ = false;  // the next access reports it
         }
@@ -301,17 +359,21 @@ void Component::run_flusher() {
 
 void Component::note_connected() {
     int death_signal = 0;
-    tied_ = prctl(PR_GET_PDEATHSIG, &death_signal) == 0 && death_signal != 0 && getppid() == client_->pid();
+    tied_ = prctl(PR_GET_PDEATHSIG, &death_signal) == 0 && death_signal != 0 &&
+            getppid() == client_->pid();
     loss_reported_ = false;
 }
 
 void Component::handle_loss() {
     if (std::exchange(loss_reported_, true)) return;
-    if (ends_when_lost_ && tied_) return;  // the kernel or the machine sends SIGTERM
-    std::fprintf(stderr, "%s: the machine '%s' (process %lld) has ended; %s\n", name_.c_str(), client_->instance().c_str(),
-                 static_cast<long long>(client_->pid()),
+    if (ends_when_lost_ && tied_) {
+        return;  // the kernel or the machine sends SIGTERM
+    }
+    std::fprintf(stderr, "%s: the machine '%s' (process %lld) has ended; %s\n", name_.c_str(),
+                 client_->instance().c_str(), static_cast<long long>(client_->pid()),
                  ends_when_lost_ ? "ending"
-                                 : "pins take their safe values, others keep theirs, until it is running again (HALCYON_LOST=end ends the "
+                                 : "pins take their safe values, others keep theirs, until it is "
+                                   "running again (HALCYON_LOST=end ends the "
                                    "program instead)");
     if (ends_when_lost_) {
         kill(getpid(), SIGTERM);
@@ -335,15 +397,24 @@ void Component::reconnect() {
     }
     try {
         if (!client->request(announcement()).value("ok", false)) return;
-        for (std::size_t i = 0; i < items_.size(); ++i)
-            checked(client->request({{"component", name_}, {"prefix", prefixes_[i]}, {"pins", Json::array({items_[i].declared})}}));
+        for (std::size_t i = 0; i < items_.size(); ++i) {
+            checked(client->request({{"component", name_},
+                                     {"prefix", prefixes_[i]},
+                                     {"pins", Json::array({items_[i].declared})}}));
+        }
         client_ = std::move(client);
         note_connected();
-        for (Item& item : items_) item.dirty = dirty_ = item.own() && item.type.type != HAL_TYPE_PORT;
-        for (const Item& item : items_) dirty_ = dirty_ || item.dirty;
+        for (Item& item : items_) {
+            item.dirty = dirty_ = item.own() && item.type.type != HAL_TYPE_PORT;
+        }
+        for (const Item& item : items_) {
+            dirty_ = dirty_ || item.dirty;
+        }
         fetched_ = {};
         exchange(false);
-        if (ready_) client_->request({{"component", name_}, {"ready", true}});
+        if (ready_) {
+            client_->request({{"component", name_}, {"ready", true}});
+        }
     } catch (const std::exception&) {
         // the flusher tries again
     }
@@ -360,9 +431,14 @@ void leave_all(bool clean) {
 }
 
 void forget_all() {
-    const bool locked = registry().mutex.try_lock();  // a thread that held it in the parent does not exist here
-    for (Component* const component : registry().components) component->forget();
-    if (locked) registry().mutex.unlock();
+    // a thread that held it in the parent does not exist here
+    const bool locked = registry().mutex.try_lock();
+    for (Component* const component : registry().components) {
+        component->forget();
+    }
+    if (locked) {
+        registry().mutex.unlock();
+    }
 }
 
 }  // namespace hal::python

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The C++ part of Python's module `hal`, the module hal._core: a connection, and components. hal/__init__.py gives them LinuxCNC's names.
+// The C++ part of Python's module `hal`, the module hal._core: a connection, and components.
+// hal/__init__.py gives them LinuxCNC's names.
 #include <memory>
 #include <mutex>
 #include <string>
@@ -22,8 +23,12 @@ public:
         const py::gil_scoped_release release_gil;
         const std::scoped_lock lock(mutex_);
         const Json body = Json::parse(text);
-        if (client_ && !client_->connected()) client_.reset();
-        if (!client_) client_ = connect_to_instance();
+        if (client_ && !client_->connected()) {
+            client_.reset();
+        }
+        if (!client_) {
+            client_ = connect_to_instance();
+        }
         Json reply = client_->request(body);
         if (!client_->connected()) {  // the instance was restarted in the meantime
             client_ = connect_to_instance();
@@ -40,14 +45,21 @@ private:
 /// Returns the index of a pin or parameter. Throws AttributeError for an unknown name.
 std::size_t index_of(const Component& component, const std::string& name) {
     const long at = component.find(name);
-    if (at < 0) throw py::attribute_error("component '" + component.name() + "' has no pin or parameter '" + name + "'");
+    if (at < 0) {
+        throw py::attribute_error("component '" + component.name() + "' has no pin or parameter '" +
+                                  name + "'");
+    }
     return static_cast<std::size_t>(at);
 }
 
 /// Sends what was written before another process is started: that process may read it.
 int before_processes(const char* event, PyObject*, void*) {
-    for (const std::string_view starts : {"subprocess.Popen", "os.system", "os.posix_spawn", "os.fork"})
-        if (event == starts) flush_all();
+    for (const std::string_view starts :
+         {"subprocess.Popen", "os.system", "os.posix_spawn", "os.fork"}) {
+        if (event == starts) {
+            flush_all();
+        }
+    }
     return 0;
 }
 
@@ -58,31 +70,36 @@ PYBIND11_MODULE(_core, module) {
     py::register_exception<Problem>(module, "error", PyExc_RuntimeError);
     py::class_<Link>(module, "Link").def(py::init<>()).def("request", &Link::request);
     py::class_<Component, std::shared_ptr<Component>>(module, "Component")
-        .def(py::init([](std::string name, std::string prefix, long timeout_ms, long every_ms, bool ends_when_lost) {
-            return std::make_shared<Component>(std::move(name), std::move(prefix), timeout_ms < -1 ? Json(nullptr) : Json(timeout_ms), every_ms, ends_when_lost);
-        }))
+        .def(py::init([](std::string name, std::string prefix, long timeout_ms, long every_ms,
+                         bool ends_when_lost) {
+        return std::make_shared<Component>(std::move(name), std::move(prefix),
+                                           timeout_ms < -1 ? Json(nullptr) : Json(timeout_ms),
+                                           every_ms, ends_when_lost);
+    }))
         .def("add", &Component::add)
         .def("ready", &Component::ready)
         .def("find", &Component::find)
         .def("get", &Component::get)
         .def("set", &Component::set)
-        .def("get_named", [](Component& c, const std::string& name) { return c.get(index_of(c, name)); })
-        .def("set_named", [](Component& c, const std::string& name, const py::object& value) { c.set(index_of(c, name), value); })
+        .def("get_named",
+             [](Component& c, const std::string& name) { return c.get(index_of(c, name)); })
+        .def("set_named", [](Component& c, const std::string& name,
+                             const py::object& value) { c.set(index_of(c, name), value); })
         .def("request", &Component::request)
         .def("invalidate", &Component::invalidate)
         .def("alive", &Component::alive)
-        .def("leave", [](Component& c, bool clean) {
-            const py::gil_scoped_release release_gil;
-            c.leave(clean);
-        })
+        .def("leave",
+             [](Component& c, bool clean) {
+        const py::gil_scoped_release release_gil;
+        c.leave(clean);
+    })
         .def("connected", &Component::is_connected)
         .def("prefix", &Component::prefix)
         .def("set_prefix", &Component::set_prefix)
         .def("describe", [](const Component& c, std::size_t i) {
-            const hal::python::Item& item = c.item(i);
-            return py::make_tuple(item.name, item.full, static_cast<int>(item.type.type), item.dir);
-        })
-        .def("size", &Component::size);
+        const hal::python::Item& item = c.item(i);
+        return py::make_tuple(item.name, item.full, static_cast<int>(item.type.type), item.dir);
+    }).def("size", &Component::size);
     py::class_<Probe>(module, "Probe")
         .def(py::init<const std::vector<std::string>&, std::uint32_t, int, int>())
         .def("columns", &Probe::columns)

@@ -7,7 +7,8 @@
 
 namespace hal::python {
 
-Probe::Probe(const std::vector<std::string>& names, std::uint32_t every, int batch_ms, int buffer_ms) {
+Probe::Probe(const std::vector<std::string>& names, std::uint32_t every, int batch_ms,
+             int buffer_ms) {
     const py::gil_scoped_release release_gil;
     client_ = connect_to_instance();
     ProbeClient::Options options;
@@ -21,8 +22,10 @@ Probe::Probe(const std::vector<std::string>& names, std::uint32_t every, int bat
 
 py::list Probe::columns() const {
     py::list all;
-    for (const ProbeColumn& column : probe_->columns())
-        all.append(py::make_tuple(column.name, std::string(1, row(column.type).letter), column.unit));
+    for (const ProbeColumn& column : probe_->columns()) {
+        all.append(
+            py::make_tuple(column.name, std::string(1, row(column.type).letter), column.unit));
+    }
     return all;
 }
 
@@ -35,13 +38,16 @@ py::list Probe::next(int timeout_ms) {
             got = probe_->next(batch, timeout_ms);
         } while (got == ProbeClient::Got::layout || got == ProbeClient::Got::journal);
     }
-    if (got == ProbeClient::Got::disconnected) throw Problem("instance '" + client_->instance() + "' has ended");
+    if (got == ProbeClient::Got::disconnected) {
+        throw Problem("instance '" + client_->instance() + "' has ended");
+    }
     py::list parts;
     if (got == ProbeClient::Got::nothing) return parts;
     for (const ProbeBatch::Part& part : batch.parts) {
         const ProbeGroup& group = probe_->groups().at(part.group);
-        parts.append(py::make_tuple(group.thread, group.columns, part.rows, part.lost,
-                                    py::bytes(batch.bytes.data() + part.offset, part.rows * (part.columns + 2) * 8)));
+        parts.append(py::make_tuple(
+            group.thread, group.columns, part.rows, part.lost,
+            py::bytes(batch.bytes.data() + part.offset, part.rows * (part.columns + 2) * 8)));
     }
     return parts;
 }

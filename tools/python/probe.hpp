@@ -20,8 +20,8 @@ public:
 
     /// Returns a list of (name, type letter, unit).
     py::list columns() const;
-    /// Waits for the next batch and returns a list of (thread, column numbers, rows, lost, bytes), empty after the time-out. Throws Problem when the
-    /// instance has ended.
+    /// Waits for the next batch and returns a list of (thread, column numbers, rows, lost, bytes),
+    /// empty after the time-out. Throws Problem when the instance has ended.
     py::list next(int timeout_ms);
     std::int64_t unix_ns(std::int64_t time_ns) const { return probe_->unix_ns(time_ns); }
     std::uint64_t lost() const { return probe_->lost(); }

@@ -8,7 +8,12 @@ namespace hal::python {
 
 namespace {
 
-double real(const Json& value) { return value.is_number() ? value.get<double>() : value == "inf" ? HUGE_VAL : value == "-inf" ? -HUGE_VAL : NAN; }
+double real(const Json& value) {
+    return value.is_number() ? value.get<double>()
+           : value == "inf"  ? HUGE_VAL
+           : value == "-inf" ? -HUGE_VAL
+                             : NAN;
+}
 
 template <class T>
 Json integer(const Item& item, const py::object& value) {
@@ -22,16 +27,25 @@ Json integer(const Item& item, const py::object& value) {
     } else {
         const long long got = PyLong_AsLongLongAndOverflow(number.ptr(), &beyond);
         if (PyErr_Occurred()) throw py::error_already_set();
-        if (beyond == 0 && got >= static_cast<long long>(std::numeric_limits<T>::min()) && got <= static_cast<long long>(std::numeric_limits<T>::max())) return got;
+        if (beyond == 0 && got >= static_cast<long long>(std::numeric_limits<T>::min()) &&
+            got <= static_cast<long long>(std::numeric_limits<T>::max())) {
+            return got;
+        }
     }
-    PyErr_SetString(PyExc_OverflowError, (py::str(value).cast<std::string>() + " is out of range for " + item.type.name + " '" + item.full + "'").c_str());
+    PyErr_SetString(PyExc_OverflowError,
+                    (py::str(value).cast<std::string>() + " is out of range for " + item.type.name +
+                     " '" + item.full + "'")
+                        .c_str());
     throw py::error_already_set();
 }
 
 }  // namespace
 
 Json initial_value(hal_type type) {
-    return type == HAL_TYPE_BIT ? Json(false) : type == HAL_TYPE_FLOAT ? Json(0.0) : type == HAL_TYPE_PORT ? Json(nullptr) : Json(0);
+    return type == HAL_TYPE_BIT     ? Json(false)
+           : type == HAL_TYPE_FLOAT ? Json(0.0)
+           : type == HAL_TYPE_PORT  ? Json(nullptr)
+                                    : Json(0);
 }
 
 py::object to_python(const Item& item) {
@@ -68,7 +82,8 @@ Json to_json(const Item& item, const py::object& value) {
     case HAL_TYPE_U64: return integer<std::uint64_t>(item, value);
     case HAL_TYPE_PORT: break;
     }
-    PyErr_SetString(PyExc_TypeError, ("port '" + item.full + "' has no value; use write()").c_str());
+    PyErr_SetString(PyExc_TypeError,
+                    ("port '" + item.full + "' has no value; use write()").c_str());
     throw py::error_already_set();
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// One pin or parameter of a Python component, and the conversion of its value between Python and the control protocol.
+// One pin or parameter of a Python component, and the conversion of its value between Python and
+// the control protocol.
 #pragma once
 
 #include <string>
@@ -31,7 +32,8 @@ struct Item {
 Json initial_value(hal_type type);
 /// Returns the local copy as a Python object; None for a port. Needs the GIL.
 py::object to_python(const Item& item);
-/// Returns the Python value as the protocol's value. Raises OverflowError outside of the type's range, TypeError for a port. Needs the GIL.
+/// Returns the Python value as the protocol's value. Raises OverflowError outside of the type's
+/// range, TypeError for a port. Needs the GIL.
 Json to_json(const Item& item, const py::object& value);
 
 }  // namespace hal::python

@@ -25,8 +25,12 @@ public:
 
 private:
     void put(std::uint64_t value, std::size_t bytes) {
-        while ((to_.size() - 4) % bytes != 0) to_ += '\0';
-        for (std::size_t k = 0; k < bytes; ++k) to_ += static_cast<char>(value >> (8 * k));
+        while ((to_.size() - 4) % bytes != 0) {
+            to_ += '\0';
+        }
+        for (std::size_t k = 0; k < bytes; ++k) {
+            to_ += static_cast<char>(value >> (8 * k));
+        }
     }
     std::string& to_;
 };

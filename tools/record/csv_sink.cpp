@@ -16,11 +16,14 @@ namespace {
 std::string field(const std::string& text) {
     if (text.find_first_of(",\"\n") == std::string::npos) return text;
     std::string quoted = "\"";
-    for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+    for (const char c : text) {
+        quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+    }
     return quoted + '"';
 }
 
-/// A line per row: the time, then all values; those of other threads are empty. Events have no place in it.
+/// A line per row: the time, then all values; those of other threads are empty. Events have no
+/// place in it.
 class CsvSink final : public Sink {
 public:
     ~CsvSink() override { close(); }
@@ -28,7 +31,9 @@ public:
         : columns_(columns), path_(path), held_(mcap::hold_file(path)), file_(held_.file) {
         if (held_.file < 0) return;
         std::string line = "time_s";
-        for (const ProbeColumn& column : columns_) line += "," + field(column.name);
+        for (const ProbeColumn& column : columns_) {
+            line += "," + field(column.name);
+        }
         put(line + "\n");
     }
 
@@ -37,11 +42,17 @@ public:
         return error() == 0;
     }
 
-    bool row(std::size_t group, std::uint64_t, std::int64_t time_ns, const std::uint64_t* words) override {
+    bool row(std::size_t group, std::uint64_t, std::int64_t time_ns,
+             const std::uint64_t* words) override {
         cells_.assign(columns_.size(), "");
-        for (const std::size_t i : groups_[group].columns) cells_[i] = text(columns_[i].type, *words++);
-        std::string line = fmt::format("{}.{:09}", time_ns / 1'000'000'000, time_ns % 1'000'000'000);
-        for (const std::string& cell : cells_) (line += ',') += cell;
+        for (const std::size_t i : groups_[group].columns) {
+            cells_[i] = text(columns_[i].type, *words++);
+        }
+        std::string line =
+            fmt::format("{}.{:09}", time_ns / 1'000'000'000, time_ns % 1'000'000'000);
+        for (const std::string& cell : cells_) {
+            (line += ',') += cell;
+        }
         return put(line + "\n");
     }
 
@@ -49,20 +60,31 @@ public:
     bool flush() override { return error() == 0 && file_.flush(); }
     bool close() override {
         file_.close();
-        if (held_.file >= 0 && ::close(held_.file) != 0 && closing_ == 0) closing_ = errno;
+        if (held_.file >= 0 && ::close(held_.file) != 0 && closing_ == 0) {
+            closing_ = errno;
+        }
         held_.file = -1;
         return error() == 0;
     }
     std::uint64_t bytes() const override { return bytes_; }
-    int error() const override { return held_.error != 0 ? held_.error : file_.error() != 0 ? file_.error() : closing_; }
-    std::string problem() const override { return !held_.problem.empty() ? held_.problem : error() != 0 ? std::strerror(error()) : ""; }
+    int error() const override {
+        return held_.error != 0 ? held_.error : file_.error() != 0 ? file_.error() : closing_;
+    }
+    std::string problem() const override {
+        return !held_.problem.empty() ? held_.problem : error() != 0 ? std::strerror(error()) : "";
+    }
     std::string where() const override { return held_.error == 0 ? path_ : ""; }
     std::uint64_t rows() const override { return file_.records() == 0 ? 0 : file_.records() - 1; }
 
 private:
     static std::string text(hal_type type, std::uint64_t word) {
-        if (type == HAL_TYPE_FLOAT) return fmt::format("{}", std::bit_cast<double>(word));  // reads as the same value
-        if (type == HAL_TYPE_S32 || type == HAL_TYPE_S64) return std::to_string(static_cast<std::int64_t>(word));
+        // reads as the same value
+        if (type == HAL_TYPE_FLOAT) {
+            return fmt::format("{}", std::bit_cast<double>(word));
+        }
+        if (type == HAL_TYPE_S32 || type == HAL_TYPE_S64) {
+            return std::to_string(static_cast<std::int64_t>(word));
+        }
         return std::to_string(word);
     }
     bool put(const std::string& line) {
@@ -83,7 +105,8 @@ private:
 
 }  // namespace
 
-std::unique_ptr<Sink> make_csv_sink(const std::string& path, const std::vector<ProbeColumn>& columns) {
+std::unique_ptr<Sink> make_csv_sink(const std::string& path,
+                                    const std::vector<ProbeColumn>& columns) {
     return std::make_unique<CsvSink>(path, columns);
 }
 
@@ -93,8 +116,10 @@ std::string unsupported_profile(const std::string& profile, const std::string& p
     return path.ends_with(".mcap") ? "" : "--profile is for a recording that ends in .mcap";
 }
 
-std::unique_ptr<Sink> make_sink(const std::string& path, const std::vector<ProbeColumn>& columns, const Origin& origin) {
-    return path.ends_with(".csv") ? make_csv_sink(path, columns) : make_mcap_sink(path, columns, origin);
+std::unique_ptr<Sink> make_sink(const std::string& path, const std::vector<ProbeColumn>& columns,
+                                const Origin& origin) {
+    return path.ends_with(".csv") ? make_csv_sink(path, columns)
+                                  : make_mcap_sink(path, columns, origin);
 }
 
 std::string cannot_write(Sink& sink, const std::string& path) {
@@ -110,17 +135,21 @@ std::string cannot_write(Sink& sink, const std::string& path) {
 
 std::string kept_line(const Sink& sink, const std::string& path) {
     if (sink.kept().empty()) return "";
-    return fmt::format("'{}.part' was left by a recorder that was killed; it is now '{}'\n", path, sink.kept());
+    return fmt::format("'{}.part' was left by a recorder that was killed; it is now '{}'\n", path,
+                       sink.kept());
 }
 
-bool add_batch(Sink& sink, const ProbeBatch& batch, std::int64_t begin_ns, std::int64_t end_ns, std::uint64_t& rows) {
+bool add_batch(Sink& sink, const ProbeBatch& batch, std::int64_t begin_ns, std::int64_t end_ns,
+               std::uint64_t& rows) {
     bool good = true;
     std::vector<std::uint64_t> words;
     batch.in_time_order([&](const ProbeBatch::Part& part, std::size_t row) {
         const std::int64_t time_ns = batch.time_ns(part, row);
         if (!good || time_ns < begin_ns || time_ns >= end_ns) return;
         words.clear();
-        for (std::size_t c = 0; c < part.columns; ++c) words.push_back(batch.raw(part, row, c));
+        for (std::size_t c = 0; c < part.columns; ++c) {
+            words.push_back(batch.raw(part, row, c));
+        }
         good = sink.row(part.group, batch.cycle(part, row), time_ns, words.data());
         rows += good ? 1 : 0;
     });

@@ -18,12 +18,20 @@ void FlightMemory::add(ProbeBatch&& batch) {
 
 void FlightMemory::note_last(const Held& held) {
     for (const ProbeBatch::Part& part : held.batch.parts) {
-        if (part.rows == 0 || part.group >= layouts_[held.layout].size() || layouts_[held.layout][part.group].period_ns != 0) continue;
-        auto at =
-            std::find_if(last_.begin(), last_.end(), [&](const Last& one) { return one.layout == held.layout && one.group == part.group; });
-        if (at == last_.end()) at = last_.insert(at, {held.layout, part.group, {}});
+        if (part.rows == 0 || part.group >= layouts_[held.layout].size() ||
+            layouts_[held.layout][part.group].period_ns != 0) {
+            continue;
+        }
+        auto at = std::find_if(last_.begin(), last_.end(), [&](const Last& one) {
+            return one.layout == held.layout && one.group == part.group;
+        });
+        if (at == last_.end()) {
+            at = last_.insert(at, {held.layout, part.group, {}});
+        }
         at->words.clear();
-        for (std::size_t c = 0; c < part.columns; ++c) at->words.push_back(held.batch.raw(part, part.rows - 1, c));
+        for (std::size_t c = 0; c < part.columns; ++c) {
+            at->words.push_back(held.batch.raw(part, part.rows - 1, c));
+        }
     }
 }
 
@@ -35,20 +43,28 @@ void FlightMemory::prune(std::int64_t now_ns, std::int64_t but_from_ns) {
         forgotten_until_ns_ = batches_.front().batch.until_ns;
         batches_.pop_front();
     }
-    while (!entries_.empty() && entries_.front().time_ns < from) entries_.pop_front();
+    while (!entries_.empty() && entries_.front().time_ns < from) {
+        entries_.pop_front();
+    }
 }
 
-bool FlightMemory::write(Sink& sink, std::int64_t begin_ns, std::int64_t end_ns, std::uint64_t& rows) const {
-    for (const auto& entry : entries_)
+bool FlightMemory::write(Sink& sink, std::int64_t begin_ns, std::int64_t end_ns,
+                         std::uint64_t& rows) const {
+    for (const auto& entry : entries_) {
         if (entry.time_ns >= begin_ns && entry.time_ns < end_ns && !sink.event(entry)) return false;
+    }
     std::optional<std::size_t> layout;
     for (const Held& held : batches_) {
         if (held.batch.until_ns < begin_ns) continue;
         if (layout != held.layout) {
             layout = held.layout;
             if (!sink.layout(layouts_[*layout])) return false;
-            for (const Last& last : last_)
-                if (last.layout == *layout && !sink.row(last.group, 0, begin_ns, last.words.data())) return false;
+            for (const Last& last : last_) {
+                if (last.layout == *layout &&
+                    !sink.row(last.group, 0, begin_ns, last.words.data())) {
+                    return false;
+                }
+            }
         }
         if (!add_batch(sink, held.batch, begin_ns, end_ns, rows)) return false;
     }
@@ -66,8 +82,11 @@ void FlightTrigger::event(std::int64_t time_ns, const std::string& cause) {
 }
 
 void FlightBacklog::add(FlightEvent event) {
-    if (events_.size() >= most_events) ++lost_;
-    else events_.push_back(std::move(event));
+    if (events_.size() >= most_events) {
+        ++lost_;
+    } else {
+        events_.push_back(std::move(event));
+    }
 }
 
 void FlightBacklog::forget(std::int64_t until_ns) {
@@ -79,7 +98,9 @@ void FlightBacklog::forget(std::int64_t until_ns) {
 
 void FlightBacklog::written() {
     events_.pop_front();
-    if (failing_) ++late_;
+    if (failing_) {
+        ++late_;
+    }
 }
 
 bool FlightBacklog::failed(std::int64_t now_ns) {
@@ -89,7 +110,8 @@ bool FlightBacklog::failed(std::int64_t now_ns) {
 }
 
 bool FlightBacklog::may_write(std::int64_t now_ns) {
-    constexpr std::int64_t look_ns = 500'000'000, anyway_ns = 30'000'000'000;
+    constexpr std::int64_t look_ns = 500'000'000;
+    constexpr std::int64_t anyway_ns = 30'000'000'000;
     if (!failing_ || now_ns - failed_ns_ >= anyway_ns) return true;
     if (now_ns - looked_ns_ < look_ns) return false;
     looked_ns_ = now_ns;
@@ -99,25 +121,33 @@ bool FlightBacklog::may_write(std::int64_t now_ns) {
 std::string FlightBacklog::recovered() {
     if (!failing_ || !events_.empty()) return "";
     failing_ = false;
-    const std::uint64_t late = std::exchange(late_, 0), lost = std::exchange(lost_, 0);
-    return fmt::format("writing again: {} event{} written late, {} lost\n", late, late == 1 ? "" : "s", lost);
+    const std::uint64_t late = std::exchange(late_, 0);
+    const std::uint64_t lost = std::exchange(lost_, 0);
+    return fmt::format("writing again: {} event{} written late, {} lost\n", late,
+                       late == 1 ? "" : "s", lost);
 }
 
 std::uint64_t FlightBacklog::free_bytes() const {
     struct statvfs disk{};
-    return ::statvfs(folder_.c_str(), &disk) == 0 ? std::uint64_t{disk.f_bavail} * disk.f_frsize : 0;
+    return ::statvfs(folder_.c_str(), &disk) == 0 ? std::uint64_t{disk.f_bavail} * disk.f_frsize
+                                                  : 0;
 }
 
-std::string flight_name(const std::string& file, std::int64_t unix_ns, const std::string& cause, unsigned number) {
+std::string flight_name(const std::string& file, std::int64_t unix_ns, const std::string& cause,
+                        unsigned number) {
     const std::time_t seconds = static_cast<std::time_t>(unix_ns / 1'000'000'000);
     std::tm utc{};
     gmtime_r(&seconds, &utc);
     char time[32];
     std::strftime(time, sizeof time, "%Y%m%dT%H%M%SZ", &utc);
     std::string word;
-    for (const char c : cause) word += (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ? c : '-';
+    for (const char c : cause) {
+        word +=
+            (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ? c : '-';
+    }
     const std::size_t dot = file.rfind('.');
-    return fmt::format("{}-{}-{}-{:03}{}", file.substr(0, dot), time, word, number, file.substr(dot));
+    return fmt::format("{}-{}-{}-{:03}{}", file.substr(0, dot), time, word, number,
+                       file.substr(dot));
 }
 
 }  // namespace hal::tools

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Positions, velocities and efforts as the ROS 2 message sensor_msgs/msg/JointState, for the 3D views of Foxglove and Lichtblick.
+// Positions, velocities and efforts as the ROS 2 message sensor_msgs/msg/JointState, for the 3D
+// views of Foxglove and Lichtblick.
 #pragma once
 
 #include <cstdint>
@@ -13,12 +14,14 @@ namespace hal::tools {
 class Joints {
 public:
     static constexpr const char* message = "sensor_msgs/msg/JointState";
-    static constexpr std::int64_t every_ns = 20'000'000;  ///< for the eye: each cycle's values are in the rows
+    /// for the eye: each cycle's values are in the rows
+    static constexpr std::int64_t every_ns = 20'000'000;
     /// The definition of the message with those that it contains, as `ros2msg`.
     static const char* schema();
 
-    /// A value in rad or m is a position, in rad/s or m/s a velocity, in N*m or N an effort. Those whose names differ in their last word only
-    /// belong to one joint: `motor-position` and `motor-velocity` to `motor`.
+    /// A value in rad or m is a position, in rad/s or m/s a velocity, in N*m or N an effort. Those
+    /// whose names differ in their last word only belong to one joint: `motor-position` and
+    /// `motor-velocity` to `motor`.
     explicit Joints(const std::vector<ProbeColumn>& columns);
     /// Returns whether no value is a position.
     bool empty() const { return joints_.empty(); }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include <cstring>
 #include <map>
-#include <set>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "record/cdr.hpp"
 #include "record/joints.hpp"
@@ -19,19 +19,23 @@ constexpr const char* event_schema =
 /// The message of ROS 2 for events.
 constexpr const char* log_message = "rcl_interfaces/msg/Log";
 constexpr const char* log_schema =
-    "builtin_interfaces/Time stamp\nuint8 level\nstring name\nstring msg\nstring file\nstring function\nuint32 line\n"
+    "builtin_interfaces/Time stamp\nuint8 level\nstring name\nstring msg\nstring file\nstring "
+    "function\nuint32 line\n"
     "================================================================================\n"
     "MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n";
 
 /// Writes an event as `log_message`, with its kind as the name.
 void write_log(const ProbeClient::Entry& entry, std::int64_t unix_ns, std::string& to) {
     constexpr std::int64_t second = 1'000'000'000;
-    constexpr std::uint32_t info = 20, error = 40;  // of that message
+    constexpr std::uint32_t info = 20;
+    constexpr std::uint32_t error = 40;  // of that message
     Cdr cdr(to);
     cdr.word(static_cast<std::uint32_t>(unix_ns / second));
     cdr.word(static_cast<std::uint32_t>(unix_ns % second));
     cdr.byte(entry.kind == "fault" ? error : info);
-    for (const std::string& text : {entry.kind, entry.text, std::string(), std::string()}) cdr.text(text);
+    for (const std::string& text : {entry.kind, entry.text, std::string(), std::string()}) {
+        cdr.text(text);
+    }
     cdr.word(0);
 }
 
@@ -40,8 +44,12 @@ std::string message_name(const std::string& thread) {
     std::string name;
     bool begins = true;
     for (const char c : thread) {
-        const bool letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'), digit = c >= '0' && c <= '9';
-        if (letter || (digit && !name.empty())) name += begins && c >= 'a' ? static_cast<char>(c - 'a' + 'A') : c;
+        const bool letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
+
+        const bool digit = c >= '0' && c <= '9';
+        if (letter || (digit && !name.empty())) {
+            name += begins && c >= 'a' ? static_cast<char>(c - 'a' + 'A') : c;
+        }
         begins = !letter;
     }
     return name.empty() ? "Values" : name;
@@ -50,14 +58,24 @@ std::string message_name(const std::string& thread) {
 class McapSink final : public Sink {
 public:
     McapSink(const std::string& path, const std::vector<ProbeColumn>& columns, const Origin& origin)
-        : columns_(columns), offset_ns_(origin.unix_offset_ns), ros_(origin.profile == "ros2"), writer_(path, origin.profile) {
+        : columns_(columns),
+          offset_ns_(origin.unix_offset_ns),
+          ros_(origin.profile == "ros2"),
+          writer_(path, origin.profile) {
         std::map<std::string, std::string> about{
-            {"instance", origin.instance}, {"version", origin.version}, {"unix_offset_ns", std::to_string(origin.unix_offset_ns)}};
-        if (!origin.cause.empty()) about["cause"] = origin.cause;
+            {"instance", origin.instance},
+            {"version", origin.version},
+            {"unix_offset_ns", std::to_string(origin.unix_offset_ns)}};
+        if (!origin.cause.empty()) {
+            about["cause"] = origin.cause;
+        }
         writer_.metadata("halcyon", about);
-        if (!origin.netlist.empty()) writer_.attachment("netlist.hal", "text/plain", origin.netlist, 0);
-        const std::uint16_t schema = ros_ ? writer_.add_schema(log_message, "ros2msg", log_schema)
-                                          : writer_.add_schema("halcyon.Event", "jsonschema", event_schema);
+        if (!origin.netlist.empty()) {
+            writer_.attachment("netlist.hal", "text/plain", origin.netlist, 0);
+        }
+        const std::uint16_t schema =
+            ros_ ? writer_.add_schema(log_message, "ros2msg", log_schema)
+                 : writer_.add_schema("halcyon.Event", "jsonschema", event_schema);
         events_ = writer_.add_channel(schema, "/hal/events", ros_ ? "cdr" : "json", {});
     }
 
@@ -73,38 +91,50 @@ public:
             mcap::RowWriter rows(columns);
             Joints joints(probed);
             const std::string thread = group.thread.empty() ? "no-thread" : group.thread;
-            const int number = ++layouts_[thread];  // a schema never changes: after an edit a thread's rows have another topic
+            // a schema never changes: after an edit a thread's rows have another topic
+            const int number = ++layouts_[thread];
             const std::string suffix = number == 1 ? "" : "_" + std::to_string(number);
             auto metadata = rows.metadata();
             metadata["thread"] = group.thread;
             metadata["period_ns"] = std::to_string(group.period_ns);
             const auto schema = writer_.add_schema(type_of(thread), "ros2msg", rows.schema());
             const std::string topic = topic_of(thread, suffix);
-            groups_.push_back({writer_.add_channel(schema, topic, "cdr", std::move(metadata)), std::move(rows), std::move(joints)});
+            groups_.push_back({writer_.add_channel(schema, topic, "cdr", std::move(metadata)),
+                               std::move(rows), std::move(joints)});
             if (groups_.back().joints.empty()) continue;
-            if (joint_schema_ == 0) joint_schema_ = writer_.add_schema(Joints::message, "ros2msg", Joints::schema());
-            groups_.back().joint_channel = writer_.add_channel(joint_schema_, topic + "/joints", "cdr", {});
+            if (joint_schema_ == 0) {
+                joint_schema_ = writer_.add_schema(Joints::message, "ros2msg", Joints::schema());
+            }
+            groups_.back().joint_channel =
+                writer_.add_channel(joint_schema_, topic + "/joints", "cdr", {});
             joint_channels_.push_back(groups_.back().joint_channel);
         }
         return writer_.error() == 0;
     }
 
-    bool row(std::size_t group, std::uint64_t cycle, std::int64_t time_ns, const std::uint64_t* words) override {
+    bool row(std::size_t group, std::uint64_t cycle, std::int64_t time_ns,
+             const std::uint64_t* words) override {
         Group& to = groups_[group];
         const std::int64_t unix_ns = time_ns + offset_ns_;
         to.rows.write(words, payload_);
-        if (!writer_.message(to.channel, static_cast<std::uint32_t>(cycle), static_cast<std::uint64_t>(unix_ns), payload_)) return false;
+        if (!writer_.message(to.channel, static_cast<std::uint32_t>(cycle),
+                             static_cast<std::uint64_t>(unix_ns), payload_)) {
+            return false;
+        }
         if (to.joints.empty() || time_ns < to.joints_due_ns) return true;
         to.joints_due_ns = time_ns + Joints::every_ns;
         to.joints.write(words, unix_ns, payload_);
-        return writer_.message(to.joint_channel, static_cast<std::uint32_t>(cycle), static_cast<std::uint64_t>(unix_ns), payload_);
+        return writer_.message(to.joint_channel, static_cast<std::uint32_t>(cycle),
+                               static_cast<std::uint64_t>(unix_ns), payload_);
     }
 
     bool event(const ProbeClient::Entry& entry) override {
         const std::int64_t unix_ns = entry.time_ns + offset_ns_;
         const nlohmann::json object{{"kind", entry.kind}, {"text", entry.text}};
         std::string text = object.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
-        if (ros_) write_log(entry, unix_ns, text);
+        if (ros_) {
+            write_log(entry, unix_ns, text);
+        }
         return writer_.message(events_, number_++, static_cast<std::uint64_t>(unix_ns), text);
     }
 
@@ -113,22 +143,29 @@ public:
     std::uint64_t bytes() const override { return writer_.bytes(); }
     int error() const override { return writer_.error(); }
     std::string problem() const override {
-        return !writer_.problem().empty() ? writer_.problem() : writer_.error() != 0 ? std::strerror(writer_.error()) : "";
+        return !writer_.problem().empty() ? writer_.problem()
+               : writer_.error() != 0     ? std::strerror(writer_.error())
+                                          : "";
     }
     std::string kept() const override { return writer_.kept(); }
     std::string where() const override { return writer_.where(); }
     std::uint64_t rows() const override {
         std::uint64_t rows = writer_.messages() - writer_.messages(events_);
-        for (const std::uint16_t channel : joint_channels_) rows -= writer_.messages(channel);
+        for (const std::uint16_t channel : joint_channels_) {
+            rows -= writer_.messages(channel);
+        }
         return rows;
     }
 
 private:
-    /// Returns a topic of its own for a thread: ROS allows no dash in it, and two threads may differ in that only.
+    /// Returns a topic of its own for a thread: ROS allows no dash in it, and two threads may
+    /// differ in that only.
     std::string topic_of(const std::string& thread, const std::string& suffix) {
         const std::string base = "/hal/" + (ros_ ? mcap::ros_name(thread) : thread) + suffix;
         std::string topic = base;
-        for (int n = 2; !topics_.insert(topic).second; ++n) topic = base + "_" + std::to_string(n);
+        for (int n = 2; !topics_.insert(topic).second; ++n) {
+            topic = base + "_" + std::to_string(n);
+        }
         return topic;
     }
 
@@ -136,7 +173,9 @@ private:
     std::string type_of(const std::string& thread) {
         const std::string base = "halcyon_msgs/msg/" + message_name(thread);
         std::string type = base;
-        for (int n = 2; !types_.insert(type).second; ++n) type = base + "V" + std::to_string(n);
+        for (int n = 2; !types_.insert(type).second; ++n) {
+            type = base + "V" + std::to_string(n);
+        }
         return type;
     }
 
@@ -154,7 +193,8 @@ private:
     mcap::Writer writer_;
     std::vector<Group> groups_;
     std::map<std::string, int> layouts_;
-    std::uint16_t events_ = 0, joint_schema_ = 0;
+    std::uint16_t events_ = 0;
+    std::uint16_t joint_schema_ = 0;
     std::vector<std::uint16_t> joint_channels_;
     std::uint32_t number_ = 0;
     std::string payload_;
@@ -162,7 +202,9 @@ private:
 
 }  // namespace
 
-std::unique_ptr<Sink> make_mcap_sink(const std::string& path, const std::vector<ProbeColumn>& columns, const Origin& origin) {
+std::unique_ptr<Sink> make_mcap_sink(const std::string& path,
+                                     const std::vector<ProbeColumn>& columns,
+                                     const Origin& origin) {
     return std::make_unique<McapSink>(path, columns, origin);
 }
 

@@ -16,14 +16,17 @@ namespace {
 constexpr std::size_t most_traces = 24;
 
 /// The columns of a name or a pattern, in the order of the file.
-std::size_t add_traces(const mcap::Recording& recording, const std::string& wanted, std::vector<Trace>& traces) {
+std::size_t add_traces(const mcap::Recording& recording, const std::string& wanted,
+                       std::vector<Trace>& traces) {
     const std::size_t before = traces.size();
-    for (const mcap::Table& table : recording.tables)
+    for (const mcap::Table& table : recording.tables) {
         for (std::size_t c = 0; c < table.columns.size(); ++c) {
             const mcap::Column& column = table.columns[c];
-            if (column.name == wanted || ::fnmatch(wanted.c_str(), column.name.c_str(), 0) == 0)
+            if (column.name == wanted || ::fnmatch(wanted.c_str(), column.name.c_str(), 0) == 0) {
                 traces.push_back({column.name, column.unit, column.type, &table, c});
+            }
         }
+    }
     return traces.size() - before;
 }
 
@@ -31,40 +34,66 @@ std::size_t add_traces(const mcap::Recording& recording, const std::string& want
 
 int run_plot(const PlotOptions& options) {
     const std::string& file = options.words.front();
-    if (const std::string& to = options.output; !to.empty() && to != "-" && !to.ends_with(".svg") && !to.ends_with(".png"))
+    if (const std::string& to = options.output;
+        !to.empty() && to != "-" && !to.ends_with(".svg") && !to.ends_with(".png")) {
         return fail(options, fmt::format("unknown format of '{}'; name the file .svg or .png", to));
+    }
     mcap::Recording recording;
     std::string problem;
     if (!mcap::load(file, recording, problem)) return fail(options, problem);
-    for (const std::string& note : recording.notes()) std::fputs(fmt::format("{}: {}\n", options.program, note).c_str(), stderr);
-    if (recording.tables.empty())
-        return fail(options, fmt::format("'{}' has no rows{}", file, recording.unread.empty() ? "" : "; " + recording.unread));
+    for (const std::string& note : recording.notes()) {
+        std::fputs(fmt::format("{}: {}\n", options.program, note).c_str(), stderr);
+    }
+    if (recording.tables.empty()) {
+        return fail(options, fmt::format("'{}' has no rows{}", file,
+                                         recording.unread.empty() ? "" : "; " + recording.unread));
+    }
     std::vector<Trace> traces;
     for (std::size_t i = 1; i < options.words.size(); ++i) {
         if (add_traces(recording, options.words[i], traces) != 0) continue;
         std::vector<std::string> names;
-        for (const mcap::Table& table : recording.tables)
-            for (const mcap::Column& column : table.columns) names.push_back(column.name);
+        for (const mcap::Table& table : recording.tables) {
+            for (const mcap::Column& column : table.columns) {
+                names.push_back(column.name);
+            }
+        }
         const std::string hint = suggestion(options.words[i], names, "it has");
-        return fail(options, fmt::format("'{}' has no value '{}'{}", file, options.words[i], hint.empty() ? "" : "; " + hint));
+        return fail(options, fmt::format("'{}' has no value '{}'{}", file, options.words[i],
+                                         hint.empty() ? "" : "; " + hint));
     }
-    if (options.words.size() == 1) add_traces(recording, "*", traces);
-    if (traces.size() > most_traces)
-        return fail(options, fmt::format("{} values are too many for one picture (limit {}); name some: hal plot FILE NAME…", traces.size(),
-                                         most_traces));
-    const std::int64_t begin_ns = recording.begin_ns() + options.from_ns, last_ns = recording.end_ns();
-    const std::int64_t end_ns = options.for_ns < 0 ? last_ns : std::min(last_ns, begin_ns + options.for_ns);
-    if (begin_ns >= last_ns && options.from_ns > 0)
-        return fail(options, fmt::format("--from is after the end: '{}' has {:.6g} s", file,
-                                         static_cast<double>(last_ns - recording.begin_ns()) * 1e-9));
+    if (options.words.size() == 1) {
+        add_traces(recording, "*", traces);
+    }
+    if (traces.size() > most_traces) {
+        return fail(
+            options,
+            fmt::format(
+                "{} values are too many for one picture (limit {}); name some: hal plot FILE NAME…",
+                traces.size(), most_traces));
+    }
+    const std::int64_t begin_ns = recording.begin_ns() + options.from_ns;
+
+    const std::int64_t last_ns = recording.end_ns();
+    const std::int64_t end_ns =
+        options.for_ns < 0 ? last_ns : std::min(last_ns, begin_ns + options.for_ns);
+    if (begin_ns >= last_ns && options.from_ns > 0) {
+        return fail(options,
+                    fmt::format("--from is after the end: '{}' has {:.6g} s", file,
+                                static_cast<double>(last_ns - recording.begin_ns()) * 1e-9));
+    }
     const std::string svg = plot_svg(traces, recording.events, begin_ns, end_ns, options.width);
     if (options.output == "-") return print(svg) ? 0 : 1;
-    const std::string output = options.output.empty() ? file.substr(0, file.rfind('.')) + ".svg" : options.output;
+    const std::string output =
+        options.output.empty() ? file.substr(0, file.rfind('.')) + ".svg" : options.output;
     std::string picture;
-    if (!output.ends_with(".png")) picture = svg;
-    else {
+    if (!output.ends_with(".png")) {
+        picture = svg;
+    } else {
         problem = run_filter({"rsvg-convert", "--format=png"}, svg, picture, "librsvg2-bin");
-        if (!problem.empty()) return fail(options, fmt::format("cannot draw '{}': {} (or name the file .svg)", output, problem));
+        if (!problem.empty()) {
+            return fail(options, fmt::format("cannot draw '{}': {} (or name the file .svg)", output,
+                                             problem));
+        }
     }
     problem = write_file(output, picture);
     if (!problem.empty()) return fail(options, problem);

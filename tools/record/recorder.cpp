@@ -23,7 +23,8 @@ namespace {
 
 std::string file_size(std::uint64_t bytes) {
     const double size = static_cast<double>(bytes);
-    return size < 1e6 ? fmt::format("{:.1f} kB", size * 1e-3) : fmt::format("{:.1f} MB", size * 1e-6);
+    return size < 1e6 ? fmt::format("{:.1f} kB", size * 1e-3)
+                      : fmt::format("{:.1f} MB", size * 1e-6);
 }
 
 class Recorder {
@@ -33,7 +34,8 @@ public:
           what_(what),
           client_(client),
           probe_(probe),
-          origin_{client.instance(), client.version(), client.run("save").out, "", probe.unix_ns(0), what.profile} {
+          origin_{client.instance(), client.version(), client.run("save").out, "",
+                  probe.unix_ns(0),  what.profile} {
         client.cancel_on(-1);
     }
 
@@ -42,16 +44,21 @@ public:
         while (!stop_.requested() && !ended_) {
             const auto got = next();
             if (got == ProbeClient::Got::disconnected) return lost_machine();
-            if (got == ProbeClient::Got::layout && !sink_->layout(probe_.groups())) return cannot_write();
-            if (got == ProbeClient::Got::journal && !sink_->event(probe_.entry())) return cannot_write();
+            if (got == ProbeClient::Got::layout && !sink_->layout(probe_.groups())) {
+                return cannot_write();
+            }
+            if (got == ProbeClient::Got::journal && !sink_->event(probe_.entry())) {
+                return cannot_write();
+            }
             if (got == ProbeClient::Got::batch && !add()) return cannot_write();
         }
         return finish();
     }
 
     int flight() {
-        if (const std::string problem = mcap::unwritable(what_.file); !problem.empty())
+        if (const std::string problem = mcap::unwritable(what_.file); !problem.empty()) {
             return fail(options_, fmt::format("cannot write '{}': {}", what_.file, problem));
+        }
         FlightMemory memory(probe_.groups(), what_.last_ns);
         FlightTrigger trigger(what_.last_ns, what_.after_ns);
         const std::filesystem::path folder = std::filesystem::path(what_.file).parent_path();
@@ -59,30 +66,50 @@ public:
         const bool forever = what_.for_ns < 0;
         for (bool over = false; !over;) {
             const auto got = next();
-            over = stop_.requested() || got == ProbeClient::Got::disconnected || (!forever && now_ns_ - first_ns_ >= what_.for_ns);
-            if (got == ProbeClient::Got::layout) memory.layout(probe_.groups());
+            over = stop_.requested() || got == ProbeClient::Got::disconnected ||
+                   (!forever && now_ns_ - first_ns_ >= what_.for_ns);
+            if (got == ProbeClient::Got::layout) {
+                memory.layout(probe_.groups());
+            }
             if (got == ProbeClient::Got::journal) {
                 memory.add(probe_.entry());
-                if (probe_.entry().kind == "fault") trigger.event(probe_.entry().time_ns, "fault");
+                if (probe_.entry().kind == "fault") {
+                    trigger.event(probe_.entry().time_ns, "fault");
+                }
             }
             if (got == ProbeClient::Got::batch) {
                 now_ns_ = batch_.until_ns;
-                if (first_ns_ == 0) first_ns_ = now_ns_;
-                if (const auto time_ns = triggered()) trigger.event(*time_ns, what_.trigger);
+                if (first_ns_ == 0) {
+                    first_ns_ = now_ns_;
+                }
+                if (const auto time_ns = triggered()) {
+                    trigger.event(*time_ns, what_.trigger);
+                }
                 memory.add(std::move(batch_));
-                memory.prune(now_ns_, std::min(backlog.needed_from_ns(), trigger.pending() ? trigger.begin_ns() : INT64_MAX));
+                memory.prune(now_ns_, std::min(backlog.needed_from_ns(),
+                                               trigger.pending() ? trigger.begin_ns() : INT64_MAX));
             }
-            if (got == ProbeClient::Got::disconnected && was_killed(client_.instance())) trigger.event(now_ns_, "end-of-machine");
+            if (got == ProbeClient::Got::disconnected && was_killed(client_.instance())) {
+                trigger.event(now_ns_, "end-of-machine");
+            }
             if (trigger.pending() && (over || now_ns_ >= trigger.end_ns())) {
-                backlog.add({trigger.begin_ns(), trigger.begin_ns() + what_.last_ns, trigger.end_ns(), trigger.cause(), ""});
+                backlog.add({trigger.begin_ns(), trigger.begin_ns() + what_.last_ns,
+                             trigger.end_ns(), trigger.cause(), ""});
                 trigger.done();
             }
             backlog.forget(memory.forgotten_until_ns());
-            if (over || backlog.may_write(monotonic_ns())) write(memory, backlog);
+            if (over || backlog.may_write(monotonic_ns())) {
+                write(memory, backlog);
+            }
         }
-        if (!backlog.empty() || backlog.lost() != 0)
-            return fail(options_, fmt::format("{} not written: {}", counted(backlog.size() + backlog.lost(), "event"), failure_));
-        if (files_ == 0) nothing_written();
+        if (!backlog.empty() || backlog.lost() != 0) {
+            return fail(options_,
+                        fmt::format("{} not written: {}",
+                                    counted(backlog.size() + backlog.lost(), "event"), failure_));
+        }
+        if (files_ == 0) {
+            nothing_written();
+        }
         return 0;
     }
 
@@ -95,7 +122,8 @@ private:
     std::string file_name() const {
         if (what_.rotate_ns < 0) return what_.file;
         const std::size_t dot = what_.file.rfind('.');
-        return fmt::format("{}-{:03}{}", what_.file.substr(0, dot), files_ + 1, what_.file.substr(dot));
+        return fmt::format("{}-{:03}{}", what_.file.substr(0, dot), files_ + 1,
+                           what_.file.substr(dot));
     }
 
     bool open(const std::string& path) {
@@ -103,43 +131,60 @@ private:
         rows_ = 0;
         ++files_;
         sink_ = make_sink(path, probe_.columns(), origin_);
-        if (sink_->error() == 0) print(kept_line(*sink_, path));
+        if (sink_->error() == 0) {
+            print(kept_line(*sink_, path));
+        }
         if (sink_->error() == 0 && sink_->layout(probe_.groups())) return true;
         cannot_write();
         return false;
     }
 
     bool add() {
-        if (begin_ns_ < 0) begin_ns_ = first_time();
-        const std::int64_t end_ns = what_.for_ns < 0 || begin_ns_ < 0 ? INT64_MAX : begin_ns_ + what_.for_ns;
+        if (begin_ns_ < 0) {
+            begin_ns_ = first_time();
+        }
+        const std::int64_t end_ns =
+            what_.for_ns < 0 || begin_ns_ < 0 ? INT64_MAX : begin_ns_ + what_.for_ns;
         if (!add_batch(*sink_, batch_, 0, end_ns, rows_)) return false;
         ended_ = begin_ns_ >= 0 && batch_.until_ns >= end_ns;
-        if (what_.most_mb > 0 && static_cast<double>(sink_->bytes()) >= what_.most_mb * 1e6) ended_ = true;
-        if (what_.rotate_ns < 0 || begin_ns_ < 0 || ended_ || batch_.until_ns - begin_ns_ < what_.rotate_ns * files_) return true;
+        if (what_.most_mb > 0 && static_cast<double>(sink_->bytes()) >= what_.most_mb * 1e6) {
+            ended_ = true;
+        }
+        if (what_.rotate_ns < 0 || begin_ns_ < 0 || ended_ ||
+            batch_.until_ns - begin_ns_ < what_.rotate_ns * files_) {
+            return true;
+        }
         if (!complete()) return false;
         return open(file_name());
     }
 
     void nothing_written() {
-        const std::string trigger = what_.trigger.empty() ? ""
-                                    : was_on_             ? fmt::format(", and '{}' was TRUE or non-zero all the time", what_.trigger)
-                                                          : fmt::format(", and '{}' did not become TRUE or non-zero", what_.trigger);
+        const std::string trigger =
+            what_.trigger.empty() ? ""
+            : was_on_ ? fmt::format(", and '{}' was TRUE or non-zero all the time", what_.trigger)
+                      : fmt::format(", and '{}' did not become TRUE or non-zero", what_.trigger);
         print(fmt::format("nothing was written: there was no fault{}\n", trigger));
     }
 
     std::int64_t first_time() const {
         std::int64_t first = -1;
-        for (const auto& part : batch_.parts)
-            if (part.rows != 0 && (first < 0 || batch_.time_ns(part, 0) < first)) first = batch_.time_ns(part, 0);
+        for (const auto& part : batch_.parts) {
+            if (part.rows != 0 && (first < 0 || batch_.time_ns(part, 0) < first)) {
+                first = batch_.time_ns(part, 0);
+            }
+        }
         return first;
     }
 
     bool complete() {
         if (!sink_->close()) return false;
         written_.push_back(path_);
-        print(fmt::format("{}: {} of {}, {}{}\n", path_, counted(rows_, "row"), counted(probe_.columns().size(), "value"),
-                          file_size(sink_->bytes()), probe_.lost() == 0 ? "" : ", " + counted(probe_.lost(), "row") + " lost"));
-        // files of this run only; of a flight recorder the first is kept, because it is often the cause of those after it
+        print(
+            fmt::format("{}: {} of {}, {}{}\n", path_, counted(rows_, "row"),
+                        counted(probe_.columns().size(), "value"), file_size(sink_->bytes()),
+                        probe_.lost() == 0 ? "" : ", " + counted(probe_.lost(), "row") + " lost"));
+        // files of this run only; of a flight recorder the first is kept, because it is often the
+        // cause of those after it
         const std::size_t first = what_.last_ns >= 0 ? 1 : 0;
         while (what_.keep != 0 && written_.size() > std::max<std::size_t>(what_.keep, 1 + first)) {
             std::remove(written_[first].c_str());
@@ -153,11 +198,20 @@ private:
     int lost_machine() {
         const int status = finish();
         if (status != 0) return status;
-        if (was_killed(client_.instance()))
-            return fail(options_, fmt::format("instance '{}' was killed; the file is complete up to there", client_.instance()));
-        if (std::filesystem::exists(socket_path(client_.instance())))
-            return fail(options_, fmt::format("instance '{}' closed the connection, and runs on; the file is complete up to there", client_.instance()));
-        return what_.for_ns < 0 ? 0 : fail(options_, fmt::format("instance '{}' has ended before the time was over", client_.instance()));
+        if (was_killed(client_.instance())) {
+            return fail(options_,
+                        fmt::format("instance '{}' was killed; the file is complete up to there",
+                                    client_.instance()));
+        }
+        if (std::filesystem::exists(socket_path(client_.instance()))) {
+            return fail(options_, fmt::format("instance '{}' closed the connection, and runs on; "
+                                              "the file is complete up to there",
+                                              client_.instance()));
+        }
+        return what_.for_ns < 0
+                   ? 0
+                   : fail(options_, fmt::format("instance '{}' has ended before the time was over",
+                                                client_.instance()));
     }
 
     int cannot_write() { return fail(options_, tools::cannot_write(*sink_, path_)); }
@@ -173,20 +227,26 @@ private:
                 const ProbeColumn& column = probe_.columns()[columns[c]];
                 if (column.name != what_.trigger) continue;
                 const bool on = batch_.real(part, row, c, column.type) != 0;
-                if (on && !was_on_ && !at) at = batch_.time_ns(part, row);
+                if (on && !was_on_ && !at) {
+                    at = batch_.time_ns(part, row);
+                }
                 was_on_ = on;
             }
         });
         return at;
     }
 
-    /// Writes the events of the backlog, the oldest first, until one cannot be written. The first failure is reported, and the end of them.
+    /// Writes the events of the backlog, the oldest first, until one cannot be written. The first
+    /// failure is reported, and the end of them.
     void write(const FlightMemory& memory, FlightBacklog& backlog) {
         while (!backlog.empty()) {
             if (!write(memory, backlog.oldest())) {
                 failure_ = tools::cannot_write(*sink_, path_);
-                if (backlog.failed(monotonic_ns()))
-                    fail(options_, failure_ + "; the recorder goes on, and writes events from memory when there is space");
+                if (backlog.failed(monotonic_ns())) {
+                    fail(options_, failure_ +
+                                       "; the recorder goes on, and writes events from memory when "
+                                       "there is space");
+                }
                 return;
             }
             backlog.written();
@@ -195,15 +255,18 @@ private:
     }
     bool write(const FlightMemory& memory, FlightEvent& event) {
         if (event.path.empty()) {
-            do event.path = flight_name(what_.file, probe_.unix_ns(event.time_ns), event.cause, ++files_);
-            while (std::filesystem::exists(event.path));  // of another recorder
+            do {
+                event.path =
+                    flight_name(what_.file, probe_.unix_ns(event.time_ns), event.cause, ++files_);
+            } while (std::filesystem::exists(event.path));  // of another recorder
         }
         path_ = event.path;
         rows_ = 0;
         Origin origin = origin_;
         origin.cause = event.cause;
         sink_ = make_sink(path_, probe_.columns(), origin);
-        return sink_->error() == 0 && memory.write(*sink_, event.begin_ns, event.end_ns, rows_) && complete();
+        return sink_->error() == 0 && memory.write(*sink_, event.begin_ns, event.end_ns, rows_) &&
+               complete();
     }
 
     const Options& options_;
@@ -218,52 +281,84 @@ private:
     std::vector<std::string> written_;
     std::uint64_t rows_ = 0;
     unsigned files_ = 0;
-    std::int64_t begin_ns_ = -1, now_ns_ = 0, first_ns_ = 0;
-    bool ended_ = false, was_on_ = true;
+    std::int64_t begin_ns_ = -1;
+    std::int64_t now_ns_ = 0;
+    std::int64_t first_ns_ = 0;
+    bool ended_ = false;
+    bool was_on_ = true;
 };
 
 }  // namespace
 
 int record_values(const Options& options, const std::string& instance, Recording what) {
-    if (!what.file.ends_with(".mcap") && !what.file.ends_with(".csv"))
-        return fail(options, fmt::format("unknown format of '{}'; name the file .mcap or .csv", what.file));
+    if (!what.file.ends_with(".mcap") && !what.file.ends_with(".csv")) {
+        return fail(options,
+                    fmt::format("unknown format of '{}'; name the file .mcap or .csv", what.file));
+    }
     std::string problem = unsupported_profile(what.profile, what.file);
     if (!problem.empty()) return fail(options, problem);
-    if (what.names.empty() && what.groups.empty() && !what.all) return fail(options, "missing names of values; or --group NAME; or --all");
-    if (what.all && !what.groups.empty()) return fail(options, "--all has every --group; leave one out");
-    if (what.last_ns >= 0 && what.rotate_ns >= 0) return fail(options, "--last and --rotate exclude each other; leave one out");
+    if (what.names.empty() && what.groups.empty() && !what.all) {
+        return fail(options, "missing names of values; or --group NAME; or --all");
+    }
+    if (what.all && !what.groups.empty()) {
+        return fail(options, "--all has every --group; leave one out");
+    }
+    if (what.last_ns >= 0 && what.rotate_ns >= 0) {
+        return fail(options, "--last and --rotate exclude each other; leave one out");
+    }
     if (what.last_ns < 0 && what.after_ns >= 0) return fail(options, "--after needs --last TIME");
-    if (what.last_ns < 0 && what.rotate_ns < 0 && what.keep != 0) return fail(options, "--keep needs --rotate TIME or --last TIME");
+    if (what.last_ns < 0 && what.rotate_ns < 0 && what.keep != 0) {
+        return fail(options, "--keep needs --rotate TIME or --last TIME");
+    }
     constexpr std::int64_t default_after_ns = 5'000'000'000;
-    if (what.after_ns < 0) what.after_ns = default_after_ns;
-    if (what.last_ns < 0 && !what.trigger.empty()) return fail(options, "--trigger needs --last TIME: what is kept until it comes");
+    if (what.after_ns < 0) {
+        what.after_ns = default_after_ns;
+    }
+    if (what.last_ns < 0 && !what.trigger.empty()) {
+        return fail(options, "--trigger needs --last TIME: what is kept until it comes");
+    }
     const auto client = Client::connect(instance, problem);
     if (!client) return fail(options, problem);
-    if (!what.trigger.empty()) what.names.push_back(what.trigger);
+    if (!what.trigger.empty()) {
+        what.names.push_back(what.trigger);
+    }
     std::vector<std::string> names = probed_names(*client, what.names, problem);
     if (!problem.empty()) return fail(options, problem);
     const auto add = [&](std::vector<std::string> more) {
-        for (std::string& name : more)
-            if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(std::move(name));
+        for (std::string& name : more) {
+            if (std::find(names.begin(), names.end(), name) == names.end()) {
+                names.push_back(std::move(name));
+            }
+        }
     };
-    if (what.all) add(all_names(*client));
+    if (what.all) {
+        add(all_names(*client));
+    }
     for (const std::string& group : what.groups) {
         add(group_names(*client, group, problem));
         if (!problem.empty()) return fail(options, problem);
     }
-    if (names.size() > Probes::most_names)
-        return fail(options, fmt::format("{} values are more than {}; name fewer, or type --group NAME", names.size(), Probes::most_names));
+    if (names.size() > Probes::most_names) {
+        return fail(options,
+                    fmt::format("{} values are more than {}; name fewer, or type --group NAME",
+                                names.size(), Probes::most_names));
+    }
     ProbeClient::Options wanted;
     wanted.every = what.every;
     wanted.journal = true;
     auto probe = ProbeClient::attach(*client, names, wanted, problem);
-    const auto too_much = [&] { return probe ? std::string::npos : problem.find("; sample fewer values"); };
-    while (too_much() != std::string::npos && wanted.buffer_ms > 100) {  // thousands of values: the disk may be late for a shorter time only
+    const auto too_much = [&] {
+        return probe ? std::string::npos : problem.find("; sample fewer values");
+    };
+    // thousands of values: the disk may be late for a shorter time only
+    while (too_much() != std::string::npos && wanted.buffer_ms > 100) {
         wanted.buffer_ms /= 2;
         probe = ProbeClient::attach(*client, names, wanted, problem);
     }
-    if (const std::size_t advice = too_much(); advice != std::string::npos)
-        problem = problem.substr(0, advice) + "; name fewer values, or type a larger --every";  // hal record has no buffer_ms
+    if (const std::size_t advice = too_much(); advice != std::string::npos) {
+        problem = problem.substr(0, advice) +
+                  "; name fewer values, or type a larger --every";  // hal record has no buffer_ms
+    }
     if (!probe) return fail(options, problem);
     Recorder recorder(options, what, *client, *probe);
     return what.last_ns >= 0 ? recorder.flight() : recorder.to_files();

@@ -7,17 +7,22 @@
 
 namespace hal::tools {
 
-// A character is twice as high as wide, so the dots are square in Braille; else two columns make one dot.
+// A character is twice as high as wide, so the dots are square in Braille; else two columns make
+// one dot.
 Canvas::Canvas(std::size_t columns, std::size_t rows, bool unicode)
-    : raster_(columns, rows, unicode), half_(static_cast<double>((std::min(raster_.width(), raster_.height()) - 1) / 2)) {}
+    : raster_(columns, rows, unicode),
+      half_(static_cast<double>((std::min(raster_.width(), raster_.height()) - 1) / 2)) {}
 
 void Canvas::dot(double x, double y) {
-    const double column = static_cast<double>((raster_.width() - 1) / 2) + x * half_,
-                 row = static_cast<double>((raster_.height() - 1) / 2) - y * half_;
+    const double column = static_cast<double>((raster_.width() - 1) / 2) + x * half_;
+
+    const double row = static_cast<double>((raster_.height() - 1) / 2) - y * half_;
     if (!(column > -0.5 && row > -0.5 && column < static_cast<double>(raster_.width()) - 0.5 &&
-          row < static_cast<double>(raster_.height()) - 0.5))
+          row < static_cast<double>(raster_.height()) - 0.5)) {
         return;  // NaN too
-    raster_.set(static_cast<std::size_t>(std::lround(column)), static_cast<std::size_t>(std::lround(row)));
+    }
+    raster_.set(static_cast<std::size_t>(std::lround(column)),
+                static_cast<std::size_t>(std::lround(row)));
 }
 
 void Canvas::line(double x0, double y0, double x1, double y1) {

@@ -15,7 +15,8 @@ public:
     /// `columns` x `rows` characters.
     Canvas(std::size_t columns, std::size_t rows, bool unicode);
 
-    /// Coordinates are -1..1 in the largest centred square, y upwards. Points outside are not drawn.
+    /// Coordinates are -1..1 in the largest centred square, y upwards. Points outside are not
+    /// drawn.
     void dot(double x, double y);
     void line(double x0, double y0, double x1, double y1);
     void circle(double x, double y, double radius);

@@ -20,13 +20,17 @@ namespace hal::tools {
 namespace {
 
 int print_diagnostics(const ExecutionOptions& options, Diagnostics& diagnostics) {
-    if (options.loudness != Loudness::nothing) write_all(STDERR_FILENO, render(diagnostics, Sources{}, colours(STDERR_FILENO)));
+    if (options.loudness != Loudness::nothing) {
+        write_all(STDERR_FILENO, render(diagnostics, Sources{}, colours(STDERR_FILENO)));
+    }
     return 1;
 }
 
 std::vector<std::string> names_of(const std::vector<NodeLine>& nodes) {
     std::vector<std::string> names;
-    for (const NodeLine& node : nodes) names.push_back(node.name);
+    for (const NodeLine& node : nodes) {
+        names.push_back(node.name);
+    }
     return names;
 }
 
@@ -37,22 +41,28 @@ ShellOptions for_check() {
     return how;
 }
 
-/// Splits settings into words KEY=VALUE for the DDS components. Returns nothing after printing an invalid one.
-std::optional<std::vector<std::string>> dds_settings(const Options& options, const std::string& settings) {
+/// Splits settings into words KEY=VALUE for the DDS components. Returns nothing after printing an
+/// invalid one.
+std::optional<std::vector<std::string>> dds_settings(const Options& options,
+                                                     const std::string& settings) {
     std::vector<std::string> words;
-    static constexpr std::array<std::string_view, 7> keys{"domain",        "interfaces", "peers",   "server",
-                                                          "shared_memory", "profile",    "security"};
-    for (std::size_t at = settings.find_first_not_of(' '); at < settings.size(); at = settings.find_first_not_of(' ', at)) {
+    static constexpr std::array<std::string_view, 7> keys{
+        "domain", "interfaces", "peers", "server", "shared_memory", "profile", "security"};
+    for (std::size_t at = settings.find_first_not_of(' '); at < settings.size();
+         at = settings.find_first_not_of(' ', at)) {
         const std::size_t end = std::min(settings.find(' ', at), settings.size());
         const std::string word = settings.substr(at, end - at);
         const std::string key = word.substr(0, word.find('='));
         at = end;
         if (word.find('=') != word.npos && std::find(keys.begin(), keys.end(), key) != keys.end() &&
-            word.find_first_of("\"'[]{}") == word.npos) {  // loadrt removes quotes and expands ranges
+            word.find_first_of("\"'[]{}") ==
+                word.npos) {  // loadrt removes quotes and expands ranges
             words.push_back(word);
             continue;
         }
-        fail(options, fmt::format("--dds: invalid setting '{}'; use KEY=VALUE with one of the keys: {}", word, fmt::join(keys, " ")));
+        fail(options,
+             fmt::format("--dds: invalid setting '{}'; use KEY=VALUE with one of the keys: {}",
+                         word, fmt::join(keys, " ")));
         return std::nullopt;
     }
     return words;
@@ -61,9 +71,12 @@ std::optional<std::vector<std::string>> dds_settings(const Options& options, con
 /// "NODE: COMMAND" of --execute.
 int execute(const Options& options, Cell& cell, const std::string& command, Output& output) {
     const auto colon = command.find(':');
-    const std::size_t node = colon == command.npos ? cell.size() : cell.find(command.substr(0, colon));
-    if (node == cell.size())
-        return fail(options, fmt::format("--execute needs a node; use --execute '{}: {}'", cell.nodes().front().name, command));
+    const std::size_t node =
+        colon == command.npos ? cell.size() : cell.find(command.substr(0, colon));
+    if (node == cell.size()) {
+        return fail(options, fmt::format("--execute needs a node; use --execute '{}: {}'",
+                                         cell.nodes().front().name, command));
+    }
     return cell.shell(node).execute(command.substr(colon + 1), output, "<commandline>");
 }
 
@@ -72,12 +85,19 @@ int execute(const Options& options, Cell& cell, const std::string& command, Outp
 std::optional<std::vector<NodeLine>> requested_nodes(const NetlistOptions& options) {
     std::vector<NodeLine> nodes = nodes_of(options.words, options.ini);
     const std::vector<std::string> names = names_of(nodes);
-    if (options.part.empty() || std::find(names.begin(), names.end(), options.part) != names.end()) return nodes;
+    if (options.part.empty() ||
+        std::find(names.begin(), names.end(), options.part) != names.end()) {
+        return nodes;
+    }
     Diagnostics found;
     std::string files;
-    for (const std::string& word : options.words) files += (files.empty() ? "" : " ") + word;
-    found.error("no-such-node", {}, "'" + files + "' has no node '" + options.part + "'", did_you_mean(options.part, names),
-                names.empty() ? "it is for one machine: leave --node out" : "its nodes: " + listed(names, 100));
+    for (const std::string& word : options.words) {
+        files += (files.empty() ? "" : " ") + word;
+    }
+    found.error("no-such-node", {}, "'" + files + "' has no node '" + options.part + "'",
+                did_you_mean(options.part, names),
+                names.empty() ? "it is for one machine: leave --node out"
+                              : "its nodes: " + listed(names, 100));
     print_diagnostics(options, found);
     return std::nullopt;
 }
@@ -88,20 +108,31 @@ int check_cell(const NetlistOptions& options, std::vector<NodeLine> nodes) {
     Cell cell(cell_name(options.words), std::move(nodes), offline(), how);
     ErrorsOnly output;
     if (!cell.load(options.words, options.ini, output)) return 1;
-    for (const std::string& path : options.words) write_all(STDERR_FILENO, path + ": no errors\n");
+    for (const std::string& path : options.words) {
+        write_all(STDERR_FILENO, path + ": no errors\n");
+    }
     write_all(STDERR_FILENO, fmt::format("nodes: {}\n", listed(names_of(cell.nodes()), 100)));
     for (const NodeTopic& topic : cell.topics()) {
         std::vector<std::string> readers;
-        for (std::size_t i = 0; i < cell.size(); ++i)
-            if (topic.read_by(i)) readers.push_back(cell.nodes()[i].name);
-        write_all(STDERR_FILENO, fmt::format("  {} -> {}: {}\n", cell.nodes()[topic.from].name, listed(readers, 100), topic.layout()));
+        for (std::size_t i = 0; i < cell.size(); ++i) {
+            if (topic.read_by(i)) {
+                readers.push_back(cell.nodes()[i].name);
+            }
+        }
+        write_all(STDERR_FILENO, fmt::format("  {} -> {}: {}\n", cell.nodes()[topic.from].name,
+                                             listed(readers, 100), topic.layout()));
     }
     return 0;
 }
 
 int sim_cell(const SimOptions& options, std::vector<NodeLine> nodes) {
-    if (options.cycles != 0) return fail(options, "--cycles applies to one machine; for several use --for 10s");
-    if (!options.name.empty()) return fail(options, "--name applies to one machine; select it: --node " + nodes.front().name);
+    if (options.cycles != 0) {
+        return fail(options, "--cycles applies to one machine; for several use --for 10s");
+    }
+    if (!options.name.empty()) {
+        return fail(options,
+                    "--name applies to one machine; select it: --node " + nodes.front().name);
+    }
     export_variables(options, "sim");
     StopRequest stop;
     CycleGuard guard;
@@ -110,28 +141,47 @@ int sim_cell(const SimOptions& options, std::vector<NodeLine> nodes) {
     SessionOptions session;
     session.name = fmt::format("sim-{}", ::getpid());
     session.virtual_clock = true;
-    if (!options.show.empty()) return fail(options, "--show applies to one machine; for several use --execute 'NODE: getp NAME'");
+    if (!options.show.empty()) {
+        return fail(options,
+                    "--show applies to one machine; for several use --execute 'NODE: getp NAME'");
+    }
     TrackedOutput output;
     const auto begun = std::chrono::steady_clock::now();
     Cell cell(cell_name(options.words), std::move(nodes), session, shell_options(options));
     int status = cell.load(options.words, options.ini, output) && cell.start(output) ? 0 : 1;
     constexpr std::int64_t slice_ns = 100'000'000;
-    if (!options.part.empty()) cell.isolate(cell.find(options.part));
-    for (std::int64_t left = status == 0 ? options.for_ns : 0; left > 0 && !stop.requested(); left -= slice_ns)
+    if (!options.part.empty()) {
+        cell.isolate(cell.find(options.part));
+    }
+    for (std::int64_t left = status == 0 ? options.for_ns : 0; left > 0 && !stop.requested();
+         left -= slice_ns) {
         cell.advance(std::min(left, slice_ns));
+    }
     const bool loaded = status == 0;
     const auto wall = std::chrono::steady_clock::now() - begun;
-    for (const std::string& command : options.execute)
-        if (status == 0 && !stop.requested()) status = execute(options, cell, command, output);
+    for (const std::string& command : options.execute) {
+        if (status == 0 && !stop.requested()) {
+            status = execute(options, cell, command, output);
+        }
+    }
     if (loaded && !options.report && summary_wanted(options, output.printed) && cell.size() != 0) {
         write_all(STDERR_FILENO, simulated_for(cell.session(0).threads().now_ns(), wall) + "\n");
-        for (std::size_t i = 0; i < cell.size(); ++i)
-            write_all(STDERR_FILENO, simulated_summary(cell.session(i), fmt::format("node {}", cell.nodes()[i].name)));
+        for (std::size_t i = 0; i < cell.size(); ++i) {
+            write_all(
+                STDERR_FILENO,
+                simulated_summary(cell.session(i), fmt::format("node {}", cell.nodes()[i].name)));
+        }
     }
     for (std::size_t i = 0; i < cell.size(); ++i) {
         const auto reports = cell.session(i).reports().threads();
-        if (std::any_of(reports.begin(), reports.end(), [](const ThreadReport& r) { return r.faulted; })) status = 1;
-        if (options.report) write_all(STDERR_FILENO, fmt::format("node {}\n{}", cell.nodes()[i].name, timing_report(cell.session(i))));
+        if (std::any_of(reports.begin(), reports.end(),
+                        [](const ThreadReport& r) { return r.faulted; })) {
+            status = 1;
+        }
+        if (options.report) {
+            write_all(STDERR_FILENO, fmt::format("node {}\n{}", cell.nodes()[i].name,
+                                                 timing_report(cell.session(i))));
+        }
     }
     stop.release();
     return stop.requested() ? 1 : status;
@@ -149,22 +199,31 @@ int load_node(HostedMachine& machine, const RunOptions& options, std::vector<Nod
     }
     const std::size_t own = cell.find(options.part);
     const auto available = machine.session.host().available_components();
-    if (std::find(available.begin(), available.end(), "dds_publish") == available.end() && cell.size() > 1) {
+    if (std::find(available.begin(), available.end(), "dds_publish") == available.end() &&
+        cell.size() > 1) {
         Diagnostics found;
-        found.error("no-dds", {}, "the nodes of this netlist exchange signals over DDS, and this Halcyon was built without it", "",
-                    "sudo apt install libfastrtps-dev, and build again; hal sim runs all nodes in one process without it");
+        found.error("no-dds", {},
+                    "the nodes of this netlist exchange signals over DDS, and this Halcyon was "
+                    "built without it",
+                    "",
+                    "sudo apt install libfastrtps-dev, and build again; hal sim runs all nodes in "
+                    "one process without it");
         return print_diagnostics(options, found);
     }
     const char* const usual = std::getenv("HALCYON_DDS");
-    const auto participant = dds_settings(options, options.dds.empty() && usual ? usual : options.dds);
+    const auto participant =
+        dds_settings(options, options.dds.empty() && usual ? usual : options.dds);
     if (!participant) return 1;
     const NodeLinks links = cell.size() > 1 ? node_links(cell, own, *participant) : NodeLinks{};
     machine.shell.add_latencies(node_latencies(cell, own, false));
     const std::string name = fmt::format("<links of node {}>", options.part);
     const auto netlist = [](const std::string& path) { return path.ends_with(".hal"); };
-    if (options.ini.empty() && std::all_of(options.words.begin(), options.words.end(), netlist)) {  // the whole machine is one transaction
+    // the whole machine is one transaction
+    if (options.ini.empty() && std::all_of(options.words.begin(), options.words.end(), netlist)) {
         auto commands = links.before;
-        for (const std::string& path : options.words) commands.push_back({"source", path});
+        for (const std::string& path : options.words) {
+            commands.push_back({"source", path});
+        }
         commands.insert(commands.end(), links.after.begin(), links.after.end());
         return machine.shell.execute(commands, output, name);
     }

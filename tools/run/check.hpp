@@ -15,8 +15,10 @@ struct CheckOptions : NetlistOptions {
     void declare(OptionSet& set) override {
         set.words("FILE", "netlists in load order; FILE.ini: the netlists of its [HAL] section");
         set.value("-i,--ini", ini, "FILE", "INI file for [SECTION]KEY");
-        set.flag("--linuxcnc", linuxcnc, "also report what runs here and LinuxCNC 2.9 does not load");
-        set.values("--assume", assume, "NAME", "a component, or a prefix of names, that exists on the target machine only");
+        set.flag("--linuxcnc", linuxcnc,
+                 "also report what runs here and LinuxCNC 2.9 does not load");
+        set.values("--assume", assume, "NAME",
+                   "a component, or a prefix of names, that exists on the target machine only");
     }
 };
 

@@ -13,8 +13,8 @@
 
 namespace hal::tools {
 
-/// Prints "fault: SENTENCE [CODE]" for each fault of a machine with real-time threads, limited by a MessageLog. Its thread takes
-/// the session's lock only after a fault was raised.
+/// Prints "fault: SENTENCE [CODE]" for each fault of a machine with real-time threads, limited by a
+/// MessageLog. Its thread takes the session's lock only after a fault was raised.
 class FaultLines {
 public:
     /// `sink` receives the lines instead of standard error.
@@ -30,9 +30,11 @@ private:
 
     Session& session_;
     MessageLog log_;
-    std::map<std::uint64_t, std::uint64_t> seen_;  // record number to its count, of the records in the session's log
-    std::uint64_t raised_ = 0;                      // fault_count() when it last changed
-    std::int64_t raised_ns_ = 0;                   // when the newest was seen: a storm queues its count up to a second later
+    // record number to its count, of the records in the session's log
+    std::map<std::uint64_t, std::uint64_t> seen_;
+    std::uint64_t raised_ = 0;  // fault_count() when it last changed
+    // when the newest was seen: a storm queues its count up to a second later
+    std::int64_t raised_ns_ = 0;
     std::mutex mutex_;
     std::condition_variable wake_;
     bool ending_ = false;

@@ -28,12 +28,18 @@ int run_fmt(const FmtOptions& options) {
             write_all(STDERR_FILENO, render(diagnostics, sources, colours(STDERR_FILENO)));
             status = 1;
         } else if (options.check) {
-            if (formatted != text) status = fail(options, fmt::format("'{0}' is not formatted; type: hal fmt {0}", path));
+            if (formatted != text) {
+                status =
+                    fail(options, fmt::format("'{0}' is not formatted; type: hal fmt {0}", path));
+            }
         } else if (path == "-") {
-            if (!print(formatted)) status = 1;
+            if (!print(formatted)) {
+                status = 1;
+            }
         } else if (formatted != text) {
-            if (const std::string why = replace_file(path, formatted); !why.empty())
+            if (const std::string why = replace_file(path, formatted); !why.empty()) {
                 status = fail(options, fmt::format("cannot write '{}': {}", path, why));
+            }
         }
     }
     return status;

@@ -18,7 +18,8 @@ namespace hal::tools {
 
 namespace {
 
-SessionOptions session_options(const NetlistOptions& of, const std::string& name, bool virtual_clock, ExitObserver* observer) {
+SessionOptions session_options(const NetlistOptions& of, const std::string& name,
+                               bool virtual_clock, ExitObserver* observer) {
     SessionOptions options;
     options.observer = observer;
     options.name = name;
@@ -43,19 +44,26 @@ ShellOptions shell_options(const NetlistOptions& options) {
     return how;
 }
 
-/// What stands behind `--`: $1, $2 … of the netlists, and NAME=VALUE as $NAME. For the programs they start: which
-/// instance halcmd is to talk to, and first in PATH the folder of this very program.
+/// What stands behind `--`: $1, $2 … of the netlists, and NAME=VALUE as $NAME. For the programs
+/// they start: which instance halcmd is to talk to, and first in PATH the folder of this very
+/// program.
 void export_variables(const Options& options, const std::string& instance) {
     ::setenv("HALCYON_INSTANCE", instance.c_str(), 1);
     std::error_code unknown;
-    const std::string folder = std::filesystem::read_symlink("/proc/self/exe", unknown).parent_path().string();
+    const std::string folder =
+        std::filesystem::read_symlink("/proc/self/exe", unknown).parent_path().string();
     const char* path = std::getenv("PATH");
-    if (!unknown) ::setenv("PATH", (folder + ":" + (path && *path ? path : "/usr/local/bin:/usr/bin:/bin")).c_str(), 1);
+    if (!unknown) {
+        ::setenv("PATH",
+                 (folder + ":" + (path && *path ? path : "/usr/local/bin:/usr/bin:/bin")).c_str(),
+                 1);
+    }
     for (std::size_t i = 0; i < options.arguments.size(); ++i) {
         const std::string& argument = options.arguments[i];
         ::setenv(std::to_string(i + 1).c_str(), argument.c_str(), 1);
-        if (const auto equals = argument.find('='); equals != std::string::npos && equals != 0)
+        if (const auto equals = argument.find('='); equals != std::string::npos && equals != 0) {
             ::setenv(argument.substr(0, equals).c_str(), argument.substr(equals + 1).c_str(), 1);
+        }
     }
 }
 
@@ -63,7 +71,8 @@ namespace {
 
 class OwnShell final : public LineExecutor {
 public:
-    OwnShell(Shell& shell, StopRequest& stop, Output& output) : shell_(shell), stop_(stop), output_(output) {}
+    OwnShell(Shell& shell, StopRequest& stop, Output& output)
+        : shell_(shell), stop_(stop), output_(output) {}
     int execute(std::string_view line) override {
         shell_.cancel(false);
         stop_.spare(true);  // Ctrl-C is for the command now
@@ -71,7 +80,9 @@ public:
         stop_.spare(false);
         return status;
     }
-    Completion complete(std::string_view line, std::size_t cursor) override { return shell_.complete(line, cursor); }
+    Completion complete(std::string_view line, std::size_t cursor) override {
+        return shell_.complete(line, cursor);
+    }
     bool collecting() const override { return shell_.collecting(); }
     bool over() const override { return shell_.quit() || stop_.requested(); }
 
@@ -90,18 +101,30 @@ std::string own_name(const NetlistOptions& options) {
     return variable && *variable ? variable : "default";
 }
 
-HostedMachine::HostedMachine(const NetlistOptions& options, const std::string& name, bool virtual_clock)
+HostedMachine::HostedMachine(const NetlistOptions& options, const std::string& name,
+                             bool virtual_clock)
     : observer_(virtual_clock ? nullptr : std::make_unique<ExitObserver>(name)),
-      session(session_options(options, name, virtual_clock, observer_.get())), shell(session, shell_options(options)), options_(options) {
+      session(session_options(options, name, virtual_clock, observer_.get())),
+      shell(session, shell_options(options)),
+      options_(options) {
     export_variables(options, name);
-    if (!virtual_clock)  // a machine that is stopped from the terminal would leave its outputs as they are
-        for (const int number : {SIGTSTP, SIGTTIN, SIGTTOU}) std::signal(number, SIG_IGN);
-    shell.run_scripts_with(
-        [this](const std::string& path, const std::vector<std::string>& arguments, Pass pass, Output&) { return run_script(path, arguments, pass); });
-    if (virtual_clock) cycle_guard_.begin(options.cycle_limit_ns);
+    // a machine that is stopped from the terminal would leave its outputs as they are
+    if (!virtual_clock) {
+        for (const int number : {SIGTSTP, SIGTTIN, SIGTTOU}) {
+            std::signal(number, SIG_IGN);
+        }
+    }
+    shell.run_scripts_with([this](const std::string& path,
+                                  const std::vector<std::string>& arguments, Pass pass,
+                                  Output&) { return run_script(path, arguments, pass); });
+    if (virtual_clock) {
+        cycle_guard_.begin(options.cycle_limit_ns);
+    }
     stop.when_signalled([this, virtual_clock] {
         shell.cancel();
-        if (virtual_clock) cycle_guard_.end_soon();
+        if (virtual_clock) {
+            cycle_guard_.end_soon();
+        }
         if (!stop.requested()) return;
         end_now();
         setup_guard_.end_soon();
@@ -110,7 +133,8 @@ HostedMachine::HostedMachine(const NetlistOptions& options, const std::string& n
 
 HostedMachine::~HostedMachine() {
     shut_down();
-    ExitObserver::silence();  // outputs are safe: a second Ctrl-C ends the process at once from here on
+    // outputs are safe: a second Ctrl-C ends the process at once from here on
+    ExitObserver::silence();
     stop.release();  // it calls the shell, which goes now
     server_.reset();
 }
@@ -124,7 +148,10 @@ void HostedMachine::end_now() {
 bool HostedMachine::serve(bool needed) {
     const std::string& name = session.options().name;
     if (!good_instance_name(name)) {
-        fail(options_, fmt::format("invalid instance name '{}'; use up to 64 letters, digits, '-', '_' and '.'", name));
+        fail(options_,
+             fmt::format(
+                 "invalid instance name '{}'; use up to 64 letters, digits, '-', '_' and '.'",
+                 name));
         return false;
     }
     ServerOptions how;
@@ -137,26 +164,36 @@ bool HostedMachine::serve(bool needed) {
     Diagnostics diagnostics;
     if (server_->start(diagnostics)) return true;
     server_.reset();
-    if (needed) write_all(STDERR_FILENO, render(diagnostics, session.sources, colours(STDERR_FILENO)));
+    if (needed) {
+        write_all(STDERR_FILENO, render(diagnostics, session.sources, colours(STDERR_FILENO)));
+    }
     return !needed;
 }
 
 int HostedMachine::load(Output* output) {
     Output& to = output != nullptr ? *output : output_;
     if (!options_.ini.empty() && shell.read_ini(options_.ini, to) != 0) return 1;
-    if (!options_.ini.empty()) ini_path = absolute_path(options_.ini);
+    if (!options_.ini.empty()) {
+        ini_path = absolute_path(options_.ini);
+    }
     int status = 0;
     for (const std::string& path : options_.words) {
         if (stop.requested()) return 1;
-        if (path.ends_with(".ini")) ini_path = absolute_path(path);
-        status = std::max(status, path.ends_with(".tcl") ? run_script(path, options_.arguments, Pass::both) : shell.run_file(path, to));
+        if (path.ends_with(".ini")) {
+            ini_path = absolute_path(path);
+        }
+        status = std::max(status, path.ends_with(".tcl")
+                                      ? run_script(path, options_.arguments, Pass::both)
+                                      : shell.run_file(path, to));
         if (status != 0 && !options_.keep_going) return status;
     }
     return status;
 }
 
-int HostedMachine::run_script(const std::string& path, const std::vector<std::string>& arguments, Pass pass) {
-    const std::string name = path.empty() ? "<haltcl>" : "<" + std::filesystem::path(path).filename().string() + ">";
+int HostedMachine::run_script(const std::string& path, const std::vector<std::string>& arguments,
+                              Pass pass) {
+    const std::string name =
+        path.empty() ? "<haltcl>" : "<" + std::filesystem::path(path).filename().string() + ">";
     TclScript script;
     script.path = path;
     script.directory = shell.options.directory;
@@ -171,15 +208,22 @@ int HostedMachine::run_script(const std::string& path, const std::vector<std::st
     };
     std::string problem;
     const int status = run_tcl(script, execute, stop.fd(), problem);
-    if (status < 0) return fail(options_, fmt::format("'{}' cannot be run: {}", path.empty() ? "Tcl" : path, problem));
-    if (status != 0 && !stop.requested() && !path.empty()) fail(options_, fmt::format("'{}' {}", path, end_description(status)));
+    if (status < 0) {
+        return fail(options_,
+                    fmt::format("'{}' cannot be run: {}", path.empty() ? "Tcl" : path, problem));
+    }
+    if (status != 0 && !stop.requested() && !path.empty()) {
+        fail(options_, fmt::format("'{}' {}", path, end_description(status)));
+    }
     return status == 0 ? 0 : 1;
 }
 
 void HostedMachine::start_threads() {
     forbid_builds();
     const auto lock = session.lock();
-    if (!session.threads().running() && !session.model().threads.empty()) session.threads().start();
+    if (!session.threads().running() && !session.model().threads.empty()) {
+        session.threads().start();
+    }
 }
 
 int HostedMachine::converse(const Prompt& prompt) {
@@ -212,7 +256,8 @@ void HostedMachine::shut_down() {
 bool HostedMachine::faulted() {
     const auto lock = session.lock();
     const auto reports = session.reports().threads();
-    return std::any_of(reports.begin(), reports.end(), [](const ThreadReport& r) { return r.faulted || r.hangs != 0; });
+    return std::any_of(reports.begin(), reports.end(),
+                       [](const ThreadReport& r) { return r.faulted || r.hangs != 0; });
 }
 
 }  // namespace hal::tools

@@ -21,16 +21,20 @@ namespace hal::tools {
 
 class HostedMachine {
 public:
-    /// Handles the signals that end a run. Programs started from its netlists find it through $HALCYON_INSTANCE.
+    /// Handles the signals that end a run. Programs started from its netlists find it through
+    /// $HALCYON_INSTANCE.
     HostedMachine(const NetlistOptions& options, const std::string& name, bool virtual_clock);
     ~HostedMachine();  ///< outputs safe, processes ended, instances destroyed
     HostedMachine(const HostedMachine&) = delete;
 
-    /// Opens the control socket. Returns false after printing the error; a socket that is not `needed` is optional.
+    /// Opens the control socket. Returns false after printing the error; a socket that is not
+    /// `needed` is optional.
     bool serve(bool needed);
-    /// Runs the files; their output goes to `output`, by default to the process's own. Returns the exit status.
+    /// Runs the files; their output goes to `output`, by default to the process's own. Returns the
+    /// exit status.
     int load(Output* output = nullptr);
-    /// Runs a netlist in Tcl; an empty path: lines from standard input. Returns 0, or 1 after printing why it failed.
+    /// Runs a netlist in Tcl; an empty path: lines from standard input. Returns 0, or 1 after
+    /// printing why it failed.
     int run_script(const std::string& path, const std::vector<std::string>& arguments, Pass pass);
     /// Executes `start`, unless the threads are running.
     void start_threads();
@@ -38,7 +42,8 @@ public:
     int converse(const Prompt& prompt);
     /// Advances the virtual clock; returns early when the end is requested.
     void advance(std::int64_t ns, std::uint64_t cycles);
-    /// From now on a request to end the run stops the threads at once and interrupts what clients do, before the caller shuts down.
+    /// From now on a request to end the run stops the threads at once and interrupts what clients
+    /// do, before the caller shuts down.
     void stop_at_once() { stops_at_once_ = true; }
     /// Ends the run: sets outputs to their safe values.
     void shut_down();
@@ -46,7 +51,9 @@ public:
     bool faulted();
 
 private:
-    std::unique_ptr<ExitObserver> observer_;  // before the first thread of the process, and after the session
+    // before the first thread of the process, and after the session
+    std::unique_ptr<ExitObserver> observer_;
+
 public:
     StopRequest stop;
     Session session;
@@ -64,7 +71,8 @@ private:
     SetupGuard setup_guard_;
 };
 
-/// For netlists and the programs they start: $1 $2 … and NAME=VALUE from behind `--`, $HALCYON_INSTANCE, PATH.
+/// For netlists and the programs they start: $1 $2 … and NAME=VALUE from behind `--`,
+/// $HALCYON_INSTANCE, PATH.
 void export_variables(const Options& options, const std::string& instance);
 ShellOptions shell_options(const NetlistOptions& options);
 

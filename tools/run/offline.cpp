@@ -16,12 +16,16 @@ SessionOptions offline() {
     return options;
 }
 
-int load_offline(Shell& shell, const NetlistOptions& options, Output& output, const std::function<void(const std::string& path)>& good) {
+int load_offline(Shell& shell, const NetlistOptions& options, Output& output,
+                 const std::function<void(const std::string& path)>& good) {
     if (!options.ini.empty() && shell.read_ini(options.ini, output) != 0) return 1;
     int bad = 0;
     for (const std::string& path : options.words) {
-        if (shell.run_file(path, output) != 0) ++bad;
-        else if (good) good(path);
+        if (shell.run_file(path, output) != 0) {
+            ++bad;
+        } else if (good) {
+            good(path);
+        }
     }
     return bad;
 }

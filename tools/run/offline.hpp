@@ -11,9 +11,11 @@
 
 namespace hal::tools {
 
-/// Loads the files of `options.words` into a session that constructs components but starts none. Everything printed,
-/// diagnostics included, goes to `output`; `good` is called for each file without errors. Returns how many have some.
-int load_offline(Shell& shell, const NetlistOptions& options, Output& output, const std::function<void(const std::string& path)>& good = {});
+/// Loads the files of `options.words` into a session that constructs components but starts none.
+/// Everything printed, diagnostics included, goes to `output`; `good` is called for each file
+/// without errors. Returns how many have some.
+int load_offline(Shell& shell, const NetlistOptions& options, Output& output,
+                 const std::function<void(const std::string& path)>& good = {});
 
 /// Options of such a session.
 SessionOptions offline();

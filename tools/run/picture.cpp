@@ -20,39 +20,55 @@ namespace hal::tools {
 
 namespace {
 
-constexpr std::size_t side_columns = 24, side_rows = 11;
+constexpr std::size_t side_columns = 24;
+constexpr std::size_t side_rows = 11;
 
 /// Side by side, with a title above each.
-std::vector<std::string> beside(const char* left_title, const Canvas& left, const char* right_title, const Canvas& right) {
-    std::vector<std::string> lines{fmt::format("  {:{}}    {}", left_title, side_columns, right_title)};
-    const auto a = left.rows(), b = right.rows();
-    for (std::size_t i = 0; i < a.size(); ++i) lines.push_back("  " + a[i] + "    " + b[i]);
+std::vector<std::string> beside(const char* left_title, const Canvas& left, const char* right_title,
+                                const Canvas& right) {
+    std::vector<std::string> lines{
+        fmt::format("  {:{}}    {}", left_title, side_columns, right_title)};
+    const auto a = left.rows();
+    const auto b = right.rows();
+    for (std::size_t i = 0; i < a.size(); ++i) {
+        lines.push_back("  " + a[i] + "    " + b[i]);
+    }
     return lines;
 }
 
 std::string degrees(double radians) {
-    return fmt::format("{:8.1f}{}", std::remainder(radians, 2.0 * std::numbers::pi) * 180.0 / std::numbers::pi, " deg");
+    return fmt::format("{:8.1f}{}",
+                       std::remainder(radians, 2.0 * std::numbers::pi) * 180.0 / std::numbers::pi,
+                       " deg");
 }
 
 std::string status_line(const Scene& scene) {
-    return fmt::format("  t {:6.1f} s   {} wake-up latency p50 {} p99 {}   missed {}{}", scene.seconds, scene.thread.name,
-                       format_duration(scene.thread.wakeup_p50_ns), format_duration(scene.thread.wakeup_p99_ns), scene.missed,
-                       scene.faults != 0 ? fmt::format("   faults {}: show fault", scene.faults) : "");
+    return fmt::format(
+        "  t {:6.1f} s   {} wake-up latency p50 {} p99 {}   missed {}{}", scene.seconds,
+        scene.thread.name, format_duration(scene.thread.wakeup_p50_ns),
+        format_duration(scene.thread.wakeup_p99_ns), scene.missed,
+        scene.faults != 0 ? fmt::format("   faults {}: show fault", scene.faults) : "");
 }
 
-/// Angles in rad: the arm's from straight ahead, seen from above; the pendulum's from hanging, seen from the arm's end.
+/// Angles in rad: the arm's from straight ahead, seen from above; the pendulum's from hanging, seen
+/// from the arm's end.
 std::vector<std::string> draw_furuta(const Scene& scene, bool unicode) {
-    const double arm = scene.values[0], pendulum = scene.values[1];
+    const double arm = scene.values[0];
+    const double pendulum = scene.values[1];
     Canvas above(side_columns, side_rows, unicode), side(side_columns, side_rows, unicode);
     above.circle(0, 0, 0.95);
     above.circle(0, 0, 0.08);
     above.line(0, 0, 0.85 * std::cos(arm), 0.85 * std::sin(arm));
-    const double reach = 0.3 * std::sin(pendulum), end = 0.85;  // the pendulum swings across the arm
-    above.line(end * std::cos(arm), end * std::sin(arm), end * std::cos(arm) - reach * std::sin(arm),
+    // the pendulum swings across the arm
+    const double reach = 0.3 * std::sin(pendulum);
+    const double end = 0.85;
+    above.line(end * std::cos(arm), end * std::sin(arm),
+               end * std::cos(arm) - reach * std::sin(arm),
                end * std::sin(arm) + reach * std::cos(arm));
     side.circle(0, 0, 0.06);
     side.line(-0.25, 0, 0.25, 0);
-    const double x = 0.85 * std::sin(pendulum), y = -0.85 * std::cos(pendulum);
+    const double x = 0.85 * std::sin(pendulum);
+    const double y = -0.85 * std::cos(pendulum);
     side.line(0, 0, x, y);
     side.circle(x, y, 0.1);
     auto lines = beside("arm, from above", above, "pendulum, from the side", side);
@@ -64,13 +80,18 @@ std::vector<std::string> draw_furuta(const Scene& scene, bool unicode) {
 std::vector<std::string> draw_axis(const Scene& scene, bool unicode) {
     static double farthest = 1.0;  // one picture per process, drawn by one thread
     const double position = scene.values[0];
-    if (std::isfinite(position)) farthest = std::max(farthest, std::abs(position));
+    if (std::isfinite(position)) {
+        farthest = std::max(farthest, std::abs(position));
+    }
     constexpr std::size_t columns = 60;
     const double place = std::isfinite(position) ? (position / farthest + 1.0) / 2.0 : 0.5;
     const auto at = static_cast<std::size_t>(std::lround(place * static_cast<double>(columns - 5)));
     std::string rail;
-    for (std::size_t i = 0; i < columns; ++i) rail += unicode ? "─" : "-";
-    const std::string roof = unicode ? "┌───┐" : "+---+", floor = unicode ? "└─┴─┘" : "+-+-+";
+    for (std::size_t i = 0; i < columns; ++i) {
+        rail += unicode ? "─" : "-";
+    }
+    const std::string roof = unicode ? "┌───┐" : "+---+";
+    const std::string floor = unicode ? "└─┴─┘" : "+-+-+";
     return {"  " + std::string(at, ' ') + roof, "  " + std::string(at, ' ') + floor, "  " + rail,
             fmt::format("  {:<{}.4g}{:>{}.4g}", -farthest, columns / 2, farthest, columns / 2),
             fmt::format("  position {:10.4f}", position)};
@@ -111,14 +132,17 @@ struct Picture::State {
         const auto lock = session.lock();
         Scene scene;
         for (const auto& reading : session.values().read(motif.signals)) {
-            if (!reading || reading->type != HAL_TYPE_FLOAT) return std::nullopt;  // the signal was deleted
+            // the signal was deleted
+            if (!reading || reading->type != HAL_TYPE_FLOAT) return std::nullopt;
             scene.values.push_back(reading->value.real);
         }
         scene.seconds = static_cast<double>(session.threads().now_ns() - start_ns) * 1e-9;
         scene.faults = session.reports().fault_count();
         for (const ThreadReport& report : session.reports().threads()) {
             scene.missed += report.missed;
-            if (report.period_ns >= scene.thread.period_ns) scene.thread = report;
+            if (report.period_ns >= scene.thread.period_ns) {
+                scene.thread = report;
+            }
         }
         return scene;
     }
@@ -129,18 +153,24 @@ struct Picture::State {
         std::vector<std::string> lines = motif.draw(*scene, unicode);
         lines.push_back(status_line(*scene));
         std::string frame = drawn != 0 ? fmt::format("\033[{}A", drawn) : "";
-        for (const std::string& line : lines) frame += "\r" + line + "\033[K\n";
+        for (const std::string& line : lines) {
+            frame += "\r" + line + "\033[K\n";
+        }
         drawn = lines.size();
         print(frame);
     }
 
     void loop() {
-        for (std::unique_lock lock(mutex); !ending; wake.wait_for(lock, std::chrono::milliseconds(50), [this] { return ending; })) draw();
+        for (std::unique_lock lock(mutex); !ending;
+             wake.wait_for(lock, std::chrono::milliseconds(50), [this] { return ending; })) {
+            draw();
+        }
         draw();
     }
 };
 
-Picture::Picture(Session& session, const Motif& motif) : state_(std::make_unique<State>(session, motif)) {
+Picture::Picture(Session& session, const Motif& motif)
+    : state_(std::make_unique<State>(session, motif)) {
     {
         const auto lock = session.lock();
         state_->start_ns = session.threads().now_ns();
@@ -160,15 +190,21 @@ Picture::~Picture() {
 void Picture::print_below(const std::string& line) {
     const std::lock_guard lock(state_->mutex);
     write_all(STDERR_FILENO, line);
-    if (::isatty(STDERR_FILENO)) state_->drawn = 0;
+    if (::isatty(STDERR_FILENO)) {
+        state_->drawn = 0;
+    }
 }
 
 std::unique_ptr<Picture> Picture::start(Session& session) {
     winsize size{};
     const char* term = std::getenv("TERM");
-    if (!::isatty(STDOUT_FILENO) || !term || std::string_view(term) == "dumb" || ::ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) != 0)
+    if (!::isatty(STDOUT_FILENO) || !term || std::string_view(term) == "dumb" ||
+        ::ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) != 0) {
         return nullptr;
-    if ((size.ws_col != 0 && size.ws_col < 80) || (size.ws_row != 0 && size.ws_row < 16)) return nullptr;
+    }
+    if ((size.ws_col != 0 && size.ws_col < 80) || (size.ws_row != 0 && size.ws_row < 16)) {
+        return nullptr;
+    }
     const Motif* motif = nullptr;
     {
         const auto lock = session.lock();

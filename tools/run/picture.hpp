@@ -17,7 +17,8 @@ struct Scene {
     std::vector<double> values;  ///< in the order of Motif::signals
     double seconds = 0;          ///< since the start
     ThreadReport thread;         ///< the slowest one
-    std::uint64_t missed = 0, faults = 0;
+    std::uint64_t missed = 0;
+    std::uint64_t faults = 0;
 };
 
 /// A machine that can be drawn: which signals it needs, and its lines of text.
@@ -29,14 +30,17 @@ struct Motif {
 /// The motif whose signals the model has, or nullptr.
 const Motif* motif_for(const Model& model);
 
-/// Draws about 20 times a second on standard output, from a thread of its own, until destroyed; then the cursor stands
-/// below the last picture. Changes no mode of the terminal, so there is nothing to restore whatever happens.
+/// Draws about 20 times a second on standard output, from a thread of its own, until destroyed;
+/// then the cursor stands below the last picture. Changes no mode of the terminal, so there is
+/// nothing to restore whatever happens.
 class Picture {
 public:
-    /// Returns nullptr when standard output is not a terminal, it is too small, or the netlist has no motif.
+    /// Returns nullptr when standard output is not a terminal, it is too small, or the netlist has
+    /// no motif.
     static std::unique_ptr<Picture> start(Session& session);
     ~Picture();
-    /// Writes a line to standard error, in the terminal below the last picture; the next picture is drawn below it. [any]
+    /// Writes a line to standard error, in the terminal below the last picture; the next picture is
+    /// drawn below it. [any]
     void print_below(const std::string& line);
 
 private:

@@ -36,7 +36,9 @@ bool matches(const std::string& list, const std::string& name) {
 
 double real_of(hal_type type, std::uint64_t word) {
     if (type == HAL_TYPE_FLOAT) return std::bit_cast<double>(word);
-    return type == HAL_TYPE_S32 || type == HAL_TYPE_S64 ? static_cast<double>(static_cast<std::int64_t>(word)) : static_cast<double>(word);
+    return type == HAL_TYPE_S32 || type == HAL_TYPE_S64
+               ? static_cast<double>(static_cast<std::int64_t>(word))
+               : static_cast<double>(word);
 }
 
 /// A recorded value that the netlist computes itself.
@@ -44,8 +46,11 @@ struct Compared {
     std::string name;
     const mcap::Table* table;
     std::size_t column;
-    std::size_t row = 0, rows = 0;     // the next recorded row; compared so far
-    double worst = 0, recorded = 0, replayed = 0;
+    std::size_t row = 0;
+    std::size_t rows = 0;     // the next recorded row; compared so far
+    double worst = 0;
+    double recorded = 0;
+    double replayed = 0;
     std::int64_t at_ns = 0;
 };
 
@@ -56,28 +61,40 @@ public:
 
     /// Connects the player to what has no writer. Returns the exit status.
     int connect(const std::string& file) {
-        std::vector<std::vector<std::string>> commands{{"loadrt", "playback", "names=" + std::string(player), "file=" + file}};
-        if (const std::string unknown = unknown_name(); !unknown.empty()) return fail(options_, unknown);
+        std::vector<std::vector<std::string>> commands{
+            {"loadrt", "playback", "names=" + std::string(player), "file=" + file}};
+        if (const std::string unknown = unknown_name(); !unknown.empty()) {
+            return fail(options_, unknown);
+        }
         if (file.ends_with(".csv")) {
             std::string problem;
             const std::string types = take_types(problem);
             if (!problem.empty()) return fail(options_, problem);
-            if (!types.empty()) commands[0].push_back("types=" + types);
+            if (!types.empty()) {
+                commands[0].push_back("types=" + types);
+            }
         }
         {
             const auto lock = machine_.session.lock();
             const Model& model = machine_.session.model();
             if (model.threads.empty()) return fail(options_, "the netlist has no thread");
             const std::string thread = thread_name(model);
-            if (thread.empty()) return fail(options_, fmt::format("unknown thread '{}'", options_.thread));
+            if (thread.empty()) {
+                return fail(options_, fmt::format("unknown thread '{}'", options_.thread));
+            }
             commands.push_back({"addf", std::string(player) + ".update", thread, "1"});
-            for (const mcap::Table& table : recording_.tables)
-                for (std::size_t c = 0; c < table.columns.size(); ++c) use(model, table, c, commands);
+            for (const mcap::Table& table : recording_.tables) {
+                for (std::size_t c = 0; c < table.columns.size(); ++c) {
+                    use(model, table, c, commands);
+                }
+            }
         }
-        if (driven_.empty())
+        if (driven_.empty()) {
             return fail(options_,
-                        "nothing of the recording is an input of the netlist: no value in it is a signal without a writer, or an input pin "
+                        "nothing of the recording is an input of the netlist: no value in it is a "
+                        "signal without a writer, or an input pin "
                         "without a signal");
+        }
         ProcessOutput output;
         return machine_.shell.execute(commands, output, "<replay>");
     }
@@ -85,7 +102,9 @@ public:
     /// Runs the netlist over the recording and compares.
     int run() {
         std::vector<std::string> names;
-        for (const Compared& one : compared_) names.push_back(one.name);
+        for (const Compared& one : compared_) {
+            names.push_back(one.name);
+        }
         std::shared_ptr<LiveProbe> probe;
         if (!names.empty()) {
             const auto lock = machine_.session.lock();
@@ -96,14 +115,19 @@ public:
         }
         machine_.start_threads();
         const std::int64_t all_ns = recording_.end_ns() - recording_.begin_ns();
-        const std::int64_t wanted_ns = options_.for_ns < 0 ? all_ns : std::min(options_.for_ns, all_ns);
+        const std::int64_t wanted_ns =
+            options_.for_ns < 0 ? all_ns : std::min(options_.for_ns, all_ns);
         constexpr std::int64_t step_ns = 200'000'000;
-        for (std::int64_t left_ns = wanted_ns + period_ns_; left_ns > 0 && !machine_.stop.requested(); left_ns -= step_ns) {
+        for (std::int64_t left_ns = wanted_ns + period_ns_;
+             left_ns > 0 && !machine_.stop.requested(); left_ns -= step_ns) {
             machine_.advance(std::min(step_ns, left_ns), 0);
             replayed_ns_ = std::min(wanted_ns, wanted_ns - left_ns + step_ns);
             if (!probe) continue;
             const auto lock = machine_.session.lock();
-            for (const ProbeRows& rows : machine_.session.probes().take(*probe, std::size_t{1} << 28)) compare(rows, wanted_ns);
+            for (const ProbeRows& rows :
+                 machine_.session.probes().take(*probe, std::size_t{1} << 28)) {
+                compare(rows, wanted_ns);
+            }
         }
         return machine_.faulted() || machine_.stop.requested() ? 1 : 0;
     }
@@ -111,35 +135,51 @@ public:
     /// Prints the result. Returns the exit status.
     int report(int status) {
         std::size_t width = 0;
-        for (const Compared& one : compared_) width = std::max(width, one.name.size());
+        for (const Compared& one : compared_) {
+            width = std::max(width, one.name.size());
+        }
         std::string text;
-        std::size_t different = 0, rows = 0;
+        std::size_t different = 0;
+        std::size_t rows = 0;
         for (const Compared& one : compared_) {
             const bool differs = options_.tolerance >= 0 && !(one.worst <= options_.tolerance);
             different += differs;
             rows += one.rows;
             if (options_.quiet && !differs) continue;
-            if (one.rows == 0) text += fmt::format("{:{}}  no row at the same time\n", one.name, width);
-            else if (one.worst == 0) text += fmt::format("{:{}}  equal in {}\n", one.name, width, counted(one.rows, "row"));
-            else
-                text += fmt::format("{:{}}  differs by up to {:.6g}: {:.6g} instead of {:.6g} at {:.6f} s\n", one.name, width, one.worst,
-                                    one.replayed, one.recorded, static_cast<double>(one.at_ns) * 1e-9);
+            if (one.rows == 0) {
+                text += fmt::format("{:{}}  no row at the same time\n", one.name, width);
+            } else if (one.worst == 0) {
+                text +=
+                    fmt::format("{:{}}  equal in {}\n", one.name, width, counted(one.rows, "row"));
+            } else {
+                text += fmt::format(
+                    "{:{}}  differs by up to {:.6g}: {:.6g} instead of {:.6g} at {:.6f} s\n",
+                    one.name, width, one.worst, one.replayed, one.recorded,
+                    static_cast<double>(one.at_ns) * 1e-9);
+            }
         }
-        const double seconds = static_cast<double>(recording_.end_ns() - recording_.begin_ns()) * 1e-9;
-        const double wanted = options_.for_ns < 0 ? seconds : std::min(seconds, static_cast<double>(options_.for_ns) * 1e-9);
+        const double seconds =
+            static_cast<double>(recording_.end_ns() - recording_.begin_ns()) * 1e-9;
+        const double wanted = options_.for_ns < 0
+                                  ? seconds
+                                  : std::min(seconds, static_cast<double>(options_.for_ns) * 1e-9);
         const double replayed = static_cast<double>(replayed_ns_) * 1e-9;
         const bool nothing = options_.tolerance >= 0 && rows == 0;  // a test that tests nothing
-        if (!options_.quiet || different != 0 || nothing)
-            text += fmt::format("{} s of recording: {} driven, {} compared{}\n",
-                                machine_.stop.requested() ? fmt::format("interrupted after {:.6g} s of {:.6g}", replayed, wanted)
-                                                          : fmt::format("{:.6g}", wanted),
-                                counted(driven_.size(), "input"), counted(compared_.size(), "value"),
-                                options_.tolerance < 0 ? ""
-                                : nothing              ? ": nothing was tested; record values that the netlist computes too"
-                                : different == 0
-                                    ? ", none differs"
-                                    : fmt::format(", {} by more than {:g}",
-                                                  different == 1 ? "1 differs" : fmt::format("{} differ", different), options_.tolerance));
+        if (!options_.quiet || different != 0 || nothing) {
+            text += fmt::format(
+                "{} s of recording: {} driven, {} compared{}\n",
+                machine_.stop.requested()
+                    ? fmt::format("interrupted after {:.6g} s of {:.6g}", replayed, wanted)
+                    : fmt::format("{:.6g}", wanted),
+                counted(driven_.size(), "input"), counted(compared_.size(), "value"),
+                options_.tolerance < 0 ? ""
+                : nothing ? ": nothing was tested; record values that the netlist computes too"
+                : different == 0 ? ", none differs"
+                                 : fmt::format(", {} by more than {:g}",
+                                               different == 1 ? "1 differs"
+                                                              : fmt::format("{} differ", different),
+                                               options_.tolerance));
+        }
         if (!print(text)) return 1;
         return different != 0 || nothing ? 1 : status;
     }
@@ -148,17 +188,25 @@ private:
     /// States which name or pattern of --names the recording does not have; "" when it has all.
     std::string unknown_name() const {
         std::vector<std::string> names;
-        for (const mcap::Table& table : recording_.tables)
-            for (const mcap::Column& column : table.columns) names.push_back(column.name);
+        for (const mcap::Table& table : recording_.tables) {
+            for (const mcap::Column& column : table.columns) {
+                names.push_back(column.name);
+            }
+        }
         for (const std::string& one : names_in({options_.names})) {
-            if (std::any_of(names.begin(), names.end(), [&](const std::string& name) { return matches(one, name); })) continue;
+            if (std::any_of(names.begin(), names.end(),
+                            [&](const std::string& name) { return matches(one, name); })) {
+                continue;
+            }
             const std::string hint = suggestion(one, names, "it has");
-            return fmt::format("--names: the recording has no value '{}'{}", one, hint.empty() ? "" : "; " + hint);
+            return fmt::format("--names: the recording has no value '{}'{}", one,
+                               hint.empty() ? "" : "; " + hint);
         }
         return "";
     }
 
-    /// A table has no types: its values get those that the netlist has. Returns them as playback's argument.
+    /// A table has no types: its values get those that the netlist has. Returns them as playback's
+    /// argument.
     std::string take_types(std::string& problem) {
         mcap::LoadOptions options;
         std::string text;
@@ -169,13 +217,18 @@ private:
                 const Pin* const pin = model.find_pin(column.name);
                 const Signal* const signal = pin ? nullptr : model.find_signal(column.name);
                 const hal_type type = pin ? pin->type : signal ? signal->type : HAL_TYPE_FLOAT;
-                if (type == HAL_TYPE_FLOAT || type == HAL_TYPE_PORT || !matches(options_.names, column.name)) continue;
+                if (type == HAL_TYPE_FLOAT || type == HAL_TYPE_PORT ||
+                    !matches(options_.names, column.name)) {
+                    continue;
+                }
                 options.types[column.name] = type;
                 text += (text.empty() ? "" : ",") + column.name + ":" + hal::name(type);
             }
         }
         mcap::Recording typed;
-        if (mcap::load(options_.words.front(), typed, problem, options)) recording_ = std::move(typed);
+        if (mcap::load(options_.words.front(), typed, problem, options)) {
+            recording_ = std::move(typed);
+        }
         return text;
     }
 
@@ -187,34 +240,50 @@ private:
         }
         for (const mcap::Table& table : recording_.tables) {
             const std::string topic = table.topic.starts_with("/hal/") ? table.topic.substr(5) : "";
-            const Thread* const own = model.find_thread(table.thread.empty() ? topic : table.thread);
-            if (!thread && own) thread = own;
+            const Thread* const own =
+                model.find_thread(table.thread.empty() ? topic : table.thread);
+            if (!thread && own) {
+                thread = own;
+            }
         }
-        if (!thread) thread = model.threads.front().get();
+        if (!thread) {
+            thread = model.threads.front().get();
+        }
         period_ns_ = thread->options.period_ns;
         return thread->name;
     }
 
-    void use(const Model& model, const mcap::Table& table, std::size_t c, std::vector<std::vector<std::string>>& commands) {
+    void use(const Model& model, const mcap::Table& table, std::size_t c,
+             std::vector<std::vector<std::string>>& commands) {
         const mcap::Column& column = table.columns[c];
         if (!matches(options_.names, column.name)) return;
         const Pin* const pin = model.find_pin(column.name);
         const Signal* const signal = pin ? pin->signal : model.find_signal(column.name);
-        if ((!pin && !signal) || (pin && (pin->of_thread || pin->function))) return;  // times are never the same
+        // times are never the same
+        if ((!pin && !signal) || (pin && (pin->of_thread || pin->function))) return;
         const std::string source = fmt::format("{}.{}", player, column.name);
         const bool parameter = pin && pin->dir == HAL_DIR_PARAM;
         if (signal && !signal->writer && signal->ios == 0) {
-            if (driven_.insert(signal->name).second) commands.push_back({"net", signal->name, source});
+            if (driven_.insert(signal->name).second) {
+                commands.push_back({"net", signal->name, source});
+            }
         } else if (!signal && pin->dir == HAL_DIR_IN) {
-            if (driven_.insert(pin->name).second) commands.push_back({"net", fmt::format("{}:{}", player, pin->name), source, pin->name});
-        } else if (!parameter && !driven_.contains(signal ? signal->name : pin->name) && seen_.insert(column.name).second) {
+            if (driven_.insert(pin->name).second) {
+                commands.push_back(
+                    {"net", fmt::format("{}:{}", player, pin->name), source, pin->name});
+            }
+        } else if (!parameter && !driven_.contains(signal ? signal->name : pin->name) &&
+                   seen_.insert(column.name).second) {
             compared_.push_back({column.name, &table, c});
         }
     }
 
-    // Both times count from the first row. A recorded row is compared with the row of the same time.
+    // Both times count from the first row. A recorded row is compared with the row of the same
+    // time.
     void compare(const ProbeRows& rows, std::int64_t wanted_ns) {
-        if (rows.layout) layout_ = *rows.layout;
+        if (rows.layout) {
+            layout_ = *rows.layout;
+        }
         std::size_t at = 0;
         for (const auto& part : rows.parts) {
             const auto& columns = layout_.groups[part.group].columns;
@@ -222,25 +291,34 @@ private:
             for (std::size_t i = 0; i < part.rows; ++i, at += words * 8) {
                 std::vector<std::uint64_t> row(words);
                 std::memcpy(row.data(), rows.bytes.data() + at, words * 8);
-                if (begin_ns_ < 0) begin_ns_ = static_cast<std::int64_t>(row[1]);
+                if (begin_ns_ < 0) {
+                    begin_ns_ = static_cast<std::int64_t>(row[1]);
+                }
                 const std::int64_t time_ns = static_cast<std::int64_t>(row[1]) - begin_ns_;
                 if (time_ns > wanted_ns) continue;
-                for (std::size_t k = 0; k < columns.size(); ++k) compare(compared_[columns[k]], time_ns, row[k + 2]);
+                for (std::size_t k = 0; k < columns.size(); ++k) {
+                    compare(compared_[columns[k]], time_ns, row[k + 2]);
+                }
             }
         }
     }
 
     void compare(Compared& one, std::int64_t time_ns, std::uint64_t word) const {
         const auto& times = one.table->times_ns;
-        while (one.row < times.size() && times[one.row] - recording_.begin_ns() < time_ns) ++one.row;
+        while (one.row < times.size() && times[one.row] - recording_.begin_ns() < time_ns) {
+            ++one.row;
+        }
         if (one.row >= times.size() || times[one.row] - recording_.begin_ns() != time_ns) return;
         const hal_type type = one.table->columns[one.column].type;
-        const double recorded = one.table->real(one.row, one.column), replayed = real_of(type, word);
+        const double recorded = one.table->real(one.row, one.column);
+
+        const double replayed = real_of(type, word);
         ++one.rows;
         const bool no_number = std::isnan(recorded) != std::isnan(replayed);
-        const double apart = no_number                                      ? std::numeric_limits<double>::infinity()
-                             : recorded == replayed || std::isnan(recorded) ? 0
-                                                                            : std::abs(recorded - replayed);
+        const double apart = no_number ? std::numeric_limits<double>::infinity()
+                             : recorded == replayed || std::isnan(recorded)
+                                 ? 0
+                                 : std::abs(recorded - replayed);
         if (apart <= one.worst) return;
         one.worst = apart;
         one.recorded = recorded;
@@ -254,7 +332,9 @@ private:
     std::set<std::string> driven_, seen_;
     std::vector<Compared> compared_;
     ProbeLayout layout_;
-    std::int64_t begin_ns_ = -1, period_ns_ = 0, replayed_ns_ = 0;
+    std::int64_t begin_ns_ = -1;
+    std::int64_t period_ns_ = 0;
+    std::int64_t replayed_ns_ = 0;
 };
 
 }  // namespace
@@ -265,10 +345,13 @@ int run_replay(const ReplayOptions& options) {
     mcap::Recording recording;
     std::string problem;
     if (!mcap::load(options.words.front(), recording, problem)) return fail(options, problem);
-    for (const std::string& note : recording.notes()) write_all(STDERR_FILENO, fmt::format("{}: {}\n", options.program, note));
-    if (recording.tables.empty())
-        return fail(options,
-                    fmt::format("'{}' has no rows{}", options.words.front(), recording.unread.empty() ? "" : "; " + recording.unread));
+    for (const std::string& note : recording.notes()) {
+        write_all(STDERR_FILENO, fmt::format("{}: {}\n", options.program, note));
+    }
+    if (recording.tables.empty()) {
+        return fail(options, fmt::format("'{}' has no rows{}", options.words.front(),
+                                         recording.unread.empty() ? "" : "; " + recording.unread));
+    }
     ReplayOptions netlists = options;
     netlists.words.erase(netlists.words.begin());
     HostedMachine machine(netlists, fmt::format("replay-{}", ::getpid()), true);

@@ -16,12 +16,17 @@ struct ReplayOptions : NetlistOptions {
     bool quiet = false;
 
     void declare(OptionSet& set) override {
-        set.words("FILE NETLIST", "a recording (.mcap or .csv), then netlists that have values of the same names");
+        set.words("FILE NETLIST",
+                  "a recording (.mcap or .csv), then netlists that have values of the same names");
         set.duration("--for", for_ns, "replay this much (default: all)", 1);
-        set.value("--tolerance", tolerance, "X", "end with status 1 when a value differs from the recording by more than X").not_negative();
-        set.value("--names", names, "NAMES", "use only these values of the recording: patterns separated by commas");
+        set.value("--tolerance", tolerance, "X",
+                  "end with status 1 when a value differs from the recording by more than X")
+            .not_negative();
+        set.value("--names", names, "NAMES",
+                  "use only these values of the recording: patterns separated by commas");
         set.value("--thread", thread, "THREAD",
-                  "the thread that plays the recording (default: the one that was recorded, else the fastest)");
+                  "the thread that plays the recording (default: the one that was recorded, else "
+                  "the fastest)");
         set.flag("-q,--quiet", quiet, "print only values that differ by more than the tolerance");
         declare_netlists(set);
     }

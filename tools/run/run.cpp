@@ -21,15 +21,18 @@ namespace hal::tools {
 
 namespace {
 
-/// LinuxCNC's halrun: only what the commands print; threads start at the netlist's `start`; ends after the files unless
-/// the user types.
+/// LinuxCNC's halrun: only what the commands print; threads start at the netlist's `start`; ends
+/// after the files unless the user types.
 int run_classic(HostedMachine& machine, const RunOptions& options) {
     const int status = machine.load();
     if ((status != 0 && !options.keep_going) || machine.stop.requested()) return status;
     const bool converses = options.interactive || options.words.empty();
     int said = 0;
-    if (options.tcl) said = machine.run_script("", {}, Pass::both);
-    else if (converses) said = machine.converse({"halcmd: ", "halcmd+: "});
+    if (options.tcl) {
+        said = machine.run_script("", {}, Pass::both);
+    } else if (converses) {
+        said = machine.converse({"halcmd: ", "halcmd+: "});
+    }
     return std::max({status, said, machine.faulted() ? 1 : 0});
 }
 
@@ -39,25 +42,30 @@ std::string end_reason(int signal) {
     return name ? fmt::format("ended by SIG{}\n", name) : "";
 }
 
-/// Opens the device of --watchdog, or that of a service manager with a watchdog. Returns false after printing the error.
+/// Opens the device of --watchdog, or that of a service manager with a watchdog. Returns false
+/// after printing the error.
 bool attach_watchdog(HostedMachine& machine, const RunOptions& options, ServiceNotifier& service) {
     if (options.watchdog.empty() && !service.watchdog()) return true;
     const char* const name = service.watchdog() ? "WatchdogSec= of the service" : "--watchdog";
     const auto lock = machine.session.lock();
     std::string problem, device = options.watchdog;
-    if (machine.session.model().threads.empty())
-        problem = fmt::format("{} needs a thread whose progress feeds the {}; the netlist has none", name, service.watchdog() ? "watchdog" : "device");
-    else if (service.watchdog() && !device.empty())
+    if (machine.session.model().threads.empty()) {
+        problem = fmt::format("{} needs a thread whose progress feeds the {}; the netlist has none",
+                              name, service.watchdog() ? "watchdog" : "device");
+    } else if (service.watchdog() && !device.empty()) {
         problem = "--watchdog and WatchdogSec= of the service exclude each other; leave one out";
-    else if (service.watchdog())
+    } else if (service.watchdog()) {
         device = service.watchdog_device(problem);
+    }
     if (problem.empty() && machine.session.threads().attach_watchdog(device, problem)) return true;
     fail(options, problem);
     return false;
 }
 
-int run_plain(HostedMachine& machine, const RunOptions& options, std::vector<NodeLine> nodes, ServiceNotifier& service) {
-    int status = options.part.empty() ? machine.load() : load_node(machine, options, std::move(nodes));
+int run_plain(HostedMachine& machine, const RunOptions& options, std::vector<NodeLine> nodes,
+              ServiceNotifier& service) {
+    int status =
+        options.part.empty() ? machine.load() : load_node(machine, options, std::move(nodes));
     if ((status != 0 && !options.keep_going) || machine.stop.requested()) return status;
     if (!attach_watchdog(machine, options, service)) return 1;
     machine.start_threads();
@@ -68,24 +76,32 @@ int run_plain(HostedMachine& machine, const RunOptions& options, std::vector<Nod
         const FaultLines faults(machine.session);
         status = std::max(status, machine.converse({"hal> ", "hal+> "}));
     } else {
-        print(fmt::format("{}; in another terminal: hal shell{}\n", options.for_ns >= 0 ? "running" : "running until Ctrl-C",
+        print(fmt::format("{}; in another terminal: hal shell{}\n",
+                          options.for_ns >= 0 ? "running" : "running until Ctrl-C",
                           name == "default" ? "" : " --name " + name));
         const auto picture = options.no_picture ? nullptr : Picture::start(machine.session);
         const FaultLines faults(machine.session, [&picture](const std::string& line) {
-            if (picture) picture->print_below(line);
-            else write_all(STDERR_FILENO, line);
+            if (picture) {
+                picture->print_below(line);
+            } else {
+                write_all(STDERR_FILENO, line);
+            }
         });
         machine.stop.wait_ns(options.for_ns);
     }
     const bool faulted = machine.faulted();
     service.stopping();
-    const std::string report = timing_report(machine.session);  // the threads take their figures with them
+    // the threads take their figures with them
+    const std::string report = timing_report(machine.session);
     machine.shut_down();
     print("\n" + end_reason(machine.stop.signal()) + report);
     if (!options.watchdog.empty() && !machine.session.threads().watchdog_disarmed()) {
         const std::string& problem = machine.session.threads().watchdog_problem();
-        const std::string reason = problem.empty() ? " was not disarmed, because a thread does not end" : " cannot be disarmed: " + problem;
-        status = fail(options, options.watchdog + reason + "; it resets this host after its timeout");
+        const std::string reason = problem.empty()
+                                       ? " was not disarmed, because a thread does not end"
+                                       : " cannot be disarmed: " + problem;
+        status =
+            fail(options, options.watchdog + reason + "; it resets this host after its timeout");
     }
     return faulted ? 1 : status;
 }
@@ -93,20 +109,26 @@ int run_plain(HostedMachine& machine, const RunOptions& options, std::vector<Nod
 }  // namespace
 
 int run_run(const RunOptions& options) {
-    if (options.words.empty() && !options.interactive && !options.classic)
+    if (options.words.empty() && !options.interactive && !options.classic) {
         return fail(options, "missing netlist; type: hal run FILE.hal, or hal run -I");
-    if (!options.dds.empty() && options.part.empty())
+    }
+    if (!options.dds.empty() && options.part.empty()) {
         return fail(options,
-                    "--dds applies to nodes of a netlist for several machines: add --node NAME; dds_publish and dds_subscribe take " +
+                    "--dds applies to nodes of a netlist for several machines: add --node NAME; "
+                    "dds_publish and dds_subscribe take " +
                         options.dds + " themselves");
-    if (options.interactive && options.for_ns >= 0) return fail(options, "-I and --for exclude each other; leave one out");
+    }
+    if (options.interactive && options.for_ns >= 0) {
+        return fail(options, "-I and --for exclude each other; leave one out");
+    }
     const auto nodes = requested_nodes(options);
     if (!nodes) return 1;
     ServiceNotifier service;  // before there are other threads, because it changes the environment
     HostedMachine machine(options, own_name(options), false);
     machine.stop_at_once();
     if (!machine.serve(true)) return 1;
-    return options.classic ? run_classic(machine, options) : run_plain(machine, options, *nodes, service);
+    return options.classic ? run_classic(machine, options)
+                           : run_plain(machine, options, *nodes, service);
 }
 
 }  // namespace hal::tools

@@ -11,20 +11,27 @@ namespace hal::tools {
 struct RunOptions : NetlistOptions {
     std::int64_t for_ns = -1;  ///< -1: not given
     std::string watchdog;      ///< a device of the Linux watchdog API
-    std::string dds;           ///< arguments of the DDS participant: "interfaces=10.0.0.1 domain=3"
-    bool interactive = false, no_picture = false;
-    bool tcl = false;          ///< halrun -T: reads lines of Tcl after the files
+    std::string dds;  ///< arguments of the DDS participant: "interfaces=10.0.0.1 domain=3"
+    bool interactive = false;
+    bool no_picture = false;
+    bool tcl = false;  ///< halrun -T: reads lines of Tcl after the files
 
     void declare(OptionSet& set) override {
         set.words("FILE", "netlists (.hal or .tcl), or an INI file with [HAL]HALFILE", false);
-        set.flag("-I,--interactive", interactive, "open the shell after loading; leaving it ends the run");
+        set.flag("-I,--interactive", interactive,
+                 "open the shell after loading; leaving it ends the run");
         set.for_how_long(for_ns, "stop after 10s, 250ms, 2min …; default: run until Ctrl-C");
-        set.value("-N,--name", name, "NAME", "name of this instance, when several run on one machine (default: default)");
+        set.value("-N,--name", name, "NAME",
+                  "name of this instance, when several run on one machine (default: default)");
         declare_netlists(set);
-        set.value("--watchdog", watchdog, "DEVICE", "write to this device (/dev/watchdog) while every thread makes progress");
+        set.value("--watchdog", watchdog, "DEVICE",
+                  "write to this device (/dev/watchdog) while every thread makes progress");
         set.flag("--no-picture", no_picture, "no live picture in the terminal");
-        set.value("--node", part, "NAME", "load the part of this node of a netlist for several machines");
-        set.value("--dds", dds, "SETTINGS", "DDS discovery: interfaces=ADDRESS domain=N peers=… (default: this machine only)");
+        set.value("--node", part, "NAME",
+                  "load the part of this node of a netlist for several machines");
+        set.value(
+            "--dds", dds, "SETTINGS",
+            "DDS discovery: interfaces=ADDRESS domain=N peers=… (default: this machine only)");
     }
 };
 

@@ -32,15 +32,21 @@ std::int64_t now_us() {
 }  // namespace
 
 ServiceNotifier::ServiceNotifier() : socket_(take("NOTIFY_SOCKET")) {
-    if (socket_.size() >= sizeof sockaddr_un{}.sun_path || (!socket_.empty() && socket_[0] != '/' && socket_[0] != '@')) socket_.clear();
-    const std::string timeout = take("WATCHDOG_USEC"), process = take("WATCHDOG_PID");
-    if (process.empty() || std::strtol(process.c_str(), nullptr, 10) == ::getpid())
+    if (socket_.size() >= sizeof sockaddr_un{}.sun_path ||
+        (!socket_.empty() && socket_[0] != '/' && socket_[0] != '@')) {
+        socket_.clear();
+    }
+    const std::string timeout = take("WATCHDOG_USEC");
+    const std::string process = take("WATCHDOG_PID");
+    if (process.empty() || std::strtol(process.c_str(), nullptr, 10) == ::getpid()) {
         watchdog_us_ = std::strtoll(timeout.c_str(), nullptr, 10);
+    }
 }
 
 ServiceNotifier::~ServiceNotifier() {
     if (!forwarder_.joinable()) return;
-    // The supervisor of a hung thread may still have the pipe open: its end alone would not end the forwarder.
+    // The supervisor of a hung thread may still have the pipe open: its end alone would not end the
+    // forwarder.
     [[maybe_unused]] const auto written = ::write(pipe_, "V", 1);
     ::close(pipe_);
     forwarder_.join();
@@ -51,21 +57,26 @@ void ServiceNotifier::send(const std::string& lines) const {
     sockaddr_un to{};
     to.sun_family = AF_UNIX;
     std::memcpy(to.sun_path, socket_.data(), socket_.size());
-    if (socket_[0] == '@') to.sun_path[0] = '\0';  // abstract
+    if (socket_[0] == '@') {
+        to.sun_path[0] = '\0';  // abstract
+    }
     const int descriptor = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
     if (descriptor < 0) return;
-    const timeval limit{1, 0};  // a service manager that does not read delays a machine no longer than that
+    // a service manager that does not read delays a machine no longer than that
+    const timeval limit{1, 0};
     ::setsockopt(descriptor, SOL_SOCKET, SO_SNDTIMEO, &limit, sizeof limit);
     const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + socket_.size());
     [[maybe_unused]] const auto sent =
-        ::sendto(descriptor, lines.data(), lines.size(), MSG_NOSIGNAL, reinterpret_cast<const sockaddr*>(&to), size);
+        ::sendto(descriptor, lines.data(), lines.size(), MSG_NOSIGNAL,
+                 reinterpret_cast<const sockaddr*>(&to), size);
     ::close(descriptor);
 }
 
 std::string ServiceNotifier::watchdog_device(std::string& problem) {
     int ends[2];
     if (::pipe2(ends, O_CLOEXEC) != 0) {
-        problem = fmt::format("cannot create a pipe for the watchdog of the service manager: {}", std::strerror(errno));
+        problem = fmt::format("cannot create a pipe for the watchdog of the service manager: {}",
+                              std::strerror(errno));
         return {};
     }
     pipe_ = ends[1];
@@ -76,7 +87,8 @@ std::string ServiceNotifier::watchdog_device(std::string& problem) {
 void ServiceNotifier::forward(int from) const {
     std::int64_t sent_us = 0;
     char signs[64];
-    for (ssize_t count = 0; (count = ::read(from, signs, sizeof signs)) > 0 || (count < 0 && errno == EINTR);) {
+    for (ssize_t count = 0;
+         (count = ::read(from, signs, sizeof signs)) > 0 || (count < 0 && errno == EINTR);) {
         if (count > 0 && std::memchr(signs, 'V', static_cast<std::size_t>(count))) break;
         const std::int64_t now = now_us();
         if (count <= 0 || (sent_us != 0 && now - sent_us < watchdog_us_ / 4)) continue;

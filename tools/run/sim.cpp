@@ -28,20 +28,32 @@ struct Shown {
 bool add_named(Session& session, const std::string& name, std::vector<Shown>& all) {
     const Model& model = session.model();
     const auto add_pin = [&](std::string_view own, const Pin* pin) {
-        all.push_back({std::string(own), format_value(pin->type, session.values().read_pins({pin})[0])});
+        all.push_back(
+            {std::string(own), format_value(pin->type, session.values().read_pins({pin})[0])});
     };
     const auto add_signal = [&](std::string_view own, const Signal* signal) {
-        all.push_back({std::string(own), format_value(signal->type, session.values().read_signals({signal})[0])});
+        all.push_back({std::string(own),
+                       format_value(signal->type, session.values().read_signals({signal})[0])});
     };
     const std::size_t before = all.size();
-    if (const Pin* const pin = model.find_pin(name)) add_pin(name, pin);
-    else if (const Signal* const signal = model.find_signal(name)) add_signal(name, signal);
+    if (const Pin* const pin = model.find_pin(name)) {
+        add_pin(name, pin);
+    } else if (const Signal* const signal = model.find_signal(name)) {
+        add_signal(name, signal);
+    }
     if (all.size() != before) return true;
-    for (const auto& [own, pin] : model.pin)
-        if (::fnmatch(name.c_str(), std::string(own).c_str(), 0) == 0) add_pin(own, pin);
-    for (const auto& [own, signal] : model.signal)
-        if (::fnmatch(name.c_str(), std::string(own).c_str(), 0) == 0) add_signal(own, signal);
-    std::sort(all.begin() + static_cast<std::ptrdiff_t>(before), all.end(), [](const Shown& a, const Shown& b) { return a.name < b.name; });
+    for (const auto& [own, pin] : model.pin) {
+        if (::fnmatch(name.c_str(), std::string(own).c_str(), 0) == 0) {
+            add_pin(own, pin);
+        }
+    }
+    for (const auto& [own, signal] : model.signal) {
+        if (::fnmatch(name.c_str(), std::string(own).c_str(), 0) == 0) {
+            add_signal(own, signal);
+        }
+    }
+    std::sort(all.begin() + static_cast<std::ptrdiff_t>(before), all.end(),
+              [](const Shown& a, const Shown& b) { return a.name < b.name; });
     return all.size() != before;
 }
 
@@ -49,12 +61,15 @@ bool add_named(Session& session, const std::string& name, std::vector<Shown>& al
 
 std::vector<std::string> names_in(const std::vector<std::string>& lists) {
     std::vector<std::string> names;
-    for (const std::string& list : lists)
+    for (const std::string& list : lists) {
         for (std::size_t at = 0; at <= list.size();) {
             const std::size_t end = std::min(list.find(',', at), list.size());
-            if (end > at) names.push_back(list.substr(at, end - at));
+            if (end > at) {
+                names.push_back(list.substr(at, end - at));
+            }
             at = end + 1;
         }
+    }
     return names;
 }
 
@@ -64,42 +79,66 @@ int show_values(const SimOptions& options, Session& session) {
     for (const std::string& name : names_in(options.show)) {
         if (add_named(session, name, all)) continue;
         std::vector<std::string> names;
-        for (const auto& [own, pin] : session.model().pin) names.emplace_back(own);
-        for (const auto& [own, signal] : session.model().signal) names.emplace_back(own);
+        for (const auto& [own, pin] : session.model().pin) {
+            names.emplace_back(own);
+        }
+        for (const auto& [own, signal] : session.model().signal) {
+            names.emplace_back(own);
+        }
         const std::string hint = did_you_mean(name, names);
-        return fail(options, fmt::format("--show: unknown pin, parameter or signal '{}'{}", name, hint.empty() ? "" : "; " + hint));
+        return fail(options, fmt::format("--show: unknown pin, parameter or signal '{}'{}", name,
+                                         hint.empty() ? "" : "; " + hint));
     }
     std::size_t width = 0;
-    for (const Shown& one : all) width = std::max(width, one.name.size());
+    for (const Shown& one : all) {
+        width = std::max(width, one.name.size());
+    }
     std::string text;
-    for (const Shown& one : all) text += fmt::format("{:{}}  {}\n", one.name, width, one.value);
+    for (const Shown& one : all) {
+        text += fmt::format("{:{}}  {}\n", one.name, width, one.value);
+    }
     return print(text) ? 0 : 1;
 }
 
 std::string simulated_for(std::int64_t virtual_ns, std::chrono::steady_clock::duration wall) {
     if (virtual_ns <= 0) return "no time simulated: add --for 10s, or advance in the netlist";
-    const double wall_ns = std::max(1.0, static_cast<double>(std::chrono::nanoseconds(wall).count()));
+    const double wall_ns =
+        std::max(1.0, static_cast<double>(std::chrono::nanoseconds(wall).count()));
     const double ratio = static_cast<double>(virtual_ns) / wall_ns;
-    return fmt::format("simulated {} in {}, {:.{}f} times as fast as real time", format_duration(static_cast<double>(virtual_ns)),
-                       format_duration(wall_ns), ratio, ratio < 10 ? 2 : 0);
+    return fmt::format("simulated {} in {}, {:.{}f} times as fast as real time",
+                       format_duration(static_cast<double>(virtual_ns)), format_duration(wall_ns),
+                       ratio, ratio < 10 ? 2 : 0);
 }
 
-bool summary_wanted(const SimOptions& options, bool printed) { return !options.quiet && (!printed || ::isatty(STDERR_FILENO) != 0); }
+bool summary_wanted(const SimOptions& options, bool printed) {
+    return !options.quiet && (!printed || ::isatty(STDERR_FILENO) != 0);
+}
 
 int run_sim(const SimOptions& options) { return simulate(options, nullptr); }
 
 int simulate(const SimOptions& options, const SimRecorder* recorder) {
     const bool advance = options.for_ns >= 0 || options.cycles != 0;
-    if (!options.record.empty() && !advance) return fail(options, "--record needs --for TIME or --cycles N");
-    if (!options.values.empty() && options.record.empty()) return fail(options, "--values needs --record FILE");
-    if (!options.profile.empty() && options.record.empty()) return fail(options, "--profile needs --record FILE.mcap");
-    if (options.for_ns >= 0 && options.cycles != 0) return fail(options, "--for and --cycles exclude each other; leave one out");
+    if (!options.record.empty() && !advance) {
+        return fail(options, "--record needs --for TIME or --cycles N");
+    }
+    if (!options.values.empty() && options.record.empty()) {
+        return fail(options, "--values needs --record FILE");
+    }
+    if (!options.profile.empty() && options.record.empty()) {
+        return fail(options, "--profile needs --record FILE.mcap");
+    }
+    if (options.for_ns >= 0 && options.cycles != 0) {
+        return fail(options, "--for and --cycles exclude each other; leave one out");
+    }
     auto nodes = requested_nodes(options);
     if (!nodes) return 1;
-    if (!nodes->empty() && !options.record.empty()) return fail(options, "--record records one machine; add --node NAME");
+    if (!nodes->empty() && !options.record.empty()) {
+        return fail(options, "--record records one machine; add --node NAME");
+    }
     if (recorder && !options.record.empty() && recorder->check(options) != 0) return 1;
     if (!nodes->empty()) return sim_cell(options, std::move(*nodes));
-    HostedMachine machine(options, options.name.empty() ? fmt::format("sim-{}", ::getpid()) : options.name, true);
+    HostedMachine machine(
+        options, options.name.empty() ? fmt::format("sim-{}", ::getpid()) : options.name, true);
     if (!machine.serve(!options.name.empty())) return 1;
     TrackedOutput output;
     const auto begun = std::chrono::steady_clock::now();
@@ -107,18 +146,34 @@ int simulate(const SimOptions& options, const SimRecorder* recorder) {
     const bool loaded = status == 0;
     if (loaded && advance) {
         machine.start_threads();
-        if (recorder && !options.record.empty()) status = recorder->advance(options, machine);
-        else machine.advance(options.for_ns, options.cycles);
+        if (recorder && !options.record.empty()) {
+            status = recorder->advance(options, machine);
+        } else {
+            machine.advance(options.for_ns, options.cycles);
+        }
     }
     const auto wall = std::chrono::steady_clock::now() - begun;
-    for (const std::string& command : options.execute)
-        if (status == 0 && !machine.stop.requested()) status = machine.shell.execute(command, output, "<commandline>");
-    if (status == 0 && !options.show.empty()) status = show_values(options, machine.session);
-    if (loaded && status == 0) machine.shell.warn_when_nothing_ran(output);
-    if (machine.faulted() || machine.stop.requested()) status = 1;
-    if (options.report) write_all(STDERR_FILENO, timing_report(machine.session));
-    else if (loaded && summary_wanted(options, output.printed || !options.show.empty()))
-        write_all(STDERR_FILENO, simulated_summary(machine.session, simulated_for(machine.session.threads().now_ns(), wall)));
+    for (const std::string& command : options.execute) {
+        if (status == 0 && !machine.stop.requested()) {
+            status = machine.shell.execute(command, output, "<commandline>");
+        }
+    }
+    if (status == 0 && !options.show.empty()) {
+        status = show_values(options, machine.session);
+    }
+    if (loaded && status == 0) {
+        machine.shell.warn_when_nothing_ran(output);
+    }
+    if (machine.faulted() || machine.stop.requested()) {
+        status = 1;
+    }
+    if (options.report) {
+        write_all(STDERR_FILENO, timing_report(machine.session));
+    } else if (loaded && summary_wanted(options, output.printed || !options.show.empty())) {
+        write_all(STDERR_FILENO,
+                  simulated_summary(machine.session,
+                                    simulated_for(machine.session.threads().now_ns(), wall)));
+    }
     return status;
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// From a stream of samples to records: pre-trigger, trigger, modes. Time is the samples' own, so that it works on recorded data too.
+// From a stream of samples to records: pre-trigger, trigger, modes. Time is the samples' own, so
+// that it works on recorded data too.
 #pragma once
 
 #include <cstdint>
@@ -12,18 +13,20 @@
 
 namespace hal::tools {
 
-/// automatic: free-running records when no trigger comes; normal: keeps the last record until the next trigger; single: one record, then stops;
-/// roll: no trigger, the newest samples.
+/// automatic: free-running records when no trigger comes; normal: keeps the last record until the
+/// next trigger; single: one record, then stops; roll: no trigger, the newest samples.
 enum class Mode { automatic, normal, single, roll };
 
-enum class State { stopped, filling, armed, triggered };  ///< filling: fewer samples than the time before the trigger
+/// filling: fewer samples than the time before the trigger
+enum class State { stopped, filling, armed, triggered };
 
 class Acquisition {
 public:
     /// Times before and after the trigger, in ns, together at least 1.
     Acquisition(std::vector<Channel> channels, std::int64_t pre_ns, std::int64_t post_ns);
 
-    void set_trigger(const std::optional<Trigger>& trigger);  ///< nothing: as in roll mode, records without a trigger
+    /// nothing: as in roll mode, records without a trigger
+    void set_trigger(const std::optional<Trigger>& trigger);
     void set_mode(Mode mode);
     void set_window(std::int64_t pre_ns, std::int64_t post_ns);
     void run();  ///< starts, or arms for the next single record
@@ -32,7 +35,8 @@ public:
 
     /// Takes a sample of a channel. The times of a channel increase.
     void feed(std::size_t channel, Sample sample);
-    /// No sample of any channel that was taken before `until_ns` will come: finishes what is complete.
+    /// No sample of any channel that was taken before `until_ns` will come: finishes what is
+    /// complete.
     void progress(std::int64_t until_ns);
     /// Samples were lost: an edge across the gap is not one.
     void gap();
@@ -65,9 +69,13 @@ private:
     State state_ = State::filling;
     std::optional<Trigger> trigger_;
     std::optional<TriggerSearch> search_;
-    std::int64_t first_ns_ = 0, until_ns_ = 0;  ///< first_ns_: of the first sample since the start or the last gap
-    std::int64_t armed_ns_ = 0, trigger_ns_ = 0;
-    bool any_ = false, forced_ = false;
+    /// first_ns_: of the first sample since the start or the last gap
+    std::int64_t first_ns_ = 0;
+    std::int64_t until_ns_ = 0;
+    std::int64_t armed_ns_ = 0;
+    std::int64_t trigger_ns_ = 0;
+    bool any_ = false;
+    bool forced_ = false;
     std::optional<Record> record_;
     std::uint64_t finished_ = 0;
 };

@@ -14,7 +14,8 @@ struct MeterOptions : Options {
 
     void declare(OptionSet& set) override {
         set.words("NAME", "pin, signal or parameter");
-        set.for_how_long(for_ns, "end after 10s …; default: until q in a terminal, else after the first value");
+        set.for_how_long(
+            for_ns, "end after 10s …; default: until q in a terminal, else after the first value");
         set.value("--name", name, "NAME", "instance");
     }
 };

@@ -12,7 +12,8 @@
 
 namespace hal::tools {
 
-enum class Edge { rising, falling, either, above, below };  ///< above, below: the state, not the edge
+/// above, below: the state, not the edge
+enum class Edge { rising, falling, either, above, below };
 
 struct Trigger {
     std::size_t source = 0;  ///< channel
@@ -21,7 +22,8 @@ struct Trigger {
     bool magnitude = false;  ///< of the absolute value
 };
 
-/// A trigger as written: "x-error > 0.1", "|x-error| > 0.1", "level x-error > 0.1", "x-error <> 0" (either edge), "estop" or "!estop" (a bit).
+/// A trigger as written: "x-error > 0.1", "|x-error| > 0.1", "level x-error > 0.1", "x-error <> 0"
+/// (either edge), "estop" or "!estop" (a bit).
 struct TriggerText {
     std::string name;
     Trigger trigger;  ///< without the source
@@ -40,8 +42,8 @@ class TriggerSearch {
 public:
     TriggerSearch(const Trigger& trigger, bool bit) : trigger_(trigger), bit_(bit) {}
 
-    /// Takes the next sample. Returns the time at which the trigger fired: for an edge between two samples interpolated, for a bit and a state
-    /// the time of the sample.
+    /// Takes the next sample. Returns the time at which the trigger fired: for an edge between two
+    /// samples interpolated, for a bit and a state the time of the sample.
     std::optional<std::int64_t> feed(Sample sample);
     /// Forgets edges in progress; the range seen so far stays.
     void rearm();
@@ -51,9 +53,11 @@ public:
 private:
     Trigger trigger_;
     bool bit_;
-    bool below_ = false, above_ = false;  ///< armed for a rising, a falling edge
+    bool below_ = false;
+    bool above_ = false;  ///< armed for a rising, a falling edge
     std::optional<Sample> last_;
-    double least_ = 1, most_ = -1;
+    double least_ = 1;
+    double most_ = -1;
 };
 
 }  // namespace hal::tools

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The scope's picture in the terminal and what its keys change. Knows no terminal: tests give it keys and read its lines.
+// The scope's picture in the terminal and what its keys change. Knows no terminal: tests give it
+// keys and read its lines.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +13,8 @@
 
 namespace hal::tools {
 
-constexpr int divisions_x = 10, divisions_y = 8;
+constexpr int divisions_x = 10;
+constexpr int divisions_y = 8;
 
 /// How a channel is drawn.
 struct ChannelView {
@@ -23,12 +25,14 @@ struct ChannelView {
 
 class ScopeView {
 public:
-    /// Changes the acquisition by its keys. `colour` false: one colour, channels are marked by numbers only.
+    /// Changes the acquisition by its keys. `colour` false: one colour, channels are marked by
+    /// numbers only.
     ScopeView(Acquisition& acquisition, bool unicode, bool colour);
 
     enum class Action { none, quit, save };
     Action key(const Key& key);
-    /// Draws columns x rows characters; at least 40 x 10, otherwise one line that asks for more. `lost`: samples.
+    /// Draws columns x rows characters; at least 40 x 10, otherwise one line that asks for more.
+    /// `lost`: samples.
     std::vector<std::string> frame(std::size_t columns, std::size_t rows, std::uint64_t lost = 0);
     /// Shows a sentence below the picture until the next key.
     void say(std::string sentence) { message_ = std::move(sentence); }
@@ -40,7 +44,8 @@ public:
 
     const std::vector<ChannelView>& traces() const { return traces_; }
     std::size_t selected() const { return selected_; }
-    /// Returns the record that is drawn: the newest one of a trigger, or the newest samples before the first record and in roll mode.
+    /// Returns the record that is drawn: the newest one of a trigger, or the newest samples before
+    /// the first record and in roll mode.
     Record shown() const;
     struct Cursors {
         bool on = false;
@@ -70,7 +75,9 @@ private:
     std::vector<ChannelView> traces_;
     std::size_t selected_ = 0;
     Cursors cursors_;
-    bool measures_ = true, help_ = false, fitted_ = false;
+    bool measures_ = true;
+    bool help_ = false;
+    bool fitted_ = false;
     std::string message_;
 };
 

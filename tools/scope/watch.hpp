@@ -16,7 +16,8 @@ struct WatchOptions : Options {
     void declare(OptionSet& set) override {
         set.words("NAME", "pins, signals or parameters; or patterns with * ? [ ]");
         set.for_how_long(for_ns, "end after 10s …; default: until q in a terminal, else 1s");
-        set.flag("--once", once, "print the table at the end (the default when the output is not a terminal)");
+        set.flag("--once", once,
+                 "print the table at the end (the default when the output is not a terminal)");
         set.value("--name", name, "NAME", "instance");
     }
 };

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What tclsh executes before a netlist. The variables halcyon::requests, answers, pass and commands are set before it.
+// What tclsh executes before a netlist. The variables halcyon::requests, answers, pass and commands
+// are set before it.
 #pragma once
 
 namespace hal::tools {

@@ -13,34 +13,89 @@ namespace trace {
 constexpr unsigned packet = 1;
 }
 namespace packet {
-constexpr unsigned ftrace_events = 1, clock_snapshot = 6, timestamp = 8, sequence = 10, track_event = 11, interned_data = 12,
-                   sequence_flags = 13, timestamp_clock = 58, defaults = 59, track_descriptor = 60;
-}
+constexpr unsigned ftrace_events = 1;
+constexpr unsigned clock_snapshot = 6;
+constexpr unsigned timestamp = 8;
+constexpr unsigned sequence = 10;
+
+constexpr unsigned track_event = 11;
+constexpr unsigned interned_data = 12;
+constexpr unsigned sequence_flags = 13;
+constexpr unsigned timestamp_clock = 58;
+
+constexpr unsigned defaults = 59;
+constexpr unsigned track_descriptor = 60;
+}  // namespace packet
 namespace snapshot {
-constexpr unsigned clocks = 1, primary = 2, clock_id = 1, clock_timestamp = 2;
-}
+constexpr unsigned clocks = 1;
+constexpr unsigned primary = 2;
+constexpr unsigned clock_id = 1;
+constexpr unsigned clock_timestamp = 2;
+}  // namespace snapshot
 namespace descriptor {
-constexpr unsigned uuid = 1, name = 2, process = 3, thread = 4, parent = 5, counter = 8;
-constexpr unsigned process_pid = 1, process_name = 6, thread_pid = 1, thread_tid = 2, thread_name = 5, counter_unit = 3,
-                   counter_unit_name = 6;
+constexpr unsigned uuid = 1;
+constexpr unsigned name = 2;
+constexpr unsigned process = 3;
+constexpr unsigned thread = 4;
+constexpr unsigned parent = 5;
+constexpr unsigned counter = 8;
+constexpr unsigned process_pid = 1;
+constexpr unsigned process_name = 6;
+constexpr unsigned thread_pid = 1;
+constexpr unsigned thread_tid = 2;
+
+constexpr unsigned thread_name = 5;
+constexpr unsigned counter_unit = 3;
+constexpr unsigned counter_unit_name = 6;
 }  // namespace descriptor
 namespace event {
-constexpr unsigned annotations = 4, type = 9, name_iid = 10, track = 11, name = 23, counter_value = 30;
-}
+constexpr unsigned annotations = 4;
+constexpr unsigned type = 9;
+constexpr unsigned name_iid = 10;
+constexpr unsigned track = 11;
+constexpr unsigned name = 23;
+
+constexpr unsigned counter_value = 30;
+}  // namespace event
 namespace annotation {
-constexpr unsigned uint = 3, string = 6, name = 10;
-}
+constexpr unsigned uint = 3;
+constexpr unsigned string = 6;
+constexpr unsigned name = 10;
+}  // namespace annotation
 namespace bundle {
-constexpr unsigned cpu = 1, event = 2, event_timestamp = 1, event_pid = 2, sched_switch = 4;
-constexpr unsigned prev_comm = 1, prev_pid = 2, prev_prio = 3, prev_state = 4, next_comm = 5, next_pid = 6, next_prio = 7;
+constexpr unsigned cpu = 1;
+constexpr unsigned event = 2;
+constexpr unsigned event_timestamp = 1;
+constexpr unsigned event_pid = 2;
+constexpr unsigned sched_switch = 4;
+constexpr unsigned prev_comm = 1;
+constexpr unsigned prev_pid = 2;
+constexpr unsigned prev_prio = 3;
+constexpr unsigned prev_state = 4;
+constexpr unsigned next_comm = 5;
+
+constexpr unsigned next_pid = 6;
+constexpr unsigned next_prio = 7;
 }  // namespace bundle
 
-constexpr std::uint64_t realtime = 1, monotonic = 3, boottime = 6;                    // clocks
-constexpr std::uint64_t slice_begin = 1, slice_end = 2, instant_event = 3, counter_event = 4;  // types of events
-constexpr std::uint64_t state_cleared = 1, needs_state = 2;                           // sequence flags
-constexpr std::uint64_t process_track = 1, journal_track = 2, own_sequence = 1;
+constexpr std::uint64_t realtime = 1;
+constexpr std::uint64_t monotonic = 3;
+constexpr std::uint64_t boottime = 6;                    // clocks
+// types of events
+constexpr std::uint64_t slice_begin = 1;
+constexpr std::uint64_t slice_end = 2;
+constexpr std::uint64_t instant_event = 3;
+constexpr std::uint64_t counter_event = 4;
+// sequence flags
+constexpr std::uint64_t state_cleared = 1;
+constexpr std::uint64_t needs_state = 2;
+constexpr std::uint64_t process_track = 1;
+constexpr std::uint64_t journal_track = 2;
+constexpr std::uint64_t own_sequence = 1;
 
-std::string packed(const Message& message) { return Message().message(trace::packet, message).bytes(); }
+std::string packed(const Message& message) {
+    return Message().message(trace::packet, message).bytes();
+}
 
 Message packet_at(std::int64_t time_ns) {
     Message message;
@@ -52,7 +107,8 @@ Message packet_at(std::int64_t time_ns) {
 
 Message clock_at(std::uint64_t id, std::int64_t time_ns) {
     Message clock;
-    clock.number(snapshot::clock_id, id).number(snapshot::clock_timestamp, static_cast<std::uint64_t>(time_ns));
+    clock.number(snapshot::clock_id, id)
+        .number(snapshot::clock_timestamp, static_cast<std::uint64_t>(time_ns));
     return clock;
 }
 
@@ -63,16 +119,21 @@ std::string described(const Message& descriptor) {
 }
 
 std::string frame_name(const ThreadEvent& frame) {
-    const bool sent = frame.kind == ThreadEvent::can_sent || frame.kind == ThreadEvent::ethernet_sent;
+    const bool sent =
+        frame.kind == ThreadEvent::can_sent || frame.kind == ThreadEvent::ethernet_sent;
     const std::string what = sent ? "send " : "receive ";
-    if (frame.kind >= ThreadEvent::ethernet_sent) return what + fmt::format("Ethernet {:04X}h", frame.id);
+    if (frame.kind >= ThreadEvent::ethernet_sent) {
+        return what + fmt::format("Ethernet {:04X}h", frame.id);
+    }
     constexpr std::uint32_t extended = 0x80000000U;
-    return what + (frame.id & extended ? fmt::format("CAN {:08X}h", frame.id & ~extended) : fmt::format("CAN {:03X}h", frame.id));
+    return what + (frame.id & extended ? fmt::format("CAN {:08X}h", frame.id & ~extended)
+                                       : fmt::format("CAN {:03X}h", frame.id));
 }
 
 }  // namespace
 
-std::string PerfettoWriter::begin(const std::string& instance, std::int64_t pid, const ClockReading& clocks) {
+std::string PerfettoWriter::begin(const std::string& instance, std::int64_t pid,
+                                  const ClockReading& clocks) {
     pid_ = pid;
     Message snapshot;
     snapshot.message(snapshot::clocks, clock_at(realtime, clocks.realtime_ns))
@@ -84,9 +145,12 @@ std::string PerfettoWriter::begin(const std::string& instance, std::int64_t pid,
     Message defaults;
     defaults.number(packet::timestamp_clock, monotonic);
     Message second;
-    second.number(packet::sequence, own_sequence).number(packet::sequence_flags, state_cleared).message(packet::defaults, defaults);
+    second.number(packet::sequence, own_sequence)
+        .number(packet::sequence_flags, state_cleared)
+        .message(packet::defaults, defaults);
     Message process;
-    process.number(descriptor::process_pid, static_cast<std::uint64_t>(pid)).text(descriptor::process_name, "hal " + instance);
+    process.number(descriptor::process_pid, static_cast<std::uint64_t>(pid))
+        .text(descriptor::process_name, "hal " + instance);
     Message whole, journal;
     whole.number(descriptor::uuid, process_track).message(descriptor::process, process);
     journal.number(descriptor::uuid, journal_track)
@@ -103,7 +167,9 @@ std::uint64_t PerfettoWriter::track(const TraceThread& thread, std::string& out)
     about.number(descriptor::thread_pid, static_cast<std::uint64_t>(pid_))
         .number(descriptor::thread_tid, static_cast<std::uint64_t>(thread.tid))
         .text(descriptor::thread_name, thread.name);
-    whole.number(descriptor::uuid, at->second).number(descriptor::parent, process_track).message(descriptor::thread, about);
+    whole.number(descriptor::uuid, at->second)
+        .number(descriptor::parent, process_track)
+        .message(descriptor::thread, about);
     out += described(whole);
     return at->second;
 }
@@ -120,10 +186,12 @@ std::uint64_t PerfettoWriter::interned(const std::string& name, Message& to) {
     return at->second;
 }
 
-void PerfettoWriter::slice(std::string& out, std::uint64_t track, std::int64_t begin_ns, const std::string& name,
-                           const std::vector<Annotation>& annotations) {
+void PerfettoWriter::slice(std::string& out, std::uint64_t track, std::int64_t begin_ns,
+                           const std::string& name, const std::vector<Annotation>& annotations) {
     Message message = packet_at(begin_ns), event;
-    event.number(event::type, slice_begin).number(event::name_iid, interned(name, message)).number(event::track, track);
+    event.number(event::type, slice_begin)
+        .number(event::name_iid, interned(name, message))
+        .number(event::track, track);
     for (const Annotation& one : annotations) {
         Message annotation;
         annotation.text(annotation::name, one.name).number(annotation::uint, one.value);
@@ -138,10 +206,13 @@ void PerfettoWriter::end(std::string& out, std::uint64_t track, std::int64_t tim
     out += packed(message.message(packet::track_event, event));
 }
 
-void PerfettoWriter::mark(std::string& out, std::uint64_t track, std::int64_t time_ns, const std::string& name,
-                          const std::vector<Annotation>& annotations, const std::string& text) {
+void PerfettoWriter::mark(std::string& out, std::uint64_t track, std::int64_t time_ns,
+                          const std::string& name, const std::vector<Annotation>& annotations,
+                          const std::string& text) {
     Message message = packet_at(time_ns), event;
-    event.number(event::type, instant_event).number(event::name_iid, interned(name, message)).number(event::track, track);
+    event.number(event::type, instant_event)
+        .number(event::name_iid, interned(name, message))
+        .number(event::track, track);
     for (const Annotation& one : annotations) {
         Message annotation;
         annotation.text(annotation::name, one.name).number(annotation::uint, one.value);
@@ -155,12 +226,15 @@ void PerfettoWriter::mark(std::string& out, std::uint64_t track, std::int64_t ti
     out += packed(message.message(packet::track_event, event));
 }
 
-std::string PerfettoWriter::events(const TraceThread& thread, const std::vector<ThreadEvent>& events, std::uint64_t lost) {
+std::string PerfettoWriter::events(const TraceThread& thread,
+                                   const std::vector<ThreadEvent>& events, std::uint64_t lost) {
     std::string out;
     const std::uint64_t to = track(thread, out);
     std::vector<ThreadEvent>& open = open_[thread.tid];
     const auto inner = [&](const ThreadEvent& one) {
-        if (one.kind >= ThreadEvent::can_sent) return mark(out, to, one.begin_ns, frame_name(one), {{"bytes", one.bytes}});
+        if (one.kind >= ThreadEvent::can_sent) {
+            return mark(out, to, one.begin_ns, frame_name(one), {{"bytes", one.bytes}});
+        }
         const auto named = functions_.find(one.id);
         const std::string name = one.kind == ThreadEvent::plan ? "take new plan"
                                  : named != functions_.end()   ? named->second
@@ -170,45 +244,57 @@ std::string PerfettoWriter::events(const TraceThread& thread, const std::vector<
     };
     for (const ThreadEvent& one : events) {
         if (one.kind == ThreadEvent::missed) {
-            mark(out, to, one.begin_ns, "missed periods", {{"periods", one.id}, {"next_cycle", one.cycle_number}});
+            mark(out, to, one.begin_ns, "missed periods",
+                 {{"periods", one.id}, {"next_cycle", one.cycle_number}});
         } else if (one.kind != ThreadEvent::cycle) {
             open.push_back(one);
         } else {
-            // What ended before the cycle began (a plan taken between two cycles) stands for itself.
-            const auto within =
-                std::stable_partition(open.begin(), open.end(), [&](const ThreadEvent& other) { return other.begin_ns < one.begin_ns; });
+            // What ended before the cycle began (a plan taken between two cycles) stands for
+            // itself.
+            const auto within = std::stable_partition(
+                open.begin(), open.end(),
+                [&](const ThreadEvent& other) { return other.begin_ns < one.begin_ns; });
             std::for_each(open.begin(), within, inner);
-            slice(out, to, one.begin_ns, "cycle", {{"cycle", one.cycle_number}, {"latency_ns", one.id}});
+            slice(out, to, one.begin_ns, "cycle",
+                  {{"cycle", one.cycle_number}, {"latency_ns", one.id}});
             std::for_each(within, open.end(), inner);
             end(out, to, one.end_ns);
             const std::int64_t took_ns = one.end_ns - one.begin_ns;
-            if (took_ns + one.id > thread.period_ns)
+            if (took_ns + one.id > thread.period_ns) {
                 mark(out, to, one.end_ns, "overrun",
-                     {{"cycle", one.cycle_number}, {"latency_ns", one.id}, {"execution_ns", static_cast<std::uint64_t>(took_ns)}});
+                     {{"cycle", one.cycle_number},
+                      {"latency_ns", one.id},
+                      {"execution_ns", static_cast<std::uint64_t>(took_ns)}});
+            }
             out += counter(thread, "wake-up latency", one.begin_ns, one.id);
             out += counter(thread, "execution time", one.begin_ns, took_ns);
             open.clear();
         }
     }
-    if (lost > 0 && !events.empty()) mark(out, to, events.back().end_ns, "lost events", {{"events", lost}});
+    if (lost > 0 && !events.empty()) {
+        mark(out, to, events.back().end_ns, "lost events", {{"events", lost}});
+    }
     return out;
 }
 
-std::string PerfettoWriter::instant(std::int64_t time_ns, const std::string& kind, const std::string& text) {
+std::string PerfettoWriter::instant(std::int64_t time_ns, const std::string& kind,
+                                    const std::string& text) {
     std::string out;
     mark(out, journal_track, time_ns, kind, {}, text);
     return out;
 }
 
-std::string PerfettoWriter::counter(const TraceThread& thread, const std::string& name, std::int64_t time_ns, std::int64_t value,
-                                    const char* unit) {
+std::string PerfettoWriter::counter(const TraceThread& thread, const std::string& name,
+                                    std::int64_t time_ns, std::int64_t value, const char* unit) {
     std::string out;
     const auto [at, fresh] = counters_.emplace(std::pair(thread.tid, name), next_track_);
     if (fresh) {
         ++next_track_;
         Message about, whole;
         about.text(descriptor::counter_unit_name, unit);
-        if (std::string_view(unit) == "ns") about.number(descriptor::counter_unit, 1);
+        if (std::string_view(unit) == "ns") {
+            about.number(descriptor::counter_unit, 1);
+        }
         whole.number(descriptor::uuid, at->second)
             .text(descriptor::name, thread.name + " " + name)
             .number(descriptor::parent, process_track)
@@ -237,7 +323,9 @@ std::string PerfettoWriter::switches(const std::vector<Switch>& all) {
             .number(bundle::event_pid, static_cast<std::uint64_t>(one.previous_tid))
             .message(bundle::sched_switch, change);
         Message& bundle = bundles[one.cpu];
-        if (bundle.bytes().empty()) bundle.number(bundle::cpu, static_cast<std::uint64_t>(one.cpu));
+        if (bundle.bytes().empty()) {
+            bundle.number(bundle::cpu, static_cast<std::uint64_t>(one.cpu));
+        }
         bundle.message(bundle::event, event);
     }
     std::string out;

@@ -28,7 +28,9 @@ public:
 private:
     void key(unsigned field, unsigned wire_type) { varint(std::uint64_t{field} << 3 | wire_type); }
     void varint(std::uint64_t value) {
-        for (; value >= 0x80; value >>= 7) bytes_ += static_cast<char>(value | 0x80);
+        for (; value >= 0x80; value >>= 7) {
+            bytes_ += static_cast<char>(value | 0x80);
+        }
         bytes_ += static_cast<char>(value);
     }
     std::string bytes_;

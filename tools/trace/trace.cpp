@@ -32,7 +32,8 @@ namespace {
 
 using nlohmann::json;
 using Clock = std::chrono::steady_clock;
-constexpr std::int64_t default_keep_ns = 5'000'000'000, default_after_ns = 200'000'000;
+constexpr std::int64_t default_keep_ns = 5'000'000'000;
+constexpr std::int64_t default_after_ns = 200'000'000;
 constexpr auto times_period = std::chrono::milliseconds(100);
 constexpr std::size_t most_kept_bytes = std::size_t{512} << 20;
 
@@ -61,29 +62,40 @@ struct Chunk {
 
     std::size_t bytes() const {
         std::size_t bytes = sizeof(Chunk) + switches.size() * sizeof(Switch);
-        for (const Part& part : parts) bytes += part.events.size() * sizeof(ThreadEvent);
+        for (const Part& part : parts) {
+            bytes += part.events.size() * sizeof(ThreadEvent);
+        }
         return bytes;
     }
 };
 
 /// What is printed at the end.
 struct Summary {
-    std::uint64_t cycles = 0, calls = 0, lost = 0, overruns = 0;
+    std::uint64_t cycles = 0;
+    std::uint64_t calls = 0;
+    std::uint64_t lost = 0;
+    std::uint64_t overruns = 0;
     std::int64_t longest_ns = -1;  ///< from the due time of a cycle to its end
     std::string thread, function;
     std::uint64_t cycle = 0;
-    std::int64_t latency_ns = 0, execution_ns = 0, function_ns = 0;
+    std::int64_t latency_ns = 0;
+    std::int64_t execution_ns = 0;
+    std::int64_t function_ns = 0;
     std::map<int, ThreadEvent> slowest;  ///< function of the cycle that is not over yet, by tid
 
-    void add(const TraceThread& from, const ThreadEvent& event, const std::map<std::uint32_t, std::string>& names) {
+    void add(const TraceThread& from, const ThreadEvent& event,
+             const std::map<std::uint32_t, std::string>& names) {
         if (event.kind == ThreadEvent::function) {
             ++calls;
             const auto [at, fresh] = slowest.emplace(from.tid, event);
-            if (!fresh && event.end_ns - event.begin_ns > at->second.end_ns - at->second.begin_ns) at->second = event;
+            if (!fresh && event.end_ns - event.begin_ns > at->second.end_ns - at->second.begin_ns) {
+                at->second = event;
+            }
         }
         if (event.kind != ThreadEvent::cycle) return;
         ++cycles;
-        const std::int64_t took_ns = event.end_ns - event.begin_ns, late_ns = took_ns + event.id;
+        const std::int64_t took_ns = event.end_ns - event.begin_ns;
+        const std::int64_t late_ns = took_ns + event.id;
         overruns += late_ns > from.period_ns;
         if (late_ns > longest_ns) {
             longest_ns = late_ns;
@@ -94,7 +106,9 @@ struct Summary {
             function.clear();
             if (const auto at = slowest.find(from.tid); at != slowest.end()) {
                 function_ns = at->second.end_ns - at->second.begin_ns;
-                if (const auto named = names.find(at->second.id); named != names.end()) function = named->second;
+                if (const auto named = names.find(at->second.id); named != names.end()) {
+                    function = named->second;
+                }
             }
         }
         slowest.erase(from.tid);
@@ -105,7 +119,9 @@ class Tracer {
 public:
     explicit Tracer(const TraceOptions& options) : options_(options) {}
     ~Tracer() {
-        if (file_ >= 0) ::close(file_);
+        if (file_ >= 0) {
+            ::close(file_);
+        }
     }
     Tracer(const Tracer&) = delete;
     int run();
@@ -118,8 +134,11 @@ private:
     void keep(Chunk chunk);
     void write(const std::string& bytes) {
         if (error_ != 0) return;
-        if (write_all(file_, bytes)) written_ += bytes.size();
-        else error_ = errno;
+        if (write_all(file_, bytes)) {
+            written_ += bytes.size();
+        } else {
+            error_ = errno;
+        }
     }
     void write(const Chunk& chunk);
     bool open();
@@ -155,8 +174,12 @@ bool Tracer::attach() {
     if (!reply.value("ok", false)) return fail(options_, reply.value("error", "no answer")) == 0;
     client_->request({{"journal", true}});
     if (!options_.sched) return true;
-    if (const std::string why = scheduler_.open(); !why.empty())
-        fail(options_, fmt::format("no scheduler events: {}; the trace has the waiting times of the threads instead", why));
+    if (const std::string why = scheduler_.open(); !why.empty()) {
+        fail(options_,
+             fmt::format(
+                 "no scheduler events: {}; the trace has the waiting times of the threads instead",
+                 why));
+    }
     return true;
 }
 
@@ -171,7 +194,8 @@ void Tracer::take(const json& event, const std::string& payload, Chunk& chunk) {
     std::size_t at = 0;
     for (const json& part : event.value("parts", json::array())) {
         Chunk::Part one;
-        one.thread = {part.value("thread", ""), part.value("period_ns", std::int64_t{0}), part.value("tid", 0)};
+        one.thread = {part.value("thread", ""), part.value("period_ns", std::int64_t{0}),
+                      part.value("tid", 0)};
         one.lost = part.value("lost", std::uint64_t{0});
         const auto count = part.value("count", std::size_t{0});
         if (count > (payload.size() - at) / sizeof(ThreadEvent)) return;
@@ -183,11 +207,13 @@ void Tracer::take(const json& event, const std::string& payload, Chunk& chunk) {
         for (const ThreadEvent& each : one.events) {
             summary_.add(one.thread, each, names_);
             const std::int64_t late_ns = each.end_ns - each.begin_ns + each.id;
-            if (options_.on_overrun && fired_ns_ == 0 && each.kind == ThreadEvent::cycle && late_ns > one.thread.period_ns) {
+            if (options_.on_overrun && fired_ns_ == 0 && each.kind == ThreadEvent::cycle &&
+                late_ns > one.thread.period_ns) {
                 fired_ns_ = each.end_ns;
-                cause_ =
-                    fmt::format("cycle {} of '{}' ended {} after it was due (period {})", each.cycle_number, one.thread.name,
-                                format_duration(static_cast<double>(late_ns)), format_duration(static_cast<double>(one.thread.period_ns)));
+                cause_ = fmt::format("cycle {} of '{}' ended {} after it was due (period {})",
+                                     each.cycle_number, one.thread.name,
+                                     format_duration(static_cast<double>(late_ns)),
+                                     format_duration(static_cast<double>(one.thread.period_ns)));
             }
         }
         chunk.parts.push_back(std::move(one));
@@ -201,9 +227,12 @@ void Tracer::receive(int timeout_ms) {
     while (client_->next_event(event, payload, timeout_ms)) {
         timeout_ms = 0;
         const std::string kind = event.value("event", "");
-        if (kind == "trace") take(event, payload, chunk);
+        if (kind == "trace") {
+            take(event, payload, chunk);
+        }
         if (kind != "journal") continue;
-        chunk.entries.push_back({event.value("time_ns", std::int64_t{0}), event.value("kind", ""), event.value("text", "")});
+        chunk.entries.push_back({event.value("time_ns", std::int64_t{0}), event.value("kind", ""),
+                                 event.value("text", "")});
         if (options_.on_fault && fired_ns_ == 0 && chunk.entries.back().kind == "fault") {
             fired_ns_ = chunk.entries.back().time_ns;
             cause_ = chunk.entries.back().text;
@@ -212,20 +241,30 @@ void Tracer::receive(int timeout_ms) {
     chunk.switches = scheduler_.take();
     if (Clock::now() >= next_times_) {
         next_times_ = Clock::now() + times_period;
-        for (const auto& [tid, thread] : threads_)
-            if (const auto times = thread_times(client_->pid(), tid)) chunk.times.emplace_back(thread, *times);
+        for (const auto& [tid, thread] : threads_) {
+            if (const auto times = thread_times(client_->pid(), tid)) {
+                chunk.times.emplace_back(thread, *times);
+            }
+        }
     }
     chunk.time_ns = now_ns(CLOCK_MONOTONIC);
-    if (chunk.parts.empty() && chunk.entries.empty() && chunk.switches.empty() && chunk.times.empty()) return;
-    if (ring()) keep(std::move(chunk));
-    else write(chunk);
+    if (chunk.parts.empty() && chunk.entries.empty() && chunk.switches.empty() &&
+        chunk.times.empty()) {
+        return;
+    }
+    if (ring()) {
+        keep(std::move(chunk));
+    } else {
+        write(chunk);
+    }
 }
 
 void Tracer::keep(Chunk chunk) {
     kept_bytes_ += chunk.bytes();
     kept_.push_back(std::move(chunk));
     const std::int64_t keep_ns = options_.keep_ns >= 0 ? options_.keep_ns : default_keep_ns;
-    while ((fired_ns_ == 0 && kept_.front().time_ns < kept_.back().time_ns - keep_ns) || kept_bytes_ > most_kept_bytes) {
+    while ((fired_ns_ == 0 && kept_.front().time_ns < kept_.back().time_ns - keep_ns) ||
+           kept_bytes_ > most_kept_bytes) {
         kept_bytes_ -= kept_.front().bytes();
         kept_.pop_front();
     }
@@ -233,8 +272,12 @@ void Tracer::keep(Chunk chunk) {
 
 void Tracer::write(const Chunk& chunk) {
     std::string bytes;
-    for (const Chunk::Part& part : chunk.parts) bytes += writer_.events(part.thread, part.events, part.lost);
-    for (const Chunk::Entry& entry : chunk.entries) bytes += writer_.instant(entry.time_ns, entry.kind, entry.text);
+    for (const Chunk::Part& part : chunk.parts) {
+        bytes += writer_.events(part.thread, part.events, part.lost);
+    }
+    for (const Chunk::Entry& entry : chunk.entries) {
+        bytes += writer_.instant(entry.time_ns, entry.kind, entry.text);
+    }
     for (const auto& [thread, times] : chunk.times) {
         bytes += writer_.counter(thread, "run time", chunk.time_ns, times.ran_ns);
         bytes += writer_.counter(thread, "waited for a CPU", chunk.time_ns, times.waited_ns);
@@ -243,25 +286,33 @@ void Tracer::write(const Chunk& chunk) {
     write(bytes);
 }
 
-/// Opens the file before anything is traced: what cannot be written is known then, not after the fault. An old one is replaced later.
+/// Opens the file before anything is traced: what cannot be written is known then, not after the
+/// fault. An old one is replaced later.
 bool Tracer::open() {
     const std::string& path = options_.words.front();
     fresh_ = ::access(path.c_str(), F_OK) != 0;
     file_ = ::open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0644);
-    return file_ >= 0 || fail(options_, fmt::format("cannot write '{}': {}", path, std::strerror(errno))) == 0;
+    return file_ >= 0 ||
+           fail(options_, fmt::format("cannot write '{}': {}", path, std::strerror(errno))) == 0;
 }
 
 void Tracer::begin_file() {
-    if (::ftruncate(file_, 0) != 0 && errno != EINVAL) error_ = errno;  // EINVAL: a pipe
-    write(writer_.begin(client_->instance(), client_->pid(), {now_ns(CLOCK_MONOTONIC), now_ns(CLOCK_REALTIME), now_ns(CLOCK_BOOTTIME)}));
+    if (::ftruncate(file_, 0) != 0 && errno != EINVAL) {
+        error_ = errno;  // EINVAL: a pipe
+    }
+    write(writer_.begin(client_->instance(), client_->pid(),
+                        {now_ns(CLOCK_MONOTONIC), now_ns(CLOCK_REALTIME), now_ns(CLOCK_BOOTTIME)}));
 }
 
-bool Tracer::remove_if_empty() { return written_ == 0 && fresh_ && ::unlink(options_.words.front().c_str()) == 0; }
+bool Tracer::remove_if_empty() {
+    return written_ == 0 && fresh_ && ::unlink(options_.words.front().c_str()) == 0;
+}
 
 /// What is in the file ends with a whole packet then.
 int Tracer::fail_to_write() {
     const bool cut = ::ftruncate(file_, static_cast<off_t>(written_)) == 0;
-    return fail(options_, fmt::format("cannot write '{}': {}; {}", options_.words.front(), std::strerror(error_),
+    return fail(options_, fmt::format("cannot write '{}': {}; {}", options_.words.front(),
+                                      std::strerror(error_),
                                       remove_if_empty() ? "nothing was written"
                                       : written_ == 0   ? "the file is empty"
                                       : cut             ? "the file is complete up to there"
@@ -274,10 +325,13 @@ int Tracer::finish() {
         const std::string& why = client_->closed_because();
         const bool killed = was_killed(client_->instance());
         const bool runs = !killed && std::filesystem::exists(socket_path(client_->instance()));
-        const std::string ended = !why.empty() ? fmt::format("instance '{}' closed the connection: {}", client_->instance(), why)
-                                  : killed     ? fmt::format("instance '{}' was killed", client_->instance())
-                                  : runs       ? fmt::format("instance '{}' closed the connection, and runs on", client_->instance())
-                                               : fmt::format("instance '{}' has ended", client_->instance());
+        const std::string ended =
+            !why.empty()
+                ? fmt::format("instance '{}' closed the connection: {}", client_->instance(), why)
+            : killed ? fmt::format("instance '{}' was killed", client_->instance())
+            : runs   ? fmt::format("instance '{}' closed the connection, and runs on",
+                                   client_->instance())
+                     : fmt::format("instance '{}' has ended", client_->instance());
         if (ring() && fired_ns_ == 0 && killed) {
             fired_ns_ = now_ns(CLOCK_MONOTONIC);
             cause_ = ended;
@@ -289,46 +343,67 @@ int Tracer::finish() {
     }
     if (ring() && fired_ns_ == 0) {
         remove_if_empty();
-        print(fmt::format("no {} in {}; nothing was written\n",
-                          options_.on_overrun ? options_.on_fault ? "overrun or fault" : "overrun" : "fault",
-                          counted(summary_.cycles, "cycle")));
+        print(fmt::format(
+            "no {} in {}; nothing was written\n",
+            options_.on_overrun ? options_.on_fault ? "overrun or fault" : "overrun" : "fault",
+            counted(summary_.cycles, "cycle")));
         return status;
     }
     if (ring()) {
         begin_file();
-        for (const Chunk& chunk : kept_) write(chunk);
+        for (const Chunk& chunk : kept_) {
+            write(chunk);
+        }
     }
     const std::string& path = options_.words.front();
     if (error_ != 0) return fail_to_write();
-    if (!cause_.empty()) print(cause_ + "\n");
-    print(fmt::format("wrote {}: {}, {}, {}, {} lost; open it in https://ui.perfetto.dev\n", path, counted(summary_.cycles, "cycle"),
-                      counted(summary_.calls, "function call"), counted(summary_.overruns, "overrun"), counted(summary_.lost, "event")));
+    if (!cause_.empty()) {
+        print(cause_ + "\n");
+    }
+    print(fmt::format("wrote {}: {}, {}, {}, {} lost; open it in https://ui.perfetto.dev\n", path,
+                      counted(summary_.cycles, "cycle"), counted(summary_.calls, "function call"),
+                      counted(summary_.overruns, "overrun"), counted(summary_.lost, "event")));
     if (summary_.longest_ns < 0) return status;
-    std::string line =
-        fmt::format("latest end: cycle {} of '{}', {} after it was due: wake-up latency {}, execution {}", summary_.cycle, summary_.thread,
-                    format_duration(static_cast<double>(summary_.longest_ns)), format_duration(static_cast<double>(summary_.latency_ns)),
-                    format_duration(static_cast<double>(summary_.execution_ns)));
-    if (!summary_.function.empty())
-        line += fmt::format(", of it {} in {}", format_duration(static_cast<double>(summary_.function_ns)), summary_.function);
+    std::string line = fmt::format(
+        "latest end: cycle {} of '{}', {} after it was due: wake-up latency {}, execution {}",
+        summary_.cycle, summary_.thread, format_duration(static_cast<double>(summary_.longest_ns)),
+        format_duration(static_cast<double>(summary_.latency_ns)),
+        format_duration(static_cast<double>(summary_.execution_ns)));
+    if (!summary_.function.empty()) {
+        line += fmt::format(", of it {} in {}",
+                            format_duration(static_cast<double>(summary_.function_ns)),
+                            summary_.function);
+    }
     print(line + "\n");
     return status;
 }
 
 int Tracer::run() {
-    if (options_.words.size() != 1)
-        return fail(options_, fmt::format("unexpected argument '{}'; type: hal trace {}", options_.words[1], options_.words[0]));
-    if (!ring() && (options_.keep_ns >= 0 || options_.after_ns >= 0))
-        return fail(options_, fmt::format("{} needs --on-overrun or --on-fault", options_.keep_ns >= 0 ? "--keep" : "--after"));
+    if (options_.words.size() != 1) {
+        return fail(options_, fmt::format("unexpected argument '{}'; type: hal trace {}",
+                                          options_.words[1], options_.words[0]));
+    }
+    if (!ring() && (options_.keep_ns >= 0 || options_.after_ns >= 0)) {
+        return fail(options_, fmt::format("{} needs --on-overrun or --on-fault",
+                                          options_.keep_ns >= 0 ? "--keep" : "--after"));
+    }
     if (options_.for_ns == 0) return fail(options_, "--for 0 traces nothing; use a time like 10s");
     if (!attach()) return 1;
     if (!open()) return 1;
-    if (!ring()) begin_file();
-    const auto end = options_.for_ns >= 0 ? Clock::now() + std::chrono::nanoseconds(options_.for_ns) : Clock::time_point::max();
+    if (!ring()) {
+        begin_file();
+    }
+    const auto end = options_.for_ns >= 0 ? Clock::now() + std::chrono::nanoseconds(options_.for_ns)
+                                          : Clock::time_point::max();
     while (!stop_.requested() && error_ == 0 && Clock::now() < end && client_->connected()) {
         pollfd waiting[] = {{client_->fd(), POLLIN, 0}, {stop_.fd(), POLLIN, 0}};
         ::poll(waiting, 2, 20);
         receive(0);
-        if (fired_ns_ != 0 && now_ns(CLOCK_MONOTONIC) > fired_ns_ + (options_.after_ns >= 0 ? options_.after_ns : default_after_ns)) break;
+        if (fired_ns_ != 0 &&
+            now_ns(CLOCK_MONOTONIC) >
+                fired_ns_ + (options_.after_ns >= 0 ? options_.after_ns : default_after_ns)) {
+            break;
+        }
     }
     if (client_->connected()) {
         client_->request({{"trace", false}});

@@ -35,23 +35,36 @@ constexpr Name names[] = {
     {0x1fd0, 0x1fff, "Object dispatching list #"},
 };
 constexpr Name drive_names[] = {
-    {0x6046, 0x6046, "vl velocity min max amount"}, {0x6048, 0x6048, "vl velocity acceleration"},
-    {0x6049, 0x6049, "vl velocity deceleration"},   {0x604a, 0x604a, "vl velocity quick stop"},
-    {0x604b, 0x604b, "vl set-point factor"},        {0x604c, 0x604c, "vl dimension factor"},
-    {0x607b, 0x607b, "Position range limit"},       {0x607d, 0x607d, "Software position limit"},
-    {0x608f, 0x608f, "Position encoder resolution"}, {0x6090, 0x6090, "Velocity encoder resolution"},
-    {0x6091, 0x6091, "Gear ratio"},                 {0x6092, 0x6092, "Feed constant"},
-    {0x6096, 0x6096, "Velocity factor"},            {0x6097, 0x6097, "Acceleration factor"},
-    {0x6099, 0x6099, "Homing speeds"},              {0x60c1, 0x60c1, "Interpolation data record"},
-    {0x60c2, 0x60c2, "Interpolation time period"},  {0x60c4, 0x60c4, "Interpolation data configuration"},
-    {0x60e3, 0x60e3, "Supported homing methods"},   {0x60fe, 0x60fe, "Digital outputs"},
+    {0x6046, 0x6046, "vl velocity min max amount"},
+    {0x6048, 0x6048, "vl velocity acceleration"},
+    {0x6049, 0x6049, "vl velocity deceleration"},
+    {0x604a, 0x604a, "vl velocity quick stop"},
+    {0x604b, 0x604b, "vl set-point factor"},
+    {0x604c, 0x604c, "vl dimension factor"},
+    {0x607b, 0x607b, "Position range limit"},
+    {0x607d, 0x607d, "Software position limit"},
+    {0x608f, 0x608f, "Position encoder resolution"},
+    {0x6090, 0x6090, "Velocity encoder resolution"},
+    {0x6091, 0x6091, "Gear ratio"},
+    {0x6092, 0x6092, "Feed constant"},
+    {0x6096, 0x6096, "Velocity factor"},
+    {0x6097, 0x6097, "Acceleration factor"},
+    {0x6099, 0x6099, "Homing speeds"},
+    {0x60c1, 0x60c1, "Interpolation data record"},
+    {0x60c2, 0x60c2, "Interpolation time period"},
+    {0x60c4, 0x60c4, "Interpolation data configuration"},
+    {0x60e3, 0x60e3, "Supported homing methods"},
+    {0x60fe, 0x60fe, "Digital outputs"},
 };
 
 std::string find_name(std::span<const Name> table, std::uint16_t index) {
     for (const auto& row : table) {
         if (index < row.first || index > row.last) continue;
         std::string name = row.name;
-        if (name.back() == '#') name.pop_back(), name += std::to_string(index - row.first + 1);
+        if (name.back() == '#') {
+            name.pop_back();
+            name += std::to_string(index - row.first + 1);
+        }
         return name;
     }
     return {};
@@ -59,21 +72,27 @@ std::string find_name(std::span<const Name> table, std::uint16_t index) {
 
 std::string hexadecimal(std::uint64_t value) {
     std::string digits;
-    do digits.insert(digits.begin(), "0123456789ABCDEF"[value & 15]);
-    while ((value >>= 4) != 0);
+    do {
+        digits.insert(digits.begin(), "0123456789ABCDEF"[value & 15]);
+    } while ((value >>= 4) != 0);
     return "0x" + digits;
 }
 
 std::string value_text(const EntryDescription& e) {
-    if (e.type == Type::domain || e.value.empty()) return {};
+    if (e.type == Type::domain || e.value.empty()) {
+        return {};
+    }
     const auto text = eds::spell(e.value, static_cast<std::uint16_t>(e.type));
     return e.plus_node_id ? "$NODEID+" + text : text;
 }
 
 std::string limit_text(const EntryDescription& e, std::int64_t limit) {
     std::vector<std::uint8_t> bytes(bytes_of(e.type));
-    if (e.type == Type::real32) store(bytes.data(), static_cast<float>(std::bit_cast<double>(limit)));
-    else std::copy_n(reinterpret_cast<const std::uint8_t*>(&limit), bytes.size(), bytes.begin());
+    if (e.type == Type::real32) {
+        store(bytes.data(), static_cast<float>(std::bit_cast<double>(limit)));
+    } else {
+        std::copy_n(reinterpret_cast<const std::uint8_t*>(&limit), bytes.size(), bytes.begin());
+    }
     return eds::spell(bytes, static_cast<std::uint16_t>(e.type));
 }
 
@@ -89,25 +108,35 @@ eds::Entry entry_of(const EntryDescription& e) {
     case Access::write_only: out.access = eds::Access::wo; break;
     case Access::constant: out.access = eds::Access::constant; break;
     case Access::read_write:
-        out.access = e.rpdo == e.tpdo ? eds::Access::rw : e.rpdo ? eds::Access::rww : eds::Access::rwr;
+        out.access = e.rpdo == e.tpdo ? eds::Access::rw
+                     : e.rpdo         ? eds::Access::rww
+                                      : eds::Access::rwr;
         break;
     }
     out.default_value = value_text(e);
-    if (e.ranged) out.low_limit = limit_text(e, e.low), out.high_limit = limit_text(e, e.high);
+    if (e.ranged) {
+        out.low_limit = limit_text(e, e.low);
+        out.high_limit = limit_text(e, e.high);
+    }
     return out;
 }
 
 /// CiA 301 defines these as records although their values may have the same type.
-bool record_by_rule(std::uint16_t index) { return index == 0x1018 || (index >= 0x1200 && index <= 0x1bff); }
+bool record_by_rule(std::uint16_t index) {
+    return index == 0x1018 || (index >= 0x1200 && index <= 0x1bff);
+}
 
 eds::Object object_of(const Description& d, std::span<const EntryDescription* const> entries) {
     const auto& first = *entries.front();
     eds::Object out;
     out.index = first.index;
-    out.category = first.index == 0x1000 || first.index == 0x1001 || first.index == 0x1018 ? eds::Category::mandatory
-                   : first.index >= 0x2000 && first.index <= 0x5fff                        ? eds::Category::manufacturer
-                                                                                           : eds::Category::optional;
-    for (const auto* e : entries) out.entries.push_back(entry_of(*e));
+    out.category = first.index == 0x1000 || first.index == 0x1001 || first.index == 0x1018
+                       ? eds::Category::mandatory
+                   : first.index >= 0x2000 && first.index <= 0x5fff ? eds::Category::manufacturer
+                                                                    : eds::Category::optional;
+    for (const auto* e : entries) {
+        out.entries.push_back(entry_of(*e));
+    }
     if (entries.size() == 1 && first.sub == 0) {
         out.name = out.entries[0].name;
         out.type = out.entries[0].type;
@@ -115,10 +144,13 @@ eds::Object object_of(const Description& d, std::span<const EntryDescription* co
         return out;
     }
     out.name = object_name(d, first.index);
-    const bool alike = std::all_of(entries.begin() + (first.sub == 0), entries.end(), [&](const auto* e) {
-        return e->type == entries.back()->type && e->access == entries.back()->access && e->type != Type::domain;
+    const bool alike =
+        std::all_of(entries.begin() + (first.sub == 0), entries.end(), [&](const auto* e) {
+        return e->type == entries.back()->type && e->access == entries.back()->access &&
+               e->type != Type::domain;
     });
-    out.type = alike && !record_by_rule(first.index) ? eds::ObjectType::array : eds::ObjectType::record;
+    out.type =
+        alike && !record_by_rule(first.index) ? eds::ObjectType::array : eds::ObjectType::record;
     return out;
 }
 
@@ -134,8 +166,11 @@ std::string object_name(const Description& d, std::uint16_t index) {
     if (auto name = find_name(names, index); !name.empty()) return name;
     if (index >= 0x6000 && index <= 0x9fff && (number(d, 0x1000, 0) & 0xffff) == 402) {
         const unsigned axis = (index - 0x6000U) / 0x800;
-        if (auto name = find_name(drive_names, static_cast<std::uint16_t>(0x6000 + (index - 0x6000U) % 0x800)); !name.empty())
+        if (auto name = find_name(drive_names,
+                                  static_cast<std::uint16_t>(0x6000 + (index - 0x6000U) % 0x800));
+            !name.empty()) {
             return axis == 0 ? name : name + " " + std::to_string(axis + 1);
+        }
     }
     return "Object " + hexadecimal(index).substr(2) + "h";
 }
@@ -143,28 +178,45 @@ std::string object_name(const Description& d, std::uint16_t index) {
 eds::DeviceDescription eds_of(const Description& d) {
     eds::DeviceDescription out;
     std::vector<const EntryDescription*> order;
-    for (const auto& e : d.entries) order.push_back(&e);
-    const auto key = [](const EntryDescription* e) { return std::uint32_t{e->index} << 8 | e->sub; };
+    for (const auto& e : d.entries) {
+        order.push_back(&e);
+    }
+    const auto key = [](const EntryDescription* e) {
+        return std::uint32_t{e->index} << 8 | e->sub;
+    };
     std::stable_sort(order.begin(), order.end(), [&](auto* a, auto* b) { return key(a) < key(b); });
-    order.erase(std::unique(order.begin(), order.end(), [&](auto* a, auto* b) { return key(a) == key(b); }), order.end());
+    order.erase(
+        std::unique(order.begin(), order.end(), [&](auto* a, auto* b) { return key(a) == key(b); }),
+        order.end());
     for (std::size_t from = 0, to = 0; from < order.size(); from = to) {
-        while (to < order.size() && order[to]->index == order[from]->index) ++to;
+        while (to < order.size() && order[to]->index == order[from]->index) {
+            ++to;
+        }
         out.objects.push_back(object_of(d, std::span(order).subspan(from, to - from)));
     }
     const auto count = [&](std::uint16_t first) {
-        return static_cast<std::uint16_t>(std::count_if(out.objects.begin(), out.objects.end(), [&](const eds::Object& o) {
-            return o.index >= first && o.index < first + 0x200;
-        }));
+        return static_cast<std::uint16_t>(std::count_if(
+            out.objects.begin(), out.objects.end(),
+            [&](const eds::Object& o) { return o.index >= first && o.index < first + 0x200; }));
     };
     auto& info = out.device;
-    info.vendor_number = number(d, 0x1018, 1), info.product_number = number(d, 0x1018, 2), info.revision_number = number(d, 0x1018, 3);
-    if (const auto* name = const_cast<Description&>(d).find(0x1008, 0); name != nullptr)
+    info.vendor_number = number(d, 0x1018, 1);
+    info.product_number = number(d, 0x1018, 2);
+
+    info.revision_number = number(d, 0x1018, 3);
+    if (const auto* name = const_cast<Description&>(d).find(0x1008, 0); name != nullptr) {
         info.product_name.assign(name->value.begin(), name->value.end());
-    for (std::size_t n = 0; n < eds::baud_rates.size(); ++n) info.supports[n] = eds::baud_rates[n] != 100;
+    }
+    for (std::size_t n = 0; n < eds::baud_rates.size(); ++n) {
+        info.supports[n] = eds::baud_rates[n] != 100;
+    }
     info.boot_up_slave = info.lss = true;
     info.granularity = 1;
-    info.rx_pdos = count(0x1400), info.tx_pdos = count(0x1800);
-    for (std::uint16_t type = 1; type <= 7; ++type) out.dummies.emplace_back(type, true);
+    info.rx_pdos = count(0x1400);
+    info.tx_pdos = count(0x1800);
+    for (std::uint16_t type = 1; type <= 7; ++type) {
+        out.dummies.emplace_back(type, true);
+    }
     out.file.eds_version = "4.0";
     out.file.version = out.file.revision = 1;
     return out;

@@ -16,36 +16,45 @@ constexpr FaultRow rows[] = {
     {Fault::late_sdo, "late-sdo", "SDO response is delayed by `time`", 700 * millisecond},
     {Fault::late_pdo, "late-pdo", "PDO is delayed by `time`", 2 * millisecond},
     {Fault::no_boot_up, "no-boot-up", "boot-up message is not sent", 0},
-    {Fault::boot_storm, "boot-storm", "`time` a boot-up message is sent without a restart", 100 * millisecond},
+    {Fault::boot_storm, "boot-storm", "`time` a boot-up message is sent without a restart",
+     100 * millisecond},
     {Fault::reboot, "reboot", "`time` the device restarts as after a loss of power", 2 * second},
     {Fault::no_heartbeat, "no-heartbeat", "heartbeat or guarding response is not sent", 0},
     {Fault::wrong_state, "wrong-state", "heartbeat reports the state stopped", 0},
     {Fault::guard_toggle, "guard-toggle", "guarding response has a wrong toggle bit", 0},
     {Fault::no_sdo, "no-sdo", "SDO response is not sent", 0},
     {Fault::abort, "abort", "SDO request is aborted with a general error", 0},
-    {Fault::stale_abort, "stale-abort", "SDO response is preceded by an abort of the previous request", 0},
+    {Fault::stale_abort, "stale-abort",
+     "SDO response is preceded by an abort of the previous request", 0},
     {Fault::toggle, "toggle", "SDO segment has a wrong toggle bit", 0},
     {Fault::block_gap, "block-gap", "segment of a block upload is lost", 0},
     {Fault::block_crc, "block-crc", "block transfer ends with a wrong CRC", 0},
     {Fault::short_pdo, "short-pdo", "PDO is one byte short", 0},
     {Fault::long_pdo, "long-pdo", "PDO is one byte long", 0},
     {Fault::wrong_type, "wrong-type", "read of the device type (1000h) returns a wrong value", 0},
-    {Fault::wrong_vendor, "wrong-vendor", "read of the vendor ID (1018h:1) returns a wrong value", 0},
-    {Fault::wrong_product, "wrong-product", "read of the product code (1018h:2) returns a wrong value", 0},
-    {Fault::wrong_revision, "wrong-revision", "read of the revision number (1018h:3) returns a wrong value", 0},
-    {Fault::wrong_serial, "wrong-serial", "read of the serial number (1018h:4) returns a wrong value", 0},
-    {Fault::wrong_software, "wrong-software", "read of the software identification (1F56h:1) returns a wrong value", 0},
+    {Fault::wrong_vendor, "wrong-vendor", "read of the vendor ID (1018h:1) returns a wrong value",
+     0},
+    {Fault::wrong_product, "wrong-product",
+     "read of the product code (1018h:2) returns a wrong value", 0},
+    {Fault::wrong_revision, "wrong-revision",
+     "read of the revision number (1018h:3) returns a wrong value", 0},
+    {Fault::wrong_serial, "wrong-serial",
+     "read of the serial number (1018h:4) returns a wrong value", 0},
+    {Fault::wrong_software, "wrong-software",
+     "read of the software identification (1F56h:1) returns a wrong value", 0},
     {Fault::babble, "babble", "`time` a frame of the highest priority is sent", 200 * microsecond},
     {Fault::emcy_storm, "emcy-storm", "`time` an emergency is sent", 10 * millisecond},
     {Fault::no_srdo, "no-srdo", "SRDO is not sent", 0},
     {Fault::srdo_half, "srdo-half", "SRDO is sent without its second frame", 0},
     {Fault::srdo_wrong, "srdo-wrong", "SRDO is sent with a wrong bit in its second frame", 0},
     {Fault::srdo_order, "srdo-order", "SRDO is sent with its second frame first", 0},
-    {Fault::late_srdo, "late-srdo", "second frame of an SRDO is delayed by `time`", 30 * millisecond},
+    {Fault::late_srdo, "late-srdo", "second frame of an SRDO is delayed by `time`",
+     30 * millisecond},
 };
 static_assert([] {
-    for (std::size_t n = 0; n < std::size(rows); ++n)
+    for (std::size_t n = 0; n < std::size(rows); ++n) {
         if (rows[n].fault != static_cast<Fault>(n)) return false;
+    }
     return true;
 }(), "the table is in the order of the enumeration");
 
@@ -55,17 +64,24 @@ bool parse_time(std::string_view text, Time& time) {
     const auto [end, wrong] = std::from_chars(text.data(), text.data() + text.size(), value);
     const auto unit = text.substr(static_cast<std::size_t>(end - text.data()));
     const double factor = unit == "s" ? 1e9 : unit == "ms" ? 1e6 : unit == "us" ? 1e3 : 0.0;
-    if (wrong != std::errc{} || factor == 0.0 || !(value >= 0.0 && value * factor <= 1e15)) return false;
-    return time = static_cast<Time>(value * factor), true;
+    if (wrong != std::errc{} || factor == 0.0 || !(value >= 0.0 && value * factor <= 1e15)) {
+        return false;
+    }
+    time = static_cast<Time>(value * factor);
+    return true;
 }
 
 std::string names() {
     std::string all;
-    for (const auto& row : rows) all += (all.empty() ? "" : ", ") + std::string(row.name);
+    for (const auto& row : rows) {
+        all += (all.empty() ? "" : ", ") + std::string(row.name);
+    }
     return all;
 }
 
-constexpr bool is_srdo(const Frame& f) noexcept { return !f.extended && f.id > 0x100 && f.id <= 0x180; }
+constexpr bool is_srdo(const Frame& f) noexcept {
+    return !f.extended && f.id > 0x100 && f.id <= 0x180;
+}
 constexpr bool is_pdo(const Frame& f, std::uint8_t node) noexcept {
     if (f.extended || f.remote) return f.extended;
     return f.id > 0x180 && f.id < 0x700 && f.id != 0x580U + node && f.id != 0x600U + node;
@@ -76,7 +92,8 @@ constexpr bool is_pdo(const Frame& f, std::uint8_t node) noexcept {
 std::span<const FaultRow> fault_rows() noexcept { return rows; }
 
 const FaultRow* find_fault(std::string_view name) noexcept {
-    const auto* found = std::find_if(std::begin(rows), std::end(rows), [&](const FaultRow& row) { return name == row.name; });
+    const auto* found = std::find_if(std::begin(rows), std::end(rows),
+                                     [&](const FaultRow& row) { return name == row.name; });
     return found == std::end(rows) ? nullptr : found;
 }
 
@@ -88,17 +105,23 @@ bool parse_fault(std::string_view text, Fault& fault, FaultSetting& setting, std
     };
     const auto name = next_part();
     const auto* row = find_fault(name);
-    if (row == nullptr) return problem = "unknown fault '" + std::string(name) + "'; use one of: " + names(), false;
+    if (row == nullptr) {
+        problem = "unknown fault '" + std::string(name) + "'; use one of: " + names();
+        return false;
+    }
     fault = row->fault;
     setting = {.every = 1};
     Time lasting = 0;
     while (!text.empty()) {
         const auto part = next_part();
         const auto equals = std::min(part.find('='), part.size());
-        const auto key = part.substr(0, equals), value = part.substr(std::min(equals + 1, part.size()));
+        const auto key = part.substr(0, equals);
+
+        const auto value = part.substr(std::min(equals + 1, part.size()));
         bool good = false;
         if (key == "every") {
-            const auto [end, wrong] = std::from_chars(value.data(), value.data() + value.size(), setting.every);
+            const auto [end, wrong] =
+                std::from_chars(value.data(), value.data() + value.size(), setting.every);
             good = wrong == std::errc{} && end == value.data() + value.size() && setting.every != 0;
         } else if (key == "time" && row->time != 0) {
             good = parse_time(value, setting.time) && setting.time != 0;
@@ -108,24 +131,33 @@ bool parse_fault(std::string_view text, Fault& fault, FaultSetting& setting, std
             good = parse_time(value, lasting) && lasting != 0;
         }
         if (good) continue;
-        problem = "invalid property '" + std::string(part) + "' of fault " + row->name + "; write every=3, " +
-                  (row->time != 0 ? "time=20ms, " : "") + "from=5s or for=1s";
+        problem = "invalid property '" + std::string(part) + "' of fault " + row->name +
+                  "; write every=3, " + (row->time != 0 ? "time=20ms, " : "") + "from=5s or for=1s";
         return false;
     }
-    if (lasting != 0) setting.until = setting.from + lasting;
+    if (lasting != 0) {
+        setting.until = setting.from + lasting;
+    }
     return true;
 }
 
 Faults::Faults(std::size_t held) : held_(std::make_unique<Held[]>(held)), held_capacity_(held) {}
 
 void Faults::find_any() noexcept {
-    any_ = std::any_of(settings_.begin(), settings_.end(), [](const FaultSetting& s) { return s.every != 0; });
-    for (std::size_t n = 0; n < kinds; ++n)
-        if (settings_[n].every == 0) next_[n] = 0;
+    any_ = std::any_of(settings_.begin(), settings_.end(),
+                       [](const FaultSetting& s) { return s.every != 0; });
+    for (std::size_t n = 0; n < kinds; ++n) {
+        if (settings_[n].every == 0) {
+            next_[n] = 0;
+        }
+    }
 }
 
 void Faults::start(Time now) noexcept {
-    if (!started_) started_ = true, began_ = now;
+    if (!started_) {
+        started_ = true;
+        began_ = now;
+    }
     now_ = now;
 }
 
@@ -137,7 +169,8 @@ bool Faults::active(Fault fault) const noexcept {
 bool Faults::hit(Fault fault) noexcept {
     if (!active(fault)) return false;
     if (++seen_[index(fault)] % settings_[index(fault)].every != 0) return false;
-    return ++hits_[index(fault)], true;
+    ++hits_[index(fault)];
+    return true;
 }
 
 Time Faults::time(Fault fault) const noexcept {
@@ -148,24 +181,42 @@ Time Faults::time(Fault fault) const noexcept {
 bool Faults::periodic(Fault fault) noexcept {
     if (!active(fault)) return false;
     auto& next = next_[index(fault)];
-    if (next == 0) next = now_ + time(fault) * settings_[index(fault)].every;
+    if (next == 0) {
+        next = now_ + time(fault) * settings_[index(fault)].every;
+    }
     if (now_ < next) return false;
     next += time(fault) * settings_[index(fault)].every;
-    if (next <= now_ - 32 * time(fault)) next = now_ + time(fault);  // a late turn does not catch up on every event
-    return ++hits_[index(fault)], true;
+    // a late turn does not catch up on every event
+    if (next <= now_ - 32 * time(fault)) {
+        next = now_ + time(fault);
+    }
+    ++hits_[index(fault)];
+    return true;
 }
 
 bool Faults::swallows(const Frame& f, std::uint8_t node, Time now) noexcept {
     start(now);
     if (hit(Fault::deaf)) return true;
     if (f.id != 0x600U + node || f.extended || f.length != 8) return false;
-    const auto command = f.data[0], kind = static_cast<std::uint8_t>(command >> 5);
-    if (command == 0x80) return block_ = Block::none, false;
-    if (block_ == Block::receiving) return false;  // these bytes are data until the device acknowledges the block
-    if (command == 0xa3) return block_ = Block::sending, last_sequence_ = 0, false;
+    const auto command = f.data[0];
+    const auto kind = static_cast<std::uint8_t>(command >> 5);
+    if (command == 0x80) {
+        block_ = Block::none;
+        return false;
+    }
+    // these bytes are data until the device acknowledges the block
+    if (block_ == Block::receiving) return false;
+    if (command == 0xa3) {
+        block_ = Block::sending;
+        last_sequence_ = 0;
+        return false;
+    }
     if (command == 0xa2) {
-        if (block_ == Block::sending && last_sequence_ != 0 && f.data[1] == last_sequence_) block_ = Block::ending;
-        return last_sequence_ = 0, false;
+        if (block_ == Block::sending && last_sequence_ != 0 && f.data[1] == last_sequence_) {
+            block_ = Block::ending;
+        }
+        last_sequence_ = 0;
+        return false;
     }
     block_ = Block::none;
     if (kind == 1 || kind == 2 || (kind == 5 && (command & 3) == 0) || kind == 6) {
@@ -186,7 +237,9 @@ void Faults::identity(Frame& f) noexcept {
                        : sub == 2         ? hit(Fault::wrong_product)
                        : sub == 3         ? hit(Fault::wrong_revision)
                                           : sub == 4 && hit(Fault::wrong_serial);
-    if (wrong) f.data[4] ^= 0xff;
+    if (wrong) {
+        f.data[4] ^= 0xff;
+    }
 }
 
 /// Alters a response of the SDO server. Returns false when it must not be sent.
@@ -198,23 +251,31 @@ bool Faults::answer(Frame& f, FrameQueue& bus) noexcept {
     };
     if (hit(Fault::no_sdo)) return false;
     if (block_ == Block::sending) {  // only segments follow
-        if ((f.data[0] & 0x80) != 0) last_sequence_ = f.data[0] & 0x7f;
+        if ((f.data[0] & 0x80) != 0) {
+            last_sequence_ = f.data[0] & 0x7f;
+        }
         return !hit(Fault::block_gap);
     }
     const auto kind = f.data[0] >> 5;
     if (block_ == Block::ending) {
         block_ = Block::none;
-        if (kind == 6 && hit(Fault::block_crc)) f.data[1] ^= 0xff;
+        if (kind == 6 && hit(Fault::block_crc)) {
+            f.data[1] ^= 0xff;
+        }
         return true;
     }
     if (block_ == Block::receiving) {
         if (f.data[0] == 0xa2) return true;
         block_ = Block::none;
-        if (f.data[0] == 0xa1 && hit(Fault::block_crc)) tell_abort(f, request_, Abort::crc);
+        if (f.data[0] == 0xa1 && hit(Fault::block_crc)) {
+            tell_abort(f, request_, Abort::crc);
+        }
         return true;
     }
     if (kind <= 1) {
-        if (hit(Fault::toggle)) f.data[0] ^= 0x10;
+        if (hit(Fault::toggle)) {
+            f.data[0] ^= 0x10;
+        }
         return true;
     }
     if (hit(Fault::stale_abort)) {
@@ -223,8 +284,13 @@ bool Faults::answer(Frame& f, FrameQueue& bus) noexcept {
         bus.push(stale);
     }
     if (f.data[0] == 0x80) return true;
-    if (hit(Fault::abort)) return tell_abort(f, request_, Abort::general), true;
-    if (kind == 5) block_ = Block::receiving;
+    if (hit(Fault::abort)) {
+        tell_abort(f, request_, Abort::general);
+        return true;
+    }
+    if (kind == 5) {
+        block_ = Block::receiving;
+    }
     identity(f);
     return true;
 }
@@ -234,17 +300,26 @@ void Faults::hold(const Frame& f, Time due, FrameQueue& bus) noexcept {
     held_[held_count_++] = {f, due};
 }
 
-/// Alters a frame of an SRDO, the first (odd identifier) or the second. Returns false when it must not be sent now.
+/// Alters a frame of an SRDO, the first (odd identifier) or the second. Returns false when it must
+/// not be sent now.
 bool Faults::safety(Frame& f, Time& late, FrameQueue& bus) noexcept {
     if (f.id % 2 == 1) {
-        skips_srdo_ = hit(Fault::no_srdo), swaps_srdo_ = hit(Fault::srdo_order);
+        skips_srdo_ = hit(Fault::no_srdo);
+        swaps_srdo_ = hit(Fault::srdo_order);
         first_of_srdo_ = f;
         return !skips_srdo_ && !swaps_srdo_;
     }
     if (skips_srdo_ || hit(Fault::srdo_half)) return false;
-    if (f.length > 0 && hit(Fault::srdo_wrong)) f.data[0] ^= 0x01;
-    if (hit(Fault::late_srdo)) late = time(Fault::late_srdo);
-    if (swaps_srdo_) bus.push(f), f = first_of_srdo_;
+    if (f.length > 0 && hit(Fault::srdo_wrong)) {
+        f.data[0] ^= 0x01;
+    }
+    if (hit(Fault::late_srdo)) {
+        late = time(Fault::late_srdo);
+    }
+    if (swaps_srdo_) {
+        bus.push(f);
+        f = first_of_srdo_;
+    }
     return true;
 }
 
@@ -254,22 +329,35 @@ void Faults::send(Frame f, std::uint8_t node, FrameQueue& bus, Time now) noexcep
     Time late = 0;
     if (!f.extended && f.id == 0x580U + node && f.length == 8) {
         if (!answer(f, bus)) return;
-        if (hit(Fault::late_sdo)) late = time(Fault::late_sdo);
+        if (hit(Fault::late_sdo)) {
+            late = time(Fault::late_sdo);
+        }
     } else if (!f.extended && f.id == 0x700U + node && f.length == 1) {
         const bool boot_up = f.data[0] == 0;
         if (boot_up ? hit(Fault::no_boot_up) : hit(Fault::no_heartbeat)) return;
-        if (!boot_up && hit(Fault::wrong_state)) f.data[0] = static_cast<std::uint8_t>((f.data[0] & 0x80) | 0x04);
-        if (!boot_up && hit(Fault::guard_toggle)) f.data[0] ^= 0x80;
+        if (!boot_up && hit(Fault::wrong_state)) {
+            f.data[0] = static_cast<std::uint8_t>((f.data[0] & 0x80) | 0x04);
+        }
+        if (!boot_up && hit(Fault::guard_toggle)) {
+            f.data[0] ^= 0x80;
+        }
     } else if (is_srdo(f)) {
         if (!safety(f, late, bus)) return;
     } else if (is_pdo(f, node)) {
-        if (f.length > 0 && hit(Fault::short_pdo)) --f.length;
-        else if (f.length < 8 && hit(Fault::long_pdo)) f.data[f.length++] = 0;
-        if (hit(Fault::late_pdo)) late = time(Fault::late_pdo);
+        if (f.length > 0 && hit(Fault::short_pdo)) {
+            --f.length;
+        } else if (f.length < 8 && hit(Fault::long_pdo)) {
+            f.data[f.length++] = 0;
+        }
+        if (hit(Fault::late_pdo)) {
+            late = time(Fault::late_pdo);
+        }
     }
     if (late != 0) return hold(f, now + late, bus);
     bus.push(f);
-    if (hit(Fault::twice)) bus.push(f);
+    if (hit(Fault::twice)) {
+        bus.push(f);
+    }
 }
 
 bool Faults::poll(std::uint8_t node, FrameQueue& bus, Time now) noexcept {
@@ -277,19 +365,25 @@ bool Faults::poll(std::uint8_t node, FrameQueue& bus, Time now) noexcept {
     std::size_t kept = 0;
     for (std::size_t n = 0; n < held_count_; ++n) {
         if (now >= held_[n].due && bus.push(held_[n].frame)) continue;
-        if (kept != n) held_[kept] = held_[n];
+        if (kept != n) {
+            held_[kept] = held_[n];
+        }
         ++kept;
     }
     held_count_ = kept;
     if (!any_) return false;
-    if (periodic(Fault::boot_storm)) bus.push(make_frame(0x700U + node, 1));
+    if (periodic(Fault::boot_storm)) {
+        bus.push(make_frame(0x700U + node, 1));
+    }
     if (periodic(Fault::emcy_storm)) {
         Frame f = make_frame(0x80U + node, 8);
         store(f.data.data(), std::uint16_t{0xff00});
         f.data[2] = 0x81;
         bus.push(f);
     }
-    for (unsigned n = 0; n < 32 && periodic(Fault::babble); ++n) bus.push(make_frame(0x001, 8));
+    for (unsigned n = 0; n < 32 && periodic(Fault::babble); ++n) {
+        bus.push(make_frame(0x001, 8));
+    }
     return periodic(Fault::reboot);
 }
 

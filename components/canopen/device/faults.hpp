@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Faults of a device on the bus, injected to test a master. A Node puts them between its device and the link.
-// They are deterministic: the same frames at the same times meet the same faults.
+// Faults of a device on the bus, injected to test a master. A Node puts them between its device and
+// the link. They are deterministic: the same frames at the same times meet the same faults.
 #pragma once
 
 #include <array>
@@ -16,9 +16,38 @@ namespace hal::canopen {
 /// Kinds of faults, in the order of fault_rows().
 
 enum class Fault : std::uint8_t {
-    mute, deaf, twice, late_sdo, late_pdo, no_boot_up, boot_storm, reboot, no_heartbeat, wrong_state, guard_toggle, no_sdo, abort,
-    stale_abort, toggle, block_gap, block_crc, short_pdo, long_pdo, wrong_type, wrong_vendor, wrong_product, wrong_revision, wrong_serial,
-    wrong_software, babble, emcy_storm, no_srdo, srdo_half, srdo_wrong, srdo_order, late_srdo,
+    mute,
+    deaf,
+    twice,
+    late_sdo,
+    late_pdo,
+    no_boot_up,
+    boot_storm,
+    reboot,
+    no_heartbeat,
+    wrong_state,
+    guard_toggle,
+    no_sdo,
+    abort,
+    stale_abort,
+    toggle,
+    block_gap,
+    block_crc,
+    short_pdo,
+    long_pdo,
+    wrong_type,
+    wrong_vendor,
+    wrong_product,
+    wrong_revision,
+    wrong_serial,
+    wrong_software,
+    babble,
+    emcy_storm,
+    no_srdo,
+    srdo_half,
+    srdo_wrong,
+    srdo_order,
+    late_srdo,
 };
 
 /// Describes a kind of fault.
@@ -26,7 +55,7 @@ struct FaultRow {
     Fault fault;
     const char* name;  ///< name in `--fault` and `faults=`
     const char* what;  ///< the event that is affected, to read after "every n-th"
-    Time time;         ///< default of `time` in ns; 0: the fault has no time
+    Time time;  ///< default of `time` in ns; 0: the fault has no time
 };
 /// Returns all kinds of faults. [any]
 std::span<const FaultRow> fault_rows() noexcept;
@@ -36,12 +65,13 @@ const FaultRow* find_fault(std::string_view name) noexcept;
 /// When a fault is active and how often it hits.
 struct FaultSetting {
     std::uint32_t every = 0;  ///< 0: off; 1: every event; n: every n-th event
-    Time time = 0;            ///< delay or period in ns; 0: the default of the row
-    Time from = 0, until = INT64_MAX;  ///< active from..until in ns after the first turn
+    Time time = 0;  ///< delay or period in ns; 0: the default of the row
+    Time from = 0;
+    Time until = INT64_MAX;  ///< active from..until in ns after the first turn
 };
 
-/// Parses `late-sdo`, `late-sdo:time=20ms`, `mute:from=5s:for=1s`, `twice:every=3`. Returns false and sets `problem` to what is wrong
-/// and what to type. [setup]
+/// Parses `late-sdo`, `late-sdo:time=20ms`, `mute:from=5s:for=1s`, `twice:every=3`. Returns false
+/// and sets `problem` to what is wrong and what to type. [setup]
 bool parse_fault(std::string_view text, Fault& fault, FaultSetting& setting, std::string& problem);
 
 /// Applies faults to the frames of one device. `node` is its node ID, `now` the time in ns.
@@ -51,24 +81,31 @@ public:
     explicit Faults(std::size_t held = 512);
 
     /// Switches a fault on or off. [realtime]
-    void set(Fault fault, const FaultSetting& setting) noexcept { settings_[index(fault)] = setting, find_any(); }
+    void set(Fault fault, const FaultSetting& setting) noexcept {
+        settings_[index(fault)] = setting;
+        find_any();
+    }
     const FaultSetting& setting(Fault fault) const noexcept { return settings_[index(fault)]; }
     /// Returns how many events a fault has hit. [realtime]
     std::uint64_t hits(Fault fault) const noexcept { return hits_[index(fault)]; }
-    /// Returns true when no fault is set and no frame is delayed, so frames need not pass here. [realtime]
+    /// Returns true when no fault is set and no frame is delayed, so frames need not pass here.
+    /// [realtime]
     bool idle() const noexcept { return !any_ && held_count_ == 0; }
 
     /// Counts a received frame and returns true when the device must not see it. [realtime]
     bool swallows(const Frame&, std::uint8_t node, Time now) noexcept;
-    /// Puts a frame sent by the device, altered or not at all, into `bus`, which needs space for 4 frames. [realtime]
+    /// Puts a frame sent by the device, altered or not at all, into `bus`, which needs space for 4
+    /// frames. [realtime]
     void send(Frame, std::uint8_t node, FrameQueue& bus, Time now) noexcept;
-    /// Puts delayed frames that are due, and frames the device never sent, into `bus`. Returns true when the device must restart.
-    /// [realtime]
+    /// Puts delayed frames that are due, and frames the device never sent, into `bus`. Returns true
+    /// when the device must restart. [realtime]
     bool poll(std::uint8_t node, FrameQueue& bus, Time now) noexcept;
 
 private:
     static constexpr std::size_t kinds = static_cast<std::size_t>(Fault::late_srdo) + 1;
-    static constexpr std::size_t index(Fault fault) noexcept { return static_cast<std::size_t>(fault); }
+    static constexpr std::size_t index(Fault fault) noexcept {
+        return static_cast<std::size_t>(fault);
+    }
     struct Held {
         Frame frame;
         Time due = 0;
@@ -90,14 +127,17 @@ private:
     std::unique_ptr<Held[]> held_;  // in order of arrival, not of due time
     const std::size_t held_capacity_;
     std::size_t held_count_ = 0;
-    bool any_ = false, started_ = false;
-    Time began_ = 0, now_ = 0;
+    bool any_ = false;
+    bool started_ = false;
+    Time began_ = 0;
+    Time now_ = 0;
     // The SDO transfer in progress, to distinguish frames that look alike.
     enum class Block : std::uint8_t { none, receiving, sending, ending } block_ = Block::none;
     std::uint8_t last_sequence_ = 0;
     std::array<std::uint8_t, 3> request_{}, previous_{};
     Frame first_of_srdo_{};  // sent after the second frame
-    bool skips_srdo_ = false, swaps_srdo_ = false;
+    bool skips_srdo_ = false;
+    bool swaps_srdo_ = false;
 };
 
 }  // namespace hal::canopen

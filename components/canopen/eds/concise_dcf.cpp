@@ -10,52 +10,75 @@ namespace hal::canopen::eds {
 namespace {
 
 void append(std::vector<std::uint8_t>& out, std::uint64_t value, unsigned bytes) {
-    for (unsigned i = 0; i < bytes; ++i) out.push_back(static_cast<std::uint8_t>(value >> (8 * i)));
+    for (unsigned i = 0; i < bytes; ++i) {
+        out.push_back(static_cast<std::uint8_t>(value >> (8 * i)));
+    }
 }
 
 std::uint64_t number_of(std::span<const std::uint8_t> bytes) {
     std::uint64_t out = 0;
-    for (std::size_t i = 0; i < bytes.size() && i < 8; ++i) out |= std::uint64_t{bytes[i]} << (8 * i);
+    for (std::size_t i = 0; i < bytes.size() && i < 8; ++i) {
+        out |= std::uint64_t{bytes[i]} << (8 * i);
+    }
     return out;
 }
 
 constexpr std::uint32_t pdo_off = 0x80000000;
 
-bool is_communication(std::uint16_t index) { return (index >= 0x1400 && index < 0x1600) || (index >= 0x1800 && index < 0x1A00); }
-bool is_mapping(std::uint16_t index) { return (index >= 0x1600 && index < 0x1800) || (index >= 0x1A00 && index < 0x1C00); }
+bool is_communication(std::uint16_t index) {
+    return (index >= 0x1400 && index < 0x1600) || (index >= 0x1800 && index < 0x1A00);
+}
+bool is_mapping(std::uint16_t index) {
+    return (index >= 0x1600 && index < 0x1800) || (index >= 0x1A00 && index < 0x1C00);
+}
 
 class Maker {
 public:
-    Maker(const DeviceDescription& d, unsigned node_id, bool all) : d_(d), node_(node_id != 0 ? node_id : d.node_id()), all_(all) {}
+    Maker(const DeviceDescription& d, unsigned node_id, bool all)
+        : d_(d), node_(node_id != 0 ? node_id : d.node_id()), all_(all) {}
 
     Configuration make() {
         for (const Object& object : d_.objects) {
             if (is_mapping(object.index)) {
-                if (d_.find(static_cast<std::uint16_t>(object.index - 0x200)) == nullptr) plain(object);
+                if (d_.find(static_cast<std::uint16_t>(object.index - 0x200)) == nullptr) {
+                    plain(object);
+                }
                 continue;  // with its communication parameters
             }
-            if (is_communication(object.index)) pdo(object);
-            else plain(object);
+            if (is_communication(object.index)) {
+                pdo(object);
+            } else {
+                plain(object);
+            }
         }
         return std::move(out_);
     }
 
 private:
-    void leave_out(const Entry& entry, std::uint16_t index, std::string why, std::string help = "") {
-        out_.messages.push_back({Severity::warning, Topic::value, entry.at,
-                                 "the value of " + label(index, entry.sub) + " is not configured: " + std::move(why), std::move(help)});
+    void leave_out(const Entry& entry, std::uint16_t index, std::string why,
+                   std::string help = "") {
+        out_.messages.push_back(
+            {Severity::warning, Topic::value, entry.at,
+             "the value of " + label(index, entry.sub) + " is not configured: " + std::move(why),
+             std::move(help)});
     }
 
     /// The bytes to write; none when there is nothing to do.
-    std::optional<std::vector<std::uint8_t>> wanted(std::uint16_t index, const Entry& entry, bool differing_only = true) {
-        if (entry.parameter_value.empty()) return {};
+    std::optional<std::vector<std::uint8_t>> wanted(std::uint16_t index, const Entry& entry,
+                                                    bool differing_only = true) {
+        if (entry.parameter_value.empty()) {
+            return {};
+        }
         const Encoded value = encode(entry.parameter_value, entry.data_type, node_);
         const Encoded before = encode(entry.default_value, entry.data_type, node_);
-        if (value && before && value.bytes == before.bytes && differing_only && !all_) return {};
+        if (value && before && value.bytes == before.bytes && differing_only && !all_) {
+            return {};
+        }
         if (!entry.writable()) {
-            if (value && before && value.bytes != before.bytes && !before.bytes.empty())
+            if (value && before && value.bytes != before.bytes && !before.bytes.empty()) {
                 leave_out(entry, index, "it is " + std::string(name_of(entry.access)),
                           "it has to be what the device holds: " + entry.default_value);
+            }
             return {};
         }
         if (index == 0x1010 || index == 0x1011) {
@@ -67,7 +90,8 @@ private:
             return {};
         }
         if (value.node_id && node_ == 0) {
-            leave_out(entry, index, "it depends on the node-id, and no node-id is given", "NodeID=… of [DeviceComissioning] gives one");
+            leave_out(entry, index, "it depends on the node-id, and no node-id is given",
+                      "NodeID=… of [DeviceComissioning] gives one");
             return {};
         }
         return value.bytes;
@@ -80,22 +104,32 @@ private:
             auto data = wanted(object.index, entry);
             if (!data) continue;
             Write write{object.index, entry.sub, std::move(*data)};
-            if (entry.sub == 0 && !object.single()) last = std::move(write);
-            else out_.writes.push_back(std::move(write));
+            if (entry.sub == 0 && !object.single()) {
+                last = std::move(write);
+            } else {
+                out_.writes.push_back(std::move(write));
+            }
         }
-        if (last) out_.writes.push_back(std::move(*last));
+        if (last) {
+            out_.writes.push_back(std::move(*last));
+        }
     }
 
     void pdo(const Object& communication) {
         const Object* mapping = d_.find(static_cast<std::uint16_t>(communication.index + 0x200));
-        const auto    changes = [&](const Object& object) {
+        const auto changes = [&](const Object& object) {
             std::vector<Write> writes;
-            for (const Entry& entry : object.entries)
-                if (auto data = wanted(object.index, entry)) writes.push_back({object.index, entry.sub, std::move(*data)});
+            for (const Entry& entry : object.entries) {
+                if (auto data = wanted(object.index, entry)) {
+                    writes.push_back({object.index, entry.sub, std::move(*data)});
+                }
+            }
             return writes;
         };
         std::vector<Write> settings = changes(communication), mapped;
-        if (mapping != nullptr) mapped = changes(*mapping);
+        if (mapping != nullptr) {
+            mapped = changes(*mapping);
+        }
         if (settings.empty() && mapped.empty()) return;
         const Entry* cob = communication.find(1);
         if (cob == nullptr || !cob->writable()) {  // cannot be switched off
@@ -104,19 +138,34 @@ private:
             return;
         }
         const std::vector<std::uint8_t> final_cob = value_of(*cob, node_);
-        if (final_cob.size() == 4) add(communication.index, 1, number_of(final_cob) | pdo_off, 4);
+        if (final_cob.size() == 4) {
+            add(communication.index, 1, number_of(final_cob) | pdo_off, 4);
+        }
         if (!mapped.empty()) {
             const Entry* count = mapping->find(0);
-            const bool   counts = count != nullptr && count->writable();
-            if (counts) add(mapping->index, 0, 0, 1);
-            for (Write& write : mapped)
-                if (write.sub != 0) out_.writes.push_back(std::move(write));
-            const std::vector<std::uint8_t> number = count != nullptr ? value_of(*count, node_) : std::vector<std::uint8_t>();
-            if (counts && !number.empty()) out_.writes.push_back({mapping->index, 0, number});
+            const bool counts = count != nullptr && count->writable();
+            if (counts) {
+                add(mapping->index, 0, 0, 1);
+            }
+            for (Write& write : mapped) {
+                if (write.sub != 0) {
+                    out_.writes.push_back(std::move(write));
+                }
+            }
+            const std::vector<std::uint8_t> number =
+                count != nullptr ? value_of(*count, node_) : std::vector<std::uint8_t>();
+            if (counts && !number.empty()) {
+                out_.writes.push_back({mapping->index, 0, number});
+            }
         }
-        for (Write& write : settings)
-            if (write.sub > 1) out_.writes.push_back(std::move(write));
-        if (final_cob.size() == 4 && (number_of(final_cob) & pdo_off) == 0) out_.writes.push_back({communication.index, 1, final_cob});
+        for (Write& write : settings) {
+            if (write.sub > 1) {
+                out_.writes.push_back(std::move(write));
+            }
+        }
+        if (final_cob.size() == 4 && (number_of(final_cob) & pdo_off) == 0) {
+            out_.writes.push_back({communication.index, 1, final_cob});
+        }
     }
 
     void add(std::uint16_t index, std::uint8_t sub, std::uint64_t value, unsigned bytes) {
@@ -126,19 +175,23 @@ private:
     }
 
     const DeviceDescription& d_;
-    unsigned                 node_;
-    bool                     all_;
-    Configuration            out_;
+    unsigned node_;
+    bool all_;
+    Configuration out_;
 };
 
 }  // namespace
 
 std::vector<std::uint8_t> value_of(const Entry& entry, unsigned node_id) {
-    Encoded value = encode(entry.parameter_value.empty() ? entry.default_value : entry.parameter_value, entry.data_type, node_id);
+    Encoded value =
+        encode(entry.parameter_value.empty() ? entry.default_value : entry.parameter_value,
+               entry.data_type, node_id);
     return value ? std::move(value.bytes) : std::vector<std::uint8_t>();
 }
 
-Configuration configuration_of(const DeviceDescription& dcf, unsigned node_id, bool all) { return Maker(dcf, node_id, all).make(); }
+Configuration configuration_of(const DeviceDescription& dcf, unsigned node_id, bool all) {
+    return Maker(dcf, node_id, all).make();
+}
 
 std::vector<std::uint8_t> concise(std::span<const Write> writes) {
     std::vector<std::uint8_t> out;
@@ -154,21 +207,31 @@ std::vector<std::uint8_t> concise(std::span<const Write> writes) {
 
 std::optional<std::vector<Write>> parse_concise(std::span<const std::uint8_t> bytes) {
     constexpr std::size_t head = 7;
-    if (bytes.size() < 4) return {};
+    if (bytes.size() < 4) {
+        return {};
+    }
     const std::uint64_t count = number_of(bytes.first(4));
     bytes = bytes.subspan(4);
-    if (count > bytes.size() / head) return {};
+    if (count > bytes.size() / head) {
+        return {};
+    }
     std::vector<Write> out;
     for (std::uint64_t i = 0; i < count; ++i) {
-        if (bytes.size() < head) return {};
+        if (bytes.size() < head) {
+            return {};
+        }
         const std::uint64_t size = number_of(bytes.subspan(3, 4));
-        if (size > bytes.size() - head) return {};
+        if (size > bytes.size() - head) {
+            return {};
+        }
         out.push_back({static_cast<std::uint16_t>(number_of(bytes.first(2))), bytes[2], {}});
         const auto data = bytes.subspan(head, static_cast<std::size_t>(size));
         out.back().data.assign(data.begin(), data.end());
         bytes = bytes.subspan(head + data.size());
     }
-    if (!bytes.empty()) return {};
+    if (!bytes.empty()) {
+        return {};
+    }
     return out;
 }
 

@@ -14,20 +14,28 @@ constexpr unsigned most_pdo_bits = 64 * 8;  // CAN FD; a classic frame has 64
 
 class Checks {
 public:
-    Checks(const DeviceDescription& d, std::vector<Message>& messages) : d_(d), messages_(messages), node_(d.node_id(1)) {}
+    Checks(const DeviceDescription& d, std::vector<Message>& messages)
+        : d_(d), messages_(messages), node_(d.node_id(1)) {}
 
     void run() {
         for (const Object& object : d_.objects) {
-            const bool receive = object.index >= 0x1600 && object.index < 0x1800, send = object.index >= 0x1A00 && object.index < 0x1C00;
-            if (receive || send) mapping(object, receive);
+            const bool receive = object.index >= 0x1600 && object.index < 0x1800;
+
+            const bool send = object.index >= 0x1A00 && object.index < 0x1C00;
+            if (receive || send) {
+                mapping(object, receive);
+            }
         }
         count(0x1400, d_.device.rx_pdos, d_.device.rx_pdos_at, "NrOfRXPDO");
         count(0x1800, d_.device.tx_pdos, d_.device.tx_pdos_at, "NrOfTXPDO");
-        if (!d_.commissioning) values_of_eds();
+        if (!d_.commissioning) {
+            values_of_eds();
+        }
     }
 
 private:
-    void report(Severity severity, Topic topic, const Span& at, std::string sentence, std::string help = "") {
+    void report(Severity severity, Topic topic, const Span& at, std::string sentence,
+                std::string help = "") {
         messages_.push_back({severity, topic, at, std::move(sentence), std::move(help)});
     }
 
@@ -35,69 +43,93 @@ private:
     void values_of_eds() {
         const std::size_t all = parameter_values(d_);
         for (const Object& object : d_.objects) {
-            const auto entry = std::find_if(object.entries.begin(), object.entries.end(), has_parameter_value);
+            const auto entry =
+                std::find_if(object.entries.begin(), object.entries.end(), has_parameter_value);
             if (entry == object.entries.end()) continue;
-            const std::string where = object.single() ? label(object.index) : label(object.index, entry->sub);
+            const std::string where =
+                object.single() ? label(object.index) : label(object.index, entry->sub);
             std::string sentence = "parameter value of " + where;
-            if (all == 2) sentence += " and 1 more";
-            if (all > 2) sentence += " and " + std::to_string(all - 1) + " more";
+            if (all == 2) {
+                sentence += " and 1 more";
+            }
+            if (all > 2) {
+                sentence += " and " + std::to_string(all - 1) + " more";
+            }
             report(Severity::note, Topic::value, entry->at,
-                sentence + ": a file without [DeviceComissioning] is an EDS, and a master does not write its parameter values",
-                "add [DeviceComissioning] with the NodeID to make it a DCF");
+                   sentence +
+                       ": a file without [DeviceComissioning] is an EDS, and a master does not "
+                       "write its parameter values",
+                   "add [DeviceComissioning] with the NodeID to make it a DCF");
             return;
         }
     }
 
     std::optional<std::uint64_t> value(const Entry& entry) const {
-        const std::string& text = entry.parameter_value.empty() ? entry.default_value : entry.parameter_value;
-        const Encoded      encoded = encode(text, entry.data_type, node_);
-        if (!encoded || encoded.bytes.empty() || encoded.bytes.size() > 8) return {};
+        const std::string& text =
+            entry.parameter_value.empty() ? entry.default_value : entry.parameter_value;
+        const Encoded encoded = encode(text, entry.data_type, node_);
+        if (!encoded || encoded.bytes.empty() || encoded.bytes.size() > 8) {
+            return {};
+        }
         std::uint64_t out = 0;
-        for (std::size_t i = 0; i < encoded.bytes.size(); ++i) out |= std::uint64_t{encoded.bytes[i]} << (8 * i);
+        for (std::size_t i = 0; i < encoded.bytes.size(); ++i) {
+            out |= std::uint64_t{encoded.bytes[i]} << (8 * i);
+        }
         return out;
     }
 
     void mapping(const Object& object, bool receive) {
         const Entry* first = object.find(0);
-        const auto   mapped = first != nullptr ? value(*first) : std::nullopt;
+        const auto mapped = first != nullptr ? value(*first) : std::nullopt;
         if (!mapped || *mapped == 0 || *mapped > 64) return;
         unsigned sum = 0;
         for (unsigned sub = 1; sub <= *mapped; ++sub) {
             const Entry* entry = object.find(static_cast<std::uint8_t>(sub));
             if (entry == nullptr) {
                 report(Severity::warning, Topic::object, object.at,
-                    label(object.index) + " maps " + std::to_string(*mapped) + " objects, but sub-index " + hex(sub, 1).substr(2) +
-                        " is not described");
+                       label(object.index) + " maps " + std::to_string(*mapped) +
+                           " objects, but sub-index " + hex(sub, 1).substr(2) +
+                           " is not described");
                 break;
             }
             const auto bits = value(*entry);
             if (!bits || *bits == 0) continue;
             sum += one(object, *entry, static_cast<std::uint32_t>(*bits), receive);
         }
-        if (sum > most_pdo_bits)
-            report(Severity::warning, Topic::object, object.at, label(object.index) + " maps " + std::to_string(sum) + " bits",
-                "that exceeds every frame");
-        else if (sum > 64)
-            report(Severity::warning, Topic::object, object.at, label(object.index) + " maps " + std::to_string(sum) + " bits",
-                "a classic CAN frame carries 64, only CAN FD carries more");
+        if (sum > most_pdo_bits) {
+            report(Severity::warning, Topic::object, object.at,
+                   label(object.index) + " maps " + std::to_string(sum) + " bits",
+                   "that exceeds every frame");
+        } else if (sum > 64) {
+            report(Severity::warning, Topic::object, object.at,
+                   label(object.index) + " maps " + std::to_string(sum) + " bits",
+                   "a classic CAN frame carries 64, only CAN FD carries more");
+        }
     }
 
     /// Returns the number of bits mapped by this entry.
     unsigned one(const Object& object, const Entry& entry, std::uint32_t word, bool receive) {
-        const auto        index = static_cast<std::uint16_t>(word >> 16);
-        const auto        sub = static_cast<std::uint8_t>(word >> 8);
-        const unsigned    bits = word & 0xFF;
-        const std::string here = label(object.index, entry.sub) + " maps " + (sub == 0 ? label(index) : label(index, sub));
-        const auto        warn = [&](std::string sentence, std::string help = "") {
-            report(Severity::warning, Topic::object, entry.at, here + std::move(sentence), std::move(help));
+        const auto index = static_cast<std::uint16_t>(word >> 16);
+        const auto sub = static_cast<std::uint8_t>(word >> 8);
+        const unsigned bits = word & 0xFF;
+        const std::string here = label(object.index, entry.sub) + " maps " +
+                                 (sub == 0 ? label(index) : label(index, sub));
+        const auto warn = [&](std::string sentence, std::string help = "") {
+            report(Severity::warning, Topic::object, entry.at, here + std::move(sentence),
+                   std::move(help));
         };
         if (index < 0x20) {  // a dummy
             const DataType* type = data_type(index);
-            const bool told = std::any_of(d_.dummies.begin(), d_.dummies.end(), [&](const auto& dummy) { return dummy.first == index; });
-            const bool may =
-                std::any_of(d_.dummies.begin(), d_.dummies.end(), [&](const auto& dummy) { return dummy.first == index && dummy.second; });
-            if (type == nullptr || type->bits == 0) warn(", which is not a data type with a length");
-            else if (!may && told) warn(", which [DummyUsage] does not allow", "write Dummy" + label(index) + "=1");
+            const bool told = std::any_of(d_.dummies.begin(), d_.dummies.end(),
+                                          [&](const auto& dummy) { return dummy.first == index; });
+            const bool may = std::any_of(
+                d_.dummies.begin(), d_.dummies.end(),
+                [&](const auto& dummy) { return dummy.first == index && dummy.second; });
+            if (type == nullptr || type->bits == 0) {
+                warn(", which is not a data type with a length");
+            } else if (!may && told) {
+                warn(", which [DummyUsage] does not allow", "write Dummy" + label(index) + "=1");
+            }
             return bits;
         }
         const Entry* target = d_.find(index, sub);
@@ -106,62 +138,80 @@ private:
             return bits;
         }
         const DataType* type = data_type(target->data_type);
-        if (type != nullptr && type->bits != 0 && type->bits != bits)
+        if (type != nullptr && type->bits != 0 && type->bits != bits) {
             warn(" with " + std::to_string(bits) + " bits; it has " + std::to_string(type->bits),
                  "write " + hex((word & ~0xFFu) | type->bits, 8));
-        if (!target->pdo_mapping) report(Severity::note, Topic::object, entry.at, here + ", which has no PDOMapping=1");
-        if (receive ? !target->writable() : !target->readable())
+        }
+        if (!target->pdo_mapping) {
+            report(Severity::note, Topic::object, entry.at, here + ", which has no PDOMapping=1");
+        }
+        if (receive ? !target->writable() : !target->readable()) {
             warn(receive ? ", which is not writable" : ", which is not readable",
                  "its AccessType is " + std::string(name_of(target->access)));
+        }
         return bits;
     }
 
     void count(std::uint16_t base, unsigned said, const Span& at, const char* key) {
-        const auto there =
-            std::count_if(d_.objects.begin(), d_.objects.end(), [&](const Object& o) { return o.index >= base && o.index < base + 0x200; });
+        const auto there = std::count_if(
+            d_.objects.begin(), d_.objects.end(),
+            [&](const Object& o) { return o.index >= base && o.index < base + 0x200; });
         if (said == static_cast<unsigned>(there) || d_.objects.empty()) return;
-        if (said == 0 && d_.file.eds_version.empty()) return;  // a DCF made by hand
+        if (said == 0 && d_.file.eds_version.empty()) {
+            return;  // a DCF made by hand
+        }
         report(Severity::note, Topic::count, at,
-            "'" + std::string(key) + "' is " + std::to_string(said) + ", but " + std::to_string(there) + " are described",
-            "write " + std::string(key) + "=" + std::to_string(there) + " in [DeviceInfo]");
+               "'" + std::string(key) + "' is " + std::to_string(said) + ", but " +
+                   std::to_string(there) + " are described",
+               "write " + std::string(key) + "=" + std::to_string(there) + " in [DeviceInfo]");
     }
 
     const DeviceDescription& d_;
-    std::vector<Message>&    messages_;
-    unsigned                 node_;
+    std::vector<Message>& messages_;
+    unsigned node_;
 };
 
 }  // namespace
 
 std::string misfit(const DeviceDescription& dcf, unsigned node_id, std::uint32_t bit_rate) {
     if (!dcf.commissioning) return "";
-    const unsigned its_node = dcf.commissioning->node_id, its_rate = dcf.commissioning->baud_rate;
-    if (its_node != 0 && its_node != node_id)
-        return "it is for node " + std::to_string(its_node) + ", not for node " + std::to_string(node_id);
+    const unsigned its_node = dcf.commissioning->node_id;
+    const unsigned its_rate = dcf.commissioning->baud_rate;
+    if (its_node != 0 && its_node != node_id) {
+        return "it is for node " + std::to_string(its_node) + ", not for node " +
+               std::to_string(node_id);
+    }
     if (its_rate == 0 || bit_rate == 0 || its_rate * 1000 == bit_rate) return "";
-    return "it is for a bus of " + std::to_string(its_rate) + " kbit/s, not of " + std::to_string(bit_rate / 1000) + " kbit/s";
+    return "it is for a bus of " + std::to_string(its_rate) + " kbit/s, not of " +
+           std::to_string(bit_rate / 1000) + " kbit/s";
 }
 
 std::size_t parameter_values(const DeviceDescription& description) {
     std::size_t count = 0;
-    for (const Object& object : description.objects)
-        count += static_cast<std::size_t>(std::count_if(object.entries.begin(), object.entries.end(), has_parameter_value));
+    for (const Object& object : description.objects) {
+        count += static_cast<std::size_t>(
+            std::count_if(object.entries.begin(), object.entries.end(), has_parameter_value));
+    }
     return count;
 }
 
-void check_objects(const DeviceDescription& description, std::vector<Message>& messages) { Checks(description, messages).run(); }
+void check_objects(const DeviceDescription& description, std::vector<Message>& messages) {
+    Checks(description, messages).run();
+}
 
 void connect_modules(DeviceDescription& d, std::vector<Message>& messages) {
     const auto object_of = [&](std::uint16_t index, const Object& like) -> Object& {
         const auto at =
-            std::lower_bound(d.objects.begin(), d.objects.end(), index, [](const Object& o, std::uint16_t i) { return o.index < i; });
+            std::lower_bound(d.objects.begin(), d.objects.end(), index,
+                             [](const Object& o, std::uint16_t i) { return o.index < i; });
         if (at != d.objects.end() && at->index == index) return *at;
         Object made;
         made.index = index;
         made.name = like.name;
         made.at = like.at;
         made.type = ObjectType::array;
-        made.category = index >= 0x2000 && index < 0x6000 ? Category::manufacturer : Category::optional;
+        made.category =
+            index >= 0x2000 && index < 0x6000 ? Category::manufacturer : Category::optional;
         Entry first;
         first.name = "Highest sub-index supported";
         first.data_type = 0x05;
@@ -172,38 +222,51 @@ void connect_modules(DeviceDescription& d, std::vector<Message>& messages) {
         return *d.objects.insert(at, std::move(made));
     };
     for (const unsigned number : d.connected_modules) {
-        const auto module = std::find_if(d.modules.begin(), d.modules.end(), [&](const Module& m) { return m.number == number; });
-        if (module == d.modules.end()) continue;  // reported by the reader
+        const auto module = std::find_if(d.modules.begin(), d.modules.end(),
+                                         [&](const Module& m) { return m.number == number; });
+        if (module == d.modules.end()) {
+            continue;  // reported by the reader
+        }
         for (const Object& fixed : module->fixed) {
             Object& there = object_of(fixed.index, fixed);
-            if (there.entries.size() <= 1 && there.type == ObjectType::array) there = fixed;
+            if (there.entries.size() <= 1 && there.type == ObjectType::array) {
+                there = fixed;
+            }
         }
         for (const SubExtension& extension : module->extensions) {
             const auto count = parse_number(extension.count);
             if (!count || count->node_id || count->magnitude == 0 || count->magnitude > 0xFE) {
                 messages.push_back({Severity::warning, Topic::value, extension.object.at,
-                                    "'Count' of module " + std::to_string(number) + " for " + label(extension.object.index) +
+                                    "'Count' of module " + std::to_string(number) + " for " +
+                                        label(extension.object.index) +
                                         " is not a plain number: '" + extension.count + "'",
                                     "its sub-indices were not added"});
                 continue;
             }
-            const Entry&  each = extension.object.entries.at(0);
+            const Entry& each = extension.object.entries.at(0);
             std::uint16_t index = extension.object.index;
-            const auto    next = parse_number(extension.object_extend);
+            const auto next = parse_number(extension.object_extend);
             for (std::uint64_t i = 0; i < count->magnitude; ++i) {
                 Object* object = &object_of(index, extension.object);
                 // Full: continue with the next object, if the module has ObjExtend.
-                while (object->entries.back().sub >= 0xFE && next && next->magnitude != 0 && index < 0xFFFF)
+                while (object->entries.back().sub >= 0xFE && next && next->magnitude != 0 &&
+                       index < 0xFFFF) {
                     object = &object_of(++index, extension.object);
+                }
                 if (object->entries.back().sub >= 0xFE) {
                     messages.push_back({Severity::warning, Topic::count, extension.object.at,
-                                        "object " + label(index) + " has no free sub-index for module " + std::to_string(number), ""});
+                                        "object " + label(index) +
+                                            " has no free sub-index for module " +
+                                            std::to_string(number),
+                                        ""});
                     break;
                 }
                 Entry made = each;
                 made.sub = static_cast<std::uint8_t>(object->entries.back().sub + 1);
                 object->entries.push_back(std::move(made));
-                if (Entry* first = object->find(0)) first->default_value = std::to_string(object->entries.back().sub);
+                if (Entry* first = object->find(0)) {
+                    first->default_value = std::to_string(object->entries.back().sub);
+                }
             }
         }
     }

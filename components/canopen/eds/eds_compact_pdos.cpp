@@ -14,12 +14,13 @@ Object communication(std::uint16_t index, std::uint8_t mask, bool receive, unsig
     object.name = receive ? "RPDO communication parameter" : "TPDO communication parameter";
     object.type = ObjectType::record;
     struct Sub {
-        const char*   name;
+        const char* name;
         std::uint16_t type;
     };
-    constexpr Sub subs[] = {{"COB-ID used by PDO", 7}, {"Transmission type", 5}, {"Inhibit time", 6},
-                            {"Reserved", 5},           {"Event timer", 6},       {"SYNC start value", 5}};
-    Entry         entry;
+    constexpr Sub subs[] = {{"COB-ID used by PDO", 7}, {"Transmission type", 5},
+                            {"Inhibit time", 6},       {"Reserved", 5},
+                            {"Event timer", 6},        {"SYNC start value", 5}};
+    Entry entry;
     entry.data_type = 5;
     entry.access = Access::constant;
     entry.name = "Highest sub-index supported";
@@ -30,7 +31,10 @@ Object communication(std::uint16_t index, std::uint8_t mask, bool receive, unsig
         entry.name = subs[i].name;
         entry.data_type = subs[i].type;
         entry.access = Access::rw;
-        entry.default_value = i == 0 ? n < 4 ? "$NODEID+" + hex((receive ? 0x200u : 0x180u) + 0x100u * n, 3) : "0x80000000" : "";
+        entry.default_value =
+            i == 0 ? n < 4 ? "$NODEID+" + hex((receive ? 0x200u : 0x180u) + 0x100u * n, 3)
+                           : "0x80000000"
+                   : "";
         object.entries.push_back(entry);
     }
     object.entries.front().default_value = std::to_string(object.entries.back().sub);
@@ -57,8 +61,9 @@ Object mapping(std::uint16_t index, bool receive) {
 }
 
 void insert(DeviceDescription& out, Object object) {
-    const auto at = std::lower_bound(out.objects.begin(), out.objects.end(), object.index,
-                                     [](const Object& o, std::uint16_t index) { return o.index < index; });
+    const auto at =
+        std::lower_bound(out.objects.begin(), out.objects.end(), object.index,
+                         [](const Object& o, std::uint16_t index) { return o.index < index; });
     out.objects.insert(at, std::move(object));
 }
 
@@ -68,16 +73,20 @@ void add_compact_pdos(DeviceDescription& out) {
     const std::uint8_t mask = out.device.compact_pdo;
     if (mask == 0) return;
     for (const bool receive : {true, false}) {
-        const std::uint16_t base = receive ? 0x1400 : 0x1800, wanted = receive ? out.device.rx_pdos : out.device.tx_pdos;
-        const auto          described = std::count_if(out.objects.begin(), out.objects.end(),
-                                                      [&](const Object& o) { return o.index >= base && o.index < base + 0x200; });
-        unsigned            missing_pdos = described < wanted ? static_cast<unsigned>(wanted - described) : 0;
+        const std::uint16_t base = receive ? 0x1400 : 0x1800;
+
+        const std::uint16_t wanted = receive ? out.device.rx_pdos : out.device.tx_pdos;
+        const auto described = std::count_if(
+            out.objects.begin(), out.objects.end(),
+            [&](const Object& o) { return o.index >= base && o.index < base + 0x200; });
+        unsigned missing_pdos = described < wanted ? static_cast<unsigned>(wanted - described) : 0;
         for (std::uint16_t n = 0; missing_pdos > 0 && n < 0x200; ++n) {
             if (out.find(static_cast<std::uint16_t>(base + n)) != nullptr) continue;
             --missing_pdos;
             insert(out, communication(static_cast<std::uint16_t>(base + n), mask, receive, n));
-            if (out.find(static_cast<std::uint16_t>(base + 0x200 + n)) == nullptr)
+            if (out.find(static_cast<std::uint16_t>(base + 0x200 + n)) == nullptr) {
                 insert(out, mapping(static_cast<std::uint16_t>(base + 0x200 + n), receive));
+            }
         }
     }
 }

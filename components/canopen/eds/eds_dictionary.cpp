@@ -10,12 +10,18 @@ namespace {
 
 std::optional<std::int64_t> limit(const std::string& text, const DataType& type) {
     const Encoded value = encode(text, type.code, 0);
-    if (!value || value.bytes.empty() || value.bytes.size() > 8) return {};
+    if (!value || value.bytes.empty() || value.bytes.size() > 8) {
+        return {};
+    }
     std::uint64_t bits = 0;
-    for (std::size_t i = 0; i < value.bytes.size(); ++i) bits |= std::uint64_t{value.bytes[i]} << (8 * i);
-    if (type.kind == Kind::real)
-        return std::bit_cast<std::int64_t>(type.bits == 32 ? double{std::bit_cast<float>(static_cast<std::uint32_t>(bits))}
-                                                           : std::bit_cast<double>(bits));
+    for (std::size_t i = 0; i < value.bytes.size(); ++i) {
+        bits |= std::uint64_t{value.bytes[i]} << (8 * i);
+    }
+    if (type.kind == Kind::real) {
+        return std::bit_cast<std::int64_t>(
+            type.bits == 32 ? double{std::bit_cast<float>(static_cast<std::uint32_t>(bits))}
+                            : std::bit_cast<double>(bits));
+    }
     if (type.kind != Kind::integer) return static_cast<std::int64_t>(bits);
     const unsigned unused = 64 - type.bits;
     return static_cast<std::int64_t>(bits << unused) >> unused;
@@ -23,14 +29,17 @@ std::optional<std::int64_t> limit(const std::string& text, const DataType& type)
 
 std::int64_t widest(const DataType& type, bool low) {
     using Infinity = std::numeric_limits<double>;
-    if (type.kind == Kind::real) return std::bit_cast<std::int64_t>(low ? -Infinity::infinity() : Infinity::infinity());
+    if (type.kind == Kind::real) {
+        return std::bit_cast<std::int64_t>(low ? -Infinity::infinity() : Infinity::infinity());
+    }
     const std::uint64_t top = type.bits == 64 ? ~0ull : (1ull << type.bits) - 1;
     if (type.kind != Kind::integer) return low ? 0 : static_cast<std::int64_t>(top);
     const auto half = static_cast<std::int64_t>(top >> 1);
     return low ? -half - 1 : half;
 }
 
-EntryDescription made(std::uint16_t index, const Entry& entry, const DataType& type, bool configured) {
+EntryDescription made(std::uint16_t index, const Entry& entry, const DataType& type,
+                      bool configured) {
     EntryDescription out;
     out.index = index;
     out.sub = entry.sub;
@@ -42,18 +51,23 @@ EntryDescription made(std::uint16_t index, const Entry& entry, const DataType& t
                  : !entry.readable()              ? Right::write_only
                                                   : Right::read_write;
     out.rpdo = entry.pdo_mapping && entry.writable() && entry.access != Access::rwr;
-    out.tpdo = entry.pdo_mapping && entry.readable() && entry.access != Access::rww && entry.access != Access::constant;
-    const std::string& text = configured && !entry.parameter_value.empty() ? entry.parameter_value : entry.default_value;
+    out.tpdo = entry.pdo_mapping && entry.readable() && entry.access != Access::rww &&
+               entry.access != Access::constant;
+    const std::string& text =
+        configured && !entry.parameter_value.empty() ? entry.parameter_value : entry.default_value;
     if (Encoded value = encode(text, type.code, 0)) {
         out.plus_node_id = value.node_id;
         out.value = std::move(value.bytes);
     }
     if (type.kind < Kind::text && type.kind != Kind::boolean) {
-        const auto low = limit(entry.low_limit, type), high = limit(entry.high_limit, type);
+        const auto low = limit(entry.low_limit, type);
+        const auto high = limit(entry.high_limit, type);
         out.ranged = low || high;
         out.low = low.value_or(widest(type, true));
         out.high = high.value_or(widest(type, false));
-        if (!out.ranged) out.low = out.high = 0;
+        if (!out.ranged) {
+            out.low = out.high = 0;
+        }
     }
     return out;
 }
@@ -63,10 +77,15 @@ EntryDescription made(std::uint16_t index, const Entry& entry, const DataType& t
 Description dictionary_of(const DeviceDescription& device, bool configured) {
     Description out;
     for (const Object& object : device.objects) {
-        if (object.index < 0x1000 || object.type == ObjectType::deftype || object.type == ObjectType::defstruct) continue;
+        if (object.index < 0x1000 || object.type == ObjectType::deftype ||
+            object.type == ObjectType::defstruct) {
+            continue;
+        }
         for (const Entry& entry : object.entries) {
             const DataType* type = data_type(entry.data_type);
-            if (type != nullptr && type->kind != Kind::structure) out.entries.push_back(made(object.index, entry, *type, configured));
+            if (type != nullptr && type->kind != Kind::structure) {
+                out.entries.push_back(made(object.index, entry, *type, configured));
+            }
         }
     }
     return out;

@@ -7,8 +7,9 @@
 
 namespace hal::canopen::eds {
 
-/// Returns the entries of the device with their values at power-on: the defaults or, with `configured`, the parameter values of a DCF.
-/// Values with `$NODEID` stay relative to the node ID. Entries of unknown data types and type definitions are omitted. [setup]
+/// Returns the entries of the device with their values at power-on: the defaults or, with
+/// `configured`, the parameter values of a DCF. Values with `$NODEID` stay relative to the node ID.
+/// Entries of unknown data types and type definitions are omitted. [setup]
 Description dictionary_of(const DeviceDescription& device, bool configured = false);
 
 }  // namespace hal::canopen::eds

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The sections other than those of objects: file and device information, lists of objects, commissioning.
+// The sections other than those of objects: file and device information, lists of objects,
+// commissioning.
 #include <algorithm>
 #include <charconv>
 
@@ -34,7 +35,8 @@ public:
 
 private:
     void missing(const char* section, Severity severity) {
-        keys_.report(severity, Topic::missing, {1, 1, 0, 0}, "missing section [" + std::string(section) + "]");
+        keys_.report(severity, Topic::missing, {1, 1, 0, 0},
+                     "missing section [" + std::string(section) + "]");
     }
 
     void date(IniSection& section, const char* key, std::string& out) {
@@ -44,13 +46,17 @@ private:
         // mm-dd-yyyy
         const auto number = [&](std::size_t from, std::size_t n) {
             int value = -1;
-            const auto [end, error] = std::from_chars(out.data() + from, out.data() + from + n, value);
+            const auto [end, error] =
+                std::from_chars(out.data() + from, out.data() + from + n, value);
             return error == std::errc() && end == out.data() + from + n ? value : -1;
         };
         const bool shape = out.size() == 10 && out[2] == '-' && out[5] == '-';
-        if (shape && number(0, 2) >= 1 && number(0, 2) <= 12 && number(3, 2) >= 1 && number(3, 2) <= 31 && number(6, 4) >= 0) return;
-        keys_.report(Severity::note, Topic::value, at->value_at, "invalid date '" + out.substr(0, 40) + "'",
-                  "write it as mm-dd-yyyy");
+        if (shape && number(0, 2) >= 1 && number(0, 2) <= 12 && number(3, 2) >= 1 &&
+            number(3, 2) <= 31 && number(6, 4) >= 0) {
+            return;
+        }
+        keys_.report(Severity::note, Topic::value, at->value_at,
+                     "invalid date '" + out.substr(0, 40) + "'", "write it as mm-dd-yyyy");
     }
 
     void file_info() {
@@ -69,25 +75,34 @@ private:
         f.last_eds = keys_.text(*section, "LastEDS");
         f.version = static_cast<std::uint8_t>(loose(*section, "FileVersion"));
         f.revision = static_cast<std::uint8_t>(loose(*section, "FileRevision"));
-        f.extras = keys_.rest(*section, {"FileName", "FileVersion", "FileRevision", "EDSVersion", "Description", "CreationTime",
-                                         "CreationDate", "CreatedBy", "ModificationTime", "ModificationDate", "ModifiedBy", "LastEDS"});
+        f.extras =
+            keys_.rest(*section, {"FileName", "FileVersion", "FileRevision", "EDSVersion",
+                                  "Description", "CreationTime", "CreationDate", "CreatedBy",
+                                  "ModificationTime", "ModificationDate", "ModifiedBy", "LastEDS"});
     }
 
-    /// FileVersion=1.2 occurs in files: the digits before the point are the value, the whole text is kept.
+    /// FileVersion=1.2 occurs in files: the digits before the point are the value, the whole text
+    /// is kept.
     std::uint64_t loose(IniSection& section, const char* name) {
         IniKey* key = section.find(name);
-        if (key == nullptr || key->value.empty() || parse_number(key->value)) return keys_.number(section, name, 0xFF).value_or(0);
+        if (key == nullptr || key->value.empty() || parse_number(key->value)) {
+            return keys_.number(section, name, 0xFF).value_or(0);
+        }
         unsigned value = 0;
-        const auto [end, error] = std::from_chars(key->value.data(), key->value.data() + key->value.size(), value);
-        keys_.report(Severity::note, Topic::value, key->value_at,
-                  "'" + key->name + "' is a number of 0..255, not '" + key->value.substr(0, 40) + "'",
-                  error == std::errc() && value <= 0xFF ? "read as " + std::to_string(value) : "read as 0");
+        const auto [end, error] =
+            std::from_chars(key->value.data(), key->value.data() + key->value.size(), value);
+        keys_.report(
+            Severity::note, Topic::value, key->value_at,
+            "'" + key->name + "' is a number of 0..255, not '" + key->value.substr(0, 40) + "'",
+            error == std::errc() && value <= 0xFF ? "read as " + std::to_string(value)
+                                                  : "read as 0");
         return error == std::errc() && value <= 0xFF ? value : 0;
     }
 
     std::optional<std::uint32_t> identity(IniSection& section, const char* key) {
         const auto number = keys_.number(section, key, 0xFFFFFFFF);
-        return number ? std::optional<std::uint32_t>(static_cast<std::uint32_t>(*number)) : std::nullopt;
+        return number ? std::optional<std::uint32_t>(static_cast<std::uint32_t>(*number))
+                      : std::nullopt;
     }
 
     void device_info() {
@@ -106,58 +121,80 @@ private:
             any = any || section->find(key) != nullptr;
             d.supports[i] = keys_.flag(*section, key);
         }
-        if (!any)
+        if (!any) {
             keys_.report(Severity::note, Topic::missing, section->at, "no bit rate in [DeviceInfo]",
-                      "write BaudRate_1000=1 for a device that supports 1 Mbit/s");
+                         "write BaudRate_1000=1 for a device that supports 1 Mbit/s");
+        }
         d.boot_up_master = keys_.flag(*section, "SimpleBootUpMaster");
         d.boot_up_slave = keys_.flag(*section, "SimpleBootUpSlave");
-        d.granularity = static_cast<std::uint8_t>(keys_.number(*section, "Granularity", 0xFF).value_or(0));
-        if (d.granularity > 64)
+        d.granularity =
+            static_cast<std::uint8_t>(keys_.number(*section, "Granularity", 0xFF).value_or(0));
+        if (d.granularity > 64) {
             keys_.report(Severity::note, Topic::value, section->find("Granularity")->value_at,
-                      "invalid granularity of " + std::to_string(d.granularity) + " bits", "the range is 0..64");
-        d.dynamic_channels = keys_.number(*section, "DynamicChannelsSupported", 0xFFFF).value_or(0) != 0;
+                         "invalid granularity of " + std::to_string(d.granularity) + " bits",
+                         "the range is 0..64");
+        }
+        d.dynamic_channels =
+            keys_.number(*section, "DynamicChannelsSupported", 0xFFFF).value_or(0) != 0;
         d.group_messaging = keys_.flag(*section, "GroupMessaging");
         d.lss = keys_.flag(*section, "LSS_Supported");
-        d.compact_pdo = static_cast<std::uint8_t>(keys_.number(*section, "CompactPDO", 0xFF).value_or(0));
-        d.rx_pdos = static_cast<std::uint16_t>(keys_.number(*section, "NrOfRXPDO", 512).value_or(0));
-        d.tx_pdos = static_cast<std::uint16_t>(keys_.number(*section, "NrOfTXPDO", 512).value_or(0));
+        d.compact_pdo =
+            static_cast<std::uint8_t>(keys_.number(*section, "CompactPDO", 0xFF).value_or(0));
+        d.rx_pdos =
+            static_cast<std::uint16_t>(keys_.number(*section, "NrOfRXPDO", 512).value_or(0));
+        d.tx_pdos =
+            static_cast<std::uint16_t>(keys_.number(*section, "NrOfTXPDO", 512).value_or(0));
         const auto place = [&](const char* key) {
             const auto* found = section->find(key);
             return found != nullptr ? found->value_at : section->at;
         };
-        d.rx_pdos_at = place("NrOfRXPDO"), d.tx_pdos_at = place("NrOfTXPDO");
-        d.extras = keys_.rest(*section, {"VendorName", "VendorNumber", "ProductName", "ProductNumber", "RevisionNumber", "OrderCode",
-                                         "SimpleBootUpMaster", "SimpleBootUpSlave", "Granularity", "DynamicChannelsSupported",
-                                         "GroupMessaging", "LSS_Supported", "NrOfRXPDO", "NrOfTXPDO"});
+        d.rx_pdos_at = place("NrOfRXPDO");
+        d.tx_pdos_at = place("NrOfTXPDO");
+        d.extras =
+            keys_.rest(*section, {"VendorName", "VendorNumber", "ProductName", "ProductNumber",
+                                  "RevisionNumber", "OrderCode", "SimpleBootUpMaster",
+                                  "SimpleBootUpSlave", "Granularity", "DynamicChannelsSupported",
+                                  "GroupMessaging", "LSS_Supported", "NrOfRXPDO", "NrOfTXPDO"});
     }
 
     void commissioning() {
         IniSection* section = ini_.find("DeviceComissioning");  // the spelling of CiA 306
-        if (section == nullptr) section = ini_.find("DeviceCommissioning");
+        if (section == nullptr) {
+            section = ini_.find("DeviceCommissioning");
+        }
         if (section == nullptr) return;
         Commissioning c;
-        const auto    id = keys_.number(*section, "NodeID", 0xFF);
+        const auto id = keys_.number(*section, "NodeID", 0xFF);
         c.node_id = static_cast<std::uint8_t>(id.value_or(0));
         if (!id || *id < 1 || *id > 127) {
             IniKey* key = section->find("NodeID");
-            keys_.report(Severity::warning, key == nullptr ? Topic::missing : Topic::value, key == nullptr ? section->at : key->value_at,
-                      key == nullptr ? "missing 'NodeID' in [" + section->name + "]" : "invalid node ID '" + key->value + "'",
-                      "the range is 1..127");
+            keys_.report(Severity::warning, key == nullptr ? Topic::missing : Topic::value,
+                         key == nullptr ? section->at : key->value_at,
+                         key == nullptr ? "missing 'NodeID' in [" + section->name + "]"
+                                        : "invalid node ID '" + key->value + "'",
+                         "the range is 1..127");
             c.node_id = 0;
         }
         c.node_name = keys_.text(*section, "NodeName");
         c.node_reference = keys_.text(*section, "NodeRefd");
-        c.baud_rate = static_cast<std::uint16_t>(keys_.number(*section, "Baudrate", 0xFFFF).value_or(0));
-        if (c.baud_rate != 0 && std::find(baud_rates.begin(), baud_rates.end(), c.baud_rate) == baud_rates.end())
+        c.baud_rate =
+            static_cast<std::uint16_t>(keys_.number(*section, "Baudrate", 0xFFFF).value_or(0));
+        if (c.baud_rate != 0 &&
+            std::find(baud_rates.begin(), baud_rates.end(), c.baud_rate) == baud_rates.end()) {
             keys_.report(Severity::warning, Topic::value, section->find("Baudrate")->value_at,
-                      std::to_string(c.baud_rate) + " kbit/s is not a bit rate of CiA 301", "the rates are 10, 20, 50, 125, 250, 500, 800 and 1000");
-        c.network = static_cast<std::uint32_t>(keys_.number(*section, "NetNumber", 0xFFFFFFFF).value_or(0));
+                         std::to_string(c.baud_rate) + " kbit/s is not a bit rate of CiA 301",
+                         "the rates are 10, 20, 50, 125, 250, 500, 800 and 1000");
+        }
+        c.network =
+            static_cast<std::uint32_t>(keys_.number(*section, "NetNumber", 0xFFFFFFFF).value_or(0));
         c.network_name = keys_.text(*section, "NetworkName");
         c.network_reference = keys_.text(*section, "NetRefd");
         c.manager = keys_.flag(*section, "CANopenManager");
-        c.lss_serial_number = static_cast<std::uint32_t>(keys_.number(*section, "LSS_SerialNumber", 0xFFFFFFFF).value_or(0));
-        c.extras = keys_.rest(*section, {"NodeID", "NodeName", "NodeRefd", "Baudrate", "NetNumber", "NetworkName", "NetRefd",
-                                         "CANopenManager", "LSS_SerialNumber"});
+        c.lss_serial_number = static_cast<std::uint32_t>(
+            keys_.number(*section, "LSS_SerialNumber", 0xFFFFFFFF).value_or(0));
+        c.extras =
+            keys_.rest(*section, {"NodeID", "NodeName", "NodeRefd", "Baudrate", "NetNumber",
+                                  "NetworkName", "NetRefd", "CANopenManager", "LSS_SerialNumber"});
         out_.commissioning = std::move(c);
     }
 
@@ -166,30 +203,38 @@ private:
         if (section == nullptr) return;
         constexpr std::string_view word = "Dummy";
         for (IniKey& key : section->keys) {
-            if (key.name.size() != word.size() + 4 || !same_word(std::string_view(key.name).substr(0, word.size()), word)) continue;
+            if (key.name.size() != word.size() + 4 ||
+                !same_word(std::string_view(key.name).substr(0, word.size()), word)) {
+                continue;
+            }
             const auto code = parse_number("0x" + key.name.substr(word.size()));
             if (!code) continue;
             const std::string name = key.name;
-            out_.dummies.emplace_back(static_cast<std::uint16_t>(code->magnitude), keys_.flag(*section, name));
+            out_.dummies.emplace_back(static_cast<std::uint16_t>(code->magnitude),
+                                      keys_.flag(*section, name));
             key.used = true;
         }
         std::sort(out_.dummies.begin(), out_.dummies.end());
-        if (const Extras more = keys_.rest(*section, {"Dummy0001"}); !more.empty()) out_.others.push_back({section->name, more});
+        if (const Extras more = keys_.rest(*section, {"Dummy0001"}); !more.empty()) {
+            out_.others.push_back({section->name, more});
+        }
     }
 
     void lists() {
         struct List {
             const char* name;
-            Category    category;
+            Category category;
         };
         std::map<unsigned, const IniKey*> listed;
-        bool                              any = false;
+        bool any = false;
         for (const List& list : {List{"MandatoryObjects", Category::mandatory},
                                  {"OptionalObjects", Category::optional},
                                  {"ManufacturerObjects", Category::manufacturer}}) {
             IniSection* section = ini_.find(list.name);
             if (section == nullptr) {
-                if (list.category == Category::mandatory) missing(list.name, Severity::warning);
+                if (list.category == Category::mandatory) {
+                    missing(list.name, Severity::warning);
+                }
                 continue;
             }
             any = true;
@@ -198,38 +243,52 @@ private:
                 if (!index) continue;
                 const auto [at, fresh] = listed.emplace(static_cast<unsigned>(*index), key);
                 if (!fresh) {
-                    keys_.report(Severity::warning, Topic::count, key->value_at,
-                              "object " + label(static_cast<std::uint16_t>(*index)) + " is listed twice",
-                              "first in line " + std::to_string(at->second->at.line));
+                    keys_.report(
+                        Severity::warning, Topic::count, key->value_at,
+                        "object " + label(static_cast<std::uint16_t>(*index)) + " is listed twice",
+                        "first in line " + std::to_string(at->second->at.line));
                     continue;
                 }
                 Object* object = out_.find(static_cast<std::uint16_t>(*index));
                 if (object == nullptr) {
-                    keys_.report(Severity::warning, Topic::missing, key->value_at,
-                              "object " + label(static_cast<std::uint16_t>(*index)) + " is listed but not described",
-                              "missing section [" + label(static_cast<std::uint16_t>(*index)) + "]");
+                    keys_.report(
+                        Severity::warning, Topic::missing, key->value_at,
+                        "object " + label(static_cast<std::uint16_t>(*index)) +
+                            " is listed but not described",
+                        "missing section [" + label(static_cast<std::uint16_t>(*index)) + "]");
                     continue;
                 }
                 object->category = list.category;
                 const Category usual = category_of(object->index);
-                if (usual != list.category && (usual == Category::manufacturer || list.category == Category::manufacturer))
-                    keys_.report(
-                        Severity::note, Topic::count, key->value_at,
-                        "object " + label(object->index) + " does not belong in [" + section->name + "]",
-                        "manufacturer-specific objects are 2000..5FFF");
+                if (usual != list.category &&
+                    (usual == Category::manufacturer || list.category == Category::manufacturer)) {
+                    keys_.report(Severity::note, Topic::count, key->value_at,
+                                 "object " + label(object->index) + " does not belong in [" +
+                                     section->name + "]",
+                                 "manufacturer-specific objects are 2000..5FFF");
+                }
             }
-            if (const Extras more = keys_.rest(*section); !more.empty()) out_.others.push_back({section->name, more});
+            if (const Extras more = keys_.rest(*section); !more.empty()) {
+                out_.others.push_back({section->name, more});
+            }
         }
         for (Object& object : out_.objects) {
             if (listed.count(object.index) != 0) continue;
             object.category = category_of(object.index);
-            if (any && object.index >= 0x1000)
-                keys_.report(Severity::warning, Topic::count, object.at, "object " + label(object.index) + " is described but not listed",
-                          "it was read all the same; add it to [" + std::string(list_of(object.category)) + "]");
+            if (any && object.index >= 0x1000) {
+                keys_.report(Severity::warning, Topic::count, object.at,
+                             "object " + label(object.index) + " is described but not listed",
+                             "it was read all the same; add it to [" +
+                                 std::string(list_of(object.category)) + "]");
+            }
         }
-        for (const std::uint16_t index : {std::uint16_t{0x1000}, std::uint16_t{0x1001}, std::uint16_t{0x1018}})
-            if (out_.find(index) == nullptr && any)
-                keys_.report(Severity::warning, Topic::missing, {1, 1, 0, 0}, "missing mandatory object " + label(index));
+        for (const std::uint16_t index :
+             {std::uint16_t{0x1000}, std::uint16_t{0x1001}, std::uint16_t{0x1018}}) {
+            if (out_.find(index) == nullptr && any) {
+                keys_.report(Severity::warning, Topic::missing, {1, 1, 0, 0},
+                             "missing mandatory object " + label(index));
+            }
+        }
     }
 
     static Category category_of(std::uint16_t index) {
@@ -250,11 +309,12 @@ private:
             const std::string i = std::to_string(n);
             if (section->find("Type" + i) == nullptr && section->find("Range" + i) == nullptr) {
                 keys_.report(Severity::warning, Topic::count, section->at,
-                          "segment " + i + " of [DynamicChannels] is counted and not described");
+                             "segment " + i + " of [DynamicChannels] is counted and not described");
                 continue;
             }
             DynamicSegment one;
-            one.type = static_cast<std::uint16_t>(keys_.number(*section, "Type" + i, 0xFFFF).value_or(0));
+            one.type =
+                static_cast<std::uint16_t>(keys_.number(*section, "Type" + i, 0xFFFF).value_or(0));
             const std::string dir = lower(keys_.bare(*section, "Dir" + i));
             one.access = dir == "ro"    ? Access::ro
                          : dir == "wo"  ? Access::wo
@@ -262,14 +322,17 @@ private:
                          : dir == "rww" ? Access::rww
                                         : Access::rw;
             one.range = keys_.bare(*section, "Range" + i);
-            one.image_offset = static_cast<std::uint32_t>(keys_.number(*section, "PPOffset" + i, 0xFFFFFFFF).value_or(0));
+            one.image_offset = static_cast<std::uint32_t>(
+                keys_.number(*section, "PPOffset" + i, 0xFFFFFFFF).value_or(0));
             out_.dynamic_channels.push_back(std::move(one));
         }
-        if (const Extras more = keys_.rest(*section); !more.empty()) out_.others.push_back({section->name, more});
+        if (const Extras more = keys_.rest(*section); !more.empty()) {
+            out_.others.push_back({section->name, more});
+        }
     }
 
-    Ini&              ini_;
-    Keys              keys_;
+    Ini& ini_;
+    Keys keys_;
     DeviceDescription out_;
 };
 
@@ -277,46 +340,61 @@ private:
 
 std::size_t Reading::count(Severity severity) const {
     return static_cast<std::size_t>(
-        std::count_if(messages.begin(), messages.end(), [&](const Message& m) { return m.severity == severity; }));
+        std::count_if(messages.begin(), messages.end(),
+                      [&](const Message& m) { return m.severity == severity; }));
 }
 
 Reading read_eds(std::string_view bytes) {
     Reading out;
     if (!decode(bytes, out.text, out.messages)) return out;
     const std::size_t of_decoding = out.messages.size();
-    Ini               ini;
+    Ini ini;
     ini.parse(out.text, out.messages);
     const auto refuse = [&](std::string sentence, std::string help) {
         out.messages.erase(out.messages.begin() + static_cast<std::ptrdiff_t>(of_decoding),
                            out.messages.end());  // messages about a file of another kind
-        out.messages.push_back({Severity::error, Topic::unreadable, {1, 1, 0, 0}, std::move(sentence), std::move(help)});
+        out.messages.push_back({Severity::error,
+                                Topic::unreadable,
+                                {1, 1, 0, 0},
+                                std::move(sentence),
+                                std::move(help)});
         return std::move(out);
     };
     if (trimmed(out.text).empty()) return refuse("the file is empty", "");
-    if (trimmed(out.text)[0] == '<') return refuse("the file is XML", "device descriptions in XML are named .xdd or .xdc");
-    const bool objects = std::any_of(ini.sections().begin(), ini.sections().end(),
-                                     [](const IniSection& s) { return section_name(s.name).what == SectionName::What::object; });
-    if (!objects && ini.find("DeviceInfo") == nullptr)
-        return refuse("the file describes neither a device nor an object",
-                      "an EDS has [FileInfo], [DeviceInfo] and a section for each object, as in [1000]");
+    if (trimmed(out.text)[0] == '<') {
+        return refuse("the file is XML", "device descriptions in XML are named .xdd or .xdc");
+    }
+    const bool objects = std::any_of(
+        ini.sections().begin(), ini.sections().end(),
+        [](const IniSection& s) { return section_name(s.name).what == SectionName::What::object; });
+    if (!objects && ini.find("DeviceInfo") == nullptr) {
+        return refuse(
+            "the file describes neither a device nor an object",
+            "an EDS has [FileInfo], [DeviceInfo] and a section for each object, as in [1000]");
+    }
     out.description = File(ini, out.messages).read();
     check_objects(*out.description, out.messages);
-    std::stable_sort(out.messages.begin(), out.messages.end(), [](const Message& a, const Message& b) { return a.at.offset < b.at.offset; });
+    std::stable_sort(out.messages.begin(), out.messages.end(),
+                     [](const Message& a, const Message& b) { return a.at.offset < b.at.offset; });
     return out;
 }
 
 const Entry* Object::find(std::uint8_t sub) const {
-    const auto found = std::find_if(entries.begin(), entries.end(), [&](const Entry& e) { return e.sub == sub; });
+    const auto found =
+        std::find_if(entries.begin(), entries.end(), [&](const Entry& e) { return e.sub == sub; });
     return found == entries.end() ? nullptr : &*found;
 }
 Entry* Object::find(std::uint8_t sub) { return const_cast<Entry*>(std::as_const(*this).find(sub)); }
 
 const Object* DeviceDescription::find(std::uint16_t index) const {
     const auto found =
-        std::lower_bound(objects.begin(), objects.end(), index, [](const Object& o, std::uint16_t i) { return o.index < i; });
+        std::lower_bound(objects.begin(), objects.end(), index,
+                         [](const Object& o, std::uint16_t i) { return o.index < i; });
     return found == objects.end() || found->index != index ? nullptr : &*found;
 }
-Object* DeviceDescription::find(std::uint16_t index) { return const_cast<Object*>(std::as_const(*this).find(index)); }
+Object* DeviceDescription::find(std::uint16_t index) {
+    return const_cast<Object*>(std::as_const(*this).find(index));
+}
 
 const Entry* DeviceDescription::find(std::uint16_t index, std::uint8_t sub) const {
     const Object* object = find(index);
@@ -325,7 +403,9 @@ const Entry* DeviceDescription::find(std::uint16_t index, std::uint8_t sub) cons
 
 std::size_t DeviceDescription::entries() const {
     std::size_t count = 0;
-    for (const Object& object : objects) count += object.entries.size();
+    for (const Object& object : objects) {
+        count += object.entries.size();
+    }
     return count;
 }
 

@@ -20,10 +20,10 @@ std::string label(std::uint16_t index, unsigned sub);   ///< "1018sub1"
 /// The meaning of a section name.
 struct SectionName {
     enum class What : std::uint8_t { other, object, sub, names, values, denotations, links };
-    What          what = What::other;
+    What what = What::other;
     std::uint16_t index = 0;
-    unsigned      sub = 0;
-    bool          odd = false;  ///< recognized, but not spelled as in CiA 306
+    unsigned sub = 0;
+    bool odd = false;  ///< recognized, but not spelled as in CiA 306
 };
 SectionName section_name(std::string_view name);
 
@@ -32,20 +32,25 @@ class Keys {
 public:
     explicit Keys(std::vector<Message>& messages) : messages_(messages) {}
 
-    void report(Severity severity, Topic topic, Span at, std::string sentence, std::string help = "") {
+    void report(Severity severity, Topic topic, Span at, std::string sentence,
+                std::string help = "") {
         messages_.push_back({severity, topic, at, std::move(sentence), std::move(help)});
     }
     /// Returns the value as written; empty if the key is missing.
     std::string text(IniSection& section, std::string_view key);
     /// Returns the value without a trailing comment.
     std::string bare(IniSection& section, std::string_view key);
-    /// Returns nothing if the key is missing, empty or not a number in 0..`most`; reports an invalid number.
-    std::optional<std::uint64_t> number(IniSection& section, std::string_view key, std::uint64_t most);
-    bool                         flag(IniSection& section, std::string_view key, bool otherwise = false);
-    /// Returns the keys 1=, 2=, … of a list whose length is in `count_key`; without one the length is not checked.
-    std::map<unsigned, IniKey*>  list(IniSection& section, const char* count_key);
+    /// Returns nothing if the key is missing, empty or not a number in 0..`most`; reports an
+    /// invalid number.
+    std::optional<std::uint64_t> number(IniSection& section, std::string_view key,
+                                        std::uint64_t most);
+    bool flag(IniSection& section, std::string_view key, bool otherwise = false);
+    /// Returns the keys 1=, 2=, … of a list whose length is in `count_key`; without one the length
+    /// is not checked.
+    std::map<unsigned, IniKey*> list(IniSection& section, const char* count_key);
     std::optional<std::uint64_t> parse(IniSection& section, IniKey& key, std::uint64_t most);
-    /// Returns what was not read: comment lines and unknown keys. Warns of a key that is close to one of `known`.
+    /// Returns what was not read: comment lines and unknown keys. Warns of a key that is close to
+    /// one of `known`.
     Extras rest(IniSection& section, std::initializer_list<std::string_view> known = {});
     /// Cuts " ; comment" or " # comment" off the key's value.
     void cut_comment(IniKey& key);
@@ -57,7 +62,8 @@ private:
 /// Objects of the main part or of a module, in its section-name prefix.
 class ObjectReader {
 public:
-    ObjectReader(Ini& ini, Keys& keys, std::string prefix) : ini_(ini), keys_(keys), prefix_(std::move(prefix)) {}
+    ObjectReader(Ini& ini, Keys& keys, std::string prefix)
+        : ini_(ini), keys_(keys), prefix_(std::move(prefix)) {}
 
     /// Reads all objects whose sections begin with the prefix.
     std::vector<Object> read();
@@ -66,30 +72,34 @@ public:
 
 private:
     struct Draft {
-        IniSection *                    object = nullptr, *names = nullptr, *values = nullptr, *denotations = nullptr, *links = nullptr;
+        IniSection *object = nullptr, *names = nullptr, *values = nullptr, *denotations = nullptr,
+                   *links = nullptr;
         std::map<unsigned, IniSection*> subs = {};
     };
-    Object        object(std::uint16_t index, Draft& draft);
-    void          expand(Object& out, IniSection& section, unsigned count);
-    void          spread(Object& out, IniSection* list, std::string Entry::* field, const char* what);
-    void          check_entries(const Object& out, IniSection& section);
-    void          value(IniSection& section, const char* key, std::string& out, std::uint16_t type, const std::string& what);
-    ObjectType    object_type(IniSection& section, const std::string& what, bool& given);
+    Object object(std::uint16_t index, Draft& draft);
+    void expand(Object& out, IniSection& section, unsigned count);
+    void spread(Object& out, IniSection* list, std::string Entry::* field, const char* what);
+    void check_entries(const Object& out, IniSection& section);
+    void value(IniSection& section, const char* key, std::string& out, std::uint16_t type,
+               const std::string& what);
+    ObjectType object_type(IniSection& section, const std::string& what, bool& given);
     std::uint16_t type_of(IniSection& section, const std::string& what, bool needed);
-    Access        access_of(IniSection& section, const std::string& what, bool needed);
+    Access access_of(IniSection& section, const std::string& what, bool needed);
 
-    Ini&        ini_;
-    Keys&       keys_;
+    Ini& ini_;
+    Keys& keys_;
     std::string prefix_;
 };
 
 /// Reads a section of comment lines; moves its other keys to `others`.
-void read_comments(Keys& keys, IniSection* section, std::vector<std::string>& out, std::vector<OtherSection>& others);
+void read_comments(Keys& keys, IniSection* section, std::vector<std::string>& out,
+                   std::vector<OtherSection>& others);
 void read_modules(Ini& ini, Keys& keys, DeviceDescription& out);
 /// Adds the PDOs that CompactPDO describes.
 void add_compact_pdos(DeviceDescription& out);
 
-/// Returns whether CompactSubObj can describe the object: entries 1..n differ only in names and DCF values, and sub-index 0 is standard.
+/// Returns whether CompactSubObj can describe the object: entries 1..n differ only in names and DCF
+/// values, and sub-index 0 is standard.
 bool compactable(const Object& object);
 
 }  // namespace hal::canopen::eds

@@ -14,20 +14,35 @@ constexpr std::size_t most_line = 65536;
 void append_utf8(std::string& out, std::uint32_t c) {
     const auto add = [&](std::uint32_t byte) { out += static_cast<char>(byte); };
     if (c < 0x80) return add(c);
-    if (c < 0x800) return add(0xC0 | c >> 6), add(0x80 | (c & 0x3F));
-    if (c < 0x10000) return add(0xE0 | c >> 12), add(0x80 | (c >> 6 & 0x3F)), add(0x80 | (c & 0x3F));
-    add(0xF0 | c >> 18), add(0x80 | (c >> 12 & 0x3F)), add(0x80 | (c >> 6 & 0x3F)), add(0x80 | (c & 0x3F));
+    if (c < 0x800) {
+        add(0xC0 | c >> 6);
+        return add(0x80 | (c & 0x3F));
+    }
+    if (c < 0x10000) {
+        add(0xE0 | c >> 12);
+        add(0x80 | (c >> 6 & 0x3F));
+        return add(0x80 | (c & 0x3F));
+    }
+    add(0xF0 | c >> 18);
+    add(0x80 | (c >> 12 & 0x3F));
+    add(0x80 | (c >> 6 & 0x3F));
+
+    add(0x80 | (c & 0x3F));
 }
 
 /// Bytes of the UTF-8 character at `at`; 0 when there is none.
 std::size_t utf8_at(std::string_view text, std::size_t at) {
-    const auto byte = [&](std::size_t i) { return i < text.size() ? static_cast<unsigned char>(text[i]) : 0u; };
+    const auto byte = [&](std::size_t i) {
+        return i < text.size() ? static_cast<unsigned char>(text[i]) : 0u;
+    };
     const auto follows = [&](std::size_t n) {
-        for (std::size_t i = 1; i <= n; ++i)
+        for (std::size_t i = 1; i <= n; ++i) {
             if ((byte(at + i) & 0xC0) != 0x80) return false;
+        }
         return true;
     };
-    const unsigned first = byte(at), second = byte(at + 1);
+    const unsigned first = byte(at);
+    const unsigned second = byte(at + 1);
     if (first < 0x80) return 1;
     if (first >= 0xC2 && first < 0xE0) return follows(1) ? 2 : 0;
     if (first >= 0xE0 && first < 0xF0) {
@@ -51,9 +66,10 @@ std::size_t first_bad_utf8(std::string_view text) {
 }
 
 /// Windows-1252 0x80..0x9F; the five holes are kept as control characters.
-constexpr std::array<std::uint16_t, 32> windows{0x20AC, 0x81,   0x201A, 0x0192, 0x201E, 0x2026, 0x2020, 0x2021, 0x02C6, 0x2030, 0x0160,
-                                                0x2039, 0x0152, 0x8D,   0x017D, 0x8F,   0x90,   0x2018, 0x2019, 0x201C, 0x201D, 0x2022,
-                                                0x2013, 0x2014, 0x02DC, 0x2122, 0x0161, 0x203A, 0x0153, 0x9D,   0x017E, 0x0178};
+constexpr std::array<std::uint16_t, 32> windows{
+    0x20AC, 0x81,   0x201A, 0x0192, 0x201E, 0x2026, 0x2020, 0x2021, 0x02C6, 0x2030, 0x0160,
+    0x2039, 0x0152, 0x8D,   0x017D, 0x8F,   0x90,   0x2018, 0x2019, 0x201C, 0x201D, 0x2022,
+    0x2013, 0x2014, 0x02DC, 0x2122, 0x0161, 0x203A, 0x0153, 0x9D,   0x017E, 0x0178};
 
 std::string from_windows(std::string_view bytes) {
     std::string text;
@@ -67,14 +83,17 @@ std::string from_windows(std::string_view bytes) {
 
 std::string from_utf16(std::string_view bytes, bool big, bool& whole) {
     std::string text;
-    const auto  unit = [&](std::size_t i) {
-        const unsigned a = static_cast<unsigned char>(bytes[i]), b = static_cast<unsigned char>(bytes[i + 1]);
+    const auto unit = [&](std::size_t i) {
+        const unsigned a = static_cast<unsigned char>(bytes[i]);
+
+        const unsigned b = static_cast<unsigned char>(bytes[i + 1]);
         return big ? a << 8 | b : b << 8 | a;
     };
     whole = bytes.size() % 2 == 0;
     for (std::size_t i = 0; i + 1 < bytes.size(); i += 2) {
         std::uint32_t c = unit(i);
-        if (c >= 0xD800 && c < 0xDC00 && i + 3 < bytes.size() && (unit(i + 2) & 0xFC00u) == 0xDC00u) {
+        if (c >= 0xD800 && c < 0xDC00 && i + 3 < bytes.size() &&
+            (unit(i + 2) & 0xFC00u) == 0xDC00u) {
             c = 0x10000 + ((c & 0x3FF) << 10) + (unit(i + 2) & 0x3FF);
             i += 2;
         } else if (c >= 0xD800 && c < 0xE000) {
@@ -87,63 +106,78 @@ std::string from_utf16(std::string_view bytes, bool big, bool& whole) {
 }
 
 std::uint32_t line_of(std::string_view text, std::size_t at) {
-    return 1 + static_cast<std::uint32_t>(
-                   std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(std::min(at, text.size())), '\n'));
+    return 1 + static_cast<std::uint32_t>(std::count(
+                   text.begin(),
+                   text.begin() + static_cast<std::ptrdiff_t>(std::min(at, text.size())), '\n'));
 }
 
 }  // namespace
 
 std::string to_string(const Message& message) {
     constexpr std::array<const char*, 3> words{"note", "warning", "error"};
-    std::string                          text;
-    if (message.at.line != 0) text = "line " + std::to_string(message.at.line) + ", column " + std::to_string(message.at.column) + ": ";
-    text += std::string(words[static_cast<std::size_t>(message.severity)]) + ": " + message.sentence;
+    std::string text;
+    if (message.at.line != 0) {
+        text = "line " + std::to_string(message.at.line) + ", column " +
+               std::to_string(message.at.column) + ": ";
+    }
+    text +=
+        std::string(words[static_cast<std::size_t>(message.severity)]) + ": " + message.sentence;
     return message.help.empty() ? text : text + "; " + message.help;
 }
 
 bool decode(std::string_view bytes, std::string& text, std::vector<Message>& messages) {
-    const auto report = [&](Severity severity, Topic topic, std::uint32_t line, std::string sentence, std::string help) {
-        messages.push_back({severity, topic, {line, 1, 0, 0}, std::move(sentence), std::move(help)});
+    const auto report = [&](Severity severity, Topic topic, std::uint32_t line,
+                            std::string sentence, std::string help) {
+        messages.push_back(
+            {severity, topic, {line, 1, 0, 0}, std::move(sentence), std::move(help)});
     };
     const auto refuse = [&](std::string sentence, std::string help) {
         report(Severity::error, Topic::unreadable, 0, std::move(sentence), std::move(help));
         return false;
     };
     text.clear();
-    if (bytes.size() > most_bytes)
+    if (bytes.size() > most_bytes) {
         return refuse("the file is larger than 32 MiB", "is it the right file?");
-    std::string          plain;
-    const auto           starts = [&](std::string_view mark) { return bytes.substr(0, mark.size()) == mark; };
+    }
+    std::string plain;
+    const auto starts = [&](std::string_view mark) { return bytes.substr(0, mark.size()) == mark; };
     std::vector<Message> later;  // their offsets are those of the translated text
     if (starts("\xFF\xFE") || starts("\xFE\xFF")) {
         bool whole = true;
         plain = from_utf16(bytes.substr(2), starts("\xFE\xFF"), whole);
-        report(Severity::warning, Topic::syntax, 1, "the file is UTF-16 text", "save it as ASCII: most tools read nothing else");
-        if (!whole) report(Severity::warning, Topic::syntax, 1, "truncated UTF-16 characters", "");
+        report(Severity::warning, Topic::syntax, 1, "the file is UTF-16 text",
+               "save it as ASCII: most tools read nothing else");
+        if (!whole) {
+            report(Severity::warning, Topic::syntax, 1, "truncated UTF-16 characters", "");
+        }
     } else if (bytes.size() >= 4 && bytes[1] == 0 && bytes[3] == 0 && bytes[0] != 0) {
         bool whole = true;
         plain = from_utf16(bytes, false, whole);
-        report(Severity::warning, Topic::syntax, 1, "the file is UTF-16 text without a byte order mark",
-            "save it as ASCII: most tools read nothing else");
+        report(Severity::warning, Topic::syntax, 1,
+               "the file is UTF-16 text without a byte order mark",
+               "save it as ASCII: most tools read nothing else");
     } else {
         if (starts("\xEF\xBB\xBF")) {
             bytes.remove_prefix(3);
             report(Severity::note, Topic::syntax, 1, "the file begins with a byte order mark",
-                "some tools then miss the first section; save it without");
+                   "some tools then miss the first section; save it without");
         }
         const std::size_t bad = first_bad_utf8(bytes);
         if (bad == std::string_view::npos) {
             plain = bytes;
         } else {
             plain = from_windows(bytes);
-            report(Severity::note, Topic::syntax, line_of(bytes, bad), "invalid UTF-8; the file was read as Windows-1252",
-                "CiA 306 requires ASCII");
+            report(Severity::note, Topic::syntax, line_of(bytes, bad),
+                   "invalid UTF-8; the file was read as Windows-1252", "CiA 306 requires ASCII");
         }
     }
     const auto zeros = static_cast<std::size_t>(std::count(plain.begin(), plain.end(), '\0'));
-    if (zeros > plain.size() / 16 + 4) return refuse("not a text file", "an EDS consists of [sections] and Key=Value lines");
+    if (zeros > plain.size() / 16 + 4) {
+        return refuse("not a text file", "an EDS consists of [sections] and Key=Value lines");
+    }
     if (zeros != 0) {
-        report(Severity::warning, Topic::syntax, line_of(plain, plain.find('\0')), "zero byte in the text ignored", "");
+        report(Severity::warning, Topic::syntax, line_of(plain, plain.find('\0')),
+               "zero byte in the text ignored", "");
         std::erase(plain, '\0');
     }
     text.reserve(plain.size());
@@ -154,7 +188,9 @@ bool decode(std::string_view bytes, std::string& text, std::vector<Message>& mes
             continue;
         }
         std::size_t next = i;
-        while (next < plain.size() && plain[next] == '\r') ++next;
+        while (next < plain.size() && plain[next] == '\r') {
+            ++next;
+        }
         if (next < plain.size() && plain[next] == '\n') {
             i = next - 1;  // any number of \r before \n: one line end
         } else {
@@ -162,13 +198,17 @@ bool decode(std::string_view bytes, std::string& text, std::vector<Message>& mes
             lone = true;
         }
     }
-    if (lone) report(Severity::note, Topic::syntax, 1, "lines end with a carriage return only", "");
+    if (lone) {
+        report(Severity::note, Topic::syntax, 1, "lines end with a carriage return only", "");
+    }
     // The spans point to the start of their lines.
     for (Message& message : messages) {
         std::size_t at = 0;
         for (std::uint32_t line = 1; line < message.at.line && at != std::string::npos; ++line) {
             at = text.find('\n', at);
-            if (at != std::string::npos) ++at;
+            if (at != std::string::npos) {
+                ++at;
+            }
         }
         message.at.offset = static_cast<std::uint32_t>(std::min(at, text.size()));
     }
@@ -176,7 +216,8 @@ bool decode(std::string_view bytes, std::string& text, std::vector<Message>& mes
 }
 
 IniKey* IniSection::find(std::string_view key) {
-    const auto found = std::find_if(keys.begin(), keys.end(), [&](const IniKey& one) { return same_word(one.name, key); });
+    const auto found = std::find_if(keys.begin(), keys.end(),
+                                    [&](const IniKey& one) { return same_word(one.name, key); });
     return found == keys.end() ? nullptr : &*found;
 }
 
@@ -186,88 +227,115 @@ IniSection* Ini::find(std::string_view name) {
 }
 
 void Ini::parse(std::string_view text, std::vector<Message>& messages) {
-    std::uint32_t                                number = 0;
-    IniSection*                                  section = nullptr;
+    std::uint32_t number = 0;
+    IniSection* section = nullptr;
     std::unordered_map<std::string, std::size_t> keys;  // of the section being read
-    bool                                         said_outside = false;
+    bool said_outside = false;
     for (std::size_t start = 0; start < text.size();) {
-        const std::size_t      stop = std::min(text.find('\n', start), text.size());
-        const std::string_view whole = text.substr(start, stop - start), line = trimmed(whole);
+        const std::size_t stop = std::min(text.find('\n', start), text.size());
+        const std::string_view whole = text.substr(start, stop - start);
+        const std::string_view line = trimmed(whole);
         ++number;
         const std::size_t line_start = start;
         start = stop + 1;
         if (line.empty()) continue;
 
         const auto place = [&](std::string_view part) {
-            const auto    offset = static_cast<std::size_t>(part.data() - text.data());
+            const auto offset = static_cast<std::size_t>(part.data() - text.data());
             std::uint32_t column = 1;
-            for (std::size_t i = line_start; i < offset; ++i) column += (text[i] & 0xC0) != 0x80;
-            return Span{number, column, static_cast<std::uint32_t>(offset), static_cast<std::uint32_t>(part.size())};
+            for (std::size_t i = line_start; i < offset; ++i) {
+                column += (text[i] & 0xC0) != 0x80;
+            }
+            return Span{number, column, static_cast<std::uint32_t>(offset),
+                        static_cast<std::uint32_t>(part.size())};
         };
-        const auto report = [&](Severity severity, std::string_view part, std::string sentence, std::string help = "") {
-            messages.push_back({severity, Topic::syntax, place(part), std::move(sentence), std::move(help)});
+        const auto report = [&](Severity severity, std::string_view part, std::string sentence,
+                                std::string help = "") {
+            messages.push_back(
+                {severity, Topic::syntax, place(part), std::move(sentence), std::move(help)});
         };
-        const auto keep = [&](std::string comment) { (section != nullptr ? section->comments : preamble_).push_back(std::move(comment)); };
+        const auto keep = [&](std::string comment) {
+            (section != nullptr ? section->comments : preamble_).push_back(std::move(comment));
+        };
 
         if (line.size() > most_line) {
-            report(Severity::warning, line.substr(0, 1), "line of " + std::to_string(line.size()) + " bytes ignored",
-                "the limit is 255 characters");
+            report(Severity::warning, line.substr(0, 1),
+                   "line of " + std::to_string(line.size()) + " bytes ignored",
+                   "the limit is 255 characters");
             continue;
         }
         using Parts = text::IniLine::Kind;
-        const text::IniLine    parts = text::ini_line(line);
-        const std::string_view name = trimmed(parts.name), value = parts.value;
+        const text::IniLine parts = text::ini_line(line);
+        const std::string_view name = trimmed(parts.name);
+        const std::string_view value = parts.value;
         if (parts.kind == Parts::comment) {
-            if (line[0] == '#' && line.find('=') != std::string_view::npos)
-                report(Severity::note, line.substr(0, 1), "line that begins with '#' read as a comment",
-                    "comments of an EDS begin with ';'");
+            if (line[0] == '#' && line.find('=') != std::string_view::npos) {
+                report(Severity::note, line.substr(0, 1),
+                       "line that begins with '#' read as a comment",
+                       "comments of an EDS begin with ';'");
+            }
             keep(std::string(line));
             continue;
         }
         if (parts.kind == Parts::section || parts.kind == Parts::open_section) {
             const bool closed = parts.kind == Parts::section;
             if (!closed) {
-                report(Severity::warning, line, "section name without ']'", "write [" + std::string(name) + "]");
+                report(Severity::warning, line, "section name without ']'",
+                       "write [" + std::string(name) + "]");
             } else if (!value.empty() && value[0] != ';') {
-                report(value[0] == '#' ? Severity::note : Severity::warning, value, "text after the section name ignored",
-                    "write comments on lines of their own");
+                report(value[0] == '#' ? Severity::note : Severity::warning, value,
+                       "text after the section name ignored",
+                       "write comments on lines of their own");
             }
             keys.clear();
             const auto [at, fresh] = by_name_.try_emplace(lower(name), sections_.size());
             if (fresh) {
-                sections_.push_back({std::string(name), place(closed ? line.substr(0, line.find(']') + 1) : line), {}, {}});
+                sections_.push_back({std::string(name),
+                                     place(closed ? line.substr(0, line.find(']') + 1) : line),
+                                     {},
+                                     {}});
                 section = &sections_.back();
             } else {
                 section = &sections_[at->second];
                 report(Severity::warning, line, "duplicate section [" + std::string(name) + "]",
-                    "first in line " + std::to_string(section->at.line) + "; keys that are here again replace those");
-                for (std::size_t i = 0; i < section->keys.size(); ++i) keys.emplace(lower(section->keys[i].name), i);
+                       "first in line " + std::to_string(section->at.line) +
+                           "; keys that are here again replace those");
+                for (std::size_t i = 0; i < section->keys.size(); ++i) {
+                    keys.emplace(lower(section->keys[i].name), i);
+                }
             }
             continue;
         }
         if (parts.kind == Parts::other) {
-            report(Severity::warning, line, line[0] == '=' ? "missing key before '='" : "invalid line: neither a [section] nor Key=Value",
-                "the line was kept as a comment; comments begin with ';'");
+            report(Severity::warning, line,
+                   line[0] == '=' ? "missing key before '='"
+                                  : "invalid line: neither a [section] nor Key=Value",
+                   "the line was kept as a comment; comments begin with ';'");
             keep("; " + std::string(line));
             continue;
         }
         if (section == nullptr) {
-            if (!said_outside)
-                report(Severity::warning, line, "key before the first section", "the lines before the first section were kept as comments");
+            if (!said_outside) {
+                report(Severity::warning, line, "key before the first section",
+                       "the lines before the first section were kept as comments");
+            }
             said_outside = true;
             keep("; " + std::string(line));
             continue;
         }
-        IniKey key{std::string(name), std::string(value), place(name), place(value.empty() ? line : value)};
+        IniKey key{std::string(name), std::string(value), place(name),
+                   place(value.empty() ? line : value)};
         const auto [at, fresh] = keys.try_emplace(lower(name), section->keys.size());
         if (fresh) {
             section->keys.push_back(std::move(key));
         } else {
-            IniKey&    old = section->keys[at->second];
+            IniKey& old = section->keys[at->second];
             const bool same = old.value == key.value;
-            report(same ? Severity::note : Severity::warning, name, "duplicate key '" + key.name + "' in [" + section->name + "]",
-                same ? "both have the same value"
-                     : "line " + std::to_string(old.at.line) + " has '" + old.value + "'; '" + key.value + "' is used");
+            report(same ? Severity::note : Severity::warning, name,
+                   "duplicate key '" + key.name + "' in [" + section->name + "]",
+                   same ? "both have the same value"
+                        : "line " + std::to_string(old.at.line) + " has '" + old.value + "'; '" +
+                              key.value + "' is used");
             old = std::move(key);
         }
     }

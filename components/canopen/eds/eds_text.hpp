@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The text of an EDS: converts the bytes of a file to UTF-8 lines, sections and keys with their spans.
+// The text of an EDS: converts the bytes of a file to UTF-8 lines, sections and keys with their
+// spans.
 #pragma once
 
 #include <cstdint>
@@ -34,38 +35,41 @@ using Message = text::Message<Topic>;
 /// Formats "line 12, column 3: warning: sentence; help", for logs without a renderer.
 std::string to_string(const Message& message);
 
-/// Converts the bytes to UTF-8 with `\n` line ends: removes a byte order mark, converts UTF-16 and Windows-1252, accepts a lone `\r` as line
-/// end. Reports what is unusual in `messages`. Returns false if the bytes are not text.
+/// Converts the bytes to UTF-8 with `\n` line ends: removes a byte order mark, converts UTF-16 and
+/// Windows-1252, accepts a lone `\r` as line end. Reports what is unusual in `messages`. Returns
+/// false if the bytes are not text.
 bool decode(std::string_view bytes, std::string& text, std::vector<Message>& messages);
 
 struct IniKey {
     std::string name, value;
-    Span       at, value_at;
-    bool        used = false;
+    Span at, value_at;
+    bool used = false;
 };
 
 struct IniSection {
-    std::string              name;
-    Span                    at;
-    std::vector<IniKey>      keys;
+    std::string name;
+    Span at;
+    std::vector<IniKey> keys;
     std::vector<std::string> comments;  ///< whole lines, with their `;` or `#`
-    bool                     used = false;
+    bool used = false;
 
     IniKey* find(std::string_view key);  ///< not case sensitive
 };
 
-/// The sections in file order. Merges duplicate sections and keeps the last value of a duplicate key; reports both.
+/// The sections in file order. Merges duplicate sections and keeps the last value of a duplicate
+/// key; reports both.
 class Ini {
 public:
-    void                            parse(std::string_view text, std::vector<Message>& messages);
-    IniSection*                     find(std::string_view name);
-    std::vector<IniSection>&        sections() { return sections_; }
-    const std::vector<std::string>& preamble() const { return preamble_; }  ///< comments before the first section
+    void parse(std::string_view text, std::vector<Message>& messages);
+    IniSection* find(std::string_view name);
+    std::vector<IniSection>& sections() { return sections_; }
+    /// comments before the first section
+    const std::vector<std::string>& preamble() const { return preamble_; }
 
 private:
-    std::vector<IniSection>                      sections_;
+    std::vector<IniSection> sections_;
     std::unordered_map<std::string, std::size_t> by_name_;
-    std::vector<std::string>                     preamble_;
+    std::vector<std::string> preamble_;
 };
 
 }  // namespace hal::canopen::eds

@@ -17,21 +17,36 @@ namespace hal::canopen::eds {
 namespace {
 
 constexpr DataType table[] = {
-    {0x01, "BOOLEAN", Kind::boolean, 1},        {0x02, "INTEGER8", Kind::integer, 8},
-    {0x03, "INTEGER16", Kind::integer, 16},     {0x04, "INTEGER32", Kind::integer, 32},
-    {0x05, "UNSIGNED8", Kind::natural, 8},      {0x06, "UNSIGNED16", Kind::natural, 16},
-    {0x07, "UNSIGNED32", Kind::natural, 32},    {0x08, "REAL32", Kind::real, 32},
-    {0x09, "VISIBLE_STRING", Kind::text, 0},    {0x0A, "OCTET_STRING", Kind::octets, 0},
-    {0x0B, "UNICODE_STRING", Kind::unicode, 0}, {0x0C, "TIME_OF_DAY", Kind::time, 48},
-    {0x0D, "TIME_DIFFERENCE", Kind::time, 48},  {0x0F, "DOMAIN", Kind::domain, 0},
-    {0x10, "INTEGER24", Kind::integer, 24},     {0x11, "REAL64", Kind::real, 64},
-    {0x12, "INTEGER40", Kind::integer, 40},     {0x13, "INTEGER48", Kind::integer, 48},
-    {0x14, "INTEGER56", Kind::integer, 56},     {0x15, "INTEGER64", Kind::integer, 64},
-    {0x16, "UNSIGNED24", Kind::natural, 24},    {0x18, "UNSIGNED40", Kind::natural, 40},
-    {0x19, "UNSIGNED48", Kind::natural, 48},    {0x1A, "UNSIGNED56", Kind::natural, 56},
-    {0x1B, "UNSIGNED64", Kind::natural, 64},    {0x20, "PDO_COMMUNICATION_PARAMETER", Kind::structure, 0},
-    {0x21, "PDO_MAPPING", Kind::structure, 0},  {0x22, "SDO_PARAMETER", Kind::structure, 0},
-    {0x23, "IDENTITY", Kind::structure, 0},     {0x24, "DEBUGGER_PAR", Kind::structure, 0},
+    {0x01, "BOOLEAN", Kind::boolean, 1},
+    {0x02, "INTEGER8", Kind::integer, 8},
+    {0x03, "INTEGER16", Kind::integer, 16},
+    {0x04, "INTEGER32", Kind::integer, 32},
+    {0x05, "UNSIGNED8", Kind::natural, 8},
+    {0x06, "UNSIGNED16", Kind::natural, 16},
+    {0x07, "UNSIGNED32", Kind::natural, 32},
+    {0x08, "REAL32", Kind::real, 32},
+    {0x09, "VISIBLE_STRING", Kind::text, 0},
+    {0x0A, "OCTET_STRING", Kind::octets, 0},
+    {0x0B, "UNICODE_STRING", Kind::unicode, 0},
+    {0x0C, "TIME_OF_DAY", Kind::time, 48},
+    {0x0D, "TIME_DIFFERENCE", Kind::time, 48},
+    {0x0F, "DOMAIN", Kind::domain, 0},
+    {0x10, "INTEGER24", Kind::integer, 24},
+    {0x11, "REAL64", Kind::real, 64},
+    {0x12, "INTEGER40", Kind::integer, 40},
+    {0x13, "INTEGER48", Kind::integer, 48},
+    {0x14, "INTEGER56", Kind::integer, 56},
+    {0x15, "INTEGER64", Kind::integer, 64},
+    {0x16, "UNSIGNED24", Kind::natural, 24},
+    {0x18, "UNSIGNED40", Kind::natural, 40},
+    {0x19, "UNSIGNED48", Kind::natural, 48},
+    {0x1A, "UNSIGNED56", Kind::natural, 56},
+    {0x1B, "UNSIGNED64", Kind::natural, 64},
+    {0x20, "PDO_COMMUNICATION_PARAMETER", Kind::structure, 0},
+    {0x21, "PDO_MAPPING", Kind::structure, 0},
+    {0x22, "SDO_PARAMETER", Kind::structure, 0},
+    {0x23, "IDENTITY", Kind::structure, 0},
+    {0x24, "DEBUGGER_PAR", Kind::structure, 0},
     {0x25, "COMMAND_PAR", Kind::structure, 0},
 };
 
@@ -42,13 +57,13 @@ std::string quoted(std::string_view text) {
 
 struct Term {
     std::uint64_t value = 0;
-    bool          hex = false;
-    Spelling      spelling = Spelling::plain;
+    bool hex = false;
+    Spelling spelling = Spelling::plain;
 };
 
 std::optional<Term> term(std::string_view text) {
     Term out;
-    int  base = 10;
+    int base = 10;
     if (text.size() > 2 && text[0] == '0' && (text[1] == 'x' || text[1] == 'X')) {
         base = 16;
         text.remove_prefix(2);
@@ -57,11 +72,19 @@ std::optional<Term> term(std::string_view text) {
         base = text.find_first_of("89") == std::string_view::npos ? 8 : 10;
         out.spelling = base == 8 ? Spelling::octal : Spelling::decimal_with_zero;
     }
-    while (!text.empty() && (text.back() == 'u' || text.back() == 'U' || text.back() == 'l' || text.back() == 'L')) text.remove_suffix(1);
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), out.value, base);
-    if (text.empty() || error != std::errc() || end != text.data() + text.size()) return {};
+    while (!text.empty() &&
+           (text.back() == 'u' || text.back() == 'U' || text.back() == 'l' || text.back() == 'L')) {
+        text.remove_suffix(1);
+    }
+    const auto [end, error] =
+        std::from_chars(text.data(), text.data() + text.size(), out.value, base);
+    if (text.empty() || error != std::errc() || end != text.data() + text.size()) {
+        return {};
+    }
     // 00 and 007 are the same in both systems.
-    if (out.spelling == Spelling::octal && out.value < 8) out.spelling = Spelling::plain;
+    if (out.spelling == Spelling::octal && out.value < 8) {
+        out.spelling = Spelling::plain;
+    }
     return out;
 }
 
@@ -73,41 +96,53 @@ std::string range_of(const DataType& type) {
 }
 
 std::string unfitting(std::string_view text, const DataType& type) {
-    return quoted(text) + " does not fit into " + std::string(type.name) + " (" + range_of(type) + ")";
+    return quoted(text) + " does not fit into " + std::string(type.name) + " (" + range_of(type) +
+           ")";
 }
 
 std::vector<std::uint8_t> little(std::uint64_t value, unsigned bytes) {
     std::vector<std::uint8_t> out(bytes);
-    for (unsigned i = 0; i < bytes; ++i) out[i] = static_cast<std::uint8_t>(value >> (8 * i));
+    for (unsigned i = 0; i < bytes; ++i) {
+        out[i] = static_cast<std::uint8_t>(value >> (8 * i));
+    }
     return out;
 }
 
 Encoded integer(std::string_view text, const DataType& type, unsigned node_id) {
-    Encoded               out;
+    Encoded out;
     std::optional<Number> number = parse_number(text);
     if (!number) {
-        if (type.kind == Kind::boolean && (same_word(text, "true") || same_word(text, "false")))
+        if (type.kind == Kind::boolean && (same_word(text, "true") || same_word(text, "false"))) {
             return {little(same_word(text, "true"), 1), false, Spelling::words, {}};
+        }
         // 12.0 is 12
         const auto real = parse_real(text);
         if (!real || *real != std::floor(*real) || std::fabs(*real) > 9e15) {
             out.error = quoted(text) + " is not a number of type " + std::string(type.name);
             return out;
         }
-        number = Number{*real < 0, static_cast<std::uint64_t>(std::fabs(*real)), false, false, Spelling::number_as_real};
+        number = Number{*real < 0, static_cast<std::uint64_t>(std::fabs(*real)), false, false,
+                        Spelling::number_as_real};
     }
     out.spelling = number->spelling;
     out.node_id = number->node_id;
     // The sum with the node-id, in sign and magnitude.
     std::uint64_t magnitude = number->magnitude;
-    bool          negative = number->negative && magnitude != 0, overflow = false;
+    bool negative = number->negative && magnitude != 0;
+    bool overflow = false;
     if (number->node_id) {
-        if (!negative) overflow = __builtin_add_overflow(magnitude, std::uint64_t{node_id}, &magnitude);
-        else if (magnitude > node_id) magnitude -= node_id;
-        else magnitude = node_id - magnitude, negative = false;
+        if (!negative) {
+            overflow = __builtin_add_overflow(magnitude, std::uint64_t{node_id}, &magnitude);
+        } else if (magnitude > node_id) {
+            magnitude -= node_id;
+        } else {
+            magnitude = node_id - magnitude;
+            negative = false;
+        }
     }
-    const std::uint64_t top = type.bits == 64 ? ~0ull : (1ull << type.bits) - 1, half = top >> 1;
-    bool                fits = !overflow;
+    const std::uint64_t top = type.bits == 64 ? ~0ull : (1ull << type.bits) - 1;
+    const std::uint64_t half = top >> 1;
+    bool fits = !overflow;
     if (type.kind != Kind::integer) {
         if (negative && type.kind == Kind::natural && magnitude <= half + 1) {
             // -1 for 0xFF…: the bits are clear
@@ -133,39 +168,59 @@ Encoded integer(std::string_view text, const DataType& type, unsigned node_id) {
 
 Encoded octets(std::string_view text) {
     Encoded out;
-    if (text.size() > 2 && text[0] == '0' && (text[1] == 'x' || text[1] == 'X')) text.remove_prefix(2);
+    if (text.size() > 2 && text[0] == '0' && (text[1] == 'x' || text[1] == 'X')) {
+        text.remove_prefix(2);
+    }
     int high = -1;
     for (const char c : text) {
         if (c == ' ' || c == '\t' || c == ',') continue;
-        const int digit = c >= '0' && c <= '9' ? c - '0' : c >= 'a' && c <= 'f' ? c - 'a' + 10 : c >= 'A' && c <= 'F' ? c - 'A' + 10 : -1;
+        const int digit = c >= '0' && c <= '9'   ? c - '0'
+                          : c >= 'a' && c <= 'f' ? c - 'a' + 10
+                          : c >= 'A' && c <= 'F' ? c - 'A' + 10
+                                                 : -1;
         if (digit < 0) {
             out.error = quoted(text) + " is not a sequence of hexadecimal bytes";
             out.bytes.clear();
             return out;
         }
-        if (high < 0) high = digit;
-        else out.bytes.push_back(static_cast<std::uint8_t>(high << 4 | digit)), high = -1;
+        if (high < 0) {
+            high = digit;
+        } else {
+            out.bytes.push_back(static_cast<std::uint8_t>(high << 4 | digit));
+            high = -1;
+        }
     }
     if (high < 0) return out;
     out.bytes.clear();
-    if (text.size() == 1) out.bytes.push_back(static_cast<std::uint8_t>(high));
-    else out.error = quoted(text) + " has an odd number of hexadecimal digits";
+    if (text.size() == 1) {
+        out.bytes.push_back(static_cast<std::uint8_t>(high));
+    } else {
+        out.error = quoted(text) + " has an odd number of hexadecimal digits";
+    }
     return out;
 }
 
 std::vector<std::uint8_t> utf16(std::string_view text) {
     std::vector<std::uint8_t> out;
-    const auto                unit = [&](std::uint32_t u) {
-        out.push_back(static_cast<std::uint8_t>(u)), out.push_back(static_cast<std::uint8_t>(u >> 8));
+    const auto unit = [&](std::uint32_t u) {
+        out.push_back(static_cast<std::uint8_t>(u));
+
+        out.push_back(static_cast<std::uint8_t>(u >> 8));
     };
     for (std::size_t i = 0; i < text.size();) {
-        const auto        first = static_cast<unsigned char>(text[i]);
+        const auto first = static_cast<unsigned char>(text[i]);
         const std::size_t n = first < 0x80 ? 1 : first < 0xE0 ? 2 : first < 0xF0 ? 3 : 4;
-        std::uint32_t     c = n == 1 ? first : first & (0xFFu >> (n + 1));
-        for (std::size_t k = 1; k < n && i + k < text.size(); ++k) c = c << 6 | (static_cast<unsigned char>(text[i + k]) & 0x3Fu);
+        std::uint32_t c = n == 1 ? first : first & (0xFFu >> (n + 1));
+        for (std::size_t k = 1; k < n && i + k < text.size(); ++k) {
+            c = c << 6 | (static_cast<unsigned char>(text[i + k]) & 0x3Fu);
+        }
         i += n;
-        if (c < 0x10000) unit(c);
-        else unit(0xD800 + ((c - 0x10000) >> 10 & 0x3FF)), unit(0xDC00 + ((c - 0x10000) & 0x3FF));
+        if (c < 0x10000) {
+            unit(c);
+        } else {
+            unit(0xD800 + ((c - 0x10000) >> 10 & 0x3FF));
+            unit(0xDC00 + ((c - 0x10000) & 0x3FF));
+        }
     }
     return out;
 }
@@ -175,41 +230,58 @@ std::vector<std::uint8_t> utf16(std::string_view text) {
 std::span<const DataType> data_types() { return table; }
 
 const DataType* data_type(std::uint16_t code) {
-    const auto* found = std::find_if(std::begin(table), std::end(table), [&](const DataType& type) { return type.code == code; });
+    const auto* found = std::find_if(std::begin(table), std::end(table),
+                                     [&](const DataType& type) { return type.code == code; });
     return found == std::end(table) ? nullptr : found;
 }
 
 const DataType* data_type(std::string_view name) {
-    const auto* found = std::find_if(std::begin(table), std::end(table), [&](const DataType& type) { return same_word(type.name, name); });
+    const auto* found = std::find_if(std::begin(table), std::end(table), [&](const DataType& type) {
+        return same_word(type.name, name);
+    });
     return found == std::end(table) ? nullptr : found;
 }
 
 std::optional<Number> parse_number(std::string_view text) {
     constexpr std::string_view node = "$NODEID";
-    Number                     out;
-    bool                       any = false, minus_next = false, sign_seen = true;
+    Number out;
+    bool any = false;
+    bool minus_next = false;
+    bool sign_seen = true;
     text = trimmed(text);
     for (std::string_view rest = text; !rest.empty() || sign_seen;) {
         rest = trimmed(rest);
-        if (rest.empty()) return {};
+        if (rest.empty()) {
+            return {};
+        }
         if (!any || sign_seen) {
             if (rest[0] == '+' || rest[0] == '-') {
-                if (any) return {};  // "1 + -2"
+                if (any) {
+                    return {};  // "1 + -2"
+                }
                 minus_next = rest[0] == '-';
                 rest = trimmed(rest.substr(1));
             }
-            const std::size_t      stop = std::min(rest.find_first_of("+- \t"), rest.size());
+            const std::size_t stop = std::min(rest.find_first_of("+- \t"), rest.size());
             const std::string_view word = rest.substr(0, stop);
             if (same_word(word, node)) {
-                if (out.node_id || minus_next) return {};
+                if (out.node_id || minus_next) {
+                    return {};
+                }
                 out.node_id = true;
             } else {
                 const auto one = term(word);
-                if (!one) return {};
+                if (!one) {
+                    return {};
+                }
                 out.hex = out.hex || one->hex;
-                if (one->spelling != Spelling::plain) out.spelling = one->spelling;
+                if (one->spelling != Spelling::plain) {
+                    out.spelling = one->spelling;
+                }
                 if (out.negative == minus_next || out.magnitude == 0) {
-                    if (__builtin_add_overflow(out.magnitude, one->value, &out.magnitude)) return {};
+                    if (__builtin_add_overflow(out.magnitude, one->value, &out.magnitude)) {
+                        return {};
+                    }
                     out.negative = minus_next;
                 } else if (out.magnitude >= one->value) {
                     out.magnitude -= one->value;
@@ -223,34 +295,48 @@ std::optional<Number> parse_number(std::string_view text) {
             rest = trimmed(rest.substr(stop));
             continue;
         }
-        if (rest[0] != '+' && rest[0] != '-') return {};
+        if (rest[0] != '+' && rest[0] != '-') {
+            return {};
+        }
         minus_next = rest[0] == '-';
         sign_seen = true;
         rest = trimmed(rest.substr(1));
     }
-    if (!any) return {};
+    if (!any) {
+        return {};
+    }
     return out;
 }
 
 std::optional<double> parse_real(std::string_view text) {
     text = trimmed(text);
-    if (const auto number = parse_number(text); number && !number->node_id)
-        return number->negative ? -static_cast<double>(number->magnitude) : static_cast<double>(number->magnitude);
-    if (!text.empty() && text[0] == '+') text.remove_prefix(1);
-    if (!text.empty() && (text.back() == 'f' || text.back() == 'F') && text.find_first_of("xX") == std::string_view::npos &&
-        text.size() > 1 && !same_word(text, "inf"))
+    if (const auto number = parse_number(text); number && !number->node_id) {
+        return number->negative ? -static_cast<double>(number->magnitude)
+                                : static_cast<double>(number->magnitude);
+    }
+    if (!text.empty() && text[0] == '+') {
+        text.remove_prefix(1);
+    }
+    if (!text.empty() && (text.back() == 'f' || text.back() == 'F') &&
+        text.find_first_of("xX") == std::string_view::npos && text.size() > 1 &&
+        !same_word(text, "inf")) {
         text.remove_suffix(1);
+    }
     double out = 0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), out);
-    if (text.empty() || error != std::errc() || end != text.data() + text.size()) return {};
+    if (text.empty() || error != std::errc() || end != text.data() + text.size()) {
+        return {};
+    }
     return out;
 }
 
 Encoded encode(std::string_view text, std::uint16_t code, unsigned node_id) {
     text = trimmed(text);
-    if (text.empty()) return {};
+    if (text.empty()) {
+        return {};
+    }
     const DataType* type = data_type(code);
-    Encoded         out;
+    Encoded out;
     if (type == nullptr || type->kind == Kind::structure) {
         // A manufacturer's type: a number as large as it needs, or nothing that could be encoded.
         out.error = "values of this data type have no spelling in CiA 306";
@@ -260,17 +346,23 @@ Encoded encode(std::string_view text, std::uint16_t code, unsigned node_id) {
     case Kind::time:
         // Days and milliseconds, with a blank between them; or all 48 bits as one number.
         if (const std::size_t gap = text.find(' '); gap != std::string_view::npos) {
-            const auto days = parse_number(text.substr(0, gap)), ms = parse_number(text.substr(gap));
-            if (days && ms && !days->negative && !ms->negative && days->magnitude <= 0xFFFF && ms->magnitude < 1u << 28)
-                return {little(ms->magnitude | days->magnitude << 32, 6), false, Spelling::plain, {}};
+            const auto days = parse_number(text.substr(0, gap));
+
+            const auto ms = parse_number(text.substr(gap));
+            if (days && ms && !days->negative && !ms->negative && days->magnitude <= 0xFFFF &&
+                ms->magnitude < 1u << 28) {
+                return {
+                    little(ms->magnitude | days->magnitude << 32, 6), false, Spelling::plain, {}};
+            }
         }
         [[fallthrough]];
     case Kind::boolean:
     case Kind::integer:
     case Kind::natural: return integer(text, *type, node_id);
     case Kind::real: {
-        // Some tools write the bits in hexadecimal. A hexadecimal number of their size is nothing else.
-        const auto     bits = parse_number(text);
+        // Some tools write the bits in hexadecimal. A hexadecimal number of their size is nothing
+        // else.
+        const auto bits = parse_number(text);
         const unsigned digits = type->bits / 4;
         if (bits && bits->hex && !bits->negative && !bits->node_id && bits->magnitude > 0xFFFF &&
             bits->magnitude >> (type->bits - 1) <= 1 && text.size() <= digits + 2) {
@@ -305,16 +397,21 @@ Encoded encode_strictly(std::string_view text, std::uint16_t code, unsigned node
         out.error = quoted(text) + " would be octal; write it without the 0 in front, or 0x…";
     } else if (out.spelling == Spelling::unsigned_for_negative) {
         const std::optional<Number> number = parse_number(text);
-        if (!number || !number->hex || number->negative) out.error = unfitting(text, *data_type(code));
+        if (!number || !number->hex || number->negative) {
+            out.error = unfitting(text, *data_type(code));
+        }
     }
     return out;
 }
 
 std::string spell(std::span<const std::uint8_t> bytes, std::uint16_t code) {
     const DataType* type = data_type(code);
-    const Kind      kind = type == nullptr ? Kind::octets : type->kind;
-    if (kind == Kind::text) return {bytes.begin(), bytes.end()};
-    if (kind == Kind::octets || kind == Kind::domain || kind == Kind::structure || kind == Kind::unicode || bytes.size() > 8) {
+    const Kind kind = type == nullptr ? Kind::octets : type->kind;
+    if (kind == Kind::text) {
+        return {bytes.begin(), bytes.end()};
+    }
+    if (kind == Kind::octets || kind == Kind::domain || kind == Kind::structure ||
+        kind == Kind::unicode || bytes.size() > 8) {
         std::string out;
         for (const std::uint8_t byte : bytes) {
             std::array<char, 4> two{};
@@ -324,37 +421,57 @@ std::string spell(std::span<const std::uint8_t> bytes, std::uint16_t code) {
         return out;
     }
     std::uint64_t value = 0;
-    for (std::size_t i = 0; i < bytes.size(); ++i) value |= std::uint64_t{bytes[i]} << (8 * i);
+    for (std::size_t i = 0; i < bytes.size(); ++i) {
+        value |= std::uint64_t{bytes[i]} << (8 * i);
+    }
     std::array<char, 64> text{};
     if (kind == Kind::real) {
         char* end = bytes.size() == 4
-                        ? std::to_chars(text.data(), text.data() + text.size(), std::bit_cast<float>(static_cast<std::uint32_t>(value))).ptr
-                        : std::to_chars(text.data(), text.data() + text.size(), std::bit_cast<double>(value)).ptr;
+                        ? std::to_chars(text.data(), text.data() + text.size(),
+                                        std::bit_cast<float>(static_cast<std::uint32_t>(value)))
+                              .ptr
+                        : std::to_chars(text.data(), text.data() + text.size(),
+                                        std::bit_cast<double>(value))
+                              .ptr;
         return {text.data(), end};
     }
     if (kind == Kind::integer) {
         const unsigned unused = 64 - type->bits;
         return std::to_string(static_cast<std::int64_t>(value << unused) >> unused);
     }
-    std::snprintf(text.data(), text.size(), "0x%0*llX", static_cast<int>(2 * bytes.size()), static_cast<unsigned long long>(value));
+    std::snprintf(text.data(), text.size(), "0x%0*llX", static_cast<int>(2 * bytes.size()),
+                  static_cast<unsigned long long>(value));
     return text.data();
 }
 
 std::optional<Comparable> comparable(std::string_view text, std::uint16_t code, unsigned node_id) {
     const DataType* type = data_type(code);
-    if (type == nullptr || trimmed(text).empty()) return {};
+    if (type == nullptr || trimmed(text).empty()) {
+        return {};
+    }
     if (type->kind == Kind::real) {
         const Encoded value = encode(text, code, node_id);
-        if (!value) return {};
+        if (!value) {
+            return {};
+        }
         std::uint64_t bits = 0;
-        for (std::size_t i = 0; i < value.bytes.size(); ++i) bits |= std::uint64_t{value.bytes[i]} << (8 * i);
-        return type->bits == 32 ? double{std::bit_cast<float>(static_cast<std::uint32_t>(bits))} : std::bit_cast<double>(bits);
+        for (std::size_t i = 0; i < value.bytes.size(); ++i) {
+            bits |= std::uint64_t{value.bytes[i]} << (8 * i);
+        }
+        return type->bits == 32 ? double{std::bit_cast<float>(static_cast<std::uint32_t>(bits))}
+                                : std::bit_cast<double>(bits);
     }
-    if (type->kind != Kind::boolean && type->kind != Kind::integer && type->kind != Kind::natural) return {};
+    if (type->kind != Kind::boolean && type->kind != Kind::integer && type->kind != Kind::natural) {
+        return {};
+    }
     const Encoded value = encode(text, code, node_id);
-    if (!value) return {};
+    if (!value) {
+        return {};
+    }
     std::uint64_t bits = 0;
-    for (std::size_t i = 0; i < value.bytes.size(); ++i) bits |= std::uint64_t{value.bytes[i]} << (8 * i);
+    for (std::size_t i = 0; i < value.bytes.size(); ++i) {
+        bits |= std::uint64_t{value.bytes[i]} << (8 * i);
+    }
     if (type->kind != Kind::integer) return bits;
     const unsigned unused = 64 - type->bits;
     return static_cast<std::int64_t>(bits << unused) >> unused;

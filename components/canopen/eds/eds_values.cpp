@@ -10,8 +10,8 @@ namespace {
 
 struct AccessWord {
     std::string_view word;
-    Access           access;
-    bool             proper;
+    Access access;
+    bool proper;
 };
 constexpr AccessWord access_words[] = {
     {"ro", Access::ro, true},
@@ -43,24 +43,28 @@ constexpr AccessWord access_words[] = {
 
 struct TypeWord {
     std::string_view word;
-    ObjectType       type;
+    ObjectType type;
 };
 constexpr TypeWord object_types[] = {
-    {"NULL", ObjectType::null}, {"DOMAIN", ObjectType::domain}, {"DEFTYPE", ObjectType::deftype}, {"DEFSTRUCT", ObjectType::defstruct},
-    {"VAR", ObjectType::var},   {"ARRAY", ObjectType::array},   {"RECORD", ObjectType::record},
+    {"NULL", ObjectType::null},       {"DOMAIN", ObjectType::domain},
+    {"DEFTYPE", ObjectType::deftype}, {"DEFSTRUCT", ObjectType::defstruct},
+    {"VAR", ObjectType::var},         {"ARRAY", ObjectType::array},
+    {"RECORD", ObjectType::record},
 };
 
 }  // namespace
 
 std::string_view name_of(ObjectType type) {
-    for (const TypeWord& row : object_types)
+    for (const TypeWord& row : object_types) {
         if (row.type == type) return row.word;
+    }
     return "?";
 }
 
 std::string_view name_of(Access access) {
-    for (const AccessWord& row : access_words)
+    for (const AccessWord& row : access_words) {
         if (row.access == access) return row.word;
+    }
     return "?";
 }
 
@@ -72,86 +76,117 @@ ObjectType ObjectReader::object_type(IniSection& section, const std::string& wha
     keys_.cut_comment(*key);
     if (key->value.empty()) {
         given = false;
-        keys_.report(Severity::warning, Topic::missing, key->value_at, "'ObjectType' of " + what + " is empty", "read as 0x7 (VAR)");
+        keys_.report(Severity::warning, Topic::missing, key->value_at,
+                     "'ObjectType' of " + what + " is empty", "read as 0x7 (VAR)");
         return ObjectType::var;
     }
-    for (const TypeWord& row : object_types)
+    for (const TypeWord& row : object_types) {
         if (same_word(row.word, key->value)) {
-            keys_.report(Severity::warning, Topic::object, key->value_at, "'ObjectType' of " + what + " is a name, not a number",
-                      "write " + hex(static_cast<unsigned>(row.type), 1));
+            keys_.report(Severity::warning, Topic::object, key->value_at,
+                         "'ObjectType' of " + what + " is a name, not a number",
+                         "write " + hex(static_cast<unsigned>(row.type), 1));
             return row.type;
         }
+    }
     const auto number = keys_.parse(section, *key, 0xFF);
-    for (const TypeWord& row : object_types)
+    for (const TypeWord& row : object_types) {
         if (number && static_cast<unsigned>(row.type) == *number) return row.type;
-    if (number)
-        keys_.report(Severity::warning, Topic::object, key->value_at, "unknown object type " + key->value,
-                  "0x2 DOMAIN, 0x5 DEFTYPE, 0x6 DEFSTRUCT, 0x7 VAR, 0x8 ARRAY, 0x9 RECORD; read as VAR");
+    }
+    if (number) {
+        keys_.report(
+            Severity::warning, Topic::object, key->value_at, "unknown object type " + key->value,
+            "0x2 DOMAIN, 0x5 DEFTYPE, 0x6 DEFSTRUCT, 0x7 VAR, 0x8 ARRAY, 0x9 RECORD; read as VAR");
+    }
     given = false;
     return ObjectType::var;
 }
 
 std::uint16_t ObjectReader::type_of(IniSection& section, const std::string& what, bool needed) {
     IniKey* key = section.find("DataType");
-    if (key != nullptr) key->used = true, keys_.cut_comment(*key);
+    if (key != nullptr) {
+        key->used = true;
+        keys_.cut_comment(*key);
+    }
     if (key == nullptr || key->value.empty()) {
-        if (needed)
-            keys_.report(Severity::warning, Topic::missing, key != nullptr ? key->value_at : section.at,
-                      "'DataType' of " + what + " is " + (key != nullptr ? "empty" : "missing"),
-                      "without it the object is read and written as raw bytes; write DataType=0x0007 for UNSIGNED32");
+        if (needed) {
+            keys_.report(Severity::warning, Topic::missing,
+                         key != nullptr ? key->value_at : section.at,
+                         "'DataType' of " + what + " is " + (key != nullptr ? "empty" : "missing"),
+                         "without it the object is read and written as raw bytes; write "
+                         "DataType=0x0007 for UNSIGNED32");
+        }
         return 0;
     }
     if (const DataType* named = data_type(std::string_view(key->value)); named != nullptr) {
-        keys_.report(Severity::warning, Topic::object, key->value_at, "'DataType' of " + what + " is a name, not a number", "write " + hex(named->code));
+        keys_.report(Severity::warning, Topic::object, key->value_at,
+                     "'DataType' of " + what + " is a name, not a number",
+                     "write " + hex(named->code));
         return named->code;
     }
     const auto number = keys_.parse(section, *key, 0xFFFF);
     if (!number) return 0;
     const auto code = static_cast<std::uint16_t>(*number);
-    if (data_type(code) == nullptr && (code < 0x20 || code > 0x25F))
-        keys_.report(Severity::warning, Topic::object, key->value_at, "unknown data type " + hex(code),
-                  "the basic types are 0x0001..0x001B; 0x0005 is UNSIGNED8");
+    if (data_type(code) == nullptr && (code < 0x20 || code > 0x25F)) {
+        keys_.report(Severity::warning, Topic::object, key->value_at,
+                     "unknown data type " + hex(code),
+                     "the basic types are 0x0001..0x001B; 0x0005 is UNSIGNED8");
+    }
     return code;
 }
 
 Access ObjectReader::access_of(IniSection& section, const std::string& what, bool needed) {
     IniKey* key = section.find("AccessType");
-    if (key != nullptr) key->used = true, keys_.cut_comment(*key);
+    if (key != nullptr) {
+        key->used = true;
+        keys_.cut_comment(*key);
+    }
     if (key == nullptr || key->value.empty()) {
-        if (needed)
-            keys_.report(Severity::warning, Topic::missing, key != nullptr ? key->value_at : section.at,
-                      "'AccessType' of " + what + " is " + (key != nullptr ? "empty" : "missing"),
-                      "read as rw; the access types are ro, wo, rw, rwr, rww, const");
+        if (needed) {
+            keys_.report(
+                Severity::warning, Topic::missing, key != nullptr ? key->value_at : section.at,
+                "'AccessType' of " + what + " is " + (key != nullptr ? "empty" : "missing"),
+                "read as rw; the access types are ro, wo, rw, rwr, rww, const");
+        }
         return Access::rw;
     }
     for (const AccessWord& row : access_words) {
         if (!same_word(row.word, key->value)) continue;
-        if (!row.proper)
-            keys_.report(Severity::warning, Topic::object, key->value_at, "unknown access type '" + key->value + "'",
-                      "read as " + std::string(name_of(row.access)));
+        if (!row.proper) {
+            keys_.report(Severity::warning, Topic::object, key->value_at,
+                         "unknown access type '" + key->value + "'",
+                         "read as " + std::string(name_of(row.access)));
+        }
         return row.access;
     }
-    keys_.report(Severity::warning, Topic::object, key->value_at, "unknown access type '" + key->value.substr(0, 40) + "'",
-              "read as rw; the access types are ro, wo, rw, rwr, rww, const");
+    keys_.report(Severity::warning, Topic::object, key->value_at,
+                 "unknown access type '" + key->value.substr(0, 40) + "'",
+                 "read as rw; the access types are ro, wo, rw, rwr, rww, const");
     return Access::rw;
 }
 
-void ObjectReader::value(IniSection& section, const char* name, std::string& out, std::uint16_t type, const std::string& what) {
+void ObjectReader::value(IniSection& section, const char* name, std::string& out,
+                         std::uint16_t type, const std::string& what) {
     IniKey* key = section.find(name);
     if (key == nullptr) return;
     key->used = true;
     const DataType* known = data_type(type);
-    const bool      number = known != nullptr && known->kind < Kind::text;
-    if (number) keys_.cut_comment(*key);
+    const bool number = known != nullptr && known->kind < Kind::text;
+    if (number) {
+        keys_.cut_comment(*key);
+    }
     out = key->value;
-    if (out.empty() || known == nullptr || known->kind == Kind::structure || known->kind == Kind::domain) return;
-    const Encoded     encoded = encode(out, type, 1);
+    if (out.empty() || known == nullptr || known->kind == Kind::structure ||
+        known->kind == Kind::domain) {
+        return;
+    }
+    const Encoded encoded = encode(out, type, 1);
     const std::string it = "'" + key->name + "' of " + what;
     if (!encoded) {
         const auto parsed = parse_number(out);
-        const bool bare_hex = number && !parsed && out.size() <= 8 && out.find_first_not_of("0123456789abcdefABCDEF") == std::string::npos;
+        const bool bare_hex = number && !parsed && out.size() <= 8 &&
+                              out.find_first_not_of("0123456789abcdefABCDEF") == std::string::npos;
         keys_.report(Severity::warning, Topic::value, key->value_at, it + ": " + encoded.error,
-                  bare_hex ? "write 0x" + out : "the value was ignored");
+                     bare_hex ? "write 0x" + out : "the value was ignored");
         return;
     }
     const auto odd = [&](Severity severity, std::string sentence, std::string help) {
@@ -159,26 +194,38 @@ void ObjectReader::value(IniSection& section, const char* name, std::string& out
     };
     switch (encoded.spelling) {
     case Spelling::octal:
-        odd(Severity::warning, it + " begins with 0 and is read as octal: " + spell(encoded.bytes, type),
+        odd(Severity::warning,
+            it + " begins with 0 and is read as octal: " + spell(encoded.bytes, type),
             "remove the 0 if it is decimal, write 0x if it is hexadecimal");
         break;
     case Spelling::decimal_with_zero:
-        odd(Severity::warning, it + " begins with 0 but is not octal; read as decimal", "remove the 0");
+        odd(Severity::warning, it + " begins with 0 but is not octal; read as decimal",
+            "remove the 0");
         break;
     case Spelling::unsigned_for_negative:
-        if (known->kind == Kind::integer)
-            odd(Severity::note, it + " is the bit pattern of a negative number: " + spell(encoded.bytes, type),
+        if (known->kind == Kind::integer) {
+            odd(Severity::note,
+                it + " is the bit pattern of a negative number: " + spell(encoded.bytes, type),
                 "write " + spell(encoded.bytes, type));
-        else
-            odd(Severity::warning, it + " is negative, but its type is " + std::string(known->name) + "; read as " + spell(encoded.bytes, type),
+        } else {
+            odd(Severity::warning,
+                it + " is negative, but its type is " + std::string(known->name) + "; read as " +
+                    spell(encoded.bytes, type),
                 "write " + spell(encoded.bytes, type));
+        }
         break;
-    case Spelling::number_as_real: odd(Severity::warning, it + " is written as a fraction", "write " + spell(encoded.bytes, type)); break;
+    case Spelling::number_as_real:
+        odd(Severity::warning, it + " is written as a fraction",
+            "write " + spell(encoded.bytes, type));
+        break;
     case Spelling::real_as_bits:
         odd(Severity::warning, it + " is read as the bit pattern of " + spell(encoded.bytes, type),
             "other tools read it as a number; write " + spell(encoded.bytes, type));
         break;
-    case Spelling::words: odd(Severity::warning, it + " is a word, not a number", "write " + spell(encoded.bytes, type)); break;
+    case Spelling::words:
+        odd(Severity::warning, it + " is a word, not a number",
+            "write " + spell(encoded.bytes, type));
+        break;
     case Spelling::plain: break;
     }
 }

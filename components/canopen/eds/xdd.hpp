@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Reads device descriptions in XML (XDD), also with a configuration (XDC), CiA 311, into the same structures as an EDS.
+// Reads device descriptions in XML (XDD), also with a configuration (XDC), CiA 311, into the same
+// structures as an EDS.
 #pragma once
 
 #include <string_view>
@@ -8,7 +9,8 @@
 
 namespace hal::canopen::eds {
 
-/// Reads the bytes of an XDD or XDC file. A build without the XML library rejects them with the reason. [setup]
+/// Reads the bytes of an XDD or XDC file. A build without the XML library rejects them with the
+/// reason. [setup]
 Reading read_xdd(std::string_view bytes);
 
 /// Reads XML if the first character that is not blank is <, else an EDS or DCF. [setup]

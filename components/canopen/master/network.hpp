@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The remote nodes of a network: for each node an SDO client, its NMT state by heartbeat or node guarding, and its emergencies. All nodes are
-// served concurrently.
+// The remote nodes of a network: for each node an SDO client, its NMT state by heartbeat or node
+// guarding, and its emergencies. All nodes are served concurrently.
 #pragma once
 
 #include <array>
@@ -19,7 +19,8 @@ namespace hal::canopen {
 class RemoteNode {
 public:
     /// Creates the node with its default SDO channel; the queue outlives it. [setup]
-    RemoteNode(std::uint8_t id, FrameQueue& out, const SdoClientSettings& settings) : id_(id), out_(out), sdo_(out, settings) {
+    RemoteNode(std::uint8_t id, FrameQueue& out, const SdoClientSettings& settings)
+        : id_(id), out_(out), sdo_(out, settings) {
         sdo_.configure(id);
     }
 
@@ -28,14 +29,17 @@ public:
     /// Returns the SDO client of the node. [realtime]
     SdoClient& sdo() noexcept { return sdo_; }
 
-    /// Supervises the heartbeat with a timeout of `limit` ns, from the first heartbeat on; 0: no supervision. [realtime]
+    /// Supervises the heartbeat with a timeout of `limit` ns, from the first heartbeat on; 0: no
+    /// supervision. [realtime]
     void expect_heartbeat(Time limit) noexcept { heartbeat_limit_ = limit; }
-    /// Guards the node every `period` ns; it is lost after `factor` periods without a valid response. 0: no guarding. [realtime]
+    /// Guards the node every `period` ns; it is lost after `factor` periods without a valid
+    /// response. 0: no guarding. [realtime]
     void guard(Time period, std::uint8_t factor, Time now) noexcept;
 
     /// Returns true if node guarding is on. [realtime]
     bool guarded() const noexcept { return guard_period_ != 0; }
-    /// Returns true if the node was lost because the toggle bit of its guarding responses did not alternate. [realtime]
+    /// Returns true if the node was lost because the toggle bit of its guarding responses did not
+    /// alternate. [realtime]
     bool toggle_stuck() const noexcept { return toggle_stuck_; }
 
     /// Returns true once a heartbeat, boot-up message or guarding response was received. [realtime]
@@ -71,13 +75,24 @@ private:
     FrameQueue& out_;
     SdoClient sdo_;
     NmtState state_ = NmtState::initialising;
-    bool heard_ = false, lost_ = false, watching_ = false;
-    Time last_ = 0, heartbeat_limit_ = 0;
-    Time guard_period_ = 0, next_guard_ = 0, answered_ = 0, wrong_at_ = 0, guard_heard_ = 0;
-    std::uint8_t guard_factor_ = 0, toggle_ = 0;
-    bool toggle_known_ = false, toggle_stuck_ = false;
+    bool heard_ = false;
+    bool lost_ = false;
+    bool watching_ = false;
+    Time last_ = 0;
+    Time heartbeat_limit_ = 0;
+    Time guard_period_ = 0;
+    Time next_guard_ = 0;
+    Time answered_ = 0;
+    Time wrong_at_ = 0;
+    Time guard_heard_ = 0;
+    std::uint8_t guard_factor_ = 0;
+    std::uint8_t toggle_ = 0;
+    bool toggle_known_ = false;
+    bool toggle_stuck_ = false;
     std::array<Emergency, history> emergencies_{};
-    std::uint64_t emergency_count_ = 0, boot_ups_ = 0, wrong_toggles_ = 0;
+    std::uint64_t emergency_count_ = 0;
+    std::uint64_t boot_ups_ = 0;
+    std::uint64_t wrong_toggles_ = 0;
     std::uint8_t error_register_ = 0;
 };
 
@@ -85,13 +100,17 @@ private:
 class Network {
 public:
     /// Creates an empty network; queue and events outlive it. [setup]
-    Network(FrameQueue& out, Events& events, const SdoClientSettings& settings = {}) : out_(out), events_(events), settings_(settings) {}
+    Network(FrameQueue& out, Events& events, const SdoClientSettings& settings = {})
+        : out_(out), events_(events), settings_(settings) {}
 
     /// Returns the node, creating it if necessary; id 1..127. [setup]
     RemoteNode& add(std::uint8_t id);
     /// Returns the node; nullptr if it was not added. [realtime]
-    RemoteNode* node(std::uint8_t id) noexcept { return id < nodes_.size() ? nodes_[id].get() : nullptr; }
-    /// Sends an NMT command to one node, or to all with id 0. Returns false if the queue is full. [realtime]
+    RemoteNode* node(std::uint8_t id) noexcept {
+        return id < nodes_.size() ? nodes_[id].get() : nullptr;
+    }
+    /// Sends an NMT command to one node, or to all with id 0. Returns false if the queue is full.
+    /// [realtime]
     bool command(NmtCommand, std::uint8_t id = 0) noexcept;
     /// Processes a frame; returns true if it belongs to one of the nodes. [realtime]
     bool handle(const Frame&, Time now) noexcept;

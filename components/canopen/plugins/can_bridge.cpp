@@ -12,38 +12,50 @@ namespace {
 /// One end of the bridge and its counters.
 struct End {
     std::unique_ptr<hal::can::Link> link;
-    std::uint64_t passed = 0, dropped = 0;
+    std::uint64_t passed = 0;
+    std::uint64_t dropped = 0;
 };
 
 struct CanBridge : hal::Component {
     using Component::Component;
 
     hal::TextArgument a{*this, "a", "sim:can0", "address of the first bus, as in sim:arm"};
-    hal::TextArgument b{*this, "b", "udp:239.74.163.2:43113", "address of the second bus, as in udp:239.74.163.2:43113 or can:can0"};
+    hal::TextArgument b{*this, "b", "udp:239.74.163.2:43113",
+                        "address of the second bus, as in udp:239.74.163.2:43113 or can:can0"};
 
     hal::In<bool> enable{*this, "enable", "false: no frames are forwarded", {.initial = true}};
     hal::In<bool> read_only{*this, "read-only", "true: frames of b are not forwarded to a"};
     hal::Out<std::uint64_t> a_to_b{*this, "a-to-b", "frames forwarded from a to b"};
     hal::Out<std::uint64_t> b_to_a{*this, "b-to-a", "frames forwarded from b to a"};
-    hal::Out<std::uint64_t> dropped{*this, "dropped",
-                                    "frames not forwarded: queue full, bus down or off, or CAN FD frame on a classic bus"};
+    hal::Out<std::uint64_t> dropped{
+        *this, "dropped",
+        "frames not forwarded: queue full, bus down or off, or CAN FD frame on a classic bus"};
     hal::Out<bool> a_up{*this, "a-up", "bus a is neither down nor bus off"};
     hal::Out<bool> b_up{*this, "b-up", "bus b is neither down nor bus off"};
 
-    hal::Function run{*this, "update", &CanBridge::update, "forwards the frames received since the last cycle"};
+    hal::Function run{*this, "update", &CanBridge::update,
+                      "forwards the frames received since the last cycle"};
 
     void start() {
-        if (a.get() == b.get()) throw hal::ArgumentError("a", "a= and b= are the same bus, " + a.get() + "; name two different ones");
+        if (a.get() == b.get()) {
+            throw hal::ArgumentError(
+                "a", "a= and b= are the same bus, " + a.get() + "; name two different ones");
+        }
         open(ends_[0], a.get());
         open(ends_[1], b.get());
         setup_time_.start();
     }
     void stop() noexcept {
         std::int64_t closing_ns = 0;
-        for (const End& end : ends_)
-            if (end.link) closing_ns += end.link->closing_ns();
+        for (const End& end : ends_) {
+            if (end.link) {
+                closing_ns += end.link->closing_ns();
+            }
+        }
         setup_time_.expect(closing_ns, hal::can::closing_text);
-        for (End& end : ends_) end.link.reset();
+        for (End& end : ends_) {
+            end.link.reset();
+        }
     }
 
     void update(hal::Cycle cycle) noexcept {
@@ -66,12 +78,16 @@ private:
         const auto state = end.link->state();
         return state != hal::can::State::down && state != hal::can::State::bus_off;
     }
-    /// Forwards at most one buffer of frames, so a babbling bus costs a bounded time; the rest stays queued until the next cycle.
+    /// Forwards at most one buffer of frames, so a babbling bus costs a bounded time; the rest
+    /// stays queued until the next cycle.
     void carry(End& from, const End& to, std::int64_t now, bool pass) noexcept {
         const auto count = from.link->receive(buffer_, now);
         for (std::size_t n = 0; n < count && pass; ++n) {
-            if (to.link->send(buffer_[n], now) == hal::can::Sent::queued) ++from.passed;
-            else ++from.dropped;
+            if (to.link->send(buffer_[n], now) == hal::can::Sent::queued) {
+                ++from.passed;
+            } else {
+                ++from.dropped;
+            }
         }
         to.link->flush(now);
     }

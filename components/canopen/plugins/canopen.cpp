@@ -32,31 +32,46 @@ public:
         std::string file;
         config_ = arguments_.read(file);
         if (by_index()) {
-            update_.emplace(*this, "update", &Canopen::update, "receives, copies received objects to pins and pins to objects, and sends");
+            update_.emplace(
+                *this, "update", &Canopen::update,
+                "receives, copies received objects to pins and pins to objects, and sends");
         } else {
-            receive_.emplace(*this, "receive", &Canopen::receive,
-                             "receives frames, boots and monitors nodes, copies received objects to pins");
-            transmit_.emplace(*this, "transmit", &Canopen::transmit, "copies pins to objects, sends the SYNC and the PDOs of this cycle");
+            receive_.emplace(
+                *this, "receive", &Canopen::receive,
+                "receives frames, boots and monitors nodes, copies received objects to pins");
+            transmit_.emplace(*this, "transmit", &Canopen::transmit,
+                              "copies pins to objects, sends the SYNC and the PDOs of this cycle");
         }
         runner_ = std::make_unique<Runner>(config_, static_cast<RunnerEvents&>(*this));
         const hal::Function& shows = by_index() ? *update_ : *receive_;
         bus_.emplace(*this, shows);
-        if (config_.flying.enabled) flying_.emplace(*this, shows);
-        if (config_.sync == config::SyncMode::follow && config_.sync_clock) follower_.emplace(*this, shows, config_);
+        if (config_.flying.enabled) {
+            flying_.emplace(*this, shows);
+        }
+        if (config_.sync == config::SyncMode::follow && config_.sync_clock) {
+            follower_.emplace(*this, shows, config_);
+        }
         objects_.emplace(shows, by_index() ? *update_ : *transmit_);
-        for (const config::Node& n : config_.nodes) nodes_.emplace_back(*this, shows, n.name), messages_.emplace_back(n);
+        for (const config::Node& n : config_.nodes) {
+            nodes_.emplace_back(*this, shows, n.name);
+            messages_.emplace_back(n);
+        }
         for (std::size_t i = 0; i < runner_->slots().size(); ++i) {
             const Slot& s = runner_->slots()[i];
-            objects_->declare(*this, by_index() ? "" : config_.nodes[s.node].name + ".", s.to_node, *s.object, i);
+            objects_->declare(*this, by_index() ? "" : config_.nodes[s.node].name + ".", s.to_node,
+                              *s.object, i);
         }
-        for (const Received& r : runner_->own().received) pdo_messages_.emplace_back(config_.nodes[r.node], *r.pdo);
+        for (const Received& r : runner_->own().received) {
+            pdo_messages_.emplace_back(config_.nodes[r.node], *r.pdo);
+        }
         node_faults_.resize(nodes_.size());
         late_faults_.resize(pdo_messages_.size());
         short_faults_.resize(pdo_messages_.size());
         srdo_faults_.resize(runner_->own().srdos.size());
         safety_.emplace(*this, shows, *runner_);
         own_id_message_ = "duplicate node ID " + std::to_string(config_.node_id) +
-                          ": another device has the node ID of the master; change one: node-id in [bus], or masternodeid=";
+                          ": another device has the node ID of the master; change one: node-id in "
+                          "[bus], or masternodeid=";
         reporter_ = std::make_unique<Reporter>(name_, config_, file);
     }
 
@@ -69,19 +84,26 @@ public:
         options.send_capacity = 4096;
         options.stamps = true;  // to follow a SYNC, and to count frames-lost
         std::string problem;
-        auto        opened = SharedLink::open(config_.link, options, problem);
+        auto opened = SharedLink::open(config_.link, options, problem);
         if (!opened) throw std::runtime_error(problem);
         const auto& description = opened->description();
-        if (description.bit_rate != 0 && description.bit_rate != config_.bit_rate && description.bit_rate != hal::can::unlimited) {
-            const std::string wanted = std::to_string(config_.bit_rate), is = std::to_string(description.bit_rate);
+        if (description.bit_rate != 0 && description.bit_rate != config_.bit_rate &&
+            description.bit_rate != hal::can::unlimited) {
+            const std::string wanted = std::to_string(config_.bit_rate);
+
+            const std::string is = std::to_string(description.bit_rate);
             const std::string& interface = description.interface;
-            throw std::runtime_error(config_.link + " runs at " + is + " bit/s, the configuration has " + wanted +
-                                     "; change one of them: bitrate = " + is + " in [bus], or " +
-                                     (interface.empty() ? "bitrate=" + wanted + " in the address"
-                                                        : "sudo ip link set " + interface + " down && sudo ip link set " + interface +
-                                                              " up type can bitrate " + wanted));
+            throw std::runtime_error(
+                config_.link + " runs at " + is + " bit/s, the configuration has " + wanted +
+                "; change one of them: bitrate = " + is + " in [bus], or " +
+                (interface.empty()
+                     ? "bitrate=" + wanted + " in the address"
+                     : "sudo ip link set " + interface + " down && sudo ip link set " + interface +
+                           " up type can bitrate " + wanted));
         }
-        if (follower_) follower_->start();
+        if (follower_) {
+            follower_->start();
+        }
         link_ = std::move(opened);
         period_ = 0;
         unsent_ = unheard_ = 0;
@@ -94,7 +116,9 @@ public:
     void stop() noexcept {
         runner_->close();
         reporter_->stop();
-        if (link_) setup_time_.expect(link_->closing_ns(), hal::can::closing_text);
+        if (link_) {
+            setup_time_.expect(link_->closing_ns(), hal::can::closing_text);
+        }
         link_.reset();
     }
 
@@ -102,23 +126,37 @@ public:
         const Time now = cycle.start_ns();
         if (period_ != cycle.period_ns()) {
             period_ = cycle.period_ns();
-            if (config_.sync == config::SyncMode::cycle) reporter_->cycle(period_);
+            if (config_.sync == config::SyncMode::cycle) {
+                reporter_->cycle(period_);
+            }
             period_fault_.end(faults_, this);
-            if (config_.sync == config::SyncMode::timed && config_.sync_period % period_ != 0)
+            if (config_.sync == config::SyncMode::timed && config_.sync_period % period_ != 0) {
                 period_fault_.begin(faults_, this,
-                                    "the SYNC period is not a multiple of the thread's period; SYNCs are up to half a period early or late");
+                                    "the SYNC period is not a multiple of the thread's period; "
+                                    "SYNCs are up to half a period early or late");
+            }
         }
         now_ = now;
         unheard_ = 0;
         unsent_ += period_;
-        if (is_long_now(unsent_, period_)) reporter_->missing(true);
+        if (is_long_now(unsent_, period_)) {
+            reporter_->missing(true);
+        }
         const bool interrupted = interrupted_.exchange(false, std::memory_order_acquire);
         runner_->receive(now);
-        if (follower_ && interrupted) follower_->restart();
-        if (follower_) follow(now);
-        if (flying_) flying_->show(*runner_);
+        if (follower_ && interrupted) {
+            follower_->restart();
+        }
+        if (follower_) {
+            follow(now);
+        }
+        if (flying_) {
+            flying_->show(*runner_);
+        }
         bus_->show(*runner_, now);
-        for (std::size_t n = 0; n < nodes_.size(); ++n) nodes_[n].show(*runner_, n, now);
+        for (std::size_t n = 0; n < nodes_.size(); ++n) {
+            nodes_[n].show(*runner_, n, now);
+        }
         objects_->show(*runner_);
         safety_->show(*runner_, now);
         end_faults(now);
@@ -127,9 +165,13 @@ public:
     void transmit(hal::Cycle cycle) noexcept {
         unsent_ = 0;
         unheard_ += cycle.period_ns();
-        if (is_long_now(unheard_, cycle.period_ns())) reporter_->missing(false);
+        if (is_long_now(unheard_, cycle.period_ns())) {
+            reporter_->missing(false);
+        }
         objects_->take(*runner_);
-        runner_->transmit(cycle.start_ns(), cycle.period_ns(), link_ && link_->leads(config_.node_id, cycle.start_ns(), cycle.period_ns()));
+        runner_->transmit(
+            cycle.start_ns(), cycle.period_ns(),
+            link_ && link_->leads(config_.node_id, cycle.start_ns(), cycle.period_ns()));
     }
 
     void update(hal::Cycle cycle) noexcept {
@@ -150,90 +192,124 @@ private:
         return naming != nullptr ? naming->name(host) : "canopen.0";
     }
     bool by_index() const { return arguments_.by_index(); }
-    /// Returns true when adding `added` brings `sum` to a second or three cycles, whichever is longer.
+    /// Returns true when adding `added` brings `sum` to a second or three cycles, whichever is
+    /// longer.
     static bool is_long_now(Time sum, Time added) noexcept {
         const Time limit = std::max<Time>(second, 3 * added);
         return sum >= limit && sum - added < limit;
     }
 
-    /// Reports the latency of each pin on a bus with a known schedule: that of the station named as the node, or the longest. [setup]
+    /// Reports the latency of each pin on a bus with a known schedule: that of the station named as
+    /// the node, or the longest. [setup]
     void report_path_delays() {
         const std::vector<hal::can::DeliveryTime> delays = link_->delivery_times();
         if (delays.empty()) return;
         hal::can::DeliveryTime longest = delays.front();
         for (const hal::can::DeliveryTime& d : delays) {
-            longest.there_ns = std::max(longest.there_ns, d.there_ns), longest.back_ns = std::max(longest.back_ns, d.back_ns);
+            longest.there_ns = std::max(longest.there_ns, d.there_ns);
+
+            longest.back_ns = std::max(longest.back_ns, d.back_ns);
             longest.there_cycles = std::max(longest.there_cycles, d.there_cycles);
             longest.back_cycles = std::max(longest.back_cycles, d.back_cycles);
             longest.round_trip = std::max(longest.round_trip, d.round_trip);
         }
         for (const Slot& s : runner_->slots()) {
             const config::Node& node = config_.nodes[s.node];
-            const auto          own = std::find_if(delays.begin(), delays.end(), [&](const auto& d) { return d.station == node.name; });
-            const auto&         delay = own == delays.end() ? longest : *own;
-            const std::string   far = "node " + std::to_string(node.setup.id) + " (" + node.name + ")";
-            const auto          report = [&](const std::string& pin) {
-                hal::report_path_delay(((by_index() ? "" : node.name + ".") + pin).c_str(), far.c_str(),
-                                       s.to_node ? delay.there_cycles : delay.back_cycles, s.to_node ? 0 : delay.round_trip,
-                                       s.to_node ? delay.there_ns : delay.back_ns);
+            const auto own = std::find_if(delays.begin(), delays.end(),
+                                          [&](const auto& d) { return d.station == node.name; });
+            const auto& delay = own == delays.end() ? longest : *own;
+            const std::string far =
+                "node " + std::to_string(node.setup.id) + " (" + node.name + ")";
+            const auto report = [&](const std::string& pin) {
+                hal::report_path_delay(
+                    ((by_index() ? "" : node.name + ".") + pin).c_str(), far.c_str(),
+                    s.to_node ? delay.there_cycles : delay.back_cycles,
+                    s.to_node ? 0 : delay.round_trip, s.to_node ? delay.there_ns : delay.back_ns);
             };
-            if (s.object->bit_pins.empty()) report(s.object->pin);
-            for (const config::BitPin& b : s.object->bit_pins) report(b.name);
+            if (s.object->bit_pins.empty()) {
+                report(s.object->pin);
+            }
+            for (const config::BitPin& b : s.object->bit_pins) {
+                report(b.name);
+            }
         }
     }
 
     void follow(Time now) noexcept {
         switch (follower_->cycle(*runner_, now, period_)) {
         case SyncFollower::Notice::lost:
-            sync_fault_.begin(faults_, this, "followed SYNC missing for {} s; threads run on their own clock until it returns",
-                              follower_->silence(now));
+            sync_fault_.begin(
+                faults_, this,
+                "followed SYNC missing for {} s; threads run on their own clock until it returns",
+                follower_->silence(now));
             break;
         case SyncFollower::Notice::in_vain:
-            sync_fault_.begin(
-                faults_, this,
-                "SYNC feedback loop: this machine produces the SYNC its own threads follow; write clock = own in the configuration");
+            sync_fault_.begin(faults_, this,
+                              "SYNC feedback loop: this machine produces the SYNC its own threads "
+                              "follow; write clock = own in the configuration");
             break;
         case SyncFollower::Notice::unequal:
-            sync_fault_.begin(
-                faults_, this,
-                "cannot follow the SYNC: its period is not a multiple of the thread's; change the thread's period, or write clock = own");
+            sync_fault_.begin(faults_, this,
+                              "cannot follow the SYNC: its period is not a multiple of the "
+                              "thread's; change the thread's period, or write clock = own");
             break;
         case SyncFollower::Notice::nothing:
-            if (sync_fault_.lasts() && follower_->locked()) sync_fault_.end(faults_, this);
+            if (sync_fault_.lasts() && follower_->locked()) {
+                sync_fault_.end(faults_, this);
+            }
             break;
         }
     }
 
-    /// Ends faults that no event ends: what is received again, and what has not been repeated. [realtime]
+    /// Ends faults that no event ends: what is received again, and what has not been repeated.
+    /// [realtime]
     void end_faults(Time now) noexcept {
         constexpr Time repeated_within = 2 * second;
-        if (foreign_fault_.lasts() && now - foreign_seen_ > repeated_within) foreign_fault_.end(faults_, this);
-        if (own_id_fault_.lasts() && now - own_id_seen_ > repeated_within) own_id_fault_.end(faults_, this);
-        for (std::size_t n = 0; n < late_faults_.size(); ++n)
-            if (late_faults_[n].lasts() && !runner_->device().pdos().rpdo(runner_->own().received[n].number).late)
+        if (foreign_fault_.lasts() && now - foreign_seen_ > repeated_within) {
+            foreign_fault_.end(faults_, this);
+        }
+        if (own_id_fault_.lasts() && now - own_id_seen_ > repeated_within) {
+            own_id_fault_.end(faults_, this);
+        }
+        for (std::size_t n = 0; n < late_faults_.size(); ++n) {
+            if (late_faults_[n].lasts() &&
+                !runner_->device().pdos().rpdo(runner_->own().received[n].number).late) {
                 late_faults_[n].end(faults_, this);
-        for (std::size_t n = 0; n < srdo_faults_.size(); ++n)
-            if (srdo_faults_[n].lasts() && runner_->srdo(n).valid) srdo_faults_[n].end(faults_, this);
+            }
+        }
+        for (std::size_t n = 0; n < srdo_faults_.size(); ++n) {
+            if (srdo_faults_[n].lasts() && runner_->srdo(n).valid) {
+                srdo_faults_[n].end(faults_, this);
+            }
+        }
     }
 
     void raise(const char* reason, double detail) noexcept {
-        if (faults_ != nullptr) faults_->raise(faults_, this, reason, detail);
+        if (faults_ != nullptr) {
+            faults_->raise(faults_, this, reason, detail);
+        }
     }
 
     // Events of the runner. [realtime]
     void on_step(std::size_t place, const NodeStatus& s) noexcept override {
-        NodePins&         pins = nodes_[place];
+        NodePins& pins = nodes_[place];
         const NodeFaultMessages& w = messages_[place];
-        const double      silence =
-            s.last_heard == 0 ? not_a_number : static_cast<double>((now_ - s.last_heard + millisecond / 2) / millisecond) * 1e-3;
+        const double silence =
+            s.last_heard == 0
+                ? not_a_number
+                : static_cast<double>((now_ - s.last_heard + millisecond / 2) / millisecond) * 1e-3;
         if (s.losses != pins.losses) {
             pins.losses = s.losses;
             pins.is_faulty = true;
             switch (s.cause) {
             case Cause::guarding: node_fault(place, w.guarding, silence); break;
             case Cause::guard_toggle: node_fault(place, w.toggle); break;
-            case Cause::boot_up: node_fault(place, s.foreign_command != 0 ? w.reset : w.rebooted); break;
-            case Cause::left_operational: node_fault(place, s.foreign_command != 0 ? w.commanded : w.left); break;
+            case Cause::boot_up:
+                node_fault(place, s.foreign_command != 0 ? w.reset : w.rebooted);
+                break;
+            case Cause::left_operational:
+                node_fault(place, s.foreign_command != 0 ? w.commanded : w.left);
+                break;
             case Cause::not_started: node_fault(place, w.not_started); break;
             case Cause::duplicate_id: node_fault(place, w.duplicate); break;
             default: node_fault(place, w.no_heartbeat, silence); break;
@@ -250,10 +326,16 @@ private:
         } else if (failed && !pins.is_faulty) {
             const NodeSetup& setup = config_.nodes[place].setup;
             // An absent node may still be powered up.
-            const bool absent = s.result == BootResult::no_answer && (s.cause == Cause::no_response || s.cause == Cause::not_sent);
-            if (absent && (!setup.mandatory || now_ - runner_->network().begun < setup.boot_limit)) return;
+            const bool absent = s.result == BootResult::no_answer &&
+                                (s.cause == Cause::no_response || s.cause == Cause::not_sent);
+            if (absent &&
+                (!setup.mandatory || now_ - runner_->network().begun < setup.boot_limit)) {
+                return;
+            }
             pins.is_faulty = true;
-            const std::string& why = s.cause == Cause::duplicate_id ? w.duplicate : w.boot[(static_cast<std::size_t>(s.result) - 'A') & 15];
+            const std::string& why = s.cause == Cause::duplicate_id
+                                         ? w.duplicate
+                                         : w.boot[(static_cast<std::size_t>(s.result) - 'A') & 15];
             node_fault(place, why);
             reporter_->node(s);
         } else if (s.step == Step::running && pins.is_faulty) {
@@ -269,38 +351,62 @@ private:
         }
     }
     /// A fault of a node lasts until it runs again. [realtime]
-    void node_fault(std::size_t place, const std::string& reason, double detail = not_a_number) noexcept {
+    void node_fault(std::size_t place, const std::string& reason,
+                    double detail = not_a_number) noexcept {
         node_faults_[place].begin(faults_, this, reason.c_str(), detail);
     }
     /// Reports each note about a node once, a suspected duplicate node ID after each boot.
     void tell_notes(std::size_t place, const NodeStatus& s) noexcept {
         const unsigned fresh = s.notes & ~unsigned{reported_notes_[place]};
-        reported_notes_[place] = static_cast<std::uint8_t>((reported_notes_[place] & ~note_duplicate_id) | s.notes);
-        for (unsigned bit = 1; bit <= note_updated; bit <<= 1)
-            if ((fresh & bit) != 0) reporter_->note(s, static_cast<Note>(bit));
-        if ((fresh & note_duplicate_id) != 0) raise(messages_[place].suspected.c_str(), not_a_number);
+        reported_notes_[place] =
+            static_cast<std::uint8_t>((reported_notes_[place] & ~note_duplicate_id) | s.notes);
+        for (unsigned bit = 1; bit <= note_updated; bit <<= 1) {
+            if ((fresh & bit) != 0) {
+                reporter_->note(s, static_cast<Note>(bit));
+            }
+        }
+        if ((fresh & note_duplicate_id) != 0) {
+            raise(messages_[place].suspected.c_str(), not_a_number);
+        }
     }
     void on_network(const NetworkStatus& n) noexcept override {
         static constexpr NodeStatus nobody{};
-        const NodeStatus*           about = &nobody;
-        for (std::size_t i = 0; i < config_.nodes.size(); ++i)
-            if (config_.nodes[i].setup.id == n.node) about = &runner_->status(i);
+        const NodeStatus* about = &nobody;
+        for (std::size_t i = 0; i < config_.nodes.size(); ++i) {
+            if (config_.nodes[i].setup.id == n.node) {
+                about = &runner_->status(i);
+            }
+        }
         reporter_->network(n, *about);
     }
-    void on_emergency(std::size_t place, const Emergency& e) noexcept override { reporter_->emergency(runner_->status(place), e); }
+    void on_emergency(std::size_t place, const Emergency& e) noexcept override {
+        reporter_->emergency(runner_->status(place), e);
+    }
     void on_late(std::size_t place) noexcept override {
-        const double timeout_s = static_cast<double>(runner_->own().received[place].pdo->limit) * 1e-9;
+        const double timeout_s =
+            static_cast<double>(runner_->own().received[place].pdo->limit) * 1e-9;
         late_faults_[place].begin(faults_, this, pdo_messages_[place].late.c_str(), timeout_s);
     }
     void on_short(std::size_t place, unsigned bytes) noexcept override {
-        if (!std::exchange(pdo_messages_[place].short_raised, true))
-            short_faults_[place].begin(faults_, this, pdo_messages_[place].short_pdo.c_str(), bytes);
+        if (!std::exchange(pdo_messages_[place].short_raised, true)) {
+            short_faults_[place].begin(faults_, this, pdo_messages_[place].short_pdo.c_str(),
+                                       bytes);
+        }
     }
     void on_foreign(const Foreign& f) noexcept override {
-        if (f.sync || f.rpdo) foreign_seen_ = now_;
-        if (f.begins && f.sync) foreign_fault_.begin(faults_, this, "another device also produces SYNC; nodes act on both");
-        if (f.begins && f.rpdo)
-            foreign_fault_.begin(faults_, this, "another device also sends RPDO {x} of a node of this master; the node follows both", f.id);
+        if (f.sync || f.rpdo) {
+            foreign_seen_ = now_;
+        }
+        if (f.begins && f.sync) {
+            foreign_fault_.begin(faults_, this,
+                                 "another device also produces SYNC; nodes act on both");
+        }
+        if (f.begins && f.rpdo) {
+            foreign_fault_.begin(faults_, this,
+                                 "another device also sends RPDO {x} of a node of this master; the "
+                                 "node follows both",
+                                 f.id);
+        }
         reporter_->foreign(f);
     }
     void on_own_id_collision() noexcept override {
@@ -311,52 +417,64 @@ private:
         srdo_faults_[place].begin(faults_, this, safety_->words(place, fault));
     }
     void on_bus_state(hal::can::State state) noexcept override {
-        if (state == hal::can::State::bus_off)
+        if (state == hal::can::State::bus_off) {
             bus_fault_.begin(faults_, this, "bus off: too many errors; the master retries");
-        else if (state == hal::can::State::down && runner_->had_bus())
-            bus_fault_.begin(faults_, this, "bus down: the interface is off or was removed; the master retries");
-        else if (state != hal::can::State::down)
+        } else if (state == hal::can::State::down && runner_->had_bus()) {
+            bus_fault_.begin(faults_, this,
+                             "bus down: the interface is off or was removed; the master retries");
+        } else if (state != hal::can::State::down) {
             bus_fault_.end(faults_, this);
+        }
         reporter_->bus(state, runner_->had_bus());
     }
-    void on_rejected(const hal::can::Rejected& what) noexcept override { reporter_->rejected(what); }
+    void on_rejected(const hal::can::Rejected& what) noexcept override {
+        reporter_->rejected(what);
+    }
     void on_flying() noexcept override { reporter_->flying(runner_->flying()); }
     void on_sync_overrun() noexcept override {
         if (!overran_) {
             overran_ = true;
-            raise("SYNC overrun: frames of the last SYNC were still queued when the next was due; to see what fits: hal canopen plan",
-                  not_a_number);
+            raise(
+                "SYNC overrun: frames of the last SYNC were still queued when the next was due; to "
+                "see what fits: hal canopen plan",
+                not_a_number);
         }
     }
 
     const std::string name_;
-    ConfigurationArguments       arguments_{*this};
-    config::MasterConfig         config_;
+    ConfigurationArguments arguments_{*this};
+    config::MasterConfig config_;
     std::optional<hal::Function> receive_, transmit_, update_;
-    hal::Emergency               emergency_{*this, &Canopen::make_safe,
-                                            "sets outputs to their safe values and takes nodes out of the operational state"};
-    std::unique_ptr<Runner>      runner_;
-    std::optional<BusPins>       bus_;
-    std::optional<FlyingPins>    flying_;
-    std::optional<SyncFollower>  follower_;
-    std::deque<NodePins>         nodes_;
+    hal::Emergency emergency_{
+        *this, &Canopen::make_safe,
+        "sets outputs to their safe values and takes nodes out of the operational state"};
+    std::unique_ptr<Runner> runner_;
+    std::optional<BusPins> bus_;
+    std::optional<FlyingPins> flying_;
+    std::optional<SyncFollower> follower_;
+    std::deque<NodePins> nodes_;
     std::deque<NodeFaultMessages> messages_;
     std::deque<PdoFaultMessages> pdo_messages_;  // indexed as OwnNode::received
-    std::string                  own_id_message_;
-    std::optional<ObjectPins>    objects_;
-    std::optional<SafetyPins>    safety_;
-    std::unique_ptr<Reporter>    reporter_;
-    std::unique_ptr<SharedLink>  link_;
-    const hal_faults*            faults_ = nullptr;
-    hal::SetupTime               setup_time_;
-    std::vector<hal::LastingFault> node_faults_, late_faults_, short_faults_, srdo_faults_;  // as nodes, received PDOs and SRDOs
-    hal::LastingFault            period_fault_, sync_fault_, bus_fault_, foreign_fault_, own_id_fault_;
-    Time                         foreign_seen_ = 0, own_id_seen_ = 0;
-    std::vector<std::uint8_t>    reported_notes_;  // bits of NodeStatus::notes, by node
-    Time                         period_ = 0, now_ = 0;
-    Time                         unsent_ = 0, unheard_ = 0;  // time since transmit, since receive
-    bool                         overran_ = false;
-    std::atomic<bool>            interrupted_{false};  // set by make_safe() in any thread, taken by receive()
+    std::string own_id_message_;
+    std::optional<ObjectPins> objects_;
+    std::optional<SafetyPins> safety_;
+    std::unique_ptr<Reporter> reporter_;
+    std::unique_ptr<SharedLink> link_;
+    const hal_faults* faults_ = nullptr;
+    hal::SetupTime setup_time_;
+    // as nodes, received PDOs and SRDOs
+    std::vector<hal::LastingFault> node_faults_, late_faults_, short_faults_, srdo_faults_;
+    hal::LastingFault period_fault_, sync_fault_, bus_fault_, foreign_fault_, own_id_fault_;
+    Time foreign_seen_ = 0;
+    Time own_id_seen_ = 0;
+    std::vector<std::uint8_t> reported_notes_;  // bits of NodeStatus::notes, by node
+    Time period_ = 0;
+    Time now_ = 0;
+    Time unsent_ = 0;
+    Time unheard_ = 0;  // time since transmit, since receive
+    bool overran_ = false;
+    // set by make_safe() in any thread, taken by receive()
+    std::atomic<bool> interrupted_{false};
 };
 
 }  // namespace

@@ -11,7 +11,9 @@ using namespace hal::canopen;
 struct CanopenJr3 final : NodeComponent {
     explicit CanopenJr3(const hal_host* host) : NodeComponent(host, 0x50) {}
 
-    hal::Function run{*this, "update", &CanopenJr3::update, "advances and decodes the bit stream of the sensor, receives and sends frames"};
+    hal::Function run{
+        *this, "update", &CanopenJr3::update,
+        "advances and decodes the bit stream of the sensor, receives and sends frames"};
 
     hal::In<double> fx{*this, "fx", "force on the sensor in x", {.unit = "N"}};
     hal::In<double> fy{*this, "fy", "force on the sensor in y", {.unit = "N"}};
@@ -19,27 +21,42 @@ struct CanopenJr3 final : NodeComponent {
     hal::In<double> mx{*this, "mx", "torque on the sensor about x", {.unit = "N*m"}};
     hal::In<double> my{*this, "my", "torque on the sensor about y", {.unit = "N*m"}};
     hal::In<double> mz{*this, "mz", "torque on the sensor about z", {.unit = "N*m"}};
-    hal::In<double> supply{*this, "supply", "supply voltage as a fraction of full scale; valid range 0.7..0.8", {.initial = 0.75}};
-    hal::In<bool> cable{*this, "cable", "false: the sensor cable is disconnected", {.initial = true}};
-    hal::Param<std::uint32_t> noise{*this, "noise", "amplitude of the noise on raw readings in counts; full scale is 16384"};
+    hal::In<double> supply{*this,
+                           "supply",
+                           "supply voltage as a fraction of full scale; valid range 0.7..0.8",
+                           {.initial = 0.75}};
+    hal::In<bool> cable{
+        *this, "cable", "false: the sensor cable is disconnected", {.initial = true}};
+    hal::Param<std::uint32_t> noise{
+        *this, "noise", "amplitude of the noise on raw readings in counts; full scale is 16384"};
 
-    hal::Outs<double> measured{*this, "measured-#", 6, "channel # of Fx Fy Fz Mx My Mz as the node measures it, in N and N*m"};
+    hal::Outs<double> measured{
+        *this, "measured-#", 6,
+        "channel # of Fx Fy Fz Mx My Mz as the node measures it, in N and N*m"};
     hal::Out<bool> overload{*this, "overload", "a channel exceeds its limit (2103h)"};
-    hal::Out<bool> calibrated{*this, "calibrated", "the node has received the calibration memory over the stream, which takes 1 s"};
-    hal::Out<bool> led{*this, "led", "status LED: off stopped, blinking pre-operational, on operational"};
+    hal::Out<bool> calibrated{
+        *this, "calibrated",
+        "the node has received the calibration memory over the stream, which takes 1 s"};
+    hal::Out<bool> led{*this, "led",
+                       "status LED: off stopped, blinking pre-operational, on operational"};
     hal::Out<std::uint32_t> packets{*this, "packets", "decoded packets of the stream"};
     hal::Out<std::uint32_t> errors{*this, "errors", "framing errors in the stream"};
 
     void update(hal::Cycle cycle) noexcept {
         jr3::Six wrench{fx, fy, fz, mx, my, mz};
-        for (double& value : wrench)
-            if (!std::isfinite(value)) value = 0.0;
+        for (double& value : wrench) {
+            if (!std::isfinite(value)) {
+                value = 0.0;
+            }
+        }
         jr3_->set_wrench(wrench);
         jr3_->set_supply(std::isfinite(supply.get()) ? supply.get() : 0.0);
         jr3_->set_noise(noise < 10000 ? noise.get() : 10000);
         jr3_->set_cable(cable);
         turn(cycle);
-        for (std::size_t n = 0; n < 6; ++n) measured[n] = jr3_->wrench()[n];
+        for (std::size_t n = 0; n < 6; ++n) {
+            measured[n] = jr3_->wrench()[n];
+        }
         overload = (jr3_->status() & jr3_status::overload) != 0;
         calibrated = jr3_->calibrated();
         led = node().powered() && jr3_->led();
@@ -60,7 +77,8 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(CanopenJr3, "canopen_jr3", "Simulated CANopen force/torque node with a JR3 sensor", R"(
+HAL_COMPONENT(CanopenJr3, "canopen_jr3", "Simulated CANopen force/torque node with a JR3 sensor",
+              R"(
 A six-axis force/torque sensor and the node that connects it to a CAN bus. The sensor sends its raw readings, its supply voltage and its
 calibration memory as a stream of 20-bit packets at 2.2 MHz. The node decodes the packets, decouples the readings with the 6 by 6 matrix
 of the calibration and serves forces and torques as objects of CiA 404.

@@ -13,38 +13,59 @@ struct CanopenSafeIo final : NodeComponent {
                       "receives and sends frames, copies values between pins and objects"};
 
     hal::Ins<bool> in{*this, "in-#", 8, "terminal of safety input #"};
-    hal::Outs<bool> out{*this, "out-#", 8, "terminal of safety output #; off unless the last SRDO is valid", {.safe = false}};
-    hal::In<bool> acknowledge{*this, "acknowledge", "rising edge: acknowledges a fault; outputs follow the next valid SRDO"};
-    hal::In<bool> fail_safe{*this, "fail-safe", "rising edge: sends the global fail-safe command (GFC)"};
+    hal::Outs<bool> out{*this,
+                        "out-#",
+                        8,
+                        "terminal of safety output #; off unless the last SRDO is valid",
+                        {.safe = false}};
+    hal::In<bool> acknowledge{
+        *this, "acknowledge",
+        "rising edge: acknowledges a fault; outputs follow the next valid SRDO"};
+    hal::In<bool> fail_safe{*this, "fail-safe",
+                            "rising edge: sends the global fail-safe command (GFC)"};
     hal::Out<std::uint32_t> fault{*this, "fault",
-                                  "cause of the outputs being off: 0 no fault, 1 late, 2 incomplete, 3 order, 4 length, 5 not inverted, "
+                                  "cause of the outputs being off: 0 no fault, 1 late, 2 "
+                                  "incomplete, 3 order, 4 length, 5 not inverted, "
                                   "6 global fail-safe command, 7 own objects do not match"};
-    hal::Out<bool> configured{*this, "configured", "the SRDO configuration is valid (13FEh): its signatures match"};
+    hal::Out<bool> configured{*this, "configured",
+                              "the SRDO configuration is valid (13FEh): its signatures match"};
 
     void update(hal::Cycle cycle) noexcept {
-        for (unsigned n = 0; n < 8; ++n) io_->set_input(n, in[n]);
-        if (acknowledge && !was_acknowledge_) io_->acknowledge(cycle.start_ns());
-        if (fail_safe && !was_fail_safe_) io_->send_fail_safe();
-        was_acknowledge_ = acknowledge, was_fail_safe_ = fail_safe;
+        for (unsigned n = 0; n < 8; ++n) {
+            io_->set_input(n, in[n]);
+        }
+        if (acknowledge && !was_acknowledge_) {
+            io_->acknowledge(cycle.start_ns());
+        }
+        if (fail_safe && !was_fail_safe_) {
+            io_->send_fail_safe();
+        }
+        was_acknowledge_ = acknowledge;
+        was_fail_safe_ = fail_safe;
         turn(cycle);
         const bool on = node().powered();
-        for (unsigned n = 0; n < 8; ++n) out[n] = on && io_->output(n);
+        for (unsigned n = 0; n < 8; ++n) {
+            out[n] = on && io_->output(n);
+        }
         fault = static_cast<std::uint32_t>(io_->fault());
         configured = on && node().device().srdos().configuration_valid();
     }
 
 private:
     Program& program() override {
-        io_ = std::make_unique<SafeIo>(SafeIoSettings{.serial = serial(), .heartbeat_ms = heartbeat()});
+        io_ = std::make_unique<SafeIo>(
+            SafeIoSettings{.serial = serial(), .heartbeat_ms = heartbeat()});
         return *io_;
     }
     std::unique_ptr<SafeIo> io_;
-    bool was_acknowledge_ = false, was_fail_safe_ = false;
+    bool was_acknowledge_ = false;
+    bool was_fail_safe_ = false;
 };
 
 }  // namespace
 
-HAL_COMPONENT(CanopenSafeIo, "canopen_safe_io", "Simulated CANopen safety I/O node (EN 50325-5)", R"(
+HAL_COMPONENT(CanopenSafeIo, "canopen_safe_io", "Simulated CANopen safety I/O node (EN 50325-5)",
+              R"(
 Eight safety inputs, sent by SRDO 1, and eight safety outputs, received by SRDO 2, after EN 50325-5 (CiA 304). It implements the protocol
 for testing a machine and is not a certified safety device: do not rely on it for anyone's safety.
 

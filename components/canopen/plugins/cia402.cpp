@@ -18,83 +18,156 @@ struct Cia402 : hal::Component {
 
     // Commands of the user.
     hal::In<bool> enable{*this, "enable",
-                         "a rising edge enables the axis, FALSE disables it; after a fault or a stop another edge is needed"};
-    hal::In<bool> reset{*this, "reset", "a rising edge clears the fault of the axis and of the drive"};
+                         "a rising edge enables the axis, FALSE disables it; after a fault or a "
+                         "stop another edge is needed"};
+    hal::In<bool> reset{*this, "reset",
+                        "a rising edge clears the fault of the axis and of the drive"};
     hal::In<bool> quick_stop{*this, "quick-stop",
-                             "TRUE: brakes with the drive's quick stop and disables the axis; then enable needs another edge"};
+                             "TRUE: brakes with the drive's quick stop and disables the axis; then "
+                             "enable needs another edge"};
     hal::In<bool> halt{*this, "halt", "TRUE: brakes to standstill and stays enabled"};
-    hal::In<std::int32_t> mode{*this, "mode", "mode of operation, see the table; 0: keep the mode of the drive", {.initial = 8}};
-    hal::In<double> position_cmd{*this, "position-cmd", "csp, ip: commanded position; pp: target of the next set-point"};
-    hal::In<double> velocity_cmd{*this, "velocity-cmd", "csv, pv, vl: commanded velocity; csp: feed-forward", {.unit = "1/s"}};
-    hal::In<double> torque_cmd{*this, "torque-cmd", "cst, tq: commanded torque; csp, csv: feed-forward"};
-    hal::In<bool> home{*this, "home", "a rising edge starts homing; FALSE aborts it"};
-    hal::In<bool> go{*this, "go", "pp: a rising edge makes position-cmd a new set-point; up to 16 are queued until the drive takes them"};
-    hal::In<bool> relative{*this, "relative", "pp: the set-point is relative to the previous one"};
-    hal::In<bool> immediate{*this, "immediate", "pp: the set-point replaces the current move at once"};
-    hal::In<bool> blend{*this, "blend", "pp: the drive passes this set-point without stopping if another follows"};
-    hal::Limit      max_velocity{*this, "max-velocity", "profile velocity (profile-velocity) of moves planned by the drive",
+    hal::In<std::int32_t> mode{*this,
+                               "mode",
+                               "mode of operation, see the table; 0: keep the mode of the drive",
+                               {.initial = 8}};
+    hal::In<double> position_cmd{*this, "position-cmd",
+                                 "csp, ip: commanded position; pp: target of the next set-point"};
+    hal::In<double> velocity_cmd{*this,
+                                 "velocity-cmd",
+                                 "csv, pv, vl: commanded velocity; csp: feed-forward",
                                  {.unit = "1/s"}};
-    hal::Limit      max_acceleration{*this, "max-acceleration", "acceleration (profile-acceleration) of moves planned by the drive",
-                                     {.unit = "1/s^2"}};
-    hal::In<double> max_deceleration{*this, "max-deceleration",
-                                     "deceleration (profile-deceleration) of these moves; 0: same as max-acceleration", {.unit = "1/s^2"}};
+    hal::In<double> torque_cmd{*this, "torque-cmd",
+                               "cst, tq: commanded torque; csp, csv: feed-forward"};
+    hal::In<bool> home{*this, "home", "a rising edge starts homing; FALSE aborts it"};
+    hal::In<bool> go{*this, "go",
+                     "pp: a rising edge makes position-cmd a new set-point; up to 16 are queued "
+                     "until the drive takes them"};
+    hal::In<bool> relative{*this, "relative", "pp: the set-point is relative to the previous one"};
+    hal::In<bool> immediate{*this, "immediate",
+                            "pp: the set-point replaces the current move at once"};
+    hal::In<bool> blend{*this, "blend",
+                        "pp: the drive passes this set-point without stopping if another follows"};
+    hal::Limit max_velocity{*this,
+                            "max-velocity",
+                            "profile velocity (profile-velocity) of moves planned by the drive",
+                            {.unit = "1/s"}};
+    hal::Limit max_acceleration{*this,
+                                "max-acceleration",
+                                "acceleration (profile-acceleration) of moves planned by the drive",
+                                {.unit = "1/s^2"}};
+    hal::In<double> max_deceleration{
+        *this,
+        "max-deceleration",
+        "deceleration (profile-deceleration) of these moves; 0: same as max-acceleration",
+        {.unit = "1/s^2"}};
 
-    hal::Param<double> position_scale{*this, "position-scale", "counts per unit; negative: reversed", {.initial = 1.0}};
-    hal::Param<double> position_divisor{*this, "position-scale-divisor", "divisor of position-scale", {.initial = 1.0}};
-    hal::Param<double> velocity_scale{*this, "velocity-scale", "velocity units of the drive per unit/s; 0: same as position-scale"};
-    hal::Param<double> velocity_divisor{*this, "velocity-scale-divisor", "divisor of velocity-scale", {.initial = 1.0}};
-    hal::Param<double> acceleration_scale{*this, "acceleration-scale",
-                                          "acceleration units of the drive per unit/s^2; 0: same as the velocity"};
-    hal::Param<double> acceleration_divisor{*this, "acceleration-scale-divisor", "divisor of acceleration-scale", {.initial = 1.0}};
-    hal::Param<double> torque_scale{*this, "torque-scale", "thousandths of the rated torque per unit of torque", {.initial = 1000.0}};
+    hal::Param<double> position_scale{
+        *this, "position-scale", "counts per unit; negative: reversed", {.initial = 1.0}};
+    hal::Param<double> position_divisor{
+        *this, "position-scale-divisor", "divisor of position-scale", {.initial = 1.0}};
+    hal::Param<double> velocity_scale{
+        *this, "velocity-scale",
+        "velocity units of the drive per unit/s; 0: same as position-scale"};
+    hal::Param<double> velocity_divisor{
+        *this, "velocity-scale-divisor", "divisor of velocity-scale", {.initial = 1.0}};
+    hal::Param<double> acceleration_scale{
+        *this, "acceleration-scale",
+        "acceleration units of the drive per unit/s^2; 0: same as the velocity"};
+    hal::Param<double> acceleration_divisor{
+        *this, "acceleration-scale-divisor", "divisor of acceleration-scale", {.initial = 1.0}};
+    hal::Param<double> torque_scale{*this,
+                                    "torque-scale",
+                                    "thousandths of the rated torque per unit of torque",
+                                    {.initial = 1000.0}};
     hal::Param<double> vl_scale{*this, "vl-scale", "mode vl: r/min per unit/s", {.initial = 60.0}};
-    hal::Param<std::uint32_t> counter_bits{*this, "counter-bits", "valid bits of position-actual-value", {.initial = 32}};
-    hal::OptionalLimitParam max_step{*this, "max-step", "largest step of position-cmd in one cycle, a larger one is a fault; 0: not checked"};
-    hal::Param<double> blend_time{*this, "blend-time",
-                                  "with max-step 0: time to blend out the distance between position-cmd and position-fb at enabling",
+    hal::Param<std::uint32_t> counter_bits{
+        *this, "counter-bits", "valid bits of position-actual-value", {.initial = 32}};
+    hal::OptionalLimitParam max_step{
+        *this, "max-step",
+        "largest step of position-cmd in one cycle, a larger one is a fault; 0: not checked"};
+    hal::Param<double> blend_time{*this,
+                                  "blend-time",
+                                  "with max-step 0: time to blend out the distance between "
+                                  "position-cmd and position-fb at enabling",
                                   {.initial = 0.5, .unit = "s"}};
-    hal::OptionalLimitParam max_error{*this, "max-following-error", "csp, ip: largest following error, a larger one is a fault; 0: not checked"};
-    hal::Param<double> step_timeout{*this, "step-timeout", "timeout of a state transition, a mode change, a set-point acknowledge",
-                                    {.initial = 2.0, .unit = "s"}};
-    hal::Param<double> stop_timeout{*this, "stop-timeout", "timeout of braking to standstill; then the voltage is disabled",
-                                    {.initial = 10.0, .unit = "s"}};
-    hal::Param<double> homing_timeout{*this, "homing-timeout", "timeout of homing; 0: none", {.unit = "s"}};
-    hal::Param<bool> auto_reset{*this, "auto-reset", "TRUE: a rising edge of enable also acts as one of reset"};
+    hal::OptionalLimitParam max_error{
+        *this, "max-following-error",
+        "csp, ip: largest following error, a larger one is a fault; 0: not checked"};
+    hal::Param<double> step_timeout{
+        *this,
+        "step-timeout",
+        "timeout of a state transition, a mode change, a set-point acknowledge",
+        {.initial = 2.0, .unit = "s"}};
+    hal::Param<double> stop_timeout{
+        *this,
+        "stop-timeout",
+        "timeout of braking to standstill; then the voltage is disabled",
+        {.initial = 10.0, .unit = "s"}};
+    hal::Param<double> homing_timeout{
+        *this, "homing-timeout", "timeout of homing; 0: none", {.unit = "s"}};
+    hal::Param<bool> auto_reset{*this, "auto-reset",
+                                "TRUE: a rising edge of enable also acts as one of reset"};
 
     // Status for the user.
-    hal::Out<bool> enabled{*this, "enabled", "the drive is in operation enabled, as commanded", {.safe = false}};
-    hal::Out<bool> active{*this, "active", "the drive follows the commands; while FALSE, let position-cmd track position-fb",
-                          {.safe = false}};
-    hal::Out<bool> fault{*this, "fault", "TRUE: the axis was disabled or rejected a command, until reset; see fault-code and `show fault`"};
+    hal::Out<bool> enabled{
+        *this, "enabled", "the drive is in operation enabled, as commanded", {.safe = false}};
+    hal::Out<bool> active{
+        *this,
+        "active",
+        "the drive follows the commands; while FALSE, let position-cmd track position-fb",
+        {.safe = false}};
+    hal::Out<bool> fault{*this, "fault",
+                         "TRUE: the axis was disabled or rejected a command, until reset; see "
+                         "fault-code and `show fault`"};
     hal::Out<std::uint32_t> fault_code{*this, "fault-code", "cause of the fault, see the table"};
-    hal::Out<std::uint32_t> failed_step{*this, "failed-step", "state transition the drive did not make, see the table"};
+    hal::Out<std::uint32_t> failed_step{*this, "failed-step",
+                                        "state transition the drive did not make, see the table"};
     hal::Out<std::uint32_t> state{*this, "state", "state of the drive, see the table"};
-    hal::Out<double> position_fb{*this, "position-fb", "measured position, extended beyond the range of the drive's counter",
-                                 {.finite = true}};
-    hal::Out<double> velocity_fb{*this, "velocity-fb", "measured velocity, or the derivative of the position", {.unit = "1/s",
-                                 .finite = true}};
+    hal::Out<double> position_fb{
+        *this,
+        "position-fb",
+        "measured position, extended beyond the range of the drive's counter",
+        {.finite = true}};
+    hal::Out<double> velocity_fb{*this,
+                                 "velocity-fb",
+                                 "measured velocity, or the derivative of the position",
+                                 {.unit = "1/s", .finite = true}};
     hal::Out<double> torque_fb{*this, "torque-fb", "measured torque", {.finite = true}};
-    hal::Out<double> following_error{*this, "following-error", "csp, ip: position sent to the drive - position-fb", {.finite = true}};
-    hal::Out<bool> target_reached{*this, "target-reached", "pp: all set-points are reached; other modes: target reached bit of the drive"};
-    hal::Out<std::uint32_t> set_points{*this, "set-points", "pp: set-points queued until the drive takes them"};
+    hal::Out<double> following_error{*this,
+                                     "following-error",
+                                     "csp, ip: position sent to the drive - position-fb",
+                                     {.finite = true}};
+    hal::Out<bool> target_reached{
+        *this, "target-reached",
+        "pp: all set-points are reached; other modes: target reached bit of the drive"};
+    hal::Out<std::uint32_t> set_points{*this, "set-points",
+                                       "pp: set-points queued until the drive takes them"};
     hal::Out<bool> homed{*this, "homed", "homed since the node was last lost"};
     hal::Out<bool> homing{*this, "homing", "homing in progress"};
     hal::Out<std::int32_t> mode_fb{*this, "mode-fb", "mode displayed by the drive"};
     hal::Out<bool> warning{*this, "warning", "statusword bit 7"};
-    hal::Out<bool> remote{*this, "remote", "statusword bit 9: the drive is controlled over the bus"};
-    hal::Out<bool> voltage{*this, "voltage-enabled", "statusword bit 4: the power stage has voltage"};
+    hal::Out<bool> remote{*this, "remote",
+                          "statusword bit 9: the drive is controlled over the bus"};
+    hal::Out<bool> voltage{*this, "voltage-enabled",
+                           "statusword bit 4: the power stage has voltage"};
     hal::Out<bool> limited{*this, "internal-limit", "statusword bit 11"};
 
     // The drive's side, named as CiA 402 names the objects.
-    hal::In<bool> operational{*this, "operational", "the node is operational; connect it to the `operational` pin of the bus component",
-                              {.initial = true}};
+    hal::In<bool> operational{
+        *this,
+        "operational",
+        "the node is operational; connect it to the `operational` pin of the bus component",
+        {.initial = true}};
     hal::In<std::uint32_t> statusword{*this, "statusword", "6041h"};
-    hal::In<std::int32_t> mode_display{*this, "modes-of-operation-display", "6061h; unlinked: mode changes are not checked"};
+    hal::In<std::int32_t> mode_display{*this, "modes-of-operation-display",
+                                       "6061h; unlinked: mode changes are not checked"};
     hal::In<std::int32_t> position{*this, "position-actual-value", "6064h"};
     hal::In<std::int32_t> velocity{*this, "velocity-actual-value", "606Ch; optional"};
-    hal::In<std::int32_t> vl_velocity{*this, "vl-velocity-actual-value", "6044h; if linked, source of velocity-fb in mode vl"};
+    hal::In<std::int32_t> vl_velocity{*this, "vl-velocity-actual-value",
+                                      "6044h; if linked, source of velocity-fb in mode vl"};
     hal::In<std::int32_t> torque{*this, "torque-actual-value", "6077h"};
-    hal::In<std::uint32_t> error_code{*this, "error-code", "603Fh, or the emcy pin of the node; optional"};
+    hal::In<std::uint32_t> error_code{*this, "error-code",
+                                      "603Fh, or the emcy pin of the node; optional"};
     hal::Out<std::uint32_t> controlword{*this, "controlword", "6040h", {.safe = 0U}};
     hal::Out<std::int32_t> mode_out{*this, "modes-of-operation", "6060h"};
     hal::Out<std::int32_t> target_position{*this, "target-position", "607Ah"};
@@ -108,11 +181,14 @@ struct Cia402 : hal::Component {
     hal::Out<std::uint32_t> profile_acceleration{*this, "profile-acceleration", "6083h"};
     hal::Out<std::uint32_t> profile_deceleration{*this, "profile-deceleration", "6084h"};
 
-    hal::Function read{*this, "read-all", &Cia402::read_all, "updates the feedback from the drive; after the bus receives"};
-    hal::Function write{*this, "write-all", &Cia402::write_all, "updates the drive from the commands; before the bus sends"};
+    hal::Function read{*this, "read-all", &Cia402::read_all,
+                       "updates the feedback from the drive; after the bus receives"};
+    hal::Function write{*this, "write-all", &Cia402::write_all,
+                        "updates the drive from the commands; before the bus sends"};
 
-    hal::Emergency off{*this, &Cia402::interrupt,
-                       "disables the axis: when the thread runs again, enable needs another rising edge"};
+    hal::Emergency off{
+        *this, &Cia402::interrupt,
+        "disables the axis: when the thread runs again, enable needs another rising edge"};
 
     void start() { faults_ = hal::extension<hal_faults>("hal.faults/1"); }
 
@@ -145,22 +221,38 @@ struct Cia402 : hal::Component {
 
     void write_all(hal::Cycle cycle) noexcept {
         AxisCommand c;
-        c.enable = enable, c.reset = reset, c.quick_stop = quick_stop, c.halt = halt, c.home = home;
-        c.go = go, c.relative = relative, c.immediate = immediate, c.blend = blend;
+        c.enable = enable;
+        c.reset = reset;
+        c.quick_stop = quick_stop;
+        c.halt = halt;
+        c.home = home;
+        c.go = go;
+        c.relative = relative;
+        c.immediate = immediate;
+        c.blend = blend;
         c.mode = static_cast<Mode>(mode.get());
-        c.position = position_cmd, c.velocity = velocity_cmd, c.torque = torque_cmd;
+        c.position = position_cmd;
+        c.velocity = velocity_cmd;
+        c.torque = torque_cmd;
         c.profile_velocity = max_velocity;
         c.profile_acceleration = max_acceleration;
-        c.profile_deceleration = max_deceleration != 0.0 && !std::isnan(max_deceleration) ? max_deceleration.get() : max_acceleration.get();
-        if (interrupted_.exchange(false, std::memory_order_acquire)) axis_.interrupt();
+        c.profile_deceleration = max_deceleration != 0.0 && !std::isnan(max_deceleration)
+                                     ? max_deceleration.get()
+                                     : max_acceleration.get();
+        if (interrupted_.exchange(false, std::memory_order_acquire)) {
+            axis_.interrupt();
+        }
         tell(axis_.act(c, rules_, cycle.start_ns()));
 
         enabled = axis_.enabled();
         active = axis_.active();
         fault = axis_.fault();
         const Failure& failure = axis_.failure();
-        if (failure && failure.cause != reported_) fault_record_.begin(faults_, this, made_.find(failure), Sentences::number(failure));
-        else if (!failure && fault_record_.lasts()) fault_record_.end(faults_, this);
+        if (failure && failure.cause != reported_) {
+            fault_record_.begin(faults_, this, made_.find(failure), Sentences::number(failure));
+        } else if (!failure && fault_record_.lasts()) {
+            fault_record_.end(faults_, this);
+        }
         reported_ = failure.cause;
         fault_code = static_cast<std::uint32_t>(failure.cause);
         failed_step = static_cast<std::uint32_t>(failure.step);
@@ -174,7 +266,9 @@ struct Cia402 : hal::Component {
 
 private:
     static Time time(double seconds) noexcept {
-        return seconds > 0.0 ? static_cast<Time>(std::min(seconds, 1e6) * static_cast<double>(one_second)) : 0;
+        return seconds > 0.0
+                   ? static_cast<Time>(std::min(seconds, 1e6) * static_cast<double>(one_second))
+                   : 0;
     }
     static const Sentences& sentences() {
         static const Sentences all;
@@ -183,8 +277,11 @@ private:
 
     void read_rules() noexcept {
         rules_.position = {position_scale, position_divisor};
-        rules_.velocity = velocity_scale != 0.0 ? Factor{velocity_scale, velocity_divisor} : rules_.position;
-        rules_.acceleration = acceleration_scale != 0.0 ? Factor{acceleration_scale, acceleration_divisor} : rules_.velocity;
+        rules_.velocity =
+            velocity_scale != 0.0 ? Factor{velocity_scale, velocity_divisor} : rules_.position;
+        rules_.acceleration = acceleration_scale != 0.0
+                                  ? Factor{acceleration_scale, acceleration_divisor}
+                                  : rules_.velocity;
         rules_.torque = {torque_scale, 1.0};
         rules_.vl = {vl_scale, 1.0};
         rules_.counter_bits = counter_bits;
@@ -217,12 +314,14 @@ private:
     Axis axis_;
     AxisRules rules_;
     Cause reported_ = Cause::none;
-    std::atomic<bool> interrupted_{false};  // set by interrupt() in any thread, taken by write_all()
+    // set by interrupt() in any thread, taken by write_all()
+    std::atomic<bool> interrupted_{false};
 };
 
 }  // namespace
 
-HAL_COMPONENT(Cia402, "cia402", "One axis of a CiA 402 drive: states, modes, homing, units, supervision", R"(
+HAL_COMPONENT(Cia402, "cia402",
+              "One axis of a CiA 402 drive: states, modes, homing, units, supervision", R"(
 The master's side of a servo drive on any bus: the process data of the drive on one side, an axis in user units on the other. It tracks
 the state machine of the drive and steps it towards the commanded state, one transition per cycle.
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A CANopen node: an object dictionary and the services of CiA 301, CiA 304 and CiA 305 around it. Devices are built on it, and so is the
-// master's own node. It owns neither bus, clock nor thread:
+// A CANopen node: an object dictionary and the services of CiA 301, CiA 304 and CiA 305 around it.
+// Devices are built on it, and so is the master's own node. It owns neither bus, clock nor thread:
 //
 //     Description d = basic_device({.vendor = 1, .product = 2, .heartbeat_ms = 100});
 //     d.add(0x2000, 0, Type::integer32, Access::read_write, 7, "speed").mappable();
@@ -33,10 +33,11 @@ namespace hal::canopen {
 /// How a node behaves.
 struct DeviceSettings {
     std::uint8_t node_id = unconfigured;  ///< 1..127; unconfigured: waits for an LSS master
-    std::size_t queue = 1024;             ///< capacity of the transmit queue in frames
-    bool auto_start = false;              ///< becomes operational after boot-up without an NMT command
-    bool nmt_slave = true;                ///< obeys NMT commands; false: it is the NMT master
-    bool lss = true;                      ///< answers LSS requests (CiA 305)
+    std::size_t queue = 1024;  ///< capacity of the transmit queue in frames
+    /// becomes operational after boot-up without an NMT command
+    bool auto_start = false;
+    bool nmt_slave = true;  ///< obeys NMT commands; false: it is the NMT master
+    bool lss = true;  ///< answers LSS requests (CiA 305)
     SdoServerSettings sdo{};
     SdoClientSettings sdo_client{};
     PdoSettings pdo{};
@@ -48,7 +49,8 @@ public:
     /// Builds the node; the events outlive it. [setup]
     Device(const Description&, const DeviceSettings&, Events&);
 
-    /// Boots the node with the present values of the dictionary and sends the boot-up message. [realtime]
+    /// Boots the node with the present values of the dictionary and sends the boot-up message.
+    /// [realtime]
     void start(Time now) noexcept;
     /// Processes a received frame. [realtime]
     void handle(const Frame&, Time now) noexcept;
@@ -67,8 +69,8 @@ public:
     void bus_off(Time now) noexcept { communication_error(0x8140, 0, now); }
     /// Reports that the bus is available again: clears EMCY 8140h. [realtime]
     void bus_recovered() noexcept { emcy_.clear(0x8140); }
-    /// Sends a SYNC now and processes it as a received one, for a thread that is the clock. Returns false if this node is not the producer (1005h)
-    /// or the queue is full. [realtime]
+    /// Sends a SYNC now and processes it as a received one, for a thread that is the clock. Returns
+    /// false if this node is not the producer (1005h) or the queue is full. [realtime]
     bool produce_sync(Time now) noexcept;
 
     /// Return the services of the node. [realtime]

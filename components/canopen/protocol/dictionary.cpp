@@ -11,44 +11,75 @@ namespace {
 /// Stream of a domain without an application stream: the bytes lie in the dictionary.
 class Memory final : public Stream {
 public:
-    Abort open_read(Entry& e, std::uint32_t& size) noexcept override { return size = e.size, Abort::none; }
+    Abort open_read(Entry& e, std::uint32_t& size) noexcept override {
+        size = e.size;
+        return Abort::none;
+    }
     Abort read(Entry& e, std::uint32_t offset, std::span<std::uint8_t> buffer) noexcept override {
-        if (offset > e.size || buffer.size() > e.size - offset) return Abort::local_control;  // rewritten since the transfer began
+        // rewritten since the transfer began
+        if (offset > e.size || buffer.size() > e.size - offset) return Abort::local_control;
         std::memcpy(buffer.data(), e.data + offset, buffer.size());
         return Abort::none;
     }
     Abort open_write(Entry& e, std::uint32_t size) noexcept override {
         if (size > e.capacity) return Abort::too_long;
-        return e.size = 0, Abort::none;
+        e.size = 0;
+        return Abort::none;
     }
-    Abort write(Entry& e, std::uint32_t offset, std::span<const std::uint8_t> bytes) noexcept override {
+    Abort write(Entry& e, std::uint32_t offset,
+                std::span<const std::uint8_t> bytes) noexcept override {
         if (offset > e.capacity || bytes.size() > e.capacity - offset) return Abort::too_long;
-        if (!bytes.empty()) std::memcpy(e.data + offset, bytes.data(), bytes.size());
+        if (!bytes.empty()) {
+            std::memcpy(e.data + offset, bytes.data(), bytes.size());
+        }
         e.size = offset + static_cast<std::uint32_t>(bytes.size());
         return Abort::none;
     }
     Abort close(Entry& e, bool writing, bool whole) noexcept override {
-        if (writing && !whole) e.size = 0;
+        if (writing && !whole) {
+            e.size = 0;
+        }
         return Abort::none;
     }
 };
 Memory own_memory;
 
-/// Returns the type that CiA 301 prescribes for an object of this library; none: any type. A description with another type is invalid.
+/// Returns the type that CiA 301 prescribes for an object of this library; none: any type. A
+/// description with another type is invalid.
 Type standard_type(std::uint16_t index, std::uint8_t sub) noexcept {
     using enum Type;
     const bool count = sub == 0;
     switch (index) {
-    case 0x1000: case 0x1002: case 0x1005: case 0x1006: case 0x1007: case 0x1012: case 0x1014: case 0x1f80: return unsigned32;
-    case 0x100c: case 0x1015: case 0x1017: return unsigned16;
-    case 0x1001: case 0x100d: case 0x1019: case 0x1029: return unsigned8;
-    case 0x1003: case 0x1010: case 0x1011: case 0x1016: case 0x1018: case 0x1028: return count ? unsigned8 : unsigned32;
+    case 0x1000:
+    case 0x1002:
+    case 0x1005:
+    case 0x1006:
+    case 0x1007:
+    case 0x1012:
+    case 0x1014:
+    case 0x1f80: return unsigned32;
+    case 0x100c:
+    case 0x1015:
+    case 0x1017: return unsigned16;
+    case 0x1001:
+    case 0x100d:
+    case 0x1019:
+    case 0x1029: return unsigned8;
+    case 0x1003:
+    case 0x1010:
+    case 0x1011:
+    case 0x1016:
+    case 0x1018:
+    case 0x1028: return count ? unsigned8 : unsigned32;
     default: break;
     }
     if (index >= 0x1200 && index <= 0x12ff) return sub == 1 || sub == 2 ? unsigned32 : unsigned8;
-    if ((index >= 0x1400 && index <= 0x15ff) || (index >= 0x1800 && index <= 0x19ff))
+    if ((index >= 0x1400 && index <= 0x15ff) || (index >= 0x1800 && index <= 0x19ff)) {
         return sub == 1 ? unsigned32 : sub == 3 || sub == 5 ? unsigned16 : unsigned8;
-    if ((index >= 0x1600 && index <= 0x17ff) || (index >= 0x1a00 && index <= 0x1bff)) return count ? unsigned8 : unsigned32;
+    }
+    if ((index >= 0x1600 && index <= 0x17ff) || (index >= 0x1a00 && index <= 0x1bff)) {
+        return count ? unsigned8 : unsigned32;
+    }
     return none;
 }
 
@@ -56,20 +87,28 @@ std::int64_t integer(const Entry& e, std::span<const std::uint8_t> bytes) noexce
     std::uint64_t raw = 0;
     std::memcpy(&raw, bytes.data(), std::min<std::size_t>(bytes.size(), 8));
     const unsigned bits = e.bits == 1 ? 8 : e.bits;
-    if (is_signed(e.type) && bits < 64 && (raw >> (bits - 1) & 1) != 0) raw |= ~std::uint64_t{0} << bits;
+    if (is_signed(e.type) && bits < 64 && (raw >> (bits - 1) & 1) != 0) {
+        raw |= ~std::uint64_t{0} << bits;
+    }
     return static_cast<std::int64_t>(raw);
 }
 
 Abort check_range(const Entry& e, std::span<const std::uint8_t> bytes) noexcept {
     if (is_real(e.type)) {
-        const double value = e.type == Type::real32 ? static_cast<double>(load<float>(bytes.data())) : load<double>(bytes.data());
-        if (!(value <= std::bit_cast<double>(e.high))) return Abort::too_high;  // NaN is outside any range
+        const double value = e.type == Type::real32 ? static_cast<double>(load<float>(bytes.data()))
+                                                    : load<double>(bytes.data());
+        // NaN is outside any range
+        if (!(value <= std::bit_cast<double>(e.high))) return Abort::too_high;
         return value < std::bit_cast<double>(e.low) ? Abort::too_low : Abort::none;
     }
     const auto value = integer(e, bytes);
     if (e.type == Type::unsigned64) {
-        if (static_cast<std::uint64_t>(value) > static_cast<std::uint64_t>(e.high)) return Abort::too_high;
-        return static_cast<std::uint64_t>(value) < static_cast<std::uint64_t>(e.low) ? Abort::too_low : Abort::none;
+        if (static_cast<std::uint64_t>(value) > static_cast<std::uint64_t>(e.high)) {
+            return Abort::too_high;
+        }
+        return static_cast<std::uint64_t>(value) < static_cast<std::uint64_t>(e.low)
+                   ? Abort::too_low
+                   : Abort::none;
     }
     return value > e.high ? Abort::too_high : value < e.low ? Abort::too_low : Abort::none;
 }
@@ -78,8 +117,12 @@ Abort check_range(const Entry& e, std::span<const std::uint8_t> bytes) noexcept 
 
 Dictionary::Dictionary(const Description& description, std::uint8_t node_id) : node_id_(node_id) {
     std::vector<const EntryDescription*> order;
-    for (const auto& e : description.entries) order.push_back(&e);
-    const auto key = [](const EntryDescription* e) { return std::uint32_t{e->index} << 8 | e->sub; };
+    for (const auto& e : description.entries) {
+        order.push_back(&e);
+    }
+    const auto key = [](const EntryDescription* e) {
+        return std::uint32_t{e->index} << 8 | e->sub;
+    };
     std::stable_sort(order.begin(), order.end(), [&](auto* a, auto* b) { return key(a) < key(b); });
     const auto report = [&](const EntryDescription& e, const char* what) {
         char text[120];
@@ -95,23 +138,37 @@ Dictionary::Dictionary(const Description& description, std::uint8_t node_id) : n
             continue;
         }
         Entry e;
-        e.index = from->index, e.sub = from->sub, e.access = from->access, e.type = from->type;
-        if (const auto standard = standard_type(e.index, e.sub); standard != Type::none && standard != e.type) {
+        e.index = from->index;
+        e.sub = from->sub;
+        e.access = from->access;
+        e.type = from->type;
+        if (const auto standard = standard_type(e.index, e.sub);
+            standard != Type::none && standard != e.type) {
             report(*from, (std::string("its type must be ") + to_string(standard)).c_str());
             e.type = standard;
         }
         e.bits = static_cast<std::uint8_t>(bits_of(e.type));
-        e.rpdo = from->rpdo, e.tpdo = from->tpdo, e.plus_node_id = from->plus_node_id;
-        e.ranged = from->ranged && e.bits != 0, e.low = from->low, e.high = from->high;
+        e.rpdo = from->rpdo;
+        e.tpdo = from->tpdo;
+        e.plus_node_id = from->plus_node_id;
+        e.ranged = from->ranged && e.bits != 0;
+        e.low = from->low;
+        e.high = from->high;
         if (e.bits != 0) {
             e.capacity = e.size = bytes_of(e.type);
-            if (!from->value.empty() && from->value.size() != e.size) report(*from, "the length of the value does not match its type");
+            if (!from->value.empty() && from->value.size() != e.size) {
+                report(*from, "the length of the value does not match its type");
+            }
         } else {
             e.capacity = std::max(from->capacity, static_cast<std::uint32_t>(from->value.size()));
             e.size = static_cast<std::uint32_t>(from->value.size());
-            if (e.type == Type::domain) e.stream = &own_memory;
+            if (e.type == Type::domain) {
+                e.stream = &own_memory;
+            }
         }
-        if (e.type != Type::domain) longest_ = std::max<std::size_t>(longest_, e.capacity);
+        if (e.type != Type::domain) {
+            longest_ = std::max<std::size_t>(longest_, e.capacity);
+        }
         keys_.push_back(key(from));
         taken.push_back(from);
         entries_.push_back(e);
@@ -123,23 +180,33 @@ Dictionary::Dictionary(const Description& description, std::uint8_t node_id) : n
         Entry& e = entries_[n];
         e.data = memory_.data() + images_[n].offset;
         const auto& value = taken[n]->value;
-        if (!value.empty()) std::memcpy(e.data, value.data(), std::min<std::size_t>(value.size(), e.capacity));
+        if (!value.empty()) {
+            std::memcpy(e.data, value.data(), std::min<std::size_t>(value.size(), e.capacity));
+        }
     }
     defaults_ = power_on_ = memory_;
-    for (auto& e : entries_) apply_node_id(e);
+    for (auto& e : entries_) {
+        apply_node_id(e);
+    }
 }
 
 Entry* Dictionary::find(std::uint16_t index, std::uint8_t sub) noexcept {
     const auto wanted = std::uint32_t{index} << 8 | sub;
     const auto found = std::lower_bound(keys_.begin(), keys_.end(), wanted);
-    return found == keys_.end() || *found != wanted ? nullptr : &entries_[static_cast<std::size_t>(found - keys_.begin())];
+    return found == keys_.end() || *found != wanted
+               ? nullptr
+               : &entries_[static_cast<std::size_t>(found - keys_.begin())];
 }
 
 Entry* Dictionary::find(std::uint16_t index, std::uint8_t sub, Abort& why) noexcept {
     const auto wanted = std::uint32_t{index} << 8 | sub;
     const auto found = std::lower_bound(keys_.begin(), keys_.end(), wanted);
-    if (found != keys_.end() && *found == wanted) return why = Abort::none, &entries_[static_cast<std::size_t>(found - keys_.begin())];
-    const bool known = (found != keys_.end() && *found >> 8 == index) || (found != keys_.begin() && found[-1] >> 8 == index);
+    if (found != keys_.end() && *found == wanted) {
+        why = Abort::none;
+        return &entries_[static_cast<std::size_t>(found - keys_.begin())];
+    }
+    const bool known = (found != keys_.end() && *found >> 8 == index) ||
+                       (found != keys_.begin() && found[-1] >> 8 == index);
     why = known ? Abort::no_sub : Abort::no_object;
     return nullptr;
 }
@@ -147,7 +214,9 @@ Entry* Dictionary::find(std::uint16_t index, std::uint8_t sub, Abort& why) noexc
 std::span<Entry> Dictionary::object(std::uint16_t index) noexcept {
     const auto first = std::lower_bound(keys_.begin(), keys_.end(), std::uint32_t{index} << 8);
     auto last = first;
-    while (last != keys_.end() && *last >> 8 == index) ++last;
+    while (last != keys_.end() && *last >> 8 == index) {
+        ++last;
+    }
     return {entries_.data() + (first - keys_.begin()), static_cast<std::size_t>(last - first)};
 }
 
@@ -156,7 +225,8 @@ Abort Dictionary::prepare_read(Entry& e) noexcept {
     return e.handler != nullptr ? e.handler->reading(e) : Abort::none;
 }
 
-Abort Dictionary::read(std::uint16_t index, std::uint8_t sub, std::span<std::uint8_t> buffer, std::size_t& size) noexcept {
+Abort Dictionary::read(std::uint16_t index, std::uint8_t sub, std::span<std::uint8_t> buffer,
+                       std::size_t& size) noexcept {
     size = 0;
     Abort why;
     Entry* e = find(index, sub, why);
@@ -164,7 +234,9 @@ Abort Dictionary::read(std::uint16_t index, std::uint8_t sub, std::span<std::uin
     if (why = prepare_read(*e); why != Abort::none) return why;
     if (e->size > buffer.size()) return Abort::memory;
     size = e->size;
-    if (size != 0) std::memcpy(buffer.data(), e->data, size);
+    if (size != 0) {
+        std::memcpy(buffer.data(), e->data, size);
+    }
     return Abort::none;
 }
 
@@ -173,7 +245,8 @@ Abort Dictionary::check_length(const Entry& e, std::uint64_t size) noexcept {
     return e.bits != 0 && size < e.capacity ? Abort::too_short : Abort::none;
 }
 
-Abort Dictionary::write(std::uint16_t index, std::uint8_t sub, std::span<const std::uint8_t> value) noexcept {
+Abort Dictionary::write(std::uint16_t index, std::uint8_t sub,
+                        std::span<const std::uint8_t> value) noexcept {
     Abort why;
     Entry* e = find(index, sub, why);
     return e != nullptr ? write(*e, value) : why;
@@ -182,26 +255,35 @@ Abort Dictionary::write(std::uint16_t index, std::uint8_t sub, std::span<const s
 Abort Dictionary::write(Entry& e, std::span<const std::uint8_t> value) noexcept {
     if (!writable(e.access)) return Abort::read_only;
     if (const auto why = check_length(e, value.size()); why != Abort::none) return why;
-    if (e.ranged)
+    if (e.ranged) {
         if (const auto why = check_range(e, value); why != Abort::none) return why;
-    if (e.handler != nullptr)
+    }
+    if (e.handler != nullptr) {
         if (const auto why = e.handler->writing(e, value); why != Abort::none) return why;
-    if (!value.empty()) std::memcpy(e.data, value.data(), value.size());
+    }
+    if (!value.empty()) {
+        std::memcpy(e.data, value.data(), value.size());
+    }
     e.size = static_cast<std::uint32_t>(value.size());
-    if (e.handler != nullptr) e.handler->written(e);
+    if (e.handler != nullptr) {
+        e.handler->written(e);
+    }
     return Abort::none;
 }
 
 bool Dictionary::handle(std::uint16_t index, Handler& handler) noexcept {
     const auto all = object(index);
-    for (auto& e : all) e.handler = &handler;
+    for (auto& e : all) {
+        e.handler = &handler;
+    }
     return !all.empty();
 }
 
 bool Dictionary::stream(std::uint16_t index, std::uint8_t sub, Stream& stream) noexcept {
     Entry* e = find(index, sub);
     if (e == nullptr || e->type != Type::domain) return false;
-    return e->stream = &stream, true;
+    e->stream = &stream;
+    return true;
 }
 
 void Dictionary::apply_node_id(Entry& e) noexcept {
@@ -214,25 +296,31 @@ void Dictionary::apply_node_id(Entry& e) noexcept {
 
 void Dictionary::reset(std::uint16_t first, std::uint16_t last) noexcept {
     const auto begin = std::lower_bound(keys_.begin(), keys_.end(), std::uint32_t{first} << 8);
-    for (auto n = static_cast<std::size_t>(begin - keys_.begin()); n < entries_.size() && entries_[n].index <= last; ++n) {
+    for (auto n = static_cast<std::size_t>(begin - keys_.begin());
+         n < entries_.size() && entries_[n].index <= last; ++n) {
         Entry& e = entries_[n];
         if (e.type == Type::domain) continue;
         e.size = images_[n].size;
-        if (e.size != 0) std::memcpy(e.data, power_on_.data() + images_[n].offset, e.size);
+        if (e.size != 0) {
+            std::memcpy(e.data, power_on_.data() + images_[n].offset, e.size);
+        }
         apply_node_id(e);
     }
 }
 
 void Dictionary::keep(std::uint16_t first, std::uint16_t last, bool to_defaults) noexcept {
     const auto begin = std::lower_bound(keys_.begin(), keys_.end(), std::uint32_t{first} << 8);
-    for (auto n = static_cast<std::size_t>(begin - keys_.begin()); n < entries_.size() && entries_[n].index <= last; ++n) {
+    for (auto n = static_cast<std::size_t>(begin - keys_.begin());
+         n < entries_.size() && entries_[n].index <= last; ++n) {
         const Entry& e = entries_[n];
         if (e.type == Type::domain || !writable(e.access)) continue;
         images_[n].size = to_defaults ? images_[n].default_size : e.size;
         auto* stored = power_on_.data() + images_[n].offset;
         if (images_[n].size == 0) continue;
-        std::memcpy(stored, to_defaults ? defaults_.data() + images_[n].offset : e.data, images_[n].size);
-        if (!to_defaults && e.plus_node_id && e.size <= 4) {  // stored without the node ID, which may be another at the next start
+        std::memcpy(stored, to_defaults ? defaults_.data() + images_[n].offset : e.data,
+                    images_[n].size);
+        // stored without the node ID, which may be another at the next start
+        if (!to_defaults && e.plus_node_id && e.size <= 4) {
             std::uint32_t value = 0;
             std::memcpy(&value, stored, e.size);
             value -= node_id_ <= 127 ? node_id_ : 0;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The object dictionary (CiA 301): typed values that SDO, PDO and the application share. Built once from a Description; afterwards it neither
-// grows nor allocates. One thread at a time.
+// The object dictionary (CiA 301): typed values that SDO, PDO and the application share. Built once
+// from a Description; afterwards it neither grows nor allocates. One thread at a time.
 #pragma once
 
 #include <cstdint>
@@ -17,20 +17,25 @@ namespace hal::canopen {
 class Handler;
 class Stream;
 
-/// One sub-index. `data` points to the value, little endian; it may lie outside the dictionary (Dictionary::bind).
+/// One sub-index. `data` points to the value, little endian; it may lie outside the dictionary
+/// (Dictionary::bind).
 struct Entry {
     std::uint16_t index = 0;
     std::uint8_t sub = 0;
     Access access = Access::read_write;
     Type type = Type::none;
-    std::uint8_t bits = 0;          ///< 0: variable length
-    bool rpdo = false, tpdo = false, plus_node_id = false, ranged = false;
-    std::uint32_t size = 0;         ///< length of the present value in bytes
-    std::uint32_t capacity = 0;     ///< maximum length in bytes
+    std::uint8_t bits = 0;  ///< 0: variable length
+    bool rpdo = false;
+    bool tpdo = false;
+    bool plus_node_id = false;
+    bool ranged = false;
+    std::uint32_t size = 0;  ///< length of the present value in bytes
+    std::uint32_t capacity = 0;  ///< maximum length in bytes
     std::uint8_t* data = nullptr;
     Handler* handler = nullptr;
-    Stream* stream = nullptr;       ///< domains: source and destination of the bytes
-    std::int64_t low = 0, high = 0;
+    Stream* stream = nullptr;  ///< domains: source and destination of the bytes
+    std::int64_t low = 0;
+    std::int64_t high = 0;
 
     /// Returns index and sub-index as one number. [any]
     std::uint32_t key() const noexcept { return std::uint32_t{index} << 8 | sub; }
@@ -38,19 +43,25 @@ struct Entry {
     std::span<const std::uint8_t> bytes() const noexcept { return {data, size}; }
 };
 
-/// Observes an object, refreshes it or rejects access to it. All calls come from the thread that polls the device. [realtime]
+/// Observes an object, refreshes it or rejects access to it. All calls come from the thread that
+/// polls the device. [realtime]
 class Handler {
 public:
     virtual ~Handler() = default;
-    /// Called before the value is read by SDO or sent in a PDO; may refresh it. Any abort code rejects the read.
+    /// Called before the value is read by SDO or sent in a PDO; may refresh it. Any abort code
+    /// rejects the read.
     virtual Abort reading(Entry&) noexcept { return Abort::none; }
-    /// Called before SDO writes `value`, whose length and limits are valid. Any abort code rejects the write.
-    virtual Abort writing(Entry&, std::span<const std::uint8_t> value) noexcept { return (void)value, Abort::none; }
+    /// Called before SDO writes `value`, whose length and limits are valid. Any abort code rejects
+    /// the write.
+    virtual Abort writing(Entry&, std::span<const std::uint8_t> value) noexcept {
+        return (void)value, Abort::none;
+    }
     /// Called after SDO or a PDO wrote the value; a PDO writes all its values first.
     virtual void written(Entry&) noexcept {}
 };
 
-/// The bytes of a domain, addressed by their offset; a block is read again if a segment was lost. Abort codes end the transfer. [realtime]
+/// The bytes of a domain, addressed by their offset; a block is read again if a segment was lost.
+/// Abort codes end the transfer. [realtime]
 class Stream {
 public:
     virtual ~Stream() = default;
@@ -69,7 +80,8 @@ public:
 /// The objects of one node.
 class Dictionary {
 public:
-    /// Builds the dictionary; entries that are invalid are left out and listed in problems(). [setup]
+    /// Builds the dictionary; entries that are invalid are left out and listed in problems().
+    /// [setup]
     explicit Dictionary(const Description&, std::uint8_t node_id = 0);
     Dictionary(const Dictionary&) = delete;
     Dictionary& operator=(const Dictionary&) = delete;
@@ -77,8 +89,11 @@ public:
     /// Returns the entry or nullptr. The pointer stays valid. [realtime]
     Entry* find(std::uint16_t index, std::uint8_t sub) noexcept;
     /// Returns the entry or nullptr. The pointer stays valid. [realtime]
-    const Entry* find(std::uint16_t index, std::uint8_t sub) const noexcept { return const_cast<Dictionary*>(this)->find(index, sub); }
-    /// Returns the entry, or nullptr and sets `why` to Abort::no_object or Abort::no_sub. [realtime]
+    const Entry* find(std::uint16_t index, std::uint8_t sub) const noexcept {
+        return const_cast<Dictionary*>(this)->find(index, sub);
+    }
+    /// Returns the entry, or nullptr and sets `why` to Abort::no_object or Abort::no_sub.
+    /// [realtime]
     Entry* find(std::uint16_t index, std::uint8_t sub, Abort& why) noexcept;
     /// Returns all sub-indices of one object. [realtime]
     std::span<Entry> object(std::uint16_t index) noexcept;
@@ -87,17 +102,21 @@ public:
 
     /// Checks the access right and calls the handler, as before an SDO upload. [realtime]
     Abort prepare_read(Entry&) noexcept;
-    /// Reads a value as SDO does, with access right and handler; domains are read through their Stream instead. `size` is the length in bytes.
-    /// [realtime]
-    Abort read(std::uint16_t index, std::uint8_t sub, std::span<std::uint8_t> buffer, std::size_t& size) noexcept;
-    /// Writes a value as SDO does, with access right, length, limits and handler; domains are written through their Stream instead. [realtime]
-    Abort write(std::uint16_t index, std::uint8_t sub, std::span<const std::uint8_t> value) noexcept;
+    /// Reads a value as SDO does, with access right and handler; domains are read through their
+    /// Stream instead. `size` is the length in bytes. [realtime]
+    Abort read(std::uint16_t index, std::uint8_t sub, std::span<std::uint8_t> buffer,
+               std::size_t& size) noexcept;
+    /// Writes a value as SDO does, with access right, length, limits and handler; domains are
+    /// written through their Stream instead. [realtime]
+    Abort write(std::uint16_t index, std::uint8_t sub,
+                std::span<const std::uint8_t> value) noexcept;
     /// Writes a value as SDO does. [realtime]
     Abort write(Entry&, std::span<const std::uint8_t> value) noexcept;
     /// Returns Abort::none if a value of `size` bytes fits the type of the entry. [realtime]
     static Abort check_length(const Entry&, std::uint64_t size) noexcept;
 
-    /// Returns the value without access rights or handlers; `otherwise` if it is missing or larger than T. [realtime]
+    /// Returns the value without access rights or handlers; `otherwise` if it is missing or larger
+    /// than T. [realtime]
     template <class T>
     T get(std::uint16_t index, std::uint8_t sub, T otherwise = {}) const noexcept {
         const Entry* e = find(index, sub);
@@ -111,16 +130,20 @@ public:
         std::memcpy(&result, e.data, e.size < sizeof(T) ? e.size : sizeof(T));
         return result;
     }
-    /// Sets the value without access rights or handlers; returns false if it is missing or has another size. [realtime]
+    /// Sets the value without access rights or handlers; returns false if it is missing or has
+    /// another size. [realtime]
     template <class T>
     bool set(std::uint16_t index, std::uint8_t sub, T value) noexcept {
         Entry* e = find(index, sub);
-        if (e == nullptr || e->capacity < sizeof(T) || (e->bits != 0 && e->size != sizeof(T))) return false;
+        if (e == nullptr || e->capacity < sizeof(T) || (e->bits != 0 && e->size != sizeof(T))) {
+            return false;
+        }
         std::memcpy(e->data, &value, sizeof(T));
         return true;
     }
 
-    /// Moves the value to `variable`, which outlives the dictionary. Returns false if it is missing or has another size. [setup]
+    /// Moves the value to `variable`, which outlives the dictionary. Returns false if it is missing
+    /// or has another size. [setup]
     template <class T>
     bool bind(std::uint16_t index, std::uint8_t sub, T& variable) noexcept {
         Entry* e = find(index, sub);
@@ -129,7 +152,8 @@ public:
         e->data = reinterpret_cast<std::uint8_t*>(&variable);
         return true;
     }
-    /// Installs a handler for all sub-indices of an object; returns false if the object does not exist. [setup]
+    /// Installs a handler for all sub-indices of an object; returns false if the object does not
+    /// exist. [setup]
     bool handle(std::uint16_t index, Handler&) noexcept;
     /// Installs the stream of a domain; returns false if the entry does not exist. [setup]
     bool stream(std::uint16_t index, std::uint8_t sub, Stream&) noexcept;
@@ -140,7 +164,8 @@ public:
     void set_node_id(std::uint8_t id) noexcept { node_id_ = id; }
     /// Sets the objects first..last to their power-on values; domains keep theirs. [realtime]
     void reset(std::uint16_t first, std::uint16_t last) noexcept;
-    /// Makes the present values of first..last the power-on values (1010h); `to_defaults`: those of the description (1011h). [realtime]
+    /// Makes the present values of first..last the power-on values (1010h); `to_defaults`: those of
+    /// the description (1011h). [realtime]
     void keep(std::uint16_t first, std::uint16_t last, bool to_defaults) noexcept;
     /// Returns the length of the longest value other than domains, in bytes. [any]
     std::size_t longest() const noexcept { return longest_; }
@@ -149,13 +174,15 @@ public:
 
 private:
     struct Image {
-        std::uint32_t offset = 0, size = 0, default_size = 0;
+        std::uint32_t offset = 0;
+        std::uint32_t size = 0;
+        std::uint32_t default_size = 0;
     };
     void apply_node_id(Entry&) noexcept;
 
     std::vector<std::uint32_t> keys_;  // sorted, parallel to entries_
     std::vector<Entry> entries_;
-    std::vector<Image> images_;        // position of each value in the three memories below
+    std::vector<Image> images_;  // position of each value in the three memories below
     std::vector<std::uint8_t> memory_, power_on_, defaults_;
     std::vector<std::string> problems_;
     std::size_t longest_ = 8;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The emergency service (CiA 301): sends the errors of this node (1001h, 1003h, 1014h, 1015h) and receives those of other nodes (1028h).
+// The emergency service (CiA 301): sends the errors of this node (1001h, 1003h, 1014h, 1015h) and
+// receives those of other nodes (1028h).
 #pragma once
 
 #include <array>
@@ -13,10 +14,16 @@ namespace hal::canopen {
 
 /// Bits of the error register 1001h (CiA 301).
 enum ErrorRegister : std::uint8_t {
-    error_generic = 0x01, error_current = 0x02, error_voltage = 0x04, error_temperature = 0x08, error_communication = 0x10,
-    error_profile = 0x20, error_manufacturer = 0x80,
+    error_generic = 0x01,
+    error_current = 0x02,
+    error_voltage = 0x04,
+    error_temperature = 0x08,
+    error_communication = 0x10,
+    error_profile = 0x20,
+    error_manufacturer = 0x80,
 };
-/// Returns the description of the class of the error code (CiA 301); "error reset or no error" for 0. [any]
+/// Returns the description of the class of the error code (CiA 301); "error reset or no error" for
+/// 0. [any]
 const char* emergency_text(std::uint16_t code) noexcept;
 
 /// The EMCY producer of a node.
@@ -30,16 +37,20 @@ public:
     void reset(bool all) noexcept;
     /// Enables transmission, in the NMT states pre-operational and operational. [realtime]
     void set_active(bool active) noexcept { active_ = active; }
-    /// Reports an error; repeated calls have no effect until clear(). `register_bits` is set in 1001h. `source` distinguishes the parts of a node
-    /// that can have the same error, such as the axes of a drive. While 8140h (bus-off) is active, transmission waits until it is cleared.
+    /// Reports an error; repeated calls have no effect until clear(). `register_bits` is set in
+    /// 1001h. `source` distinguishes the parts of a node that can have the same error, such as the
+    /// axes of a drive. While 8140h (bus-off) is active, transmission waits until it is cleared.
     /// [realtime]
-    void raise(std::uint16_t code, std::uint8_t register_bits, const Bytes& manufacturer = {}, std::uint8_t source = 0) noexcept;
+    void raise(std::uint16_t code, std::uint8_t register_bits, const Bytes& manufacturer = {},
+               std::uint8_t source = 0) noexcept;
     /// Reports that an error is over; sends "error reset" when it was active. [realtime]
     void clear(std::uint16_t code, std::uint8_t source = 0) noexcept;
     /// Returns true while the error is active. [realtime]
     bool active(std::uint16_t code, std::uint8_t source = 0) const noexcept;
     /// Returns object 1001h. [realtime]
-    std::uint8_t error_register() const noexcept { return dictionary_.get<std::uint8_t>(0x1001, 0); }
+    std::uint8_t error_register() const noexcept {
+        return dictionary_.get<std::uint8_t>(0x1001, 0);
+    }
     /// Sends pending emergencies after the inhibit time. [realtime]
     void poll(Time now) noexcept;
     /// Returns the number of emergencies discarded because too many were pending. [any]
@@ -51,7 +62,8 @@ public:
 private:
     struct Active {
         std::uint16_t code = 0;
-        std::uint8_t bits = 0, source = 0;
+        std::uint8_t bits = 0;
+        std::uint8_t source = 0;
     };
     void queue(std::uint16_t code, const Bytes&) noexcept;
     void update_register() noexcept;
@@ -63,10 +75,13 @@ private:
     std::array<Active, 64> errors_{};
     std::size_t errors_count_ = 0;
     std::array<Emergency, 16> waiting_{};
-    std::size_t head_ = 0, count_ = 0;
+    std::size_t head_ = 0;
+    std::size_t count_ = 0;
     std::uint32_t cob_ = cob_invalid;
-    Time inhibit_ = 0, sent_ = 0;
-    bool sent_once_ = false, active_ = false;
+    Time inhibit_ = 0;
+    Time sent_ = 0;
+    bool sent_once_ = false;
+    bool active_ = false;
     std::uint64_t lost_ = 0;
 };
 

@@ -3,8 +3,11 @@
 
 namespace hal::canopen {
 
-ErrorControl::ErrorControl(Dictionary& dictionary, FrameQueue& out) : dictionary_(dictionary), out_(out) {
-    for (const int index : {0x100c, 0x100d, 0x1016, 0x1017}) dictionary.handle(static_cast<std::uint16_t>(index), *this);
+ErrorControl::ErrorControl(Dictionary& dictionary, FrameQueue& out)
+    : dictionary_(dictionary), out_(out) {
+    for (const int index : {0x100c, 0x100d, 0x1016, 0x1017}) {
+        dictionary.handle(static_cast<std::uint16_t>(index), *this);
+    }
 }
 
 void ErrorControl::reset(std::uint8_t node_id) noexcept {
@@ -15,48 +18,68 @@ void ErrorControl::reset(std::uint8_t node_id) noexcept {
     lost_ = 0;
     highest_ = 0;
     consumers_.fill({});
-    for (const auto& e : dictionary_.object(0x1016)) read_consumer(e);
+    for (const auto& e : dictionary_.object(0x1016)) {
+        read_consumer(e);
+    }
     read_producer();
 }
 
 void ErrorControl::read_consumer(const Entry& e) noexcept {
     if (e.sub == 0 || e.sub > 127) return;
     auto& c = consumers_[e.sub];
-    if (c.lost) --lost_;
+    if (c.lost) {
+        --lost_;
+    }
     const auto value = load<std::uint32_t>(e.data);
     c = {};
     c.node = static_cast<std::uint8_t>(value >> 16);
     c.limit = static_cast<Time>(value & 0xffff) * millisecond;
-    if (c.node < 1 || c.node > 127) c.limit = 0;
-    if (c.limit != 0 && e.sub > highest_) highest_ = e.sub;
+    if (c.node < 1 || c.node > 127) {
+        c.limit = 0;
+    }
+    if (c.limit != 0 && e.sub > highest_) {
+        highest_ = e.sub;
+    }
 }
 
 void ErrorControl::read_producer() noexcept {
     period_ = dictionary_.get<std::uint16_t>(0x1017, 0) * millisecond;
     due_now_ = true;
-    life_time_ = static_cast<Time>(dictionary_.get<std::uint16_t>(0x100c, 0)) * dictionary_.get<std::uint8_t>(0x100d, 0) * millisecond;
-    if (life_time_ == 0 || period_ != 0) guarding_ = life_lost_ = false;
+    life_time_ = static_cast<Time>(dictionary_.get<std::uint16_t>(0x100c, 0)) *
+                 dictionary_.get<std::uint8_t>(0x100d, 0) * millisecond;
+    if (life_time_ == 0 || period_ != 0) {
+        guarding_ = life_lost_ = false;
+    }
 }
 
 void ErrorControl::boot(Time now) noexcept {
-    booted_ = true, boot_pending_ = true;
+    booted_ = true;
+    boot_pending_ = true;
     next_ = now + period_;
     due_now_ = false;
     send_boot_up();
 }
 
-void ErrorControl::send_boot_up() noexcept { boot_pending_ = !out_.push(make_frame(0x700U + node_id_, 1)); }
+void ErrorControl::send_boot_up() noexcept {
+    boot_pending_ = !out_.push(make_frame(0x700U + node_id_, 1));
+}
 
 bool ErrorControl::handle(const Frame& f, Time now, Events& events) noexcept {
     if (f.extended || f.id <= 0x700 || f.id >= 0x780) return false;
     const auto node = static_cast<std::uint8_t>(f.id - 0x700);
     if (f.remote) {
-        // The heartbeat excludes guarding (CiA 301), and nothing is sent before the boot-up message.
+        // The heartbeat excludes guarding (CiA 301), and nothing is sent before the boot-up
+        // message.
         if (node != node_id_ || !booted_ || boot_pending_ || period_ != 0) return true;
         Frame answer = make_frame(0x700U + node_id_, 1);
         answer.data[0] = static_cast<std::uint8_t>(static_cast<std::uint8_t>(state_) | toggle_);
-        if (out_.push(answer)) toggle_ ^= 0x80;
-        if (life_time_ != 0) guarding_ = true, guarded_ = now;
+        if (out_.push(answer)) {
+            toggle_ ^= 0x80;
+        }
+        if (life_time_ != 0) {
+            guarding_ = true;
+            guarded_ = now;
+        }
         if (life_lost_) {
             life_lost_ = false;
             events.on_life_guarding(false, now);
@@ -65,7 +88,9 @@ bool ErrorControl::handle(const Frame& f, Time now, Events& events) noexcept {
     }
     if (f.length < 1) return true;
     if (node == node_id_) {
-        if (!collided_) events.on_id_collision(now);
+        if (!collided_) {
+            events.on_id_collision(now);
+        }
         collided_ = true;
         return true;
     }
@@ -75,14 +100,22 @@ bool ErrorControl::handle(const Frame& f, Time now, Events& events) noexcept {
         if (c.node != node || c.limit == 0) continue;
         const bool first = !c.watching || c.lost;
         const bool changed = state != c.state;
-        if (c.lost) --lost_;
-        c.watching = true, c.lost = false;
+        if (c.lost) {
+            --lost_;
+        }
+        c.watching = true;
+        c.lost = false;
         c.heard = now;
         c.state = state;
         // After a boot-up the timeout starts with the first heartbeat.
-        if (state == NmtState::initialising) c.watching = false, events.on_node(node, NodeEvent::boot_up, state, now);
-        else if (first) events.on_node(node, NodeEvent::alive, state, now);
-        else if (changed) events.on_node(node, NodeEvent::changed, state, now);
+        if (state == NmtState::initialising) {
+            c.watching = false;
+            events.on_node(node, NodeEvent::boot_up, state, now);
+        } else if (first) {
+            events.on_node(node, NodeEvent::alive, state, now);
+        } else if (changed) {
+            events.on_node(node, NodeEvent::changed, state, now);
+        }
         break;
     }
     return true;
@@ -91,13 +124,20 @@ bool ErrorControl::handle(const Frame& f, Time now, Events& events) noexcept {
 ErrorControl::Change ErrorControl::poll(Time now, Events& events) noexcept {
     Change change;
     if (!booted_) return change;
-    if (boot_pending_) send_boot_up();
+    if (boot_pending_) {
+        send_boot_up();
+    }
     if (period_ != 0 && !boot_pending_) {
-        if (due_now_) next_ = now, due_now_ = false;
+        if (due_now_) {
+            next_ = now;
+            due_now_ = false;
+        }
         if (now >= next_) {
             Frame beat = make_frame(0x700U + node_id_, 1);
             beat.data[0] = static_cast<std::uint8_t>(state_);
-            if (out_.push(beat)) next_ += ((now - next_) / period_ + 1) * period_;
+            if (out_.push(beat)) {
+                next_ += ((now - next_) / period_ + 1) * period_;
+            }
         }
     }
     if (guarding_ && !life_lost_ && now - guarded_ >= life_time_) {
@@ -111,7 +151,8 @@ ErrorControl::Change ErrorControl::poll(Time now, Events& events) noexcept {
         c.lost = true;
         ++lost_;
         events.on_node(c.node, NodeEvent::lost, c.state, now);
-        change.lost = true, change.node = c.node;
+        change.lost = true;
+        change.node = c.node;
     }
     change.recovered = all_alive();
     return change;
@@ -123,8 +164,11 @@ Abort ErrorControl::writing(Entry& e, std::span<const std::uint8_t> value) noexc
     const auto node = wanted >> 16 & 0xff;
     if (node == 0 || (wanted & 0xffff) == 0) return Abort::none;
     if (node > 127) return Abort::incompatible;
-    for (std::size_t n = 1; n <= highest_; ++n)
-        if (n != e.sub && consumers_[n].limit != 0 && consumers_[n].node == node) return Abort::incompatible;
+    for (std::size_t n = 1; n <= highest_; ++n) {
+        if (n != e.sub && consumers_[n].limit != 0 && consumers_[n].node == node) {
+            return Abort::incompatible;
+        }
+    }
     return Abort::none;
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Error control (CiA 301): heartbeat producer (1017h) and consumer (1016h), node guarding response and life guarding (100Ch, 100Dh).
+// Error control (CiA 301): heartbeat producer (1017h) and consumer (1016h), node guarding response
+// and life guarding (100Ch, 100Dh).
 #pragma once
 
 #include <array>
@@ -26,14 +27,16 @@ public:
     bool handle(const Frame&, Time now, Events&) noexcept;
     /// What changed in a poll().
     struct Change {
-        bool lost = false;       ///< the heartbeat of a consumed node or the guarding of the master timed out
+        /// the heartbeat of a consumed node or the guarding of the master timed out
+        bool lost = false;
         std::uint8_t node = 0;   ///< its node ID; 0: the master
         bool recovered = false;  ///< no timeout is active any more
     };
     /// Sends the heartbeat when it is due and checks all timeouts. [realtime]
     Change poll(Time now, Events&) noexcept;
 
-    /// Returns true if no node of 1016h and no life guarding has timed out. Nodes never received do not count as lost. [realtime]
+    /// Returns true if no node of 1016h and no life guarding has timed out. Nodes never received do
+    /// not count as lost. [realtime]
     bool all_alive() const noexcept { return lost_ == 0 && !life_lost_; }
     /// Returns true if another device used this node ID since the communication reset. [realtime]
     bool collided() const noexcept { return collided_; }
@@ -44,8 +47,10 @@ public:
 private:
     struct Consumer {
         std::uint8_t node = 0;
-        Time limit = 0, heard = 0;
-        bool watching = false, lost = false;
+        Time limit = 0;
+        Time heard = 0;
+        bool watching = false;
+        bool lost = false;
         NmtState state = NmtState::initialising;
     };
     void read_consumer(const Entry&) noexcept;
@@ -56,11 +61,16 @@ private:
     FrameQueue& out_;
     std::uint8_t node_id_ = 0;
     NmtState state_ = NmtState::initialising;
-    Time period_ = 0, next_ = 0;
-    bool booted_ = false, boot_pending_ = false, due_now_ = false;
+    Time period_ = 0;
+    Time next_ = 0;
+    bool booted_ = false;
+    bool boot_pending_ = false;
+    bool due_now_ = false;
     // life guarding
-    Time life_time_ = 0, guarded_ = 0;
-    bool guarding_ = false, life_lost_ = false;
+    Time life_time_ = 0;
+    Time guarded_ = 0;
+    bool guarding_ = false;
+    bool life_lost_ = false;
     std::uint8_t toggle_ = 0;
     std::array<Consumer, 128> consumers_{};
     std::size_t highest_ = 0;

@@ -37,9 +37,11 @@ public:
     virtual ~Events() = default;
     /// The NMT state of this node changed.
     virtual void on_state(NmtState) noexcept {}
-    /// An NMT reset was executed; objects have their power-on values. `application`: reset node, else reset communication only.
+    /// An NMT reset was executed; objects have their power-on values. `application`: reset node,
+    /// else reset communication only.
     virtual void on_reset(bool application) noexcept { (void)application; }
-    /// A SYNC was received or sent. Synchronous RPDOs are in the dictionary; synchronous TPDOs are sampled when this returns.
+    /// A SYNC was received or sent. Synchronous RPDOs are in the dictionary; synchronous TPDOs are
+    /// sampled when this returns.
     virtual void on_sync(std::uint8_t counter, Time) noexcept { (void)counter; }
     /// No SYNC within its period 1006h.
     virtual void on_sync_lost(Time) noexcept {}
@@ -49,28 +51,40 @@ public:
     virtual void on_rpdo(unsigned number, Time) noexcept { (void)number; }
     /// An RPDO timed out (its event timer, EMCY 8250h).
     virtual void on_rpdo_late(unsigned number, Time) noexcept { (void)number; }
-    /// An RPDO was shorter than its mapping and was discarded (EMCY 8210h). Reported once until one of valid length arrives.
-    virtual void on_rpdo_short(unsigned number, unsigned bytes, Time) noexcept { (void)number, (void)bytes; }
+    /// An RPDO was shorter than its mapping and was discarded (EMCY 8210h). Reported once until one
+    /// of valid length arrives.
+    virtual void on_rpdo_short(unsigned number, unsigned bytes, Time) noexcept {
+        (void)number, (void)bytes;
+    }
     /// Error control detected an event of another node.
     virtual void on_node(std::uint8_t node, NodeEvent, NmtState, Time) noexcept { (void)node; }
     /// Another node sent an emergency.
     virtual void on_emergency(std::uint8_t node, const Emergency&) noexcept { (void)node; }
-    /// A communication error after which outputs must enter their safe state: heartbeat or guarding timeout, bus-off.
+    /// A communication error after which outputs must enter their safe state: heartbeat or guarding
+    /// timeout, bus-off.
     virtual void on_communication_error(Time) noexcept {}
     /// Life guarding: the master timed out (`lost`), or recovered.
     virtual void on_life_guarding(bool lost, Time) noexcept { (void)lost; }
     /// Another node uses the node ID of this one.
     virtual void on_id_collision(Time) noexcept {}
-    /// 1010h: the objects of this sub-index became the power-on values; store them in non-volatile memory. An abort code reports failure.
+    /// 1010h: the objects of this sub-index became the power-on values; store them in non-volatile
+    /// memory. An abort code reports failure.
     virtual Abort on_store(std::uint8_t sub) noexcept { return (void)sub, Abort::none; }
-    /// 1011h: discard the stored values; the defaults apply after the next reset. An abort code reports failure.
+    /// 1011h: discard the stored values; the defaults apply after the next reset. An abort code
+    /// reports failure.
     virtual Abort on_restore(std::uint8_t sub) noexcept { return (void)sub, Abort::none; }
-    /// LSS: store node ID and bit rate in bit/s (0: unchanged). Return false if they could not be stored.
-    virtual bool on_lss_store(std::uint8_t node_id, std::uint32_t bit_rate) noexcept { return (void)node_id, (void)bit_rate, true; }
+    /// LSS: store node ID and bit rate in bit/s (0: unchanged). Return false if they could not be
+    /// stored.
+    virtual bool on_lss_store(std::uint8_t node_id, std::uint32_t bit_rate) noexcept {
+        return (void)node_id, (void)bit_rate, true;
+    }
     /// LSS: return true if the device supports the bit rate, in bit/s.
     virtual bool on_lss_bit_rate(std::uint32_t bit_rate) noexcept { return (void)bit_rate, false; }
-    /// LSS: change to the bit rate, in bit/s; send nothing for `delay` (ns) before and after the change.
-    virtual void on_lss_activate(std::uint32_t bit_rate, Time delay) noexcept { (void)bit_rate, (void)delay; }
+    /// LSS: change to the bit rate, in bit/s; send nothing for `delay` (ns) before and after the
+    /// change.
+    virtual void on_lss_activate(std::uint32_t bit_rate, Time delay) noexcept {
+        (void)bit_rate, (void)delay;
+    }
 };
 
 }  // namespace hal::canopen

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The LSS master (CiA 305): finds unconfigured slaves and sets node IDs and bit rates. One job at a time:
+// The LSS master (CiA 305): finds unconfigured slaves and sets node IDs and bit rates. One job at a
+// time:
 //
 //     LssMaster lss(queue);
 //     lss.scan(now);                                    // finds one slave without node ID and selects it
@@ -14,26 +15,33 @@ namespace hal::canopen {
 
 /// Timeouts of the LSS master.
 struct LssMasterSettings {
-    Time timeout = 100 * millisecond;      ///< response timeout
-    Time scan_timeout = 20 * millisecond;  ///< response timeout during a scan, where no response is a result
-    unsigned repeats = 1;                  ///< repetitions of a contradictory scan step, each with twice the timeout
+    Time timeout = 100 * millisecond;  ///< response timeout
+    /// response timeout during a scan, where no response is a result
+    Time scan_timeout = 20 * millisecond;
+    /// repetitions of a contradictory scan step, each with twice the timeout
+    unsigned repeats = 1;
 };
 
-/// An LSS master: start a job, call handle() and poll() until it is no longer busy, then read the result. All calls belong to one thread.
+/// An LSS master: start a job, call handle() and poll() until it is no longer busy, then read the
+/// result. All calls belong to one thread.
 class LssMaster {
 public:
     /// The result of a job.
     struct Result {
-        bool answered = false;      ///< a slave responded; scan: one was found and is in LSS configuration state
-        std::uint8_t error = 0;     ///< configure, store: 0 success, 1 out of range or not supported, 2 storage access failed, 255 specific
+        /// a slave responded; scan: one was found and is in LSS configuration state
+        bool answered = false;
+        /// configure, store: 0 success, 1 out of range or not supported, 2 storage access failed,
+        /// 255 specific
+        std::uint8_t error = 0;
         std::uint8_t specific = 0;  ///< manufacturer-specific error code, if `error` is 255
-        std::uint32_t value = 0;    ///< inquire: the value
-        Identity identity{};        ///< scan: the identity found
+        std::uint32_t value = 0;  ///< inquire: the value
+        Identity identity{};  ///< scan: the identity found
         /// Returns true if a slave responded without error. [any]
         bool good() const noexcept { return answered && error == 0; }
     };
     /// Creates a master that sends through `out`, which outlives it. [setup]
-    explicit LssMaster(FrameQueue& out, const LssMasterSettings& settings = {}) : out_(out), settings_(settings) {}
+    explicit LssMaster(FrameQueue& out, const LssMasterSettings& settings = {})
+        : out_(out), settings_(settings) {}
 
     /// Returns the settings; changes apply from the next job on. [realtime]
     LssMasterSettings& settings() noexcept { return settings_; }
@@ -42,13 +50,16 @@ public:
     /// Returns the result of the last job. [realtime]
     const Result& result() const noexcept { return result_; }
     /// Returns true for frames that handle() must get. [any]
-    bool listens_to(const Frame& f) const noexcept { return f.id == lss_slave_to_master && !f.extended && !f.remote; }
+    bool listens_to(const Frame& f) const noexcept {
+        return f.id == lss_slave_to_master && !f.extended && !f.remote;
+    }
     /// Processes a response. [realtime]
     void handle(const Frame&, Time now) noexcept;
     /// Continues a scan and checks timeouts; call it once per cycle. [realtime]
     void poll(Time now) noexcept;
 
-    // Each of these starts a job. They return false if a job is in progress or the queue is full. [realtime]
+    // Each of these starts a job. They return false if a job is in progress or the queue is full.
+    // [realtime]
 
     /// Switches all slaves to LSS configuration or waiting state. No response; ends at once.
     bool switch_global(bool configuration) noexcept;
@@ -58,18 +69,22 @@ public:
     bool configure_node_id(std::uint8_t, Time now) noexcept;
     /// Sets the bit rate by its index in table 0 of CiA 305; see lss_bit_rate_index().
     bool configure_bit_timing(std::uint8_t index, Time now) noexcept;
-    /// Activates the new bit rate in all slaves after a pause of twice `delay_ms`. No response; ends at once.
+    /// Activates the new bit rate in all slaves after a pause of twice `delay_ms`. No response;
+    /// ends at once.
     bool activate_bit_timing(std::uint16_t delay_ms) noexcept;
     /// Stores node ID and bit rate in the selected slave.
     bool store_configuration(Time now) noexcept;
-    /// Reads a part of the identity (0..3: vendor, product, revision, serial number) or the node ID (4).
+    /// Reads a part of the identity (0..3: vendor, product, revision, serial number) or the node ID
+    /// (4).
     bool inquire(unsigned part, Time now) noexcept;
     /// Asks for slaves whose revision and serial number lie within these bounds.
     bool identify(const Identity& low, const Identity& high, Time now) noexcept;
     /// Asks for slaves without node ID.
     bool identify_unconfigured(Time now) noexcept;
-    /// Finds one slave without node ID by fastscan. The `known_bits` most significant bits of each part of `known` are taken as given.
-    bool scan(Time now, const Identity& known = {}, const std::array<std::uint8_t, 4>& known_bits = {}) noexcept;
+    /// Finds one slave without node ID by fastscan. The `known_bits` most significant bits of each
+    /// part of `known` are taken as given.
+    bool scan(Time now, const Identity& known = {},
+              const std::array<std::uint8_t, 4>& known_bits = {}) noexcept;
     /// Ends the job without a result.
     void cancel() noexcept { job_ = Job::none; }
 
@@ -89,11 +104,14 @@ private:
     Result result_;
     Identity known_{};
     std::array<std::uint8_t, 4> known_bits_{};
-    std::uint8_t part_ = 0, bit_ = 0;
+    std::uint8_t part_ = 0;
+    std::uint8_t bit_ = 0;
     unsigned repeats_left_ = 0;
-    bool unsent_ = false, heard_ = false;
+    bool unsent_ = false;
+    bool heard_ = false;
     Frame frame_;
-    Time asked_ = 0, now_ = 0;
+    Time asked_ = 0;
+    Time now_ = 0;
 };
 
 }  // namespace hal::canopen

@@ -14,18 +14,27 @@ public:
     /// Creates the slave; both arguments outlive it. [setup]
     LssSlave(FrameQueue& out, Events& events) noexcept : out_(out), events_(events) {}
     /// Sets identity (1018h) and active node ID. [realtime]
-    void configure(const Identity& identity, std::uint8_t node_id) noexcept { identity_ = identity, active_id_ = pending_id_ = node_id; }
+    void configure(const Identity& identity, std::uint8_t node_id) noexcept {
+        identity_ = identity;
+        active_id_ = pending_id_ = node_id;
+    }
     /// Processes a frame; returns true if it is an LSS request. [realtime]
     bool handle(const Frame&) noexcept;
     /// Sends a response that did not fit into the queue. [realtime]
     void poll() noexcept {
-        if (waiting_answer_) waiting_answer_ = !out_.push(answer_);
+        if (waiting_answer_) {
+            waiting_answer_ = !out_.push(answer_);
+        }
     }
     /// Returns the node ID that applies after the next communication reset. [realtime]
     std::uint8_t pending_id() const noexcept { return pending_id_; }
     /// Makes the pending node ID the active one. [realtime]
-    void activate_pending_id() noexcept { active_id_ = pending_id_, wants_reset_ = false; }
-    /// Returns true once a node without ID has received one and must reset its communication. [realtime]
+    void activate_pending_id() noexcept {
+        active_id_ = pending_id_;
+        wants_reset_ = false;
+    }
+    /// Returns true once a node without ID has received one and must reset its communication.
+    /// [realtime]
     bool wants_reset() const noexcept { return wants_reset_; }
     /// Returns true in LSS configuration state. [realtime]
     bool configuring() const noexcept { return configuring_; }
@@ -40,10 +49,14 @@ private:
     FrameQueue& out_;
     Events& events_;
     Identity identity_{};
-    std::uint8_t active_id_ = unconfigured, pending_id_ = unconfigured;
+    std::uint8_t active_id_ = unconfigured;
+    std::uint8_t pending_id_ = unconfigured;
     std::uint32_t pending_rate_ = 0;
-    bool configuring_ = false, wants_reset_ = false, waiting_answer_ = false;
-    std::uint8_t selected_ = 0, identified_ = 0;  // matching steps so far
+    bool configuring_ = false;
+    bool wants_reset_ = false;
+    bool waiting_answer_ = false;
+    std::uint8_t selected_ = 0;
+    std::uint8_t identified_ = 0;  // matching steps so far
     std::uint8_t scan_part_ = 0;
     Frame answer_;
 };

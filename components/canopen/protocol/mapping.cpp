@@ -6,35 +6,53 @@
 namespace hal::canopen {
 
 namespace {
-constexpr std::uint64_t ones(unsigned bits) noexcept { return bits >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << bits) - 1; }
-constexpr std::uint16_t index_of(std::uint32_t entry) noexcept { return static_cast<std::uint16_t>(entry >> 16); }
-constexpr std::uint8_t sub_of(std::uint32_t entry) noexcept { return static_cast<std::uint8_t>(entry >> 8); }
+constexpr std::uint64_t ones(unsigned bits) noexcept {
+    return bits >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << bits) - 1;
+}
+constexpr std::uint16_t index_of(std::uint32_t entry) noexcept {
+    return static_cast<std::uint16_t>(entry >> 16);
+}
+constexpr std::uint8_t sub_of(std::uint32_t entry) noexcept {
+    return static_cast<std::uint8_t>(entry >> 8);
+}
 constexpr unsigned bits_in(std::uint32_t entry) noexcept { return entry & 0xff; }
-constexpr bool          is_dummy(std::uint32_t entry) noexcept {
-    return index_of(entry) <= 0x1b && sub_of(entry) == 0 && bits_of(static_cast<Type>(index_of(entry))) != 0;
+constexpr bool is_dummy(std::uint32_t entry) noexcept {
+    return index_of(entry) <= 0x1b && sub_of(entry) == 0 &&
+           bits_of(static_cast<Type>(index_of(entry))) != 0;
 }
 }  // namespace
 
-Mapping::Mapping(std::size_t capacity) : capacity_(std::min<std::size_t>(capacity, 64)) { items_.reserve(capacity_); }
+Mapping::Mapping(std::size_t capacity) : capacity_(std::min<std::size_t>(capacity, 64)) {
+    items_.reserve(capacity_);
+}
 
 Abort Mapping::check(Dictionary& dictionary, std::uint32_t entry, bool received) noexcept {
     const auto bits = bits_in(entry);
     if (is_dummy(entry)) {
         if (!received) return Abort::not_mappable;
-        return bits == bits_of(static_cast<Type>(index_of(entry))) ? Abort::none : Abort::pdo_length;
+        return bits == bits_of(static_cast<Type>(index_of(entry))) ? Abort::none
+                                                                   : Abort::pdo_length;
     }
     Abort why;
     const Entry* e = dictionary.find(index_of(entry), sub_of(entry), why);
     if (e == nullptr) return why;
-    if (received ? !e->rpdo || !writable(e->access) : !e->tpdo || !readable(e->access)) return Abort::not_mappable;
+    if (received ? !e->rpdo || !writable(e->access) : !e->tpdo || !readable(e->access)) {
+        return Abort::not_mappable;
+    }
     if (bits == 0 || bits > 64) return Abort::pdo_length;
     if (e->type == Type::boolean) return bits == 1 || bits == 8 ? Abort::none : Abort::pdo_length;
-    if (e->bits == 0) return bits % 8 == 0 && bits / 8 <= e->capacity && e->type != Type::domain ? Abort::none : Abort::pdo_length;
+    if (e->bits == 0) {
+        return bits % 8 == 0 && bits / 8 <= e->capacity && e->type != Type::domain
+                   ? Abort::none
+                   : Abort::pdo_length;
+    }
     // The low bits of an integer may be mapped; a REAL only completely.
-    return bits == e->bits || (bits < e->bits && !is_real(e->type)) ? Abort::none : Abort::pdo_length;
+    return bits == e->bits || (bits < e->bits && !is_real(e->type)) ? Abort::none
+                                                                    : Abort::pdo_length;
 }
 
-Abort Mapping::build(Dictionary& dictionary, std::span<const std::uint32_t> entries, bool received) noexcept {
+Abort Mapping::build(Dictionary& dictionary, std::span<const std::uint32_t> entries,
+                     bool received) noexcept {
     if (entries.size() > capacity_) return Abort::pdo_length;
     unsigned total = 0;
     for (const auto entry : entries) {
@@ -46,21 +64,25 @@ Abort Mapping::build(Dictionary& dictionary, std::span<const std::uint32_t> entr
     bits_ = 0;
     for (const auto entry : entries) {
         auto* e = is_dummy(entry) ? nullptr : dictionary.find(index_of(entry), sub_of(entry));
-        items_.push_back({e, static_cast<std::uint8_t>(bits_), static_cast<std::uint8_t>(bits_in(entry))});
+        items_.push_back(
+            {e, static_cast<std::uint8_t>(bits_), static_cast<std::uint8_t>(bits_in(entry))});
         bits_ += bits_in(entry);
     }
     return Abort::none;
 }
 
 bool Mapping::maps(const Entry& e) const noexcept {
-    return std::any_of(items_.begin(), items_.end(), [&](const Item& item) { return item.entry == &e; });
+    return std::any_of(items_.begin(), items_.end(),
+                       [&](const Item& item) { return item.entry == &e; });
 }
 
 std::uint64_t Mapping::pack() const noexcept {
     std::uint64_t frame = 0;
     for (const auto& item : items_) {
         if (item.entry == nullptr) continue;
-        if (item.entry->handler != nullptr) item.entry->handler->reading(*item.entry);
+        if (item.entry->handler != nullptr) {
+            item.entry->handler->reading(*item.entry);
+        }
         std::uint64_t value = 0;
         std::memcpy(&value, item.entry->data, std::min<std::size_t>(item.entry->size, 8));
         frame |= (value & ones(item.bits)) << item.first;
@@ -73,13 +95,22 @@ void Mapping::unpack(std::uint64_t frame) const noexcept {
         if (item.entry == nullptr) continue;
         Entry& e = *item.entry;
         std::uint64_t value = frame >> item.first & ones(item.bits);
-        if (is_signed(e.type) && item.bits < 64 && (value >> (item.bits - 1) & 1) != 0) value |= ~ones(item.bits);
-        if (e.type == Type::boolean) value = value != 0 ? 1 : 0;
-        if (e.bits == 0) e.size = item.bits / 8U;
+        if (is_signed(e.type) && item.bits < 64 && (value >> (item.bits - 1) & 1) != 0) {
+            value |= ~ones(item.bits);
+        }
+        if (e.type == Type::boolean) {
+            value = value != 0 ? 1 : 0;
+        }
+        if (e.bits == 0) {
+            e.size = item.bits / 8U;
+        }
         std::memcpy(e.data, &value, std::min<std::size_t>(e.size, 8));
     }
-    for (const auto& item : items_)
-        if (item.entry != nullptr && item.entry->handler != nullptr) item.entry->handler->written(*item.entry);
+    for (const auto& item : items_) {
+        if (item.entry != nullptr && item.entry->handler != nullptr) {
+            item.entry->handler->written(*item.entry);
+        }
+    }
 }
 
 }  // namespace hal::canopen

@@ -15,12 +15,16 @@ public:
     /// Reserves space for `capacity` objects, 64 at most. [setup]
     explicit Mapping(std::size_t capacity);
 
-    /// Returns Abort::none if `entry` (an entry of 1600h or 1A00h) can be mapped; `received`: to an RPDO, which may contain dummies. [realtime]
+    /// Returns Abort::none if `entry` (an entry of 1600h or 1A00h) can be mapped; `received`: to an
+    /// RPDO, which may contain dummies. [realtime]
     static Abort check(Dictionary&, std::uint32_t entry, bool received) noexcept;
     /// Replaces the mapping by `entries`; on an abort it stays unchanged. [realtime]
     Abort build(Dictionary&, std::span<const std::uint32_t> entries, bool received) noexcept;
     /// Removes all entries. [realtime]
-    void clear() noexcept { items_.clear(), bits_ = 0; }
+    void clear() noexcept {
+        items_.clear();
+        bits_ = 0;
+    }
 
     /// Returns the number of entries. [any]
     std::size_t count() const noexcept { return items_.size(); }
@@ -31,7 +35,8 @@ public:
     /// Returns true if the entry is mapped. [any]
     bool maps(const Entry& e) const noexcept;
 
-    /// Returns the values as the data of a frame; its first byte is the least significant one. [realtime]
+    /// Returns the values as the data of a frame; its first byte is the least significant one.
+    /// [realtime]
     std::uint64_t pack() const noexcept;
     /// Writes all values, then calls the handlers. [realtime]
     void unpack(std::uint64_t) const noexcept;
@@ -39,7 +44,8 @@ public:
 private:
     struct Item {
         Entry* entry = nullptr;  // nullptr: a dummy
-        std::uint8_t first = 0, bits = 0;
+        std::uint8_t first = 0;
+        std::uint8_t bits = 0;
     };
     std::vector<Item> items_;  // reserved for capacity_
     std::size_t capacity_;

@@ -52,11 +52,13 @@ const char* to_string(Abort code) noexcept {
     case Abort::read_only: return "attempt to write a read-only object";
     case Abort::no_object: return "object does not exist in the object dictionary";
     case Abort::not_mappable: return "object cannot be mapped to a PDO";
-    case Abort::pdo_length: return "number and length of the objects to be mapped would exceed the PDO length";
+    case Abort::pdo_length:
+        return "number and length of the objects to be mapped would exceed the PDO length";
     case Abort::incompatible: return "general parameter incompatibility";
     case Abort::internal_incompatible: return "general internal incompatibility in the device";
     case Abort::hardware: return "access failed due to a hardware error";
-    case Abort::length: return "data type does not match, length of service parameter does not match";
+    case Abort::length:
+        return "data type does not match, length of service parameter does not match";
     case Abort::too_long: return "data type does not match, length of service parameter too high";
     case Abort::too_short: return "data type does not match, length of service parameter too low";
     case Abort::no_sub: return "sub-index does not exist";
@@ -67,9 +69,12 @@ const char* to_string(Abort code) noexcept {
     case Abort::no_resource: return "resource not available: SDO connection";
     case Abort::general: return "general error";
     case Abort::cannot_store: return "data cannot be transferred or stored to the application";
-    case Abort::local_control: return "data cannot be transferred or stored because of local control";
-    case Abort::device_state: return "data cannot be transferred or stored because of the present device state";
-    case Abort::no_dictionary: return "no object dictionary is present, or it could not be generated";
+    case Abort::local_control:
+        return "data cannot be transferred or stored because of local control";
+    case Abort::device_state:
+        return "data cannot be transferred or stored because of the present device state";
+    case Abort::no_dictionary:
+        return "no object dictionary is present, or it could not be generated";
     case Abort::no_data: return "no data available";
     }
     return "unknown abort code";
@@ -90,7 +95,9 @@ constexpr std::array<std::uint16_t, 256> crc_table = [] {
     std::array<std::uint16_t, 256> table{};
     for (unsigned byte = 0; byte < 256; ++byte) {
         unsigned crc = byte << 8;
-        for (int bit = 0; bit < 8; ++bit) crc = (crc & 0x8000) != 0 ? (crc << 1) ^ 0x1021 : crc << 1;
+        for (int bit = 0; bit < 8; ++bit) {
+            crc = (crc & 0x8000) != 0 ? (crc << 1) ^ 0x1021 : crc << 1;
+        }
         table[byte] = static_cast<std::uint16_t>(crc);
     }
     return table;
@@ -98,7 +105,9 @@ constexpr std::array<std::uint16_t, 256> crc_table = [] {
 }  // namespace
 
 std::uint16_t crc16(std::span<const std::uint8_t> data, std::uint16_t crc) noexcept {
-    for (const auto byte : data) crc = static_cast<std::uint16_t>(crc << 8 ^ crc_table[(crc >> 8 ^ byte) & 0xff]);
+    for (const auto byte : data) {
+        crc = static_cast<std::uint16_t>(crc << 8 ^ crc_table[(crc >> 8 ^ byte) & 0xff]);
+    }
     return crc;
 }
 

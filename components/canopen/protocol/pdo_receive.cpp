@@ -16,9 +16,14 @@ bool Pdos::handle(const Frame& f, Time now) noexcept {
             auto& p = tpdos_[static_cast<std::size_t>(n)];
             if (cob_id(p.cob) != f.id) continue;
             ours = true;
-            if (!operational_ || p.held || (p.cob & cob_flag30) != 0 || p.kind != Kind::plain || p.synchronous()) continue;
+            if (!operational_ || p.held || (p.cob & cob_flag30) != 0 || p.kind != Kind::plain ||
+                p.synchronous()) {
+                continue;
+            }
             if (p.transmission == 252) {
-                if (p.sampled) send(p, p.image, now);
+                if (p.sampled) {
+                    send(p, p.image, now);
+                }
             } else {
                 send(p, p.mapping.pack(), now);
             }
@@ -29,7 +34,10 @@ bool Pdos::handle(const Frame& f, Time now) noexcept {
         auto& p = rpdos_[static_cast<std::size_t>(n)];
         if (cob_id(p.cob) != f.id) continue;
         ours = true;
-        if (operational_ && !p.held && !(p.kind == Kind::plain ? receive(p, f, now) : receive_multiplexed(p, f, now))) ++p.errors;
+        if (operational_ && !p.held &&
+            !(p.kind == Kind::plain ? receive(p, f, now) : receive_multiplexed(p, f, now))) {
+            ++p.errors;
+        }
     }
     return ours;
 }
@@ -37,21 +45,34 @@ bool Pdos::handle(const Frame& f, Time now) noexcept {
 bool Pdos::receive(Rpdo& p, const Frame& f, Time now) noexcept {
     const auto bytes = p.mapping.bytes();
     if (f.length != bytes) {
-        const Emcy::Bytes details{static_cast<std::uint8_t>(p.number), static_cast<std::uint8_t>(p.number >> 8), f.length, bytes};
+        const Emcy::Bytes details{static_cast<std::uint8_t>(p.number),
+                                  static_cast<std::uint8_t>(p.number >> 8), f.length, bytes};
         if (f.length < bytes) {
-            if (!std::exchange(p.wrong_length, true)) events_.on_rpdo_short(p.number, f.length, now);
+            if (!std::exchange(p.wrong_length, true)) {
+                events_.on_rpdo_short(p.number, f.length, now);
+            }
             emcy_.raise(0x8210, error_communication, details);
             return false;
         }
-        if (settings_.report_too_long) p.wrong_length = true, emcy_.raise(0x8220, error_communication, details);
+        if (settings_.report_too_long) {
+            p.wrong_length = true;
+            emcy_.raise(0x8220, error_communication, details);
+        }
     } else if (p.wrong_length) {
         p.wrong_length = false;
-        if (std::none_of(rpdos_.begin(), rpdos_.end(), [](const Rpdo& r) { return r.wrong_length; }))
-            emcy_.clear(0x8210), emcy_.clear(0x8220);
+        if (std::none_of(rpdos_.begin(), rpdos_.end(),
+                         [](const Rpdo& r) { return r.wrong_length; })) {
+            emcy_.clear(0x8210);
+            emcy_.clear(0x8220);
+        }
     }
     restart_deadline(p, now);
-    if (!p.synchronous()) return apply(p, load<std::uint64_t>(f.data.data()), now), true;
-    if (window_ != 0 && synced_ != 0 && now - synced_ > window_) return false;  // arrived after the synchronous window
+    if (!p.synchronous()) {
+        apply(p, load<std::uint64_t>(f.data.data()), now);
+        return true;
+    }
+    // arrived after the synchronous window
+    if (window_ != 0 && synced_ != 0 && now - synced_ > window_) return false;
     p.image = load<std::uint64_t>(f.data.data());
     p.fresh = true;
     return true;
@@ -62,7 +83,9 @@ void Pdos::restart_deadline(Rpdo& p, Time now) noexcept {
     p.last = now;
     p.supervised = true;
     if (!std::exchange(p.late, false)) return;
-    if (std::none_of(rpdos_.begin(), rpdos_.end(), [](const Rpdo& r) { return r.late; })) emcy_.clear(0x8250);
+    if (std::none_of(rpdos_.begin(), rpdos_.end(), [](const Rpdo& r) { return r.late; })) {
+        emcy_.clear(0x8250);
+    }
 }
 
 void Pdos::apply(Rpdo& p, std::uint64_t image, Time now) noexcept {
@@ -79,7 +102,8 @@ bool Pdos::receive_multiplexed(Rpdo& p, const Frame& f, Time now) noexcept {
     const auto sub = f.data[3];
     const auto write = [&](std::uint16_t to, std::uint8_t to_sub) {
         const Entry* e = dictionary_.find(to, to_sub);
-        return e != nullptr && e->rpdo && e->size <= 4 && dictionary_.write(to, to_sub, {f.data.data() + 4, e->size}) == Abort::none;
+        return e != nullptr && e->rpdo && e->size <= 4 &&
+               dictionary_.write(to, to_sub, {f.data.data() + 4, e->size}) == Abort::none;
     };
     if (addressed) {
         if (p.kind != Kind::destination_address) return false;
@@ -91,19 +115,28 @@ bool Pdos::receive_multiplexed(Rpdo& p, const Frame& f, Time now) noexcept {
         emcy_.clear(0x8230);
     } else {
         if (p.kind != Kind::source_address) return false;
-        // 1FD0h–1FFFh, from the most significant byte: block size, object of this node, node ID and object of the producer (CiA 301).
+        // 1FD0h–1FFFh, from the most significant byte: block size, object of this node, node ID and
+        // object of the producer (CiA 301).
         bool found = false;
         for (unsigned list = 0x1fd0; list <= 0x1fff && !found; ++list) {
             for (const auto& e : dictionary_.object(static_cast<std::uint16_t>(list))) {
                 if (e.sub == 0 || e.size != 8) continue;
                 const auto row = load<std::uint64_t>(e.data);
-                const auto block = static_cast<unsigned>(row >> 56), from = static_cast<unsigned>(row >> 8 & 0xff);
-                if ((row & 0xff) != node || (row >> 16 & 0xffff) != index || sub < from || sub >= from + std::max(block, 1U)) continue;
-                found = write(static_cast<std::uint16_t>(row >> 40), static_cast<std::uint8_t>((row >> 32 & 0xff) + sub - from));
+                const auto block = static_cast<unsigned>(row >> 56);
+
+                const auto from = static_cast<unsigned>(row >> 8 & 0xff);
+                if ((row & 0xff) != node || (row >> 16 & 0xffff) != index || sub < from ||
+                    sub >= from + std::max(block, 1U)) {
+                    continue;
+                }
+                found = write(static_cast<std::uint16_t>(row >> 40),
+                              static_cast<std::uint8_t>((row >> 32 & 0xff) + sub - from));
                 break;
             }
         }
-        if (!found) return true;  // not in the dispatching list
+        if (!found) {
+            return true;  // not in the dispatching list
+        }
     }
     restart_deadline(p, now);
     ++p.count;
@@ -127,12 +160,16 @@ void Pdos::hold_rpdo(unsigned number, bool on) noexcept {
 }
 
 void Pdos::on_sync(Time now, Time window) noexcept {
-    now_ = now, window_ = window, synced_ = now;
+    now_ = now;
+    window_ = window;
+    synced_ = now;
     if (!operational_) return;
     for (auto& p : rpdos_) {
         if (!p.fresh) continue;
         p.fresh = false;
-        if (p.synchronous()) apply(p, p.image, now);
+        if (p.synchronous()) {
+            apply(p, p.image, now);
+        }
     }
 }
 

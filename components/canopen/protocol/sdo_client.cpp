@@ -5,7 +5,8 @@
 
 namespace hal::canopen {
 
-SdoClient::SdoClient(FrameQueue& out, const SdoClientSettings& settings) : out_(out), settings_(settings) {}
+SdoClient::SdoClient(FrameQueue& out, const SdoClientSettings& settings)
+    : out_(out), settings_(settings) {}
 
 void SdoClient::configure(std::uint32_t request_cob, std::uint32_t answer_cob) noexcept {
     cancel_all(Abort::no_resource);
@@ -16,10 +17,16 @@ void SdoClient::configure(std::uint32_t request_cob, std::uint32_t answer_cob) n
 }
 
 bool SdoClient::submit(SdoRequest& request) noexcept {
-    if (request.status == SdoRequest::Status::waiting || request.status == SdoRequest::Status::active) return false;
+    if (request.status == SdoRequest::Status::waiting ||
+        request.status == SdoRequest::Status::active) {
+        return false;
+    }
     request.status = SdoRequest::Status::waiting;
-    request.abort = Abort::none, request.aborted_by_server = request.not_sent = false;
-    request.size = 0, request.retries = 0, request.next = nullptr;
+    request.abort = Abort::none;
+    request.aborted_by_server = request.not_sent = false;
+    request.size = 0;
+    request.retries = 0;
+    request.next = nullptr;
     (first_ == nullptr ? first_ : last_->next) = &request;
     last_ = &request;
     return true;
@@ -34,9 +41,15 @@ void SdoClient::cancel(SdoRequest& request, Abort why) noexcept {
     for (auto* r = first_; r != nullptr; r = r->next) {
         if (r->next != &request) continue;
         r->next = request.next;
-        if (last_ == &request) last_ = r;
-        request.next = nullptr, request.status = SdoRequest::Status::done, request.abort = why;
-        if (request.on_done != nullptr) request.on_done(request, request.context);
+        if (last_ == &request) {
+            last_ = r;
+        }
+        request.next = nullptr;
+        request.status = SdoRequest::Status::done;
+        request.abort = why;
+        if (request.on_done != nullptr) {
+            request.on_done(request, request.context);
+        }
         return;
     }
 }
@@ -53,14 +66,19 @@ void SdoClient::cancel_all(Abort why) noexcept {
 void SdoClient::finish(Abort why, bool by_server) noexcept {
     auto& request = *first_;
     first_ = request.next;
-    if (first_ == nullptr) last_ = nullptr;
+    if (first_ == nullptr) {
+        last_ = nullptr;
+    }
     state_ = State::idle;
     pending_ = false;
     request.next = nullptr;
-    request.abort = why, request.aborted_by_server = by_server;
+    request.abort = why;
+    request.aborted_by_server = by_server;
     request.size = offset_;
     request.status = SdoRequest::Status::done;
-    if (request.on_done != nullptr) request.on_done(request, request.context);
+    if (request.on_done != nullptr) {
+        request.on_done(request, request.context);
+    }
 }
 
 void SdoClient::abort(Abort why) noexcept {
@@ -68,16 +86,21 @@ void SdoClient::abort(Abort why) noexcept {
     finish(why);
 }
 
-/// Restarts a transfer that failed for a transient reason. It continues by segments unless the request demanded blocks, because some servers
-/// offer block transfer and fail to carry it out.
+/// Restarts a transfer that failed for a transient reason. It continues by segments unless the
+/// request demanded blocks, because some servers offer block transfer and fail to carry it out.
 void SdoClient::restart_or_fail(Abort why, bool by_server) noexcept {
     if (restarts_left_ == 0) {
-        if (!by_server) send_initiate(0x80, static_cast<std::uint32_t>(why));
+        if (!by_server) {
+            send_initiate(0x80, static_cast<std::uint32_t>(why));
+        }
         return finish(why, by_server);
     }
-    if (!by_server) send_initiate(0x80, static_cast<std::uint32_t>(why));
+    if (!by_server) {
+        send_initiate(0x80, static_cast<std::uint32_t>(why));
+    }
     --restarts_left_;
-    ++retries_, ++first_->retries;
+    ++retries_;
+    ++first_->retries;
     begin_mode(in_block_ && first_->mode == SdoMode::block);
 }
 
@@ -91,7 +114,8 @@ void SdoClient::send_again() noexcept {
     pending_ = !out_.push(f);
 }
 void SdoClient::send_initiate(std::uint8_t command, std::uint32_t value) noexcept {
-    Bytes b{command, static_cast<std::uint8_t>(first_->index), static_cast<std::uint8_t>(first_->index >> 8), first_->sub};
+    Bytes b{command, static_cast<std::uint8_t>(first_->index),
+            static_cast<std::uint8_t>(first_->index >> 8), first_->sub};
     store(b.data() + 4, value);
     send(b);
 }
@@ -104,18 +128,31 @@ void SdoClient::begin() noexcept {
     auto& r = *first_;
     r.status = SdoRequest::Status::active;
     restarts_left_ = settings_.restarts;
-    if (request_cob_ & cob_invalid) return offset_ = 0, finish(Abort::no_resource);
+    if (request_cob_ & cob_invalid) {
+        offset_ = 0;
+        return finish(Abort::no_resource);
+    }
     const bool many = !r.upload && r.data.size() >= settings_.block_from;
-    begin_mode(!block_refused_ && (r.mode == SdoMode::block || (r.mode == SdoMode::automatic && many)));
+    begin_mode(!block_refused_ &&
+               (r.mode == SdoMode::block || (r.mode == SdoMode::automatic && many)));
 }
 
 void SdoClient::begin_mode(bool block) noexcept {
     auto& r = *first_;
     in_block_ = block;
-    toggle_ = 0, offset_ = 0, crc_ = 0, crc_until_ = 0, sequence_ = 0, held_count_ = 0, stalls_ = 0, acknowledged_ = 0,
+    toggle_ = 0;
+    offset_ = 0;
+    crc_ = 0;
+    crc_until_ = 0;
+    sequence_ = 0;
+    held_count_ = 0;
+    stalls_ = 0;
+
+    acknowledged_ = 0;
     last_acknowledgement_ = 0;
     size_ = r.upload ? 0 : static_cast<std::uint32_t>(r.data.size());
-    size_known_ = crc_used_ = block_sent_ = last_seen_ = segment_received_ = block_any_ = gap_ = acknowledged_early_ = false;
+    size_known_ = crc_used_ = block_sent_ = last_seen_ = segment_received_ = block_any_ = gap_ =
+        acknowledged_early_ = false;
     last_error_ = Abort::none;
     progress();
     if (r.upload) {
@@ -139,7 +176,9 @@ void SdoClient::handle(const Frame& f, Time now) noexcept {
     now_ = now;
     if (f.length != 8) return;
     take(f);
-    if (state_ == State::idle && first_ != nullptr) begin();
+    if (state_ == State::idle && first_ != nullptr) {
+        begin();
+    }
 }
 
 void SdoClient::take(const Frame& f) noexcept {
@@ -153,7 +192,10 @@ void SdoClient::take(const Frame& f) noexcept {
     case State::download_start:
         if (command >> 5 != 3 || !concerns_request(f)) return unexpected(Abort::command);
         progress();
-        if (size_ > 0 && size_ <= 4) return offset_ = size_, finish(Abort::none);
+        if (size_ > 0 && size_ <= 4) {
+            offset_ = size_;
+            return finish(Abort::none);
+        }
         state_ = State::download;
         return send_segment();
     case State::download:
@@ -197,8 +239,10 @@ void SdoClient::take(const Frame& f) noexcept {
 
 void SdoClient::on_abort(const Frame& f) noexcept {
     const auto why = static_cast<Abort>(load<std::uint32_t>(f.data.data() + 4));
-    if (!concerns_request(f)) return unexpected(why);  // of an earlier transfer: some servers send their abort late
-    const bool starting = state_ == State::upload_start || state_ == State::download_start || state_ == State::block_upload_start ||
+    // of an earlier transfer: some servers send their abort late
+    if (!concerns_request(f)) return unexpected(why);
+    const bool starting = state_ == State::upload_start || state_ == State::download_start ||
+                          state_ == State::block_upload_start ||
                           state_ == State::block_download_start;
     if (starting) {
         // The abort codes with which servers without block transfer reject it.
@@ -209,22 +253,37 @@ void SdoClient::on_abort(const Frame& f) noexcept {
         return finish(why, true);
     }
     switch (why) {
-    case Abort::toggle: case Abort::timeout: case Abort::command: case Abort::sequence: case Abort::crc: return restart_or_fail(why, true);
+    case Abort::toggle:
+    case Abort::timeout:
+    case Abort::command:
+    case Abort::sequence:
+    case Abort::crc: return restart_or_fail(why, true);
     default: return finish(why, true);
     }
 }
 
 void SdoClient::send_segment() noexcept {
     segment_ = std::min<std::uint32_t>(7, size_ - offset_);
-    Bytes b{static_cast<std::uint8_t>(toggle_ | (7 - segment_) << 1 | (offset_ + segment_ == size_ ? 1 : 0))};
-    if (segment_ != 0) std::memcpy(b.data() + 1, first_->data.data() + offset_, segment_);
+    Bytes b{static_cast<std::uint8_t>(toggle_ | (7 - segment_) << 1 |
+                                      (offset_ + segment_ == size_ ? 1 : 0))};
+    if (segment_ != 0) {
+        std::memcpy(b.data() + 1, first_->data.data() + offset_, segment_);
+    }
     send(b);
 }
 
 bool SdoClient::store_received(std::span<const std::uint8_t> bytes) noexcept {
-    if (size_known_ && bytes.size() > size_ - offset_) return restart_or_fail(Abort::too_long, false), false;
-    if (bytes.size() > first_->buffer.size() - offset_) return abort(Abort::memory), false;
-    if (!bytes.empty()) std::memcpy(first_->buffer.data() + offset_, bytes.data(), bytes.size());
+    if (size_known_ && bytes.size() > size_ - offset_) {
+        restart_or_fail(Abort::too_long, false);
+        return false;
+    }
+    if (bytes.size() > first_->buffer.size() - offset_) {
+        abort(Abort::memory);
+        return false;
+    }
+    if (!bytes.empty()) {
+        std::memcpy(first_->buffer.data() + offset_, bytes.data(), bytes.size());
+    }
     offset_ += static_cast<std::uint32_t>(bytes.size());
     return true;
 }
@@ -236,9 +295,13 @@ void SdoClient::on_upload_start(const Frame& f) noexcept {
     size_known_ = (command & 1) != 0;
     if ((command & 2) != 0) {
         size_ = size_known_ ? 4U - (command >> 2 & 3) : 4U;
-        if (!size_known_) size_ = static_cast<std::uint32_t>(std::min<std::size_t>(4, first_->buffer.size()));
+        if (!size_known_) {
+            size_ = static_cast<std::uint32_t>(std::min<std::size_t>(4, first_->buffer.size()));
+        }
         size_known_ = true;
-        if (store_received({f.data.data() + 4, size_})) finish(Abort::none);
+        if (store_received({f.data.data() + 4, size_})) {
+            finish(Abort::none);
+        }
         return;
     }
     size_ = size_known_ ? load<std::uint32_t>(f.data.data() + 4) : 0;
@@ -254,7 +317,9 @@ void SdoClient::on_upload_segment(const Frame& f) noexcept {
     progress();
     if (!store_received({f.data.data() + 1, 7U - (command >> 1 & 7)})) return;
     toggle_ ^= 0x10;
-    if ((command & 1) == 0) return send({static_cast<std::uint8_t>(0x60 | toggle_)});
+    if ((command & 1) == 0) {
+        return send({static_cast<std::uint8_t>(0x60 | toggle_)});
+    }
     if (size_known_ && offset_ != size_) return restart_or_fail(Abort::too_short, false);
     finish(Abort::none);
 }
@@ -263,15 +328,19 @@ void SdoClient::on_upload_segment(const Frame& f) noexcept {
 void SdoClient::on_timeout() noexcept {
     heard_ = now_;
     if (resends_left_ == 0) {
-        const bool starting = state_ == State::upload_start || state_ == State::download_start || state_ == State::block_upload_start ||
+        const bool starting = state_ == State::upload_start || state_ == State::download_start ||
+                              state_ == State::block_upload_start ||
                               state_ == State::block_download_start;
         const auto why = last_error_ != Abort::none ? last_error_ : Abort::timeout;
         return starting ? abort(why) : restart_or_fail(why, false);
     }
     --resends_left_;
-    ++retries_, ++first_->retries;
+    ++retries_;
+    ++first_->retries;
     if (state_ == State::block_upload && segment_received_) {
-        if (!block_any_) return send({0xa2, acknowledged_, block_size_});
+        if (!block_any_) {
+            return send({0xa2, acknowledged_, block_size_});
+        }
         acknowledge_block(gap_ ? BlockChange::smaller : BlockChange::same);
         acknowledged_early_ = first_ != nullptr && state_ == State::block_upload;
         return;
@@ -281,29 +350,41 @@ void SdoClient::on_timeout() noexcept {
 
 void SdoClient::poll(Time now) noexcept {
     now_ = now;
-    if (pending_ && out_.space() > 0) send_again();
+    if (pending_ && out_.space() > 0) {
+        send_again();
+    }
     if (state_ == State::idle) {
-        if (first_ != nullptr) begin();
+        if (first_ != nullptr) {
+            begin();
+        }
         return;
     }
     if (state_ == State::block_download && !block_sent_ && !pending_) {
         const auto before = sequence_;
         send_block();
-        const bool moves = sequence_ != before || out_.popped() != popped_;  // other clients may have used the space
+        // other clients may have used the space
+        const bool moves = sequence_ != before || out_.popped() != popped_;
         popped_ = out_.popped();
         if (!block_sent_ && !moves) return queue_full();
-        if (!block_sent_) heard_ = now;
+        if (!block_sent_) {
+            heard_ = now;
+        }
     }
     if (pending_) return queue_full();
     queue_full_since_ = -1;
-    if (now - heard_ >= settings_.timeout) on_timeout();
+    if (now - heard_ >= settings_.timeout) {
+        on_timeout();
+    }
 }
 
-/// A full transmit queue is not the server's timeout, so the response timer is held. If the queue stays full for as long as an unresponsive
-/// server would be waited for, the request fails, without an abort frame because that could not be sent either.
+/// A full transmit queue is not the server's timeout, so the response timer is held. If the queue
+/// stays full for as long as an unresponsive server would be waited for, the request fails, without
+/// an abort frame because that could not be sent either.
 void SdoClient::queue_full() noexcept {
     heard_ = now_;
-    if (queue_full_since_ < 0) queue_full_since_ = now_;
+    if (queue_full_since_ < 0) {
+        queue_full_since_ = now_;
+    }
     if (now_ - queue_full_since_ < settings_.timeout * (settings_.resends + 1)) return;
     queue_full_since_ = -1;
     first_->not_sent = true;

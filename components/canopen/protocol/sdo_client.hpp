@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// One SDO client channel (CiA 301) with a queue of requests. A master has one channel per node, so all nodes are served concurrently.
+// One SDO client channel (CiA 301) with a queue of requests. A master has one channel per node, so
+// all nodes are served concurrently.
 //
 //     std::array<std::uint8_t, 4> buffer;
 //     SdoRequest read{.index = 0x1018, .sub = 1, .upload = true, .buffer = buffer};
@@ -23,33 +24,38 @@
 
 namespace hal::canopen {
 
-/// The SDO protocol of a request. Values of up to 4 bytes are transferred expedited in the first two modes.
+/// The SDO protocol of a request. Values of up to 4 bytes are transferred expedited in the first
+/// two modes.
 enum class SdoMode : std::uint8_t {
-    automatic,  ///< block transfer for downloads of at least SdoClientSettings::block_from bytes, else segmented
+    /// block transfer for downloads of at least SdoClientSettings::block_from bytes, else segmented
+    automatic,
     segmented,  ///< never block transfer
-    block,      ///< block transfer; segmented if the server does not support it
+    block,  ///< block transfer; segmented if the server does not support it
 };
 
-/// One SDO transfer. The caller fills in the first part and keeps the request and its memory until done().
+/// One SDO transfer. The caller fills in the first part and keeps the request and its memory until
+/// done().
 struct SdoRequest {
     std::uint16_t index = 0;
     std::uint8_t sub = 0;
-    bool upload = false;                   ///< true: read the object; false: write it
+    bool upload = false;  ///< true: read the object; false: write it
     SdoMode mode = SdoMode::automatic;
     std::span<const std::uint8_t> data{};  ///< download: the value, little endian
-    std::span<std::uint8_t> buffer{};      ///< upload: receives the value; too small a buffer ends the request with Abort::memory
-    void (*on_done)(SdoRequest&, void*) noexcept = nullptr;  ///< called by poll(), handle() or cancel(); may submit again. [realtime]
-    void* context = nullptr;               ///< the second argument of on_done
+    /// upload: receives the value; too small a buffer ends the request with Abort::memory
+    std::span<std::uint8_t> buffer{};
+    /// called by poll(), handle() or cancel(); may submit again. [realtime]
+    void (*on_done)(SdoRequest&, void*) noexcept = nullptr;
+    void* context = nullptr;  ///< the second argument of on_done
 
     // Written by the client.
     enum class Status : std::uint8_t { fresh, waiting, active, done };
     Status status = Status::fresh;
-    Abort abort = Abort::none;       ///< none: success
+    Abort abort = Abort::none;  ///< none: success
     bool aborted_by_server = false;  ///< true: the server sent `abort`; false: the client did
-    bool not_sent = false;           ///< the client timed out because the bus accepted no frames
-    std::size_t size = 0;            ///< bytes transferred
-    unsigned retries = 0;            ///< repeated frames and restarted transfers
-    SdoRequest* next = nullptr;      ///< the next request in the queue
+    bool not_sent = false;  ///< the client timed out because the bus accepted no frames
+    std::size_t size = 0;  ///< bytes transferred
+    unsigned retries = 0;  ///< repeated frames and restarted transfers
+    SdoRequest* next = nullptr;  ///< the next request in the queue
 
     /// Returns true once the transfer has ended, successfully or not. [any]
     bool done() const noexcept { return status == Status::done; }
@@ -60,26 +66,32 @@ struct SdoRequest {
 /// Timing and retries of an SDO client.
 struct SdoClientSettings {
     Time timeout = 500 * millisecond;  ///< response timeout in ns, after which a frame is repeated
-    unsigned resends = 2;              ///< repeated frames per response
-    unsigned restarts = 1;             ///< restarts of a transfer that failed for a transient reason
-    std::uint8_t block_size = 127;     ///< segments per block of an upload, 1..127
-    std::size_t block_from = 1000;     ///< bytes from which SdoMode::automatic uses block transfer
+    unsigned resends = 2;  ///< repeated frames per response
+    /// restarts of a transfer that failed for a transient reason
+    unsigned restarts = 1;
+    std::uint8_t block_size = 127;  ///< segments per block of an upload, 1..127
+    std::size_t block_from = 1000;  ///< bytes from which SdoMode::automatic uses block transfer
 };
 
-/// An SDO client channel. It does one transfer at a time, in the order of submit(). All calls belong to one thread.
+/// An SDO client channel. It does one transfer at a time, in the order of submit(). All calls
+/// belong to one thread.
 class SdoClient {
 public:
     /// Creates a channel that sends through `out`, which outlives it. [setup]
     SdoClient(FrameQueue& out, const SdoClientSettings& = {});
 
-    /// Sets the COB-IDs (1280h:1 and :2); bit 31 in either disables the channel. Ends all requests with Abort::no_resource. [realtime]
+    /// Sets the COB-IDs (1280h:1 and :2); bit 31 in either disables the channel. Ends all requests
+    /// with Abort::no_resource. [realtime]
     void configure(std::uint32_t request_cob, std::uint32_t answer_cob) noexcept;
     /// Sets the predefined COB-IDs of node 1..127. [realtime]
     void configure(std::uint8_t node) noexcept { configure(0x600U + node, 0x580U + node); }
     /// Returns true for frames that handle() must get. [any]
-    bool listens_to(const Frame& f) const noexcept { return f.id == answer_id_ && f.extended == answer_extended_ && !f.remote; }
+    bool listens_to(const Frame& f) const noexcept {
+        return f.id == answer_id_ && f.extended == answer_extended_ && !f.remote;
+    }
 
-    /// Queues a request; it starts at the next poll(). Returns false if the request is already queued. [realtime]
+    /// Queues a request; it starts at the next poll(). Returns false if the request is already
+    /// queued. [realtime]
     bool submit(SdoRequest&) noexcept;
     /// Ends one request with `why`; a transfer in progress is aborted on the bus. [realtime]
     void cancel(SdoRequest&, Abort why = Abort::general) noexcept;
@@ -98,15 +110,25 @@ public:
     std::uint64_t unexpected_responses() const noexcept { return unexpected_; }
     /// Returns the number of repeated frames and restarted transfers. [any]
     std::uint64_t retries() const noexcept { return retries_; }
-    /// Returns the bytes of the transfer in progress that the other side has confirmed, or that were received; 0 when none is. Not for another thread.
+    /// Returns the bytes of the transfer in progress that the other side has confirmed, or that
+    /// were received; 0 when none is. Not for another thread.
     std::size_t transferred() const noexcept { return first_ != nullptr ? offset_ : 0; }
     /// Returns the bytes of the transfer in progress; 0 when the server has not announced them.
     std::size_t announced() const noexcept { return first_ != nullptr ? size_ : 0; }
 
 private:
     enum class State : std::uint8_t {
-        idle, download_start, download, upload_start, upload,
-        block_download_start, block_download, block_download_end, block_upload_start, block_upload, block_upload_end,
+        idle,
+        download_start,
+        download,
+        upload_start,
+        upload,
+        block_download_start,
+        block_download,
+        block_download_end,
+        block_upload_start,
+        block_upload,
+        block_upload_end,
     };
     using Bytes = std::array<std::uint8_t, 8>;
 
@@ -132,35 +154,65 @@ private:
     void on_timeout() noexcept;
     void queue_full() noexcept;
     bool store_received(std::span<const std::uint8_t>) noexcept;
-    void progress() noexcept { heard_ = now_, resends_left_ = settings_.resends; }
-    void unexpected(Abort why) noexcept { ++unexpected_, last_error_ = why; }
+    void progress() noexcept {
+        heard_ = now_;
+        resends_left_ = settings_.resends;
+    }
+    void unexpected(Abort why) noexcept {
+        ++unexpected_;
+        last_error_ = why;
+    }
     bool concerns_request(const Frame&) const noexcept;
 
     FrameQueue& out_;
     SdoClientSettings settings_;
-    std::uint32_t request_cob_ = cob_invalid, answer_id_ = 0xffffffff;
+    std::uint32_t request_cob_ = cob_invalid;
+    std::uint32_t answer_id_ = 0xffffffff;
     bool answer_extended_ = false;
 
     SdoRequest* first_ = nullptr;
     SdoRequest* last_ = nullptr;
     State state_ = State::idle;
-    std::uint8_t toggle_ = 0, block_size_ = 0, sequence_ = 0, acknowledged_ = 0, held_count_ = 0, last_command_ = 0;
-    bool crc_used_ = false, block_sent_ = false, last_seen_ = false, block_refused_ = false, in_block_ = false;
-    bool size_known_ = false, pending_ = false, segment_received_ = false, block_any_ = false;
-    bool gap_ = false;         // a segment of this block is missing
-    bool acknowledged_early_ = false;  // the block was acknowledged before its end: ignore the rest until a new block begins
+    std::uint8_t toggle_ = 0;
+    std::uint8_t block_size_ = 0;
+    std::uint8_t sequence_ = 0;
+    std::uint8_t acknowledged_ = 0;
+    std::uint8_t held_count_ = 0;
+
+    std::uint8_t last_command_ = 0;
+    bool crc_used_ = false;
+    bool block_sent_ = false;
+    bool last_seen_ = false;
+    bool block_refused_ = false;
+
+    bool in_block_ = false;
+    bool size_known_ = false;
+    bool pending_ = false;
+    bool segment_received_ = false;
+    bool block_any_ = false;
+    bool gap_ = false;  // a segment of this block is missing
+    // the block was acknowledged before its end: ignore the rest until a new block begins
+    bool acknowledged_early_ = false;
     std::size_t block_end_ = 0;  // FrameQueue::popped() once the whole block has left the queue
     std::array<std::uint8_t, 7> held_{};
-    std::uint16_t crc_ = 0, last_acknowledgement_ = 0;
-    std::uint32_t crc_until_ = 0, offset_ = 0, size_ = 0;
+    std::uint16_t crc_ = 0;
+    std::uint16_t last_acknowledgement_ = 0;
+    std::uint32_t crc_until_ = 0;
+    std::uint32_t offset_ = 0;
+    std::uint32_t size_ = 0;
     std::uint32_t segment_ = 0;  // bytes of the segment that awaits its confirmation
-    unsigned resends_left_ = 0, restarts_left_ = 0, stalls_ = 0;
+    unsigned resends_left_ = 0;
+    unsigned restarts_left_ = 0;
+    unsigned stalls_ = 0;
     Abort last_error_ = Abort::none;  // of the responses dropped since the last valid one
     Bytes sent_{};
-    Time heard_ = 0, acknowledged_at_ = 0, now_ = 0;
+    Time heard_ = 0;
+    Time acknowledged_at_ = 0;
+    Time now_ = 0;
     Time queue_full_since_ = -1;  // -1: the queue has space
-    std::size_t popped_ = 0;      // of out_ at the last poll
-    std::uint64_t unexpected_ = 0, retries_ = 0;
+    std::size_t popped_ = 0;  // of out_ at the last poll
+    std::uint64_t unexpected_ = 0;
+    std::uint64_t retries_ = 0;
 };
 
 }  // namespace hal::canopen

@@ -6,11 +6,19 @@
 namespace hal::canopen {
 
 namespace {
-constexpr std::uint16_t gfc_index = 0x1300, communication = 0x1300, mapping_base = 0x1380, valid_index = 0x13fe, signatures = 0x13ff;
-constexpr std::uint32_t gfc_id = 0x001;
-constexpr std::uint16_t emergency = 0x8100;  // "communication"; the manufacturer bytes carry SRDO number and fault
+constexpr std::uint16_t gfc_index = 0x1300;
+constexpr std::uint16_t communication = 0x1300;
+constexpr std::uint16_t mapping_base = 0x1380;
 
-constexpr std::uint64_t ones(unsigned bits) noexcept { return bits >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << bits) - 1; }
+constexpr std::uint16_t valid_index = 0x13fe;
+constexpr std::uint16_t signatures = 0x13ff;
+constexpr std::uint32_t gfc_id = 0x001;
+// "communication"; the manufacturer bytes carry SRDO number and fault
+constexpr std::uint16_t emergency = 0x8100;
+
+constexpr std::uint64_t ones(unsigned bits) noexcept {
+    return bits >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << bits) - 1;
+}
 std::uint64_t data_of(const Frame& f) noexcept { return load<std::uint64_t>(f.data.data()); }
 }  // namespace
 
@@ -28,14 +36,19 @@ const char* to_string(SrdoFault fault) noexcept {
     return "";
 }
 
-Srdos::Srdos(Dictionary& dictionary, FrameQueue& out, Emcy& emcy) : dictionary_(dictionary), out_(out), emcy_(emcy) {
+Srdos::Srdos(Dictionary& dictionary, FrameQueue& out, Emcy& emcy)
+    : dictionary_(dictionary), out_(out), emcy_(emcy) {
     of_number_.fill(-1);
     of_id_.fill(-1);
     for (unsigned n = 1; n <= max_srdos; ++n) {
-        const auto index = static_cast<std::uint16_t>(communication + n), mapping = static_cast<std::uint16_t>(mapping_base + n);
+        const auto index = static_cast<std::uint16_t>(communication + n);
+
+        const auto mapping = static_cast<std::uint16_t>(mapping_base + n);
         if (dictionary.find(index, 1) == nullptr) continue;
         std::size_t capacity = 0;
-        for (const auto& e : dictionary.object(mapping)) capacity = std::max<std::size_t>(capacity, e.sub);
+        for (const auto& e : dictionary.object(mapping)) {
+            capacity = std::max<std::size_t>(capacity, e.sub);
+        }
         of_number_[n] = static_cast<std::int8_t>(srdos_.size());
         srdos_.emplace_back(n, (capacity + 1) / 2);
         dictionary.handle(index, *this);
@@ -46,16 +59,24 @@ Srdos::Srdos(Dictionary& dictionary, FrameQueue& out, Emcy& emcy) : dictionary_(
 }
 
 Srdos::Srdo* Srdos::find(unsigned number) noexcept {
-    return number < 1 || number > max_srdos || of_number_[number] < 0 ? nullptr : &srdos_[static_cast<std::size_t>(of_number_[number])];
+    return number < 1 || number > max_srdos || of_number_[number] < 0
+               ? nullptr
+               : &srdos_[static_cast<std::size_t>(of_number_[number])];
 }
 
 std::uint16_t Srdos::signature(unsigned number) const noexcept {
-    const auto index = static_cast<std::uint16_t>(communication + number), mapping = static_cast<std::uint16_t>(mapping_base + number);
+    const auto index = static_cast<std::uint16_t>(communication + number);
+
+    const auto mapping = static_cast<std::uint16_t>(mapping_base + number);
     std::uint16_t crc = 0;
     const auto add = [&](std::uint16_t at, std::uint8_t sub) {
-        if (const Entry* e = dictionary_.find(at, sub); e != nullptr) crc = crc16(e->bytes(), crc);
+        if (const Entry* e = dictionary_.find(at, sub); e != nullptr) {
+            crc = crc16(e->bytes(), crc);
+        }
     };
-    for (const std::uint8_t sub : std::initializer_list<std::uint8_t>{1, 2, 3, 5, 6}) add(index, sub);
+    for (const std::uint8_t sub : std::initializer_list<std::uint8_t>{1, 2, 3, 5, 6}) {
+        add(index, sub);
+    }
     add(mapping, 0);
     const auto count = dictionary_.get<std::uint8_t>(mapping, 0, 0);
     for (unsigned n = 1; n <= count; ++n) {
@@ -67,39 +88,56 @@ std::uint16_t Srdos::signature(unsigned number) const noexcept {
 }
 
 Abort Srdos::configure(Srdo& s) noexcept {
-    const auto index = static_cast<std::uint16_t>(communication + s.number), mapping = static_cast<std::uint16_t>(mapping_base + s.number);
+    const auto index = static_cast<std::uint16_t>(communication + s.number);
+
+    const auto mapping = static_cast<std::uint16_t>(mapping_base + s.number);
     s.direction = static_cast<SrdoDirection>(dictionary_.get<std::uint8_t>(index, 1, 0));
     s.cycle = dictionary_.get<std::uint16_t>(index, 2, 0) * millisecond;
     s.validation = dictionary_.get<std::uint8_t>(index, 3, 0) * millisecond;
     s.cob = dictionary_.get<std::uint32_t>(index, 5, 0);
-    s.plain.clear(), s.inverted.clear();
+    s.plain.clear();
+    s.inverted.clear();
     if (s.direction == SrdoDirection::none) return Abort::none;
     const bool in_range = s.cob >= first_id && s.cob < last_id && s.cob % 2 == 1;
-    if (!in_range || dictionary_.get<std::uint32_t>(index, 6, 0) != s.cob + 1 || s.cycle == 0) return Abort::value;
+    if (!in_range || dictionary_.get<std::uint32_t>(index, 6, 0) != s.cob + 1 || s.cycle == 0) {
+        return Abort::value;
+    }
     if (s.direction == SrdoDirection::receives && s.validation == 0) return Abort::value;
-    for (const auto& other : srdos_)
-        if (&other != &s && other.direction != SrdoDirection::none && other.cob == s.cob) return Abort::value;
+    for (const auto& other : srdos_) {
+        if (&other != &s && other.direction != SrdoDirection::none && other.cob == s.cob) {
+            return Abort::value;
+        }
+    }
     const unsigned count = dictionary_.get<std::uint8_t>(mapping, 0, 0);
     if (count == 0 || count % 2 != 0 || count > 128) return Abort::pdo_length;
     std::array<std::uint32_t, 64> plain{}, inverted{};
     for (unsigned n = 0; n < count / 2; ++n) {
         plain[n] = dictionary_.get<std::uint32_t>(mapping, static_cast<std::uint8_t>(2 * n + 1), 0);
-        inverted[n] = dictionary_.get<std::uint32_t>(mapping, static_cast<std::uint8_t>(2 * n + 2), 0);
-        if (((plain[n] ^ inverted[n]) & 0xff) != 0) return Abort::pdo_length;  // both objects of a pair have the same length
+        inverted[n] =
+            dictionary_.get<std::uint32_t>(mapping, static_cast<std::uint8_t>(2 * n + 2), 0);
+        // both objects of a pair have the same length
+        if (((plain[n] ^ inverted[n]) & 0xff) != 0) return Abort::pdo_length;
     }
     const bool received = s.direction == SrdoDirection::receives;
-    if (const auto why = s.plain.build(dictionary_, {plain.data(), count / 2}, received); why != Abort::none) return why;
+    if (const auto why = s.plain.build(dictionary_, {plain.data(), count / 2}, received);
+        why != Abort::none) {
+        return why;
+    }
     return s.inverted.build(dictionary_, {inverted.data(), count / 2}, received);
 }
 
 Abort Srdos::configure() noexcept {
     of_id_.fill(-1);
-    for (auto& s : srdos_) s.direction = SrdoDirection::none;
+    for (auto& s : srdos_) {
+        s.direction = SrdoDirection::none;
+    }
     for (std::size_t n = 0; n < srdos_.size(); ++n) {
         auto& s = srdos_[n];
         if (const auto why = configure(s); why != Abort::none) return why;
         if (s.direction == SrdoDirection::none) continue;
-        if (dictionary_.get<std::uint16_t>(signatures, s.number, 0) != signature(s.number)) return Abort::value;
+        if (dictionary_.get<std::uint16_t>(signatures, s.number, 0) != signature(s.number)) {
+            return Abort::value;
+        }
         if (s.direction != SrdoDirection::receives) continue;
         of_id_[s.cob - first_id] = of_id_[s.cob + 1 - first_id] = static_cast<std::int8_t>(n);
     }
@@ -109,12 +147,17 @@ Abort Srdos::configure() noexcept {
 void Srdos::reset(std::uint8_t node_id) noexcept {
     operational_ = valid_ = false;
     if (srdos_.empty()) return;
-    if (node_id >= 1 && node_id <= 64 && dictionary_.get<std::uint32_t>(communication + 1, 5, 1) == 0) {
+    if (node_id >= 1 && node_id <= 64 &&
+        dictionary_.get<std::uint32_t>(communication + 1, 5, 1) == 0) {
         dictionary_.set(communication + 1, 5, std::uint32_t{0xff} + 2U * node_id);
         dictionary_.set(communication + 1, 6, std::uint32_t{0x100} + 2U * node_id);
     }
-    if (dictionary_.get<std::uint8_t>(valid_index, 0, 0) == valid_mark) valid_ = configure() == Abort::none;
-    if (!valid_) dictionary_.set(valid_index, 0, std::uint8_t{0});
+    if (dictionary_.get<std::uint8_t>(valid_index, 0, 0) == valid_mark) {
+        valid_ = configure() == Abort::none;
+    }
+    if (!valid_) {
+        dictionary_.set(valid_index, 0, std::uint8_t{0});
+    }
 }
 
 Abort Srdos::writing(Entry& e, std::span<const std::uint8_t> value) noexcept {
@@ -127,9 +170,11 @@ Abort Srdos::writing(Entry& e, std::span<const std::uint8_t> value) noexcept {
     switch (e.sub) {
     case 1: return value[0] > 2 ? Abort::value : Abort::none;
     case 2: return load<std::uint16_t>(value.data()) == 0 ? Abort::value : Abort::none;
-    case 5: case 6: {
+    case 5:
+    case 6: {
         const auto cob = load<std::uint32_t>(value.data());
-        return cob < first_id || cob > last_id || (cob % 2 == 1) != (e.sub == 5) ? Abort::value : Abort::none;
+        return cob < first_id || cob > last_id || (cob % 2 == 1) != (e.sub == 5) ? Abort::value
+                                                                                 : Abort::none;
     }
     default: return Abort::none;
     }
@@ -146,8 +191,11 @@ void Srdos::written(Entry& e) noexcept {
 
 void Srdos::begin(Srdo& s, Time now) noexcept {
     s.heard = s.half = false;
-    s.last = now, s.next = now;
-    if (s.fault != SrdoFault::none) emcy_.clear(emergency, s.number);
+    s.last = now;
+    s.next = now;
+    if (s.fault != SrdoFault::none) {
+        emcy_.clear(emergency, s.number);
+    }
     s.fault = SrdoFault::none;
 }
 
@@ -155,19 +203,24 @@ void Srdos::set_operational(bool operational, Time now) noexcept {
     now_ = now;
     if (operational == operational_) return;
     operational_ = operational;
-    for (auto& s : srdos_) begin(s, now);
+    for (auto& s : srdos_) {
+        begin(s, now);
+    }
 }
 
 void Srdos::expect(unsigned number, bool on, Time now) noexcept {
     auto* s = find(number);
     if (s == nullptr || (on && s->strict) || (!on && s->ignored)) return;
-    s->strict = on, s->ignored = !on;
+    s->strict = on;
+    s->ignored = !on;
     s->heard = s->half = false;
     s->last = now;
 }
 
 void Srdos::acknowledge(unsigned number, Time now) noexcept {
-    if (auto* s = find(number); s != nullptr && s->fault != SrdoFault::none) begin(*s, now);
+    if (auto* s = find(number); s != nullptr && s->fault != SrdoFault::none) {
+        begin(*s, now);
+    }
 }
 
 bool Srdos::trigger(unsigned number) noexcept {
@@ -176,60 +229,86 @@ bool Srdos::trigger(unsigned number) noexcept {
 }
 
 void Srdos::derive_inverted(unsigned number) noexcept {
-    if (auto* s = find(number); s != nullptr) s->derived = true;
+    if (auto* s = find(number); s != nullptr) {
+        s->derived = true;
+    }
 }
 
 void Srdos::fail(Srdo& s, SrdoFault fault, Time now) noexcept {
     s.half = false;
     if (s.fault != SrdoFault::none) return;
     s.fault = fault;
-    emcy_.raise(emergency, error_communication, {s.number, static_cast<std::uint8_t>(fault)}, s.number);
-    if (events_ != nullptr) events_->on_srdo_fault(s.number, fault, now);
+    emcy_.raise(emergency, error_communication, {s.number, static_cast<std::uint8_t>(fault)},
+                s.number);
+    if (events_ != nullptr) {
+        events_->on_srdo_fault(s.number, fault, now);
+    }
 }
 
 void Srdos::take(Srdo& s, const Frame& f, bool is_second, Time now) noexcept {
     if (f.length != s.plain.bytes()) return fail(s, SrdoFault::length, now);
     if (!is_second) {
         if (s.half) return fail(s, SrdoFault::order, now);
-        s.half = true, s.first = data_of(f), s.first_at = now;
+        s.half = true;
+        s.first = data_of(f);
+        s.first_at = now;
         return;
     }
     if (!s.half) return fail(s, SrdoFault::order, now);
     s.half = false;
     if (now - s.first_at > s.validation) return fail(s, SrdoFault::incomplete, now);
     const auto data = data_of(f);
-    if (((s.first ^ data) & ones(8U * f.length)) != ones(8U * f.length)) return fail(s, SrdoFault::complement, now);
+    if (((s.first ^ data) & ones(8U * f.length)) != ones(8U * f.length)) {
+        return fail(s, SrdoFault::complement, now);
+    }
     if (too_late(s, now)) return fail(s, SrdoFault::late, now);
-    s.heard = true, s.last = now;
+    s.heard = true;
+    s.last = now;
     ++s.count;
     s.plain.unpack(s.first);
     s.inverted.unpack(data);
-    if (events_ != nullptr) events_->on_srdo(s.number, now);
+    if (events_ != nullptr) {
+        events_->on_srdo(s.number, now);
+    }
 }
 
 bool Srdos::handle(const Frame& f, Time now) noexcept {
     if (srdos_.empty() || f.extended || f.remote || f.id > last_id) return false;
     now_ = now;
     if (f.id == gfc_id) {
-        if (!operational_ || f.length != 0 || dictionary_.get<std::uint8_t>(gfc_index, 0, 0) == 0) return true;
-        if (events_ != nullptr) events_->on_fail_safe(now);
-        for (auto& s : srdos_)
-            if (s.direction == SrdoDirection::receives && !s.ignored) fail(s, SrdoFault::fail_safe, now);
+        if (!operational_ || f.length != 0 || dictionary_.get<std::uint8_t>(gfc_index, 0, 0) == 0) {
+            return true;
+        }
+        if (events_ != nullptr) {
+            events_->on_fail_safe(now);
+        }
+        for (auto& s : srdos_) {
+            if (s.direction == SrdoDirection::receives && !s.ignored) {
+                fail(s, SrdoFault::fail_safe, now);
+            }
+        }
         return true;
     }
     if (f.id < first_id || of_id_[f.id - first_id] < 0) return false;
     auto& s = srdos_[static_cast<std::size_t>(of_id_[f.id - first_id])];
     // After a fault all data is invalid until the fault is acknowledged.
-    if (operational_ && valid_ && !s.ignored && s.fault == SrdoFault::none) take(s, f, f.id != s.cob, now);
+    if (operational_ && valid_ && !s.ignored && s.fault == SrdoFault::none) {
+        take(s, f, f.id != s.cob, now);
+    }
     return true;
 }
 
 void Srdos::send(Srdo& s, Time now) noexcept {
-    const auto bits = ones(8U * s.plain.bytes()), plain = s.plain.pack();
-    // Bits beyond the mapping are sent as 0 and as 1, so that the frames are complementary in all bits.
-    const auto inverted = s.derived ? ~plain & bits : s.inverted.pack() | (bits & ~ones(s.inverted.bits()));
+    const auto bits = ones(8U * s.plain.bytes());
+    const auto plain = s.plain.pack();
+    // Bits beyond the mapping are sent as 0 and as 1, so that the frames are complementary in all
+    // bits.
+    const auto inverted =
+        s.derived ? ~plain & bits : s.inverted.pack() | (bits & ~ones(s.inverted.bits()));
     if ((plain ^ inverted) != bits) return fail(s, SrdoFault::own_data, now);
-    if (out_.space() < 2) return;  // a single frame would be a fault at the receiver
+    if (out_.space() < 2) {
+        return;  // a single frame would be a fault at the receiver
+    }
     Frame frame = make_frame(s.cob, s.plain.bytes());
     store(frame.data.data(), plain);
     out_.push(frame);
@@ -248,10 +327,15 @@ void Srdos::poll(Time now) noexcept {
     for (auto& s : srdos_) {
         if (s.fault != SrdoFault::none || s.ignored) continue;
         if (s.direction == SrdoDirection::sends) {
-            if (s.now || now >= s.next) send(s, now);
+            if (s.now || now >= s.next) {
+                send(s, now);
+            }
         } else if (s.direction == SrdoDirection::receives) {
-            if (s.half && now - s.first_at > s.validation) fail(s, SrdoFault::incomplete, now);
-            else if (too_late(s, now)) fail(s, SrdoFault::late, now);
+            if (s.half && now - s.first_at > s.validation) {
+                fail(s, SrdoFault::incomplete, now);
+            } else if (too_late(s, now)) {
+                fail(s, SrdoFault::late, now);
+            }
         }
     }
 }
@@ -263,9 +347,13 @@ bool Srdos::send_fail_safe() noexcept {
 
 Srdos::Status Srdos::status(unsigned number) const noexcept {
     const auto* s = const_cast<Srdos*>(this)->find(number);
-    if (s == nullptr) return {};
+    if (s == nullptr) {
+        return {};
+    }
     const bool active = valid_ && operational_ && s->direction != SrdoDirection::none;
-    return {true, active, active && s->heard && s->fault == SrdoFault::none && !s->ignored, s->direction, s->fault, s->count};
+    return {
+        true,         active,   active && s->heard && s->fault == SrdoFault::none && !s->ignored,
+        s->direction, s->fault, s->count};
 }
 
 }  // namespace hal::canopen

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: MIT
-// The safety-related data objects (SRDOs) of one node as its objects 1300h to 13FFh configure them (EN 50325-5, formerly CiA 304). An SRDO
-// consists of two frames; the second is the bitwise inverse of the first:
+// The safety-related data objects (SRDOs) of one node as its objects 1300h to 13FFh configure them
+// (EN 50325-5, formerly CiA 304). An SRDO consists of two frames; the second is the bitwise inverse
+// of the first:
 //
 //     plain     COB-ID 1 (odd)     101h … 17Fh     objects 1, 3, 5 … of the mapping
 //     inverted  COB-ID 2 = 1 + 1   102h … 180h     objects 2, 4, 6 …
 //
-// Received data is valid if both frames arrive in this order, within the safety-relevant validation time (SRVT) of each other, complementary and
-// of the mapped length, and each SRDO within the safeguard cycle time (SCT) of the previous one. Anything else is a fault; invalid data is not
+// Received data is valid if both frames arrive in this order, within the safety-relevant validation
+// time (SRVT) of each other, complementary and of the mapped length, and each SRDO within the
+// safeguard cycle time (SCT) of the previous one. Anything else is a fault; invalid data is not
 // written to the dictionary.
 #pragma once
 
@@ -27,13 +29,13 @@ enum class SrdoDirection : std::uint8_t { none = 0, sends = 1, receives = 2 };  
 /// Why the data of a received SRDO is invalid, or why an SRDO is not sent.
 enum class SrdoFault : std::uint8_t {
     none,
-    late,        ///< no SRDO within the SCT
+    late,  ///< no SRDO within the SCT
     incomplete,  ///< the second frame did not arrive within the SRVT
-    order,       ///< the second frame arrived first, or the first one twice
-    length,      ///< the length of a frame differs from the mapping
+    order,  ///< the second frame arrived first, or the first one twice
+    length,  ///< the length of a frame differs from the mapping
     complement,  ///< the second frame is not the inverse of the first
-    fail_safe,   ///< a global fail-safe command (GFC) was received
-    own_data,    ///< sender: the two objects of a pair are not complementary; nothing is sent
+    fail_safe,  ///< a global fail-safe command (GFC) was received
+    own_data,  ///< sender: the two objects of a pair are not complementary; nothing is sent
 };
 /// Returns the fault as a clause: "second frame is not the inverse of the first". [any]
 const char* to_string(SrdoFault) noexcept;
@@ -44,9 +46,11 @@ public:
     virtual ~SafetyEvents() = default;
     /// A valid SRDO was received; its values are in the dictionary. Numbers count from 1.
     virtual void on_srdo(unsigned number, Time) noexcept { (void)number; }
-    /// The data is invalid and must enter its safe state. It stays invalid until Srdos::acknowledge() or until the node leaves operational.
+    /// The data is invalid and must enter its safe state. It stays invalid until
+    /// Srdos::acknowledge() or until the node leaves operational.
     virtual void on_srdo_fault(unsigned number, SrdoFault, Time) noexcept { (void)number; }
-    /// A global fail-safe command was received; called before on_srdo_fault() of each received SRDO.
+    /// A global fail-safe command was received; called before on_srdo_fault() of each received
+    /// SRDO.
     virtual void on_fail_safe(Time) noexcept {}
 };
 
@@ -54,7 +58,8 @@ public:
 class Srdos final : public Handler {
 public:
     static constexpr unsigned max_srdos = 64;
-    static constexpr std::uint8_t valid_mark = 0xa5;  ///< value of 13FEh that marks the configuration as valid
+    /// value of 13FEh that marks the configuration as valid
+    static constexpr std::uint8_t valid_mark = 0xa5;
 
     /// Creates the SRDOs that the dictionary describes; all arguments outlive them. [setup]
     Srdos(Dictionary&, FrameQueue& out, Emcy&);
@@ -62,30 +67,35 @@ public:
     void listen(SafetyEvents& events) noexcept { events_ = &events; }
     /// Reads all parameters after a communication reset. [realtime]
     void reset(std::uint8_t node_id) noexcept;
-    /// Starts or stops the exchange of SRDOs; they exist only in the NMT state operational. [realtime]
+    /// Starts or stops the exchange of SRDOs; they exist only in the NMT state operational.
+    /// [realtime]
     void set_operational(bool operational, Time now) noexcept;
-    /// Processes a frame; returns true if it belongs to an SRDO or is a global fail-safe command. [realtime]
+    /// Processes a frame; returns true if it belongs to an SRDO or is a global fail-safe command.
+    /// [realtime]
     bool handle(const Frame&, Time now) noexcept;
     /// Sends SRDOs that are due and checks SCT and SRVT; call it once per cycle. [realtime]
     void poll(Time now) noexcept;
 
-    /// Expects a received SRDO from now on, the first one within the SCT; without this call the SCT starts with the first SRDO received. `on`
-    /// false: ignores it. [realtime]
+    /// Expects a received SRDO from now on, the first one within the SCT; without this call the SCT
+    /// starts with the first SRDO received. `on` false: ignores it. [realtime]
     void expect(unsigned number, bool on, Time now) noexcept;
     /// Acknowledges a fault; the data is valid again from the next valid SRDO on. [realtime]
     void acknowledge(unsigned number, Time now) noexcept;
-    /// Sends an SRDO at the next poll() instead of when it is due. Returns false if it does not exist. [realtime]
+    /// Sends an SRDO at the next poll() instead of when it is due. Returns false if it does not
+    /// exist. [realtime]
     bool trigger(unsigned number) noexcept;
-    /// Derives the second frame from the first; the inverted objects of the mapping are not used. [setup]
+    /// Derives the second frame from the first; the inverted objects of the mapping are not used.
+    /// [setup]
     void derive_inverted(unsigned number) noexcept;
-    /// Sends the global fail-safe command if 1300h allows it; returns false if not, or if the queue is full. [realtime]
+    /// Sends the global fail-safe command if 1300h allows it; returns false if not, or if the queue
+    /// is full. [realtime]
     bool send_fail_safe() noexcept;
 
     /// The state of one SRDO.
     struct Status {
         bool exists = false;
-        bool active = false;    ///< the configuration is valid and the node operational
-        bool valid = false;     ///< received: at least one arrived, and there is no fault
+        bool active = false;  ///< the configuration is valid and the node operational
+        bool valid = false;  ///< received: at least one arrived, and there is no fault
         SrdoDirection direction = SrdoDirection::none;
         SrdoFault fault = SrdoFault::none;
         std::uint64_t count = 0;  ///< SRDOs sent, or received and valid
@@ -104,25 +114,36 @@ private:
     struct Srdo {
         std::uint8_t number = 0;
         SrdoDirection direction = SrdoDirection::none;
-        std::uint32_t cob = 0;                // of the first frame
-        Time cycle = 0, validation = 0;       // refresh time or SCT; SRVT
+        std::uint32_t cob = 0;  // of the first frame
+        Time cycle = 0;
+        Time validation = 0;  // refresh time or SCT; SRVT
         Mapping plain, inverted;
         SrdoFault fault = SrdoFault::none;
-        bool ignored = false, strict = false;  // set by expect()
-        bool heard = false, half = false;      // at least one valid SRDO arrived; the first frame awaits the second
-        bool derived = false, now = false;
+        bool ignored = false;
+        bool strict = false;  // set by expect()
+        // at least one valid SRDO arrived; the first frame awaits the second
+        bool heard = false;
+        bool half = false;
+        bool derived = false;
+        bool now = false;
         std::uint64_t first = 0;
-        Time first_at = 0, last = 0, next = 0;
+        Time first_at = 0;
+        Time last = 0;
+        Time next = 0;
         std::uint64_t count = 0;
-        Srdo(unsigned n, std::size_t capacity) : number(static_cast<std::uint8_t>(n)), plain(capacity), inverted(capacity) {}
+        Srdo(unsigned n, std::size_t capacity)
+            : number(static_cast<std::uint8_t>(n)), plain(capacity), inverted(capacity) {}
     };
-    static constexpr std::uint32_t first_id = 0x101, last_id = 0x180;
+    static constexpr std::uint32_t first_id = 0x101;
+    static constexpr std::uint32_t last_id = 0x180;
 
     Srdo* find(unsigned number) noexcept;
     void begin(Srdo&, Time now) noexcept;
     void fail(Srdo&, SrdoFault, Time now) noexcept;
     void take(Srdo&, const Frame&, bool is_second, Time now) noexcept;
-    bool too_late(const Srdo& s, Time now) const noexcept { return (s.heard || s.strict) && now - s.last > s.cycle; }
+    bool too_late(const Srdo& s, Time now) const noexcept {
+        return (s.heard || s.strict) && now - s.last > s.cycle;
+    }
     void send(Srdo&, Time now) noexcept;
     Abort configure() noexcept;
     Abort configure(Srdo&) noexcept;
@@ -133,8 +154,10 @@ private:
     SafetyEvents* events_ = nullptr;
     std::vector<Srdo> srdos_;
     std::array<std::int8_t, max_srdos + 1> of_number_{};
-    std::array<std::int8_t, last_id - first_id + 1> of_id_{};  // received SRDOs by identifier of either frame
-    bool operational_ = false, valid_ = false;
+    // received SRDOs by identifier of either frame
+    std::array<std::int8_t, last_id - first_id + 1> of_id_{};
+    bool operational_ = false;
+    bool valid_ = false;
     Time now_ = 0;
 };
 

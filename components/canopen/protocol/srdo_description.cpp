@@ -6,8 +6,11 @@
 namespace hal::canopen {
 
 namespace {
-constexpr auto u8 = Type::unsigned8, u16 = Type::unsigned16, u32 = Type::unsigned32;
-constexpr auto rw = Access::read_write, fixed = Access::constant;
+constexpr auto u8 = Type::unsigned8;
+constexpr auto u16 = Type::unsigned16;
+constexpr auto u32 = Type::unsigned32;
+constexpr auto rw = Access::read_write;
+constexpr auto fixed = Access::constant;
 constexpr std::size_t most_mapped = 16;
 
 template <class T>
@@ -20,10 +23,14 @@ std::uint16_t with(std::uint16_t crc, T value) noexcept {
 
 std::uint16_t srdo_signature(const SrdoDescription& s) noexcept {
     std::uint16_t crc = with(0, static_cast<std::uint8_t>(s.direction));
-    crc = with(crc, s.cycle_ms), crc = with(crc, s.validation_ms);
-    crc = with(crc, s.cob), crc = with(crc, s.cob == 0 ? 0 : s.cob + 1);
+    crc = with(crc, s.cycle_ms);
+    crc = with(crc, s.validation_ms);
+    crc = with(crc, s.cob);
+    crc = with(crc, s.cob == 0 ? 0 : s.cob + 1);
     crc = with(crc, static_cast<std::uint8_t>(s.mapping.size()));
-    for (std::size_t n = 0; n < s.mapping.size(); ++n) crc = with(with(crc, static_cast<std::uint8_t>(n + 1)), s.mapping[n]);
+    for (std::size_t n = 0; n < s.mapping.size(); ++n) {
+        crc = with(with(crc, static_cast<std::uint8_t>(n + 1)), s.mapping[n]);
+    }
     return crc;
 }
 
@@ -36,9 +43,13 @@ void add_srdos(Description& d, std::span<const SrdoDescription> srdos) {
     bool valid = true;
     for (std::size_t n = 0; n < count; ++n) {
         const auto& s = srdos[n];
-        const auto index = static_cast<std::uint16_t>(0x1301 + n), mapping = static_cast<std::uint16_t>(0x1381 + n);
+        const auto index = static_cast<std::uint16_t>(0x1301 + n);
+
+        const auto mapping = static_cast<std::uint16_t>(0x1381 + n);
         const std::string number = "SRDO " + std::to_string(n + 1);
-        d.objects[index] = number + " communication parameter", d.objects[mapping] = number + " mapping parameter";
+        d.objects[index] = number + " communication parameter";
+
+        d.objects[mapping] = number + " mapping parameter";
         d.add(index, 0, u8, fixed, 6, "Highest sub-index");
         d.add(index, 1, u8, rw, static_cast<std::uint8_t>(s.direction), "Information direction");
         d.add(index, 2, u16, rw, s.cycle_ms, "Refresh time or SCT");
@@ -47,9 +58,12 @@ void add_srdos(Description& d, std::span<const SrdoDescription> srdos) {
         d.add(index, 5, u32, rw, s.cob, "COB-ID 1");
         d.add(index, 6, u32, rw, s.cob == 0 ? 0 : s.cob + 1, "COB-ID 2");
         d.add(mapping, 0, u8, rw, s.mapping.size(), "Number of mapped objects");
-        for (std::size_t k = 0; k < std::max(most_mapped, s.mapping.size()); ++k)
-            d.add(mapping, static_cast<std::uint8_t>(k + 1), u32, rw, k < s.mapping.size() ? s.mapping[k] : 0, "Mapped object");
-        d.add(0x13ff, static_cast<std::uint8_t>(n + 1), u16, rw, srdo_signature(s), number + " signature");
+        for (std::size_t k = 0; k < std::max(most_mapped, s.mapping.size()); ++k) {
+            d.add(mapping, static_cast<std::uint8_t>(k + 1), u32, rw,
+                  k < s.mapping.size() ? s.mapping[k] : 0, "Mapped object");
+        }
+        d.add(0x13ff, static_cast<std::uint8_t>(n + 1), u16, rw, srdo_signature(s),
+              number + " signature");
         valid = valid && (s.direction == SrdoDirection::none || s.cob != 0);
     }
     d.add(0x13fe, 0, u8, rw, valid ? Srdos::valid_mark : 0, "Configuration valid");

@@ -3,8 +3,11 @@
 
 namespace hal::canopen {
 
-Sync::Sync(Dictionary& dictionary, FrameQueue& out, Emcy& emcy) : dictionary_(dictionary), out_(out), emcy_(emcy) {
-    for (const int index : {0x1005, 0x1006, 0x1007, 0x1019}) dictionary.handle(static_cast<std::uint16_t>(index), *this);
+Sync::Sync(Dictionary& dictionary, FrameQueue& out, Emcy& emcy)
+    : dictionary_(dictionary), out_(out), emcy_(emcy) {
+    for (const int index : {0x1005, 0x1006, 0x1007, 0x1019}) {
+        dictionary.handle(static_cast<std::uint16_t>(index), *this);
+    }
 }
 
 void Sync::reset() noexcept {
@@ -12,25 +15,41 @@ void Sync::reset() noexcept {
     const auto period = static_cast<Time>(dictionary_.get<std::uint32_t>(0x1006, 0)) * microsecond;
     const auto overflow = dictionary_.get<std::uint8_t>(0x1019, 0);
     const bool starts = ((cob ^ cob_) & cob_flag30) != 0 || period != period_;
-    if (starts) started_ = false;
-    if (starts || overflow != overflow_) next_counter_ = 1;
-    cob_ = cob, period_ = period, overflow_ = overflow;
+    if (starts) {
+        started_ = false;
+    }
+    if (starts || overflow != overflow_) {
+        next_counter_ = 1;
+    }
+    cob_ = cob;
+    period_ = period;
+    overflow_ = overflow;
     window_ = static_cast<Time>(dictionary_.get<std::uint32_t>(0x1007, 0)) * microsecond;
 }
 
 void Sync::set_active(bool active) noexcept {
-    if (active != active_) started_ = seen_ = lost_reported_ = false, next_counter_ = 1;
+    if (active != active_) {
+        started_ = seen_ = lost_reported_ = false;
+        next_counter_ = 1;
+    }
     active_ = active;
 }
 
 bool Sync::handle(const Frame& f, Time now) noexcept {
-    if (f.id != cob_id(cob_) || f.extended != ((cob_ & cob_extended) != 0) || f.remote) return false;
+    if (f.id != cob_id(cob_) || f.extended != ((cob_ & cob_extended) != 0) || f.remote) {
+        return false;
+    }
     if (!active_) return false;
     const std::uint8_t expected = overflow_ != 0 ? 1 : 0;
-    if (f.length != expected) emcy_.raise(0x8240, error_communication, {f.length, expected});
-    else emcy_.clear(0x8240);
+    if (f.length != expected) {
+        emcy_.raise(0x8240, error_communication, {f.length, expected});
+    } else {
+        emcy_.clear(0x8240);
+    }
     counter_ = f.length >= 1 && expected == 1 ? f.data[0] : 0;
-    last_ = now, seen_ = true, lost_reported_ = false;
+    last_ = now;
+    seen_ = true;
+    lost_reported_ = false;
     return true;
 }
 
@@ -40,14 +59,20 @@ bool Sync::produce(Time now) noexcept {
     f.data[0] = next_counter_;
     if (!out_.push(f)) return false;
     counter_ = overflow_ != 0 ? next_counter_ : 0;
-    if (overflow_ != 0) next_counter_ = next_counter_ >= overflow_ ? 1 : static_cast<std::uint8_t>(next_counter_ + 1);
+    if (overflow_ != 0) {
+        next_counter_ =
+            next_counter_ >= overflow_ ? 1 : static_cast<std::uint8_t>(next_counter_ + 1);
+    }
     last_ = now;
     return true;
 }
 
 bool Sync::poll(Time now) noexcept {
     if (!producer() || !active_ || period_ == 0) return false;
-    if (!started_) started_ = true, next_ = now;
+    if (!started_) {
+        started_ = true;
+        next_ = now;
+    }
     if (now < next_) return false;
     const auto behind = (now - next_) / period_;
     skipped_ += static_cast<std::uint64_t>(behind);
@@ -56,7 +81,10 @@ bool Sync::poll(Time now) noexcept {
 }
 
 bool Sync::lost(Time now) noexcept {
-    if (!seen_ || lost_reported_ || producer() || !active_ || period_ == 0 || now - last_ < period_ + period_ / 2) return false;
+    if (!seen_ || lost_reported_ || producer() || !active_ || period_ == 0 ||
+        now - last_ < period_ + period_ / 2) {
+        return false;
+    }
     return lost_reported_ = true;
 }
 
@@ -74,12 +102,17 @@ Abort Sync::writing(Entry& e, std::span<const std::uint8_t> value) noexcept {
     return Abort::none;
 }
 
-TimeStamp::TimeStamp(Dictionary& dictionary, FrameQueue& out) : dictionary_(dictionary), out_(out) { dictionary.handle(0x1012, *this); }
+TimeStamp::TimeStamp(Dictionary& dictionary, FrameQueue& out) : dictionary_(dictionary), out_(out) {
+    dictionary.handle(0x1012, *this);
+}
 
 bool TimeStamp::handle(const Frame& f, TimeOfDay& time) noexcept {
-    if ((cob_ & 0x80000000) == 0 || f.remote || f.id != cob_id(cob_) || f.extended != ((cob_ & cob_extended) != 0) || f.length != 6)
+    if ((cob_ & 0x80000000) == 0 || f.remote || f.id != cob_id(cob_) ||
+        f.extended != ((cob_ & cob_extended) != 0) || f.length != 6) {
         return false;
-    time = {load<std::uint32_t>(f.data.data()) & 0x0fffffff, load<std::uint16_t>(f.data.data() + 4)};
+    }
+    time = {load<std::uint32_t>(f.data.data()) & 0x0fffffff,
+            load<std::uint16_t>(f.data.data() + 4)};
     return true;
 }
 
@@ -93,8 +126,11 @@ bool TimeStamp::produce(const TimeOfDay& time) noexcept {
 
 Abort TimeStamp::writing(Entry&, std::span<const std::uint8_t> value) noexcept {
     const auto cob = load<std::uint32_t>(value.data());
-    const bool in_use = (cob_ & 0xc0000000) != 0, moved = ((cob ^ cob_) & 0x3fffffff) != 0;
-    return (in_use && moved) || ((cob & cob_extended) == 0 && restricted(cob_id(cob))) ? Abort::value : Abort::none;
+    const bool in_use = (cob_ & 0xc0000000) != 0;
+    const bool moved = ((cob ^ cob_) & 0x3fffffff) != 0;
+    return (in_use && moved) || ((cob & cob_extended) == 0 && restricted(cob_id(cob)))
+               ? Abort::value
+               : Abort::none;
 }
 
 }  // namespace hal::canopen

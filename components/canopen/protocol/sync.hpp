@@ -16,16 +16,19 @@ public:
     Sync(Dictionary&, FrameQueue& out, Emcy&);
     /// Reads all parameters. [realtime]
     void reset() noexcept;
-    /// Enables the service, in the NMT states pre-operational and operational; restarts the period of the producer. [realtime]
+    /// Enables the service, in the NMT states pre-operational and operational; restarts the period
+    /// of the producer. [realtime]
     void set_active(bool active) noexcept;
     /// Processes a frame; returns true if it is a SYNC. [realtime]
     bool handle(const Frame&, Time now) noexcept;
-    /// Sends a SYNC when it is due and returns true if it did. Missed periods are skipped; the phase is kept. [realtime]
+    /// Sends a SYNC when it is due and returns true if it did. Missed periods are skipped; the
+    /// phase is kept. [realtime]
     bool poll(Time now) noexcept;
-    /// Sends a SYNC now, for a thread that is the clock (with 1006h = 0). Returns false if this node is not the producer or the queue is full.
-    /// [realtime]
+    /// Sends a SYNC now, for a thread that is the clock (with 1006h = 0). Returns false if this
+    /// node is not the producer or the queue is full. [realtime]
     bool produce(Time now) noexcept;
-    /// Returns true once when no SYNC arrived within one and a half times the period 1006h. [realtime]
+    /// Returns true once when no SYNC arrived within one and a half times the period 1006h.
+    /// [realtime]
     bool lost(Time now) noexcept;
 
     /// Returns true if this node produces SYNC (1005h bit 30). [any]
@@ -53,9 +56,17 @@ private:
     FrameQueue& out_;
     Emcy& emcy_;
     std::uint32_t cob_ = 0x80;
-    Time period_ = 0, window_ = 0, next_ = 0, last_ = 0;
-    std::uint8_t overflow_ = 0, counter_ = 0, next_counter_ = 1;
-    bool active_ = false, started_ = false, seen_ = false, lost_reported_ = false;
+    Time period_ = 0;
+    Time window_ = 0;
+    Time next_ = 0;
+    Time last_ = 0;
+    std::uint8_t overflow_ = 0;
+    std::uint8_t counter_ = 0;
+    std::uint8_t next_counter_ = 1;
+    bool active_ = false;
+    bool started_ = false;
+    bool seen_ = false;
+    bool lost_reported_ = false;
     std::uint64_t skipped_ = 0;
 };
 
@@ -66,9 +77,11 @@ public:
     TimeStamp(Dictionary&, FrameQueue& out);
     /// Reads 1012h. [realtime]
     void reset() noexcept { cob_ = dictionary_.get<std::uint32_t>(0x1012, 0); }
-    /// Processes a frame; returns true and sets the time if it is a TIME message that this node consumes. [realtime]
+    /// Processes a frame; returns true and sets the time if it is a TIME message that this node
+    /// consumes. [realtime]
     bool handle(const Frame&, TimeOfDay&) noexcept;
-    /// Sends a TIME message. Returns false if this node is not the producer (1012h bit 30) or the queue is full. [realtime]
+    /// Sends a TIME message. Returns false if this node is not the producer (1012h bit 30) or the
+    /// queue is full. [realtime]
     bool produce(const TimeOfDay&) noexcept;
     Abort writing(Entry&, std::span<const std::uint8_t>) noexcept override;
     void written(Entry&) noexcept override { reset(); }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Writers and readers on Fast DDS 2.9. A sample is plain bytes here: the types have names and no fields. Included by the engine only.
+// Writers and readers on Fast DDS 2.9. A sample is plain bytes here: the types have names and no
+// fields. Included by the engine only.
 #pragma once
 
 #include <atomic>
@@ -23,10 +24,11 @@ namespace fd = eprosima::fastdds::dds;
 /// A sample as the library passes it to BytesType.
 struct Bytes {
     std::span<const std::uint8_t> out;  // to write; owned by the caller of write()
-    std::vector<std::uint8_t>     in;   // read
+    std::vector<std::uint8_t> in;   // read
 };
 
-/// Forwards the library's callbacks of one writer or reader to its listener, one at a time, until the owner closes it.
+/// Forwards the library's callbacks of one writer or reader to its listener, one at a time, until
+/// the owner closes it.
 class ListenerGate {
 public:
     explicit ListenerGate(Listener* listener) : listener_(listener) {}
@@ -36,34 +38,40 @@ public:
     }
     void event(Event e, int count, const std::string& text = {}) {
         const std::lock_guard lock(mutex_);
-        if (listener_ != nullptr) listener_->on_event(e, count, text);
+        if (listener_ != nullptr) {
+            listener_->on_event(e, count, text);
+        }
     }
     template <class F>
     void with(F&& f) {
         const std::lock_guard lock(mutex_);
-        if (listener_ != nullptr) f(*listener_);
+        if (listener_ != nullptr) {
+            f(*listener_);
+        }
     }
 
 private:
     std::mutex mutex_;
-    Listener*  listener_;
+    Listener* listener_;
 };
 
 class ParticipantImpl;
 
-/// What writers and readers have in common. Their participant creates them, and again when it is re-created itself.
+/// What writers and readers have in common. Their participant creates them, and again when it is
+/// re-created itself.
 class Endpoint {
 public:
-    Endpoint(std::shared_ptr<ParticipantImpl> owner, const TopicType& t, const Quality& q, Listener* l)
+    Endpoint(std::shared_ptr<ParticipantImpl> owner, const TopicType& t, const Quality& q,
+             Listener* l)
         : topic(t), quality(q), gate(std::make_shared<ListenerGate>(l)), owner_(std::move(owner)) {}
     Endpoint(const Endpoint&) = delete;
 
     virtual const char* kind() const noexcept = 0;  ///< "writer", "reader"
-    virtual bool        make(fd::Topic*) = 0;  ///< false: Fast DDS created none
-    virtual void        unmake() noexcept = 0;  ///< does nothing when it is not created
+    virtual bool make(fd::Topic*) = 0;  ///< false: Fast DDS created none
+    virtual void unmake() noexcept = 0;  ///< does nothing when it is not created
 
-    const TopicType             topic;
-    const Quality               quality;
+    const TopicType topic;
+    const Quality quality;
     const std::shared_ptr<ListenerGate> gate;
 
 protected:
@@ -73,7 +81,7 @@ protected:
         gate->event(change > 0 ? Event::matched : Event::unmatched, count);
     }
     std::shared_ptr<ParticipantImpl> owner_;
-    std::atomic<int>                 matched_{0};
+    std::atomic<int> matched_{0};
 };
 
 class WriterImpl final : public Writer, private Endpoint, private fd::DataWriterListener {
@@ -81,20 +89,22 @@ public:
     WriterImpl(std::shared_ptr<ParticipantImpl> owner, const TopicType&, const Quality&, Listener*);
     ~WriterImpl() override;
     bool write(std::span<const std::uint8_t> bytes, std::int64_t source_ns) noexcept override;
-    int  matched() const noexcept override { return matched_.load(std::memory_order_relaxed); }
+    int matched() const noexcept override { return matched_.load(std::memory_order_relaxed); }
     bool wait_for_acknowledgments(std::int64_t timeout_ns) noexcept override;
 
 private:
     const char* kind() const noexcept override { return "writer"; }
-    bool        make(fd::Topic*) override;
-    void        unmake() noexcept override;
-    void        on_publication_matched(fd::DataWriter*, const fd::PublicationMatchedStatus& s) override {
+    bool make(fd::Topic*) override;
+    void unmake() noexcept override;
+    void on_publication_matched(fd::DataWriter*, const fd::PublicationMatchedStatus& s) override {
         count_matched(s.current_count, s.current_count_change);
     }
-    void on_offered_deadline_missed(fd::DataWriter*, const fd::OfferedDeadlineMissedStatus& s) override {
+    void on_offered_deadline_missed(fd::DataWriter*,
+                                    const fd::OfferedDeadlineMissedStatus& s) override {
         gate->event(Event::deadline_missed, static_cast<int>(s.total_count));
     }
-    void on_offered_incompatible_qos(fd::DataWriter*, const fd::OfferedIncompatibleQosStatus&) override;
+    void on_offered_incompatible_qos(fd::DataWriter*,
+                                     const fd::OfferedIncompatibleQosStatus&) override;
     fd::DataWriter* writer_ = nullptr;  // used by the DDS thread only, which also re-creates it
 };
 
@@ -106,20 +116,22 @@ public:
 
 private:
     const char* kind() const noexcept override { return "reader"; }
-    bool        make(fd::Topic*) override;
-    void        unmake() noexcept override;
-    void        on_data_available(fd::DataReader*) override;
+    bool make(fd::Topic*) override;
+    void unmake() noexcept override;
+    void on_data_available(fd::DataReader*) override;
     void on_subscription_matched(fd::DataReader*, const fd::SubscriptionMatchedStatus& s) override {
         count_matched(s.current_count, s.current_count_change);
     }
-    void on_requested_deadline_missed(fd::DataReader*, const fd::RequestedDeadlineMissedStatus& s) override {
+    void on_requested_deadline_missed(fd::DataReader*,
+                                      const fd::RequestedDeadlineMissedStatus& s) override {
         gate->event(Event::deadline_missed, static_cast<int>(s.total_count));
     }
-    void on_requested_incompatible_qos(fd::DataReader*, const fd::RequestedIncompatibleQosStatus&) override;
+    void on_requested_incompatible_qos(fd::DataReader*,
+                                       const fd::RequestedIncompatibleQosStatus&) override;
     void on_liveliness_changed(fd::DataReader*, const fd::LivelinessChangedStatus& s) override {
         gate->event(s.alive_count_change > 0 ? Event::alive : Event::not_alive, s.alive_count);
     }
-    Bytes           sample_;  // under the gate's lock
+    Bytes sample_;  // under the gate's lock
     fd::DataReader* reader_ = nullptr;
 };
 

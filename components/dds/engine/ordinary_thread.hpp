@@ -12,8 +12,8 @@
 
 namespace hal::dds {
 
-/// Runs work in a thread with an ordinary policy and a small stack (mlockall makes stacks resident); threads that the library starts
-/// there inherit both.
+/// Runs work in a thread with an ordinary policy and a small stack (mlockall makes stacks
+/// resident); threads that the library starts there inherit both.
 class OrdinaryThread {
 public:
     template <class F>
@@ -30,24 +30,31 @@ public:
         pthread_attr_setstacksize(&small, stack);
         pthread_setattr_default_np(&small);
         struct Call {
-            F&                 work;
+            F& work;
             std::exception_ptr error;
         } call{work, {}};
         pthread_t thread{};
         const int failed = pthread_create(&thread, &attributes, [](void* p) -> void* {
             auto& c = *static_cast<Call*>(p);
-            setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), -10);  // inherited by the library's threads; if permitted
+            // inherited by the library's threads; if permitted
+            setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), -10);
             try {
                 c.work();
-            } catch (...) { c.error = std::current_exception(); }
+            } catch (...) {
+                c.error = std::current_exception();
+            }
             return nullptr;
         }, &call);
-        if (failed == 0) pthread_join(thread, nullptr);
+        if (failed == 0) {
+            pthread_join(thread, nullptr);
+        }
         pthread_setattr_default_np(&before);
         pthread_attr_destroy(&before);
         pthread_attr_destroy(&attributes);
         if (failed != 0) throw std::runtime_error("cannot start a thread for DDS");
-        if (call.error) std::rethrow_exception(call.error);
+        if (call.error) {
+            std::rethrow_exception(call.error);
+        }
     }
 
 private:

@@ -29,7 +29,9 @@ public:
     void add(Served& s) {
         const std::lock_guard lock(mutex_);
         entries_.push_back({&s, 0});
-        if (!running_) begin();
+        if (!running_) {
+            begin();
+        }
         wake_.notify_one();
     }
     void remove(Served& s) noexcept {
@@ -52,14 +54,15 @@ private:
     }
 
     struct Entry {
-        Served*      served;
+        Served* served;
         std::int64_t next;
     };
 
     void begin() {
         pthread_attr_t attributes;
         pthread_attr_init(&attributes);
-        pthread_attr_setinheritsched(&attributes, PTHREAD_EXPLICIT_SCHED);  // the caller may be a real-time thread
+        // the caller may be a real-time thread
+        pthread_attr_setinheritsched(&attributes, PTHREAD_EXPLICIT_SCHED);
         pthread_attr_setschedpolicy(&attributes, SCHED_OTHER);
         const sched_param none{};
         pthread_attr_setschedparam(&attributes, &none);
@@ -78,29 +81,37 @@ private:
     }
 
     void run() {
-        setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), -10);  // the highest priority of an ordinary thread, if permitted
+        // the highest priority of an ordinary thread, if permitted
+        setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), -10);
         prctl(PR_SET_TIMERSLACK, 1UL);  // the default of 50 us would delay samples
         std::unique_lock lock(mutex_);
         for (last_ns_ = awake_ns(); running_;) {
             check_for_suspension();
             engine_log().flush();
-            const auto   now = Clock::now().time_since_epoch();
+            const auto now = Clock::now().time_since_epoch();
             std::int64_t next = now.count() + 1'000'000'000;
             for (Entry& e : entries_) {
-                if (e.next <= now.count()) e.next = e.served->serve(now.count());
+                if (e.next <= now.count()) {
+                    e.next = e.served->serve(now.count());
+                }
                 next = std::min(next, e.next);
             }
-            if (next > now.count()) wake_.wait_until(lock, Clock::time_point(Clock::duration(next)));
+            if (next > now.count()) {
+                wake_.wait_until(lock, Clock::time_point(Clock::duration(next)));
+            }
         }
     }
 
-    /// The thread wakes at least every second. After a longer gap, others may have dropped this process.
+    /// The thread wakes at least every second. After a longer gap, others may have dropped this
+    /// process.
     void check_for_suspension() {
-        const std::int64_t now = awake_ns(), gone = now - std::exchange(last_ns_, now);
+        const std::int64_t now = awake_ns();
+        const std::int64_t gone = now - std::exchange(last_ns_, now);
         if (gone > participant_lease_ns) {
             char text[128];
             std::snprintf(text, sizeof text,
-                          "this process was suspended for %.1f s and may have been dropped by others; announcing it again",
+                          "this process was suspended for %.1f s and may have been dropped by "
+                          "others; announcing it again",
                           static_cast<double>(gone) * 1e-9);
             engine_log().print(text);
             anew_at_ns_ = now;
@@ -111,12 +122,14 @@ private:
         anew_at_ns_ = known ? INT64_MAX : last_ns_ + 1'000'000'000;
     }
 
-    std::mutex              mutex_;  // of everything; held while served, so that remove() waits for it
+    // of everything; held while served, so that remove() waits for it
+    std::mutex mutex_;
     std::condition_variable wake_;
-    std::vector<Entry>      entries_;
-    pthread_t               thread_{};
-    bool                    running_ = false;
-    std::int64_t            last_ns_ = 0, anew_at_ns_ = INT64_MAX;  // of the thread
+    std::vector<Entry> entries_;
+    pthread_t thread_{};
+    bool running_ = false;
+    std::int64_t last_ns_ = 0;
+    std::int64_t anew_at_ns_ = INT64_MAX;  // of the thread
 };
 
 Pump& pump() {

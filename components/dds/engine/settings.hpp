@@ -8,11 +8,12 @@
 
 namespace hal::dds {
 
-/// Returns the QoS of a participant. Throws std::runtime_error for an unknown interface, an invalid address, a missing file.
+/// Returns the QoS of a participant. Throws std::runtime_error for an unknown interface, an invalid
+/// address, a missing file.
 eprosima::fastdds::dds::DomainParticipantQos participant_qos(const Settings&);
 
-/// Prepares Fast DDS, once per process and before its first use: it reads no configuration file that was not named, and logs through
-/// engine_log().
+/// Prepares Fast DDS, once per process and before its first use: it reads no configuration file
+/// that was not named, and logs through engine_log().
 void prepare_library();
 
 }  // namespace hal::dds

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// What a program that loads dds_publish, dds_subscribe and node gives them: the names of their arguments and pins, which the components
-// declare from here, and the arguments of one instance as a struct.
+// What a program that loads dds_publish, dds_subscribe and node gives them: the names of their
+// arguments and pins, which the components declare from here, and the arguments of one instance as
+// a struct.
 //
 //     PublishLink link{{.instance = "node-out", .topic = "halcyon/cell/robot/servo", .type = "…", .fields = {{"speed", "float"}}}, 100};
 //     link.arguments("dds_publish")   // loadrt dds_publish names=node-out topic=… type=… fields=speed:float rate=100 reliable=0
@@ -19,36 +20,50 @@ namespace hal::dds {
 
 /// Names of load arguments.
 namespace argument {
-inline constexpr const char *topic = "topic", *type = "type", *fields = "fields", *reliable = "reliable", *rate = "rate",
-                            *timeout_ms = "timeout_ms", *cell = "cell", *node = "node", *others = "others", *offers = "offers",
+inline constexpr const char *topic = "topic", *type = "type", *fields = "fields",
+                            *reliable = "reliable", *rate = "rate", *timeout_ms = "timeout_ms",
+                            *cell = "cell", *node = "node", *others = "others", *offers = "offers",
                             *wants = "wants";
 }  // namespace argument
 
-/// Names of pins that are linked between dds_subscribe and node. Those of node are prefixed by the other node: `node.robot.heard`.
+/// Names of pins that are linked between dds_subscribe and node. Those of node are prefixed by the
+/// other node: `node.robot.heard`.
 namespace pin {
-inline constexpr const char *valid = "valid", *age_ms = "age-ms", *heard = "heard", *heard_age_ms = "heard-age-ms";
+inline constexpr const char *valid = "valid", *age_ms = "age-ms", *heard = "heard",
+                            *heard_age_ms = "heard-age-ms";
 }  // namespace pin
 
 /// A field of a topic.
 struct LinkField {
     std::string name, type;
-    std::string safe = {};  ///< value of a subscriber's pin while the topic is not valid; empty: the pin keeps its value
+    /// value of a subscriber's pin while the topic is not valid; empty: the pin keeps its value
+    std::string safe = {};
 };
 
 /// What both ends of a topic are given alike.
 struct TopicLink {
-    std::string            instance, topic, type;
+    std::string instance, topic, type;
     std::vector<LinkField> fields = {};
 
-    /// Returns `loadrt COMPONENT` and its arguments, a word each. Links are best effort: a newer sample replaces a lost one.
+    /// Returns `loadrt COMPONENT` and its arguments, a word each. Links are best effort: a newer
+    /// sample replaces a lost one.
     std::vector<std::string> arguments(std::string_view component) const {
         std::string list;
-        for (const LinkField& f : fields)
-            list += (list.empty() ? "" : ",") + f.name + ":" + f.type + (f.safe.empty() ? "" : "=" + f.safe);
-        return {"loadrt", std::string(component), "names=" + instance, word(argument::topic, topic), word(argument::type, type),
-                word(argument::fields, list), word(argument::reliable, "0")};
+        for (const LinkField& f : fields) {
+            list += (list.empty() ? "" : ",") + f.name + ":" + f.type +
+                    (f.safe.empty() ? "" : "=" + f.safe);
+        }
+        return {"loadrt",
+                std::string(component),
+                "names=" + instance,
+                word(argument::topic, topic),
+                word(argument::type, type),
+                word(argument::fields, list),
+                word(argument::reliable, "0")};
     }
-    static std::string word(const char* name, const std::string& value) { return std::string(name) + "=" + value; }
+    static std::string word(const char* name, const std::string& value) {
+        return std::string(name) + "=" + value;
+    }
 };
 
 /// An instance of dds_publish.
@@ -77,21 +92,30 @@ struct SubscribeLink : TopicLink {
 
 /// The one instance of node.
 struct NodeLink {
-    std::string              cell, node;
-    std::vector<std::string> others;          ///< all other nodes
-    std::string              offers, wants;   ///< topics sent and taken: NODE/THREAD=SIGNAL:TYPE,...;
+    std::string cell, node;
+    std::vector<std::string> others;  ///< all other nodes
+    /// topics sent and taken: NODE/THREAD=SIGNAL:TYPE,...;
+    std::string offers, wants;
 
     std::vector<std::string> arguments() const {
-        std::vector<std::string> words{"loadrt", "node", TopicLink::word(argument::cell, cell), TopicLink::word(argument::node, node)};
-        std::string              names;
-        for (const std::string& other : others) names += (names.empty() ? "" : ",") + other;
+        std::vector<std::string> words{"loadrt", "node", TopicLink::word(argument::cell, cell),
+                                       TopicLink::word(argument::node, node)};
+        std::string names;
+        for (const std::string& other : others) {
+            names += (names.empty() ? "" : ",") + other;
+        }
         const std::pair<const char*, const std::string*> lists[] = {
             {argument::others, &names}, {argument::offers, &offers}, {argument::wants, &wants}};
-        for (const auto& [name, value] : lists)
-            if (!value->empty()) words.push_back(TopicLink::word(name, *value));
+        for (const auto& [name, value] : lists) {
+            if (!value->empty()) {
+                words.push_back(TopicLink::word(name, *value));
+            }
+        }
         return words;
     }
-    static std::string pin(const std::string& other, const char* name) { return "node." + other + "." + name; }
+    static std::string pin(const std::string& other, const char* name) {
+        return "node." + other + "." + name;
+    }
 };
 
 }  // namespace hal::dds

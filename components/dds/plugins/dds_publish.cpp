@@ -8,9 +8,9 @@
 #include <mutex>
 #include <optional>
 
-#include "dds/topic_connection.hpp"
 #include "dds/field_pins.hpp"
 #include "dds/outbox.hpp"
+#include "dds/topic_connection.hpp"
 
 namespace {
 
@@ -19,11 +19,15 @@ using namespace hal::dds;
 class DdsPublish : public hal::Component, private Listener, private Served {
 public:
     explicit DdsPublish(const hal_host* host) : Component(host) {
-        if (!(rate_ >= 0)) throw hal::ArgumentError("rate", "rate= is negative; write samples per second, or 0 for every cycle");
+        if (!(rate_ >= 0)) {
+            throw hal::ArgumentError(
+                "rate", "rate= is negative; write samples per second, or 0 for every cycle");
+        }
     }
 
     void start() {
-        connection_.open(arguments_, settings_, *this, [this](Participant& p) { return p.writer(topic_, quality_, this); });
+        connection_.open(arguments_, settings_, *this,
+                         [this](Participant& p) { return p.writer(topic_, quality_, this); });
     }
     void stop() noexcept { connection_.close(*this); }
 
@@ -60,27 +64,37 @@ private:
         return std::int64_t{t.tv_sec} * 1'000'000'000 + t.tv_nsec;
     }
 
-    /// Writes the queued samples. Returns the time of the next call, shortly before the cycle that makes the next sample: polling the
-    /// outbox for a moment replaces a wake-up by the cycle, which would cost the cycle a system call.
+    /// Writes the queued samples. Returns the time of the next call, shortly before the cycle that
+    /// makes the next sample: polling the outbox for a moment replaces a wake-up by the cycle,
+    /// which would cost the cycle a system call.
     std::int64_t serve(std::int64_t now) noexcept override {
         const std::int64_t due = due_.load(std::memory_order_acquire);
-        bool               found = false;
-        std::int64_t       made = 0;
-        if (now >= flush_at_) flush_at_ = now + 500'000'000, arguments_.flush_log();
-        for (std::span<std::uint8_t> bytes; !(bytes = outbox_.front(made)).empty(); outbox_.take()) {
+        bool found = false;
+        std::int64_t made = 0;
+        if (now >= flush_at_) {
+            flush_at_ = now + 500'000'000;
+            arguments_.flush_log();
+        }
+        for (std::span<std::uint8_t> bytes; !(bytes = outbox_.front(made)).empty();
+             outbox_.take()) {
             found = true;
             write(bytes, made);
         }
         if (found) {
-            // Polling for a sample costs CPU time, polling after it adds latency: the target is 15 us of polling.
+            // Polling for a sample costs CPU time, polling after it adds latency: the target is 15
+            // us of polling.
             const std::int64_t looked = expected_ == made ? now - since_ : 0;
-            if (looked <= 0) lead_ -= 4'000;
-            else lead_ += (looked - 15'000) / 8;
+            if (looked <= 0) {
+                lead_ -= 4'000;
+            } else {
+                lead_ += (looked - 15'000) / 8;
+            }
             lead_ = std::clamp<std::int64_t>(lead_, -150'000, 150'000);
             expected_ = 0;
             return now;  // once more, because `due` may be older than the sample
         }
-        const bool ours = std::abs(due - now) < 2'000'000'000;  // otherwise the cycle runs on a virtual clock
+        // otherwise the cycle runs on a virtual clock
+        const bool ours = std::abs(due - now) < 2'000'000'000;
         if (!ours) return now + 1'000'000;
         if (due + lead_ > now) {
             expected_ = 0;
@@ -90,12 +104,15 @@ private:
             expected_ = due;
             since_ = now;
         }
-        if (now - since_ < 60'000) return now;  // poll again
+        if (now - since_ < 60'000) {
+            return now;  // poll again
+        }
         return now + (now - due < 5'000'000 ? 100'000 : 5'000'000);
     }
 
     void write(std::span<std::uint8_t> bytes, std::int64_t made) noexcept {
-        const std::int64_t ago = clock(CLOCK_MONOTONIC) - made, real = clock(CLOCK_REALTIME);
+        const std::int64_t ago = clock(CLOCK_MONOTONIC) - made;
+        const std::int64_t real = clock(CLOCK_REALTIME);
         const std::int64_t source = ago >= 0 && ago < 2'000'000'000 ? real - ago : real;
         if (schema_.stamp != 0) {
             const auto sec = static_cast<std::int32_t>(source / 1'000'000'000);
@@ -103,42 +120,54 @@ private:
             std::memcpy(bytes.data() + schema_.stamp, &sec, sizeof sec);
             std::memcpy(bytes.data() + schema_.stamp + 4, &nanosec, sizeof nanosec);
         }
-        (connection_.endpoint().write(bytes, source) ? sent_ : rejected_).fetch_add(1, std::memory_order_relaxed);
+        (connection_.endpoint().write(bytes, source) ? sent_ : rejected_)
+            .fetch_add(1, std::memory_order_relaxed);
     }
 
     void on_event(Event e, int count, const std::string& text) noexcept override {
-        connection_.handle(arguments_, e, count, text, "topic '" + topic_.name + "': a subscriber requests a QoS that is not offered: ");
+        connection_.handle(
+            arguments_, e, count, text,
+            "topic '" + topic_.name + "': a subscriber requests a QoS that is not offered: ");
     }
 
-    Arguments         arguments_{*this};
-    hal::RealArgument rate_{*this, argument::rate, 100, "samples per second, rounded to cycles; 0: every cycle"};
-    hal::Function     publish_{*this, "", &DdsPublish::publish, "samples the pins, every n-th cycle"};
+    Arguments arguments_{*this};
+    hal::RealArgument rate_{*this, argument::rate, 100,
+                            "samples per second, rounded to cycles; 0: every cycle"};
+    hal::Function publish_{*this, "", &DdsPublish::publish, "samples the pins, every n-th cycle"};
 
-    const Schema    schema_ = arguments_.schema();
+    const Schema schema_ = arguments_.schema();
     const TopicType topic_ = arguments_.topic(schema_);
-    const Quality   quality_ = arguments_.quality();
-    const Settings  settings_ = arguments_.participant.settings();
+    const Quality quality_ = arguments_.quality();
+    const Settings settings_ = arguments_.participant.settings();
 
     FieldPins<hal::In> fields_{*this, publish_, schema_, "field of the topic"};
-    hal::In<bool>      enable{*this, publish_, "enable", "TRUE: samples are published", {.initial = true}};
+    hal::In<bool> enable{
+        *this, publish_, "enable", "TRUE: samples are published", {.initial = true}};
 
     hal::Out<std::uint32_t> matched{*this, publish_, "matched", "matched subscribers"};
     hal::Out<std::uint64_t> sent{*this, publish_, "sent", "samples written"};
-    hal::Out<std::uint64_t> dropped{*this, publish_, "dropped", "samples lost because the queue to the DDS thread was full"};
-    hal::Out<std::uint64_t> rejected{*this, publish_, "rejected",
-                                     "samples lost because the history was full: a reliable subscriber does not keep up"};
-    hal::Out<bool>          wrong_type{*this, publish_, "wrong-type", "a subscriber uses this topic with another type"};
+    hal::Out<std::uint64_t> dropped{*this, publish_, "dropped",
+                                    "samples lost because the queue to the DDS thread was full"};
+    hal::Out<std::uint64_t> rejected{
+        *this, publish_, "rejected",
+        "samples lost because the history was full: a reliable subscriber does not keep up"};
+    hal::Out<bool> wrong_type{*this, publish_, "wrong-type",
+                              "a subscriber uses this topic with another type"};
 
     // The cycle's
-    std::int64_t period_ = 0, every_ = 1, left_ = 0;
+    std::int64_t period_ = 0;
+    std::int64_t every_ = 1;
+    std::int64_t left_ = 0;
     // Between the cycle and the DDS thread
-    Outbox                     outbox_{schema_.sample, 64};
-    std::atomic<std::int64_t>  due_{0};  // when the next sample is made
-    std::atomic<std::uint64_t> sent_{0}, rejected_{0};
+    Outbox outbox_{schema_.sample, 64};
+    std::atomic<std::int64_t> due_{0};  // when the next sample is made
+    std::atomic<std::uint64_t> sent_{0};
+    std::atomic<std::uint64_t> rejected_{0};
     // The DDS thread's
     std::int64_t lead_ = 0;  // start of polling, relative to the beginning of the cycle
     std::int64_t flush_at_ = 0;
-    std::int64_t expected_ = 0, since_ = 0;  // the cycle whose sample it polls for, and since when
+    std::int64_t expected_ = 0;
+    std::int64_t since_ = 0;  // the cycle whose sample it polls for, and since when
 
     TopicConnection<Writer> connection_;
 };

@@ -6,8 +6,8 @@
 #include <memory>
 #include <mutex>
 
-#include "dds/topic_connection.hpp"
 #include "dds/field_pins.hpp"
+#include "dds/topic_connection.hpp"
 #include "hal/lasting_fault.hpp"
 #include "hal/queue.hpp"
 
@@ -18,31 +18,40 @@ using namespace hal::dds;
 /// The newest sample, for the cycle.
 struct Message {
     std::vector<hal_value> values;
-    std::int64_t           monotonic_ns = 0;  // reception time
-    std::int64_t           transit_ns = 0;    // its age at reception, by the writer's clock
-    std::uint64_t          sequence = 0, lost = 0, received = 0, malformed = 0;
-    bool                   clock_differs = false;
+    std::int64_t monotonic_ns = 0;  // reception time
+    std::int64_t transit_ns = 0;    // its age at reception, by the writer's clock
+    std::uint64_t sequence = 0;
+    std::uint64_t lost = 0;
+    std::uint64_t received = 0;
+    std::uint64_t malformed = 0;
+    bool clock_differs = false;
 };
 
 class DdsSubscribe : public hal::Component, private Listener, private Served {
 public:
     explicit DdsSubscribe(const hal_host* host) : Component(host) {
-        if (timeout_ms_ == 0) timeout_ = (arguments_.deadline_ms() > 0 ? arguments_.deadline_ms() : 1000) * 1'000'000;
-        else timeout_ = timeout_ms_ * 1'000'000;
+        if (timeout_ms_ == 0) {
+            timeout_ = (arguments_.deadline_ms() > 0 ? arguments_.deadline_ms() : 1000) * 1'000'000;
+        } else {
+            timeout_ = timeout_ms_ * 1'000'000;
+        }
         const std::string limit = std::to_string(timeout_ / 1'000'000) + " ms";
-        stale_text_ = "no sample of topic '" + topic_.name + "' for {} s (timeout " + limit + "); its pins are not valid";
+        stale_text_ = "no sample of topic '" + topic_.name + "' for {} s (timeout " + limit +
+                      "); its pins are not valid";
     }
 
     void start() {
         faults_ = hal::extension<hal_faults>("hal.faults/1");
-        connection_.open(arguments_, settings_, *this, [this](Participant& p) { return p.reader(topic_, quality_, this); });
+        connection_.open(arguments_, settings_, *this,
+                         [this](Participant& p) { return p.reader(topic_, quality_, this); });
     }
     void stop() noexcept { connection_.close(*this); }
 
-    /// Sets the pins from the newest sample; without one within the timeout they are not valid. [realtime]
+    /// Sets the pins from the newest sample; without one within the timeout they are not valid.
+    /// [realtime]
     void take(hal::Cycle cycle) noexcept {
-        bool               fresh = false;
-        const Message&     m = mailbox_.get(&fresh);
+        bool fresh = false;
+        const Message& m = mailbox_.get(&fresh);
         const std::int64_t now = cycle.start_ns();
         if (fresh) {
             fields_.load(m.values.data());
@@ -57,24 +66,39 @@ public:
             have_ = true;
         }
         const std::int64_t silence = now - seen_;
-        if (have_) age = static_cast<double>(silence + transit_) * 1e-6;
+        if (have_) {
+            age = static_cast<double>(silence + transit_) * 1e-6;
+        }
         const bool good = have_ && silence <= timeout_;
         if (!good && valid) {
             fields_.make_safe();
-            stale_fault_.begin(faults_, this, stale_text_.c_str(), static_cast<double>(silence) * 1e-9);
+            stale_fault_.begin(faults_, this, stale_text_.c_str(),
+                               static_cast<double>(silence) * 1e-9);
         }
-        if (good && stale_fault_.lasts()) stale_fault_.end(faults_, this);
+        if (good && stale_fault_.lasts()) {
+            stale_fault_.end(faults_, this);
+        }
         valid = good;
-        state_.store(!have_ ? State::waiting : good ? State::valid : State::stale, std::memory_order_relaxed);
+        state_.store(!have_ ? State::waiting
+                     : good ? State::valid
+                            : State::stale,
+                     std::memory_order_relaxed);
         matched = connection_.matched();
         malformed = malformed_.load(std::memory_order_relaxed);
         wrong_type = connection_.wrong_type();
         silent = silent_.load(std::memory_order_relaxed);
         const std::uint64_t others = others_.load(std::memory_order_relaxed);
-        if (others != others_seen_) others_seen_ = others, second_until_ = now + second;
+        if (others != others_seen_) {
+            others_seen_ = others;
+            second_until_ = now + second;
+        }
         const bool with_other = now < second_until_;
-        if (with_other && !second_writer && exclusive_) second_fault_.begin(faults_, this, second_text_.c_str());
-        if (!with_other && second_fault_.lasts()) second_fault_.end(faults_, this);
+        if (with_other && !second_writer && exclusive_) {
+            second_fault_.begin(faults_, this, second_text_.c_str());
+        }
+        if (!with_other && second_fault_.lasts()) {
+            second_fault_.end(faults_, this);
+        }
         second_writer = with_other;
         ignored = ignored_.load(std::memory_order_relaxed);
         flood = flood_.load(std::memory_order_relaxed);
@@ -84,16 +108,22 @@ private:
     enum class State { waiting, valid, stale };
     static constexpr std::int64_t second = 1'000'000'000;
 
-    /// A topic has one owner: the first publisher, until it sends nothing for half of the timeout or is lost.
+    /// A topic has one owner: the first publisher, until it sends nothing for half of the timeout
+    /// or is lost.
     bool is_owners(const Sample& s) noexcept {
         if (s.writer != owner_) {
-            const bool has_one = owner_at_ != 0 && connection_.matched() > 1 && s.monotonic_ns - owner_at_ < timeout_ / 2;
+            const bool has_one = owner_at_ != 0 && connection_.matched() > 1 &&
+                                 s.monotonic_ns - owner_at_ < timeout_ / 2;
             if (has_one) {
                 const std::lock_guard lock(names_);
-                owner_named_ = owner_, other_named_ = s.writer;
+                owner_named_ = owner_;
+                other_named_ = s.writer;
                 other_at_.store(s.monotonic_ns, std::memory_order_relaxed);
                 others_.fetch_add(1, std::memory_order_relaxed);
-                if (exclusive_) return ignored_.fetch_add(1, std::memory_order_relaxed), false;
+                if (exclusive_) {
+                    ignored_.fetch_add(1, std::memory_order_relaxed);
+                    return false;
+                }
             }
             owner_ = s.writer;
         }
@@ -105,13 +135,18 @@ private:
         if (!is_owners(s)) return;
         ++arrivals_;
         if (s.monotonic_ns - window_ >= second) {
-            rate_ = static_cast<double>(arrivals_) * 1e9 / static_cast<double>(std::max<std::int64_t>(s.monotonic_ns - window_, 1));
-            if (window_ != 0) check_rate();
+            rate_ = static_cast<double>(arrivals_) * 1e9 /
+                    static_cast<double>(std::max<std::int64_t>(s.monotonic_ns - window_, 1));
+            if (window_ != 0) {
+                check_rate();
+            }
             window_ = s.monotonic_ns;
             arrivals_ = 0;
         }
         last_.store(s.monotonic_ns, std::memory_order_relaxed);
-        if (s.writer == writer_ && s.sequence > message_.sequence) message_.lost += s.sequence - message_.sequence - 1;
+        if (s.writer == writer_ && s.sequence > message_.sequence) {
+            message_.lost += s.sequence - message_.sequence - 1;
+        }
         writer_ = s.writer;
         message_.sequence = s.sequence;
         if (arrivals_ > static_cast<std::uint64_t>(flood_limit_) && ++skipped_ % 16 != 0) {
@@ -119,10 +154,12 @@ private:
             return;
         }
         if (!decode(schema_, s.bytes, message_.values)) {
-            if (malformed_.fetch_add(1, std::memory_order_relaxed) == 0)
-                arguments_.log("topic '" + topic_.name + "': dropped a malformed sample of " + std::to_string(s.bytes.size()) +
-                               " bytes; expected type " + topic_.type + ", final, " + std::to_string(schema_.sample.size()) +
+            if (malformed_.fetch_add(1, std::memory_order_relaxed) == 0) {
+                arguments_.log("topic '" + topic_.name + "': dropped a malformed sample of " +
+                               std::to_string(s.bytes.size()) + " bytes; expected type " +
+                               topic_.type + ", final, " + std::to_string(schema_.sample.size()) +
                                " bytes: compare the fields of both sides");
+            }
             return;
         }
         ++message_.received;
@@ -130,127 +167,179 @@ private:
         const std::int64_t transit = s.received_ns - s.source_ns;
         message_.clock_differs = transit < -5'000'000 || transit > 2 * second;
         message_.transit_ns = message_.clock_differs ? 0 : std::max<std::int64_t>(transit, 0);
-        if (message_.clock_differs != clock_differed_) check_clock(transit);
+        if (message_.clock_differs != clock_differed_) {
+            check_clock(transit);
+        }
         mailbox_.put(message_);
     }
 
     void check_rate() noexcept {
         const bool floods = rate_ > static_cast<double>(flood_limit_);
-        if (floods != flood_.load(std::memory_order_relaxed))
-            arguments_.log("topic '" + topic_.name + "': " + (floods ? "flood of " : "flood ended: ") +
-                           std::to_string(std::llround(rate_)) + " samples per second (flood_limit=" + std::to_string(flood_limit_) + ")" +
-                           (floods ? "; only one of 16 samples above the limit is decoded" : ""));
+        if (floods != flood_.load(std::memory_order_relaxed)) {
+            arguments_.log(
+                "topic '" + topic_.name + "': " + (floods ? "flood of " : "flood ended: ") +
+                std::to_string(std::llround(rate_)) +
+                " samples per second (flood_limit=" + std::to_string(flood_limit_) + ")" +
+                (floods ? "; only one of 16 samples above the limit is decoded" : ""));
+        }
         flood_.store(floods, std::memory_order_relaxed);
     }
     void check_clock(std::int64_t transit) noexcept {
         clock_differed_ = message_.clock_differs;
         char seconds[32];
-        std::snprintf(seconds, sizeof seconds, "%.3f", std::abs(static_cast<double>(transit)) * 1e-9);
-        if (clock_differed_)
-            arguments_.log("topic '" + topic_.name + "': the publisher's clock is " + seconds + " s " +
-                           (transit < 0 ? "ahead of" : "behind") + " this machine's; age-ms now counts from the reception of a sample");
-        else arguments_.log("topic '" + topic_.name + "': the publisher's clock agrees with this machine's again");
+        std::snprintf(seconds, sizeof seconds, "%.3f",
+                      std::abs(static_cast<double>(transit)) * 1e-9);
+        if (clock_differed_) {
+            arguments_.log("topic '" + topic_.name + "': the publisher's clock is " + seconds +
+                           " s " + (transit < 0 ? "ahead of" : "behind") +
+                           " this machine's; age-ms now counts from the reception of a sample");
+        } else {
+            arguments_.log("topic '" + topic_.name +
+                           "': the publisher's clock agrees with this machine's again");
+        }
     }
 
     void on_event(Event e, int count, const std::string& text) noexcept override {
-        connection_.handle(arguments_, e, count, text, "topic '" + topic_.name + "': a publisher does not offer the requested QoS: ");
+        connection_.handle(
+            arguments_, e, count, text,
+            "topic '" + topic_.name + "': a publisher does not offer the requested QoS: ");
     }
 
-    /// Reports what the cycle found, and publishers that send nothing. A lost publisher is reported by its fault. [the DDS thread]
+    /// Reports what the cycle found, and publishers that send nothing. A lost publisher is reported
+    /// by its fault. [the DDS thread]
     std::int64_t serve(std::int64_t now) noexcept override {
         const State s = state_.load(std::memory_order_relaxed);
-        if (s == State::valid && reported_ == State::stale) arguments_.log("topic '" + topic_.name + "' is valid again");
+        if (s == State::valid && reported_ == State::stale) {
+            arguments_.log("topic '" + topic_.name + "' is valid again");
+        }
         reported_ = s;
         const bool second_one = other_at_.load(std::memory_order_relaxed) > now - second;
         if (second_one && !reported_second_) {
             std::unique_lock lock(names_);
-            const auto owner = owner_named_, other = other_named_;
+            const auto owner = owner_named_;
+            const auto other = other_named_;
             lock.unlock();
-            arguments_.log("topic '" + topic_.name + "': second publisher " + connection_.describe(other) + " in addition to " +
-                           connection_.describe(owner) +
-                           (exclusive_ ? "; its samples are ignored: stop it, or accept all publishers by exclusive=0"
-                                       : "; the samples of both are accepted: to accept only the first, use exclusive=1"));
+            arguments_.log(
+                "topic '" + topic_.name + "': second publisher " + connection_.describe(other) +
+                " in addition to " + connection_.describe(owner) +
+                (exclusive_
+                     ? "; its samples are ignored: stop it, or accept all publishers by exclusive=0"
+                     : "; the samples of both are accepted: to accept only the first, use "
+                       "exclusive=1"));
         }
         reported_second_ = second_one;
         const bool has_publisher = connection_.matched() > 0;
-        if (!has_publisher || quiet_since_ == 0) quiet_since_ = now;
+        if (!has_publisher || quiet_since_ == 0) {
+            quiet_since_ = now;
+        }
         const std::int64_t since = std::max(last_.load(std::memory_order_relaxed), quiet_since_);
-        const bool         quiet = has_publisher && now - since > silence_ms_ * 1'000'000;
-        if (quiet && !silent_.load(std::memory_order_relaxed))
-            arguments_.log(
-                "topic '" + topic_.name + "': no sample from the matched publisher for " + std::to_string(silence_ms_) +
-                " ms; check that it is enabled, that its data representation is XCDR1, or XCDR2 of a final type, and the firewall");
+        const bool quiet = has_publisher && now - since > silence_ms_ * 1'000'000;
+        if (quiet && !silent_.load(std::memory_order_relaxed)) {
+            arguments_.log("topic '" + topic_.name +
+                           "': no sample from the matched publisher for " +
+                           std::to_string(silence_ms_) +
+                           " ms; check that it is enabled, that its data representation is XCDR1, "
+                           "or XCDR2 of a final type, and the firewall");
+        }
         silent_.store(quiet, std::memory_order_relaxed);
         arguments_.flush_log();
         return now + 20'000'000;
     }
 
-    Arguments     arguments_{*this};
+    Arguments arguments_{*this};
     hal::Argument timeout_ms_{
-        *this, argument::timeout_ms, 0,
-        "timeout after which the topic is not valid (ms); 0: deadline_ms, or 1000 without it", {.min = 0, .max = 86'400'000}};
+        *this,
+        argument::timeout_ms,
+        0,
+        "timeout after which the topic is not valid (ms); 0: deadline_ms, or 1000 without it",
+        {.min = 0, .max = 86'400'000}};
     hal::Argument silence_ms_{
-        *this, "silence_ms", 3000, "time without samples from a matched publisher until it is reported (ms)",
+        *this,
+        "silence_ms",
+        3000,
+        "time without samples from a matched publisher until it is reported (ms)",
         {.min = 10, .max = 86'400'000}};
-    hal::Argument flood_limit_{
-        *this, "flood_limit", 20'000, "samples per second above which most are not decoded", {.min = 1, .max = 100'000'000}};
+    hal::Argument flood_limit_{*this,
+                               "flood_limit",
+                               20'000,
+                               "samples per second above which most are not decoded",
+                               {.min = 1, .max = 100'000'000}};
     hal::Argument exclusive_argument_{
-        *this, "exclusive", -1, "1: accepts one publisher, a second one is a fault; 0: accepts all; -1: 1, but 0 with ros=",
+        *this,
+        "exclusive",
+        -1,
+        "1: accepts one publisher, a second one is a fault; 0: accepts all; -1: 1, but 0 with ros=",
         {.min = -1, .max = 1}};
     hal::Function take_{*this, "", &DdsSubscribe::take, "sets the pins from the newest sample"};
 
-    const Schema    schema_ = arguments_.schema();
+    const Schema schema_ = arguments_.schema();
     const TopicType topic_ = arguments_.topic(schema_);
-    const Quality   quality_ = arguments_.quality();
-    const Settings  settings_ = arguments_.participant.settings();
+    const Quality quality_ = arguments_.quality();
+    const Settings settings_ = arguments_.participant.settings();
 
-    FieldPins<hal::Out>     fields_{*this, take_, schema_, "field of the topic"};
-    hal::Out<std::uint64_t> seq{*this, take_, "seq", "sequence number of the sample, counted by its publisher"};
-    hal::Out<double>        age{*this, take_, pin::age_ms, "age of the sample, by the publisher's clock", {.unit = "ms"}};
-    hal::Out<bool>          valid{*this, take_, pin::valid, "a sample was received within the timeout", {.safe = false}};
+    FieldPins<hal::Out> fields_{*this, take_, schema_, "field of the topic"};
+    hal::Out<std::uint64_t> seq{*this, take_, "seq",
+                                "sequence number of the sample, counted by its publisher"};
+    hal::Out<double> age{
+        *this, take_, pin::age_ms, "age of the sample, by the publisher's clock", {.unit = "ms"}};
+    hal::Out<bool> valid{
+        *this, take_, pin::valid, "a sample was received within the timeout", {.safe = false}};
     hal::Out<std::uint64_t> lost{*this, take_, "lost", "gaps in the sequence numbers"};
     hal::Out<std::uint64_t> received{*this, take_, "received", "samples received"};
     hal::Out<std::uint32_t> matched{*this, take_, "matched", "matched publishers"};
-    hal::Out<std::uint64_t> malformed{*this, take_, "malformed", "samples that do not match the type"};
-    hal::Out<bool>          wrong_type{*this, take_, "wrong-type", "a publisher uses this topic with another type"};
-    hal::Out<bool>          silent{*this, take_, "silent", "a publisher is matched, but sends nothing for silence_ms"};
-    hal::Out<bool>          second_writer{*this, take_, "second-publisher", "another publisher writes this topic too"};
-    hal::Out<std::uint64_t> ignored{*this, take_, "ignored", "samples ignored because they are from a second publisher"};
-    hal::Out<bool>          flood{*this, take_, "flood", "the sample rate is above flood_limit"};
-    hal::Out<bool>          clock_differs{
-        *this, take_, "clock-differs", "the publisher's clock is more than 5 ms ahead or more than 2 s behind"};
+    hal::Out<std::uint64_t> malformed{*this, take_, "malformed",
+                                      "samples that do not match the type"};
+    hal::Out<bool> wrong_type{*this, take_, "wrong-type",
+                              "a publisher uses this topic with another type"};
+    hal::Out<bool> silent{*this, take_, "silent",
+                          "a publisher is matched, but sends nothing for silence_ms"};
+    hal::Out<bool> second_writer{*this, take_, "second-publisher",
+                                 "another publisher writes this topic too"};
+    hal::Out<std::uint64_t> ignored{*this, take_, "ignored",
+                                    "samples ignored because they are from a second publisher"};
+    hal::Out<bool> flood{*this, take_, "flood", "the sample rate is above flood_limit"};
+    hal::Out<bool> clock_differs{
+        *this, take_, "clock-differs",
+        "the publisher's clock is more than 5 ms ahead or more than 2 s behind"};
 
     // The cycle's
     const hal_faults* faults_ = nullptr;
     hal::LastingFault stale_fault_, second_fault_;
-    std::int64_t      timeout_ = 0, seen_ = 0, transit_ = 0;
-    bool              have_ = false;
-    std::uint64_t     others_seen_ = 0;
-    std::int64_t      second_until_ = INT64_MIN;
-    std::string       stale_text_;
-    const bool        exclusive_ = exclusive_argument_ == 1 || (exclusive_argument_ == -1 && schema_.ros.empty());
-    const std::string second_text_ = "a second publisher writes topic '" + topic_.name + "'; its samples are ignored";
+    std::int64_t timeout_ = 0;
+    std::int64_t seen_ = 0;
+    std::int64_t transit_ = 0;
+    bool have_ = false;
+    std::uint64_t others_seen_ = 0;
+    std::int64_t second_until_ = INT64_MIN;
+    std::string stale_text_;
+    const bool exclusive_ =
+        exclusive_argument_ == 1 || (exclusive_argument_ == -1 && schema_.ros.empty());
+    const std::string second_text_ =
+        "a second publisher writes topic '" + topic_.name + "'; its samples are ignored";
     // The engine's threads', one at a time
-    Message                      message_{std::vector<hal_value>(schema_.fields.size())};
+    Message message_{std::vector<hal_value>(schema_.fields.size())};
     std::array<std::uint8_t, 16> writer_{}, owner_{};
-    std::int64_t                 owner_at_ = 0;
-    std::uint64_t                arrivals_ = 0, skipped_ = 0;
-    std::int64_t                 window_ = 0;
-    double                       rate_ = 0;
-    bool                         clock_differed_ = false;
+    std::int64_t owner_at_ = 0;
+    std::uint64_t arrivals_ = 0;
+    std::uint64_t skipped_ = 0;
+    std::int64_t window_ = 0;
+    double rate_ = 0;
+    bool clock_differed_ = false;
     // Between them
-    hal::Mailbox<Message>      mailbox_{message_};
-    std::atomic<State>         state_{State::waiting};
+    hal::Mailbox<Message> mailbox_{message_};
+    std::atomic<State> state_{State::waiting};
     std::atomic<std::uint64_t> malformed_{0};
-    std::atomic<std::int64_t>  last_{0};
-    std::atomic<bool>          silent_{false}, flood_{false};
-    std::atomic<std::int64_t>  other_at_{INT64_MIN / 2};
-    std::atomic<std::uint64_t> ignored_{0}, others_{0};
-    std::mutex                 names_;  // of the next two, never of the cycle
+    std::atomic<std::int64_t> last_{0};
+    std::atomic<bool> silent_{false};
+    std::atomic<bool> flood_{false};
+    std::atomic<std::int64_t> other_at_{INT64_MIN / 2};
+    std::atomic<std::uint64_t> ignored_{0};
+    std::atomic<std::uint64_t> others_{0};
+    std::mutex names_;  // of the next two, never of the cycle
     std::array<std::uint8_t, 16> owner_named_{}, other_named_{};
     // The DDS thread's
-    State        reported_ = State::waiting;
-    bool         reported_second_ = false;
+    State reported_ = State::waiting;
+    bool reported_second_ = false;
     std::int64_t quiet_since_ = 0;
 
     TopicConnection<Reader> connection_;
@@ -258,7 +347,8 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(DdsSubscribe, "dds_subscribe", "Subscribes to a DDS topic and sets pins from its newest sample", R"(
+HAL_COMPONENT(DdsSubscribe, "dds_subscribe",
+              "Subscribes to a DDS topic and sets pins from its newest sample", R"(
 The subscriber for `dds_publish`: give both the same `topic`, `fields` and `domain`. Samples arrive in threads that are not real-time; each cycle
 uses the newest complete one.
 

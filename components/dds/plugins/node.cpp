@@ -32,25 +32,29 @@ struct Other {
           online_name(name + ".online"),
           age_ms_name(name + ".age-ms"),
           incompatible_name(name + ".incompatible"),
-          heard(c, f, heard_name.c_str(), "its signals are valid; linked when it sends some to this node"),
+          heard(c, f, heard_name.c_str(),
+                "its signals are valid; linked when it sends some to this node"),
           heard_age(c, f, age_name.c_str(), "age of its signals", {.unit = "ms"}),
-          online(c, f, online_name.c_str(), "online: its signals are valid, or its status is received if it sends none to this node",
+          online(c, f, online_name.c_str(),
+                 "online: its signals are valid, or its status is received if it sends none to "
+                 "this node",
                  {.safe = false}),
           age(c, f, age_ms_name.c_str(), "age of its signals, or of its status", {.unit = "ms"}),
-          incompatible(c, f, incompatible_name.c_str(), "it runs another version of the netlist; its signals are ignored") {}
+          incompatible(c, f, incompatible_name.c_str(),
+                       "it runs another version of the netlist; its signals are ignored") {}
 
     const std::string name, heard_name, age_name, online_name, age_ms_name, incompatible_name;
-    hal::In<bool>     heard;
-    hal::In<double>   heard_age;
-    hal::Out<bool>    online;
-    hal::Out<double>  age;
-    hal::Out<bool>    incompatible;
-    bool              sends = false;  ///< to this node
+    hal::In<bool> heard;
+    hal::In<double> heard_age;
+    hal::Out<bool> online;
+    hal::Out<double> age;
+    hal::Out<bool> incompatible;
+    bool sends = false;  ///< to this node
     // Between the engine and the cycle
     std::atomic<std::int64_t> status_at{0};  ///< reception of its last status, CLOCK_MONOTONIC
-    std::atomic<bool>         differs{false};
+    std::atomic<bool> differs{false};
     // The engine's
-    std::string  reported;
+    std::string reported;
     std::int64_t reported_at = 0;
 };
 
@@ -60,9 +64,11 @@ public:
 
     explicit Node(const hal_host* host) : Component(host) {
         const auto wanted = topics_of(wants_.get());
-        for (Other& other : others_)
-            other.sends =
-                std::any_of(wanted.begin(), wanted.end(), [&](const auto& topic) { return topic.first.starts_with(other.name + "/"); });
+        for (Other& other : others_) {
+            other.sends = std::any_of(wanted.begin(), wanted.end(), [&](const auto& topic) {
+                return topic.first.starts_with(other.name + "/");
+            });
+        }
     }
 
     void start() {
@@ -75,14 +81,19 @@ public:
         // Running nodes answer within a moment; others may start later.
         {
             std::unique_lock lock(mutex_);
-            const auto       timeout = std::chrono::milliseconds(static_cast<std::int64_t>(discovery_timeout_ms_));
-            const auto       begin = std::chrono::steady_clock::now();
+            const auto timeout =
+                std::chrono::milliseconds(static_cast<std::int64_t>(discovery_timeout_ms_));
+            const auto begin = std::chrono::steady_clock::now();
             while (rejection_.empty() && seen_.size() < others_.size()) {
                 // an instance that was discovered publishes its status soon
                 const auto known = participant_->known();
-                const auto instances = std::count_if(known.begin(), known.end(), [](const Known& one) { return one.name == "halcyon"; });
+                const auto instances =
+                    std::count_if(known.begin(), known.end(),
+                                  [](const Known& one) { return one.name == "halcyon"; });
                 const bool pending = static_cast<std::size_t>(instances) > known_.size();
-                if (std::chrono::steady_clock::now() - begin > (pending ? 5 * timeout : timeout)) break;
+                if (std::chrono::steady_clock::now() - begin > (pending ? 5 * timeout : timeout)) {
+                    break;
+                }
                 changed_.wait_for(lock, std::chrono::milliseconds(20));
             }
             started_ = true;
@@ -93,12 +104,14 @@ public:
                 throw std::runtime_error(why);
             }
         }
-        beacon_->add(this,
-                     "cell " + cell_.get() + "\nnode " + self_.get() + "\noffers " + offers_.get() + "\nwants " + wants_.get() + "\n");
+        beacon_->add(this, "cell " + cell_.get() + "\nnode " + self_.get() + "\noffers " +
+                               offers_.get() + "\nwants " + wants_.get() + "\n");
     }
     void stop() noexcept {
         reader_.reset();
-        if (beacon_) beacon_->add(this, "");
+        if (beacon_) {
+            beacon_->add(this, "");
+        }
         beacon_.reset();
         participant_.reset();
     }
@@ -107,12 +120,17 @@ public:
     void watch(hal::Cycle cycle) noexcept {
         for (Other& other : others_) {
             const std::int64_t status_at = other.status_at.load(std::memory_order_relaxed);
-            const double       since = static_cast<double>(cycle.start_ns() - status_at) * 1e-6;
-            const bool         there = status_at != 0 && since < static_cast<double>(5 * status_period_ns) * 1e-6;
+            const double since = static_cast<double>(cycle.start_ns() - status_at) * 1e-6;
+            const bool there =
+                status_at != 0 && since < static_cast<double>(5 * status_period_ns) * 1e-6;
             other.incompatible = other.differs.load(std::memory_order_relaxed);
-            other.online = !other.incompatible && (other.sends ? static_cast<bool>(other.heard) : there);
-            if (other.sends) other.age = other.heard_age;
-            else if (status_at != 0) other.age = std::max(since, 0.0);
+            other.online =
+                !other.incompatible && (other.sends ? static_cast<bool>(other.heard) : there);
+            if (other.sends) {
+                other.age = other.heard_age;
+            } else if (status_at != 0) {
+                other.age = std::max(since, 0.0);
+            }
         }
     }
 
@@ -126,39 +144,56 @@ private:
     void on_sample(const Sample& sample) noexcept override {
         try {
             const std::string_view text = status_text(sample.bytes);
-            const auto             cell = values_of(text, "cell"), node = values_of(text, "node");
+            const auto cell = values_of(text, "cell");
+            const auto node = values_of(text, "node");
             {
-                const std::lock_guard        lock(mutex_);
+                const std::lock_guard lock(mutex_);
                 std::array<std::uint8_t, 12> prefix;
                 std::copy_n(sample.writer.begin(), prefix.size(), prefix.begin());
-                if (known_.size() < 1000) known_.insert(prefix);
+                if (known_.size() < 1000) {
+                    known_.insert(prefix);
+                }
             }
             if (cell.empty() || node.empty() || cell[0] != cell_.get()) return;
             const std::lock_guard lock(mutex_);
             if (node[0] == self_.get()) return check_duplicate(text);
-            for (Other& other : others_)
-                if (other.name == node[0]) compare(other, text, sample.monotonic_ns);
-        } catch (const std::exception&) {  // NOLINT(bugprone-empty-catch): without memory the status is ignored
+            for (Other& other : others_) {
+                if (other.name == node[0]) {
+                    compare(other, text, sample.monotonic_ns);
+                }
+            }
+        } catch (
+            const std::
+                exception&) {  // NOLINT(bugprone-empty-catch): without memory the status is ignored
         }
     }
 
     static std::string describe(std::string_view text) {
-        const auto instance = values_of(text, "instance"), host = values_of(text, "host"), pid = values_of(text, "pid");
-        return shown("instance '" + (instance.empty() ? "?" : instance[0]) + "' on " + (host.empty() ? "?" : host[0]) + ", process " +
-                     (pid.empty() ? "?" : pid[0]));
+        const auto instance = values_of(text, "instance");
+        const auto host = values_of(text, "host");
+
+        const auto pid = values_of(text, "pid");
+        return shown("instance '" + (instance.empty() ? "?" : instance[0]) + "' on " +
+                     (host.empty() ? "?" : host[0]) + ", process " + (pid.empty() ? "?" : pid[0]));
     }
 
     static std::string process(std::string_view text) {
-        const auto host = values_of(text, "host"), pid = values_of(text, "pid");
+        const auto host = values_of(text, "host");
+        const auto pid = values_of(text, "pid");
         return (host.empty() ? "?" : host[0]) + ":" + (pid.empty() ? "?" : pid[0]);
     }
 
     /// Reports another process with this node's name. The own status is received too.
     void check_duplicate(std::string_view text) {
         if (process(text) == own_) return;
-        const std::string duplicate = "node '" + self_.get() + "' of '" + cell_.get() + "' is already running: " + describe(text);
-        if (!started_) rejection_ = duplicate;
-        else if (!has_duplicate_) std::fputs(("node: duplicate node: " + duplicate + "; stop one of the two\n").c_str(), stderr);
+        const std::string duplicate = "node '" + self_.get() + "' of '" + cell_.get() +
+                                      "' is already running: " + describe(text);
+        if (!started_) {
+            rejection_ = duplicate;
+        } else if (!has_duplicate_) {
+            std::fputs(("node: duplicate node: " + duplicate + "; stop one of the two\n").c_str(),
+                       stderr);
+        }
         has_duplicate_ = true;
         changed_.notify_all();
     }
@@ -167,63 +202,90 @@ private:
     void compare(Other& other, std::string_view text, std::int64_t when) {
         seen_.insert(other.name);
         other.status_at.store(when, std::memory_order_relaxed);
-        const auto  offers = values_of(text, "offers"), wants = values_of(text, "wants");
-        const auto  theirs = topics_of(offers.empty() ? "" : offers[0]), wanted = topics_of(wants.empty() ? "" : wants[0]);
+        const auto offers = values_of(text, "offers");
+        const auto wants = values_of(text, "wants");
+        const auto theirs = topics_of(offers.empty() ? "" : offers[0]);
+
+        const auto wanted = topics_of(wants.empty() ? "" : wants[0]);
         std::string why;
-        for (const auto& [topic, layout] : topics_of(wants_.get()))
+        for (const auto& [topic, layout] : topics_of(wants_.get())) {
             if (why.empty() && topic.starts_with(other.name + "/")) {
                 const auto sent = theirs.find(topic);
-                why = difference(sent == theirs.end() ? "" : sent->second, other.name, layout, self_.get());
+                why = difference(sent == theirs.end() ? "" : sent->second, other.name, layout,
+                                 self_.get());
             }
-        for (const auto& [topic, layout] : topics_of(offers_.get()))
-            if (const auto taken = wanted.find(topic); why.empty() && taken != wanted.end())
+        }
+        for (const auto& [topic, layout] : topics_of(offers_.get())) {
+            if (const auto taken = wanted.find(topic); why.empty() && taken != wanted.end()) {
                 why = difference(layout, self_.get(), taken->second, other.name);
+            }
+        }
         other.differs.store(!why.empty(), std::memory_order_relaxed);
-        if (!why.empty())
-            why = "node '" + other.name + "' (" + describe(text) + ") runs another version of netlist '" + cell_.get() + "' than node '" +
+        if (!why.empty()) {
+            why = "node '" + other.name + "' (" + describe(text) +
+                  ") runs another version of netlist '" + cell_.get() + "' than node '" +
                   self_.get() + "': " + why + "; run the same file on both";
+        }
         why = shown(why);
         if (!started_) {
-            if (!why.empty()) rejection_ = why;
+            if (!why.empty()) {
+                rejection_ = why;
+            }
         } else if (why != other.reported) {
             // at most one line per second, whatever the other node sends
             if (when - other.reported_at < 1'000'000'000) return;
             other.reported_at = when;
-            std::fputs(("node: " + (why.empty() ? "node '" + other.name + "' runs the same version of the netlist again" : why) + "\n").c_str(), stderr);
+            std::fputs(("node: " +
+                        (why.empty() ? "node '" + other.name +
+                                           "' runs the same version of the netlist again"
+                                     : why) +
+                        "\n")
+                           .c_str(),
+                       stderr);
         }
         other.reported = why;
         changed_.notify_all();
     }
 
     ParticipantArguments arguments_{*this};
-    hal::TextArgument    cell_{*this, argument::cell, "cell", "name of the netlist; nodes of other netlists are ignored"};
-    hal::TextArgument    self_{*this, argument::node, "node", "name of this node"};
-    hal::TextArgument    names_{*this, argument::others, "", "the other nodes"};
-    hal::TextArgument    offers_{*this, argument::offers, "", "topics that this node sends: NODE/THREAD=SIGNAL:TYPE,...;"};
-    hal::TextArgument    wants_{*this, argument::wants, "", "topics that this node receives, in the same format"};
-    hal::Argument        discovery_timeout_ms_{
-        *this, "discovery_timeout_ms", 1000, "how long the start waits for the status of other nodes (ms)", {.min = 0, .max = 60'000}};
+    hal::TextArgument cell_{*this, argument::cell, "cell",
+                            "name of the netlist; nodes of other netlists are ignored"};
+    hal::TextArgument self_{*this, argument::node, "node", "name of this node"};
+    hal::TextArgument names_{*this, argument::others, "", "the other nodes"};
+    hal::TextArgument offers_{*this, argument::offers, "",
+                              "topics that this node sends: NODE/THREAD=SIGNAL:TYPE,...;"};
+    hal::TextArgument wants_{*this, argument::wants, "",
+                             "topics that this node receives, in the same format"};
+    hal::Argument discovery_timeout_ms_{
+        *this,
+        "discovery_timeout_ms",
+        1000,
+        "how long the start waits for the status of other nodes (ms)",
+        {.min = 0, .max = 60'000}};
     hal::Function watch_{*this, "watch", &Node::watch, "updates which nodes are online"};
 
     std::deque<Other> others_ = [this] {
         std::deque<Other> all;
-        for (const std::string& name : list_of(names_.get())) all.emplace_back(*this, watch_, name);
+        for (const std::string& name : list_of(names_.get())) {
+            all.emplace_back(*this, watch_, name);
+        }
         return all;
     }();
 
     const hal::dds::Settings settings_ = arguments_.settings();
 
     // Between the engine's threads and start()
-    std::mutex                             mutex_;
-    std::condition_variable                changed_;
-    std::set<std::string>                  seen_;   ///< nodes whose status was received
+    std::mutex mutex_;
+    std::condition_variable changed_;
+    std::set<std::string> seen_;  ///< nodes whose status was received
     std::set<std::array<std::uint8_t, 12>> known_;  ///< participants whose status was received
-    std::string                            rejection_, own_;
-    bool                                   started_ = false, has_duplicate_ = false;
+    std::string rejection_, own_;
+    bool started_ = false;
+    bool has_duplicate_ = false;
 
     std::shared_ptr<Participant> participant_;
-    std::shared_ptr<Beacon>      beacon_;
-    std::unique_ptr<Reader>      reader_;
+    std::shared_ptr<Beacon> beacon_;
+    std::unique_ptr<Reader> reader_;
 };
 
 }  // namespace

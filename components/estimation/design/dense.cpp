@@ -19,8 +19,10 @@ FullPivot::FullPivot(const Dense& a) : factors_(new Factors{Eigen::FullPivLU<Den
 FullPivot::~FullPivot() = default;
 
 double FullPivot::rcond() const { return factors_->lu.rcond(); }
-bool   FullPivot::invertible() const { return factors_->lu.isInvertible(); }
-Dense  FullPivot::solve(const Dense& b) const { return factors_->lu.solve(b); }
-Dense  FullPivot::inverse() const { return solve(Dense::Identity(factors_->lu.rows(), factors_->lu.cols())); }
+bool FullPivot::invertible() const { return factors_->lu.isInvertible(); }
+Dense FullPivot::solve(const Dense& b) const { return factors_->lu.solve(b); }
+Dense FullPivot::inverse() const {
+    return solve(Dense::Identity(factors_->lu.rows(), factors_->lu.cols()));
+}
 
 }  // namespace hal::estimation

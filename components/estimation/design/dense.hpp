@@ -4,8 +4,9 @@
 #include <Eigen/Core>
 #include <memory>
 
-/// What is computed with dense matrices outside of the cycle. Eigen's templates take long to compile, once for each kind of expression: here
-/// they get plain matrices, and are instantiated in one source. All functions may allocate.
+/// What is computed with dense matrices outside of the cycle. Eigen's templates take long to
+/// compile, once for each kind of expression: here they get plain matrices, and are instantiated in
+/// one source. All functions may allocate.
 namespace hal::estimation {
 
 using Dense = Eigen::MatrixXd;
@@ -14,7 +15,9 @@ using Dense = Eigen::MatrixXd;
 Dense product(const Dense& a, const Dense& b);
 
 /// Returns a * b * c.
-inline Dense product(const Dense& a, const Dense& b, const Dense& c) { return product(product(a, b), c); }
+inline Dense product(const Dense& a, const Dense& b, const Dense& c) {
+    return product(product(a, b), c);
+}
 
 /// Returns (a + a') / 2.
 Dense symmetric(const Dense& a);
@@ -28,10 +31,10 @@ public:
     explicit FullPivot(const Dense& a);
     ~FullPivot();
 
-    double rcond() const;       ///< reciprocal condition number; 0 of a singular matrix
-    bool   invertible() const;
-    Dense  solve(const Dense& b) const;
-    Dense  inverse() const;
+    double rcond() const;  ///< reciprocal condition number; 0 of a singular matrix
+    bool invertible() const;
+    Dense solve(const Dense& b) const;
+    Dense inverse() const;
 
 private:
     struct Factors;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The configuration of an EtherCAT bus: a `.ethercat` file, or LinuxCNC's ethercat-conf.xml. docs/ethercat-configuration.md is the reference.
+// The configuration of an EtherCAT bus: a `.ethercat` file, or LinuxCNC's ethercat-conf.xml.
+// docs/ethercat-configuration.md is the reference.
 //
 //     config::Reading reading = config::read(text, "machine.ethercat");
 //     if (!reading.good()) print(config::to_string(reading, "machine.ethercat"));
@@ -41,52 +42,61 @@ struct PinInfo {
 
 /// An interface of the host for Ethernet over EtherCAT.
 struct HostInterface {
-    std::string   name;  ///< empty: none
+    std::string name;  ///< empty: none
     std::uint32_t ip = 0;  ///< its address, C0A80201h for 192.168.2.1; 0: configured by other means
-    unsigned      prefix = 24;
+    unsigned prefix = 24;
 };
 
-/// A slave as the user sees it; the slave of the same number in the setup is how the master sees it.
+/// A slave as the user sees it; the slave of the same number in the setup is how the master sees
+/// it.
 struct SlaveInfo {
-    std::string                                  type;  ///< order code or name of its device, for messages and lists
-    std::string                                  description;  ///< path of its ESI; empty: none
-    unsigned                                     cia402_axes = 0;  ///< drives of CiA 402
+    /// order code or name of its device, for messages and lists
+    std::string type;
+    std::string description;  ///< path of its ESI; empty: none
+    unsigned cia402_axes = 0;  ///< drives of CiA 402
     std::vector<std::pair<std::string, PinInfo>> pins;  ///< by name
-    Span                                         at{};
-    HostInterface                                eoe;  ///< of a slave with EoE, unless the bus has a switch
-    const PinInfo*                               find(std::string_view pin) const;
+    Span at{};
+    /// of a slave with EoE, unless the bus has a switch
+    HostInterface eoe;
+    const PinInfo* find(std::string_view pin) const;
 };
 
 /// One bus with its master.
 struct Bus {
-    std::string            name;  ///< of its pins in LinuxCNC's format; empty in a `.ethercat` file
-    bool                   lcec = false;  ///< of LinuxCNC's format
-    unsigned               index = 0;  ///< of the master in LinuxCNC's format: MASTER0_DEVICE of ethercat.conf
-    std::string            link = "sim:ethercat", backup;  ///< link addresses; a backup closes a ring
-    std::string            gateway;  ///< IPv4 address on which the mailbox gateway listens; empty: no gateway
-    std::uint16_t          gateway_port = 34980;
-    HostInterface          eoe_switch;  ///< of all slaves with EoE; without a name each has its own
-    bool                   cycle_given = false;  ///< setup.cycle_ns is from the file; else it is that of the thread
-    master::Setup          setup;
+    std::string name;  ///< of its pins in LinuxCNC's format; empty in a `.ethercat` file
+    bool lcec = false;  ///< of LinuxCNC's format
+    /// of the master in LinuxCNC's format: MASTER0_DEVICE of ethercat.conf
+    unsigned index = 0;
+    /// link addresses; a backup closes a ring
+    std::string link = "sim:ethercat", backup;
+    /// IPv4 address on which the mailbox gateway listens; empty: no gateway
+    std::string gateway;
+    std::uint16_t gateway_port = 34980;
+    HostInterface eoe_switch;  ///< of all slaves with EoE; without a name each has its own
+    /// setup.cycle_ns is from the file; else it is that of the thread
+    bool cycle_given = false;
+    master::Setup setup;
     std::vector<SlaveInfo> slaves;  ///< as many as in setup.slaves
-    Span                   at{};
+    Span at{};
 };
 
 struct Reading {
-    std::vector<Bus>     buses;  ///< one for a `.ethercat` file
-    bool                 lcec = false;  ///< LinuxCNC's format: pins are named lcec.MASTER.SLAVE.PIN
+    std::vector<Bus> buses;  ///< one for a `.ethercat` file
+    bool lcec = false;  ///< LinuxCNC's format: pins are named lcec.MASTER.SLAVE.PIN
     std::vector<Message> messages;  ///< in order of place
-    bool                 good() const { return text::good(messages); }
+    bool good() const { return text::good(messages); }
 };
 
 /// Reads a whole file. Returns false and sets `bytes` to the reason.
 using ReadFile = std::function<bool(const std::string& path, std::string& bytes)>;
 bool read_from_disk(const std::string& path, std::string& bytes);
 
-/// Reads a configuration of either format: XML if its first character is `<`. Relative paths in it start at the folder of `path`.
+/// Reads a configuration of either format: XML if its first character is `<`. Relative paths in it
+/// start at the folder of `path`.
 Reading read(std::string_view text, const std::string& path, const ReadFile& = read_from_disk);
 
-/// Sets the mailbox gateway of a bus: "none", ADDRESS or ADDRESS:PORT. Returns false for anything else.
+/// Sets the mailbox gateway of a bus: "none", ADDRESS or ADDRESS:PORT. Returns false for anything
+/// else.
 bool read_gateway(std::string_view text, Bus&);
 
 /// Formats each error as "file:12:7: error: sentence; help", for hosts without a renderer.
@@ -94,21 +104,25 @@ std::string to_string(const Reading&, const std::string& path);
 
 /// A slave as found on a bus or described in an ESI, for write().
 struct Found {
-    std::string                   name;  ///< of its section; empty: slave-POSITION
-    std::string                   device;  ///< name or order code, for a comment
-    std::string                   esi;  ///< path of its description; empty: none
-    std::string                   order;  ///< its order code there
-    std::uint32_t                 vendor = 0, product = 0, revision = 0;
-    std::uint16_t                 alias = 0;
-    std::vector<sii::Pdo>         rx, tx;  ///< of the SII; those with a sync manager are assigned
+    std::string name;  ///< of its section; empty: slave-POSITION
+    std::string device;  ///< name or order code, for a comment
+    std::string esi;  ///< path of its description; empty: none
+    std::string order;  ///< its order code there
+    std::uint32_t vendor = 0;
+    std::uint32_t product = 0;
+    std::uint32_t revision = 0;
+    std::uint16_t alias = 0;
+    std::vector<sii::Pdo> rx, tx;  ///< of the SII; those with a sync manager are assigned
     std::vector<sii::SyncManager> sync_managers;
-    std::uint16_t                 assign_activate = 0;  ///< 0: without SYNC
+    std::uint16_t assign_activate = 0;  ///< 0: without SYNC
 };
-/// Returns the text of a `.ethercat` file for these slaves in order of position. It can be read without errors.
+/// Returns the text of a `.ethercat` file for these slaves in order of position. It can be read
+/// without errors.
 std::string write(const std::string& link, std::int64_t cycle_ns, const std::vector<Found>& slaves);
 
-/// Returns the text of a netlist that runs the bus of the configuration `file`: its master, a component cia402 for each drive, linked and
-/// disabled, and the remaining pins as comments. `segment`: devices of ethercat_segment, or empty for a real bus.
+/// Returns the text of a netlist that runs the bus of the configuration `file`: its master, a
+/// component cia402 for each drive, linked and disabled, and the remaining pins as comments.
+/// `segment`: devices of ethercat_segment, or empty for a real bus.
 std::string netlist(const Bus&, const std::string& file, const std::string& segment);
 
 /// Returns "out u32   SLAVE.NAME  6041:0" with a line end, seen from the netlist: an output of the bus is an input there.

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// One message for one cause: a start-up that fails is tried again and again, and fails for the same reason.
+// One message for one cause: a start-up that fails is tried again and again, and fails for the same
+// reason.
 #pragma once
 
 #include <array>
@@ -16,9 +17,11 @@ public:
     /// `slaves`: how many the setup names. [setup]
     explicit EventFilter(std::size_t slaves) : slaves_(slaves) {}
 
-    /// Returns whether an event is new. A failed start-up is news once for each cause, until the slave is operational, is lost or returns; that
-    /// it failed at all is news only without a cause. [realtime]
-    bool is_new(master::Event event, std::uint32_t slave, std::int64_t first, std::int64_t second) noexcept {
+    /// Returns whether an event is new. A failed start-up is news once for each cause, until the
+    /// slave is operational, is lost or returns; that it failed at all is news only without a
+    /// cause. [realtime]
+    bool is_new(master::Event event, std::uint32_t slave, std::int64_t first,
+                std::int64_t second) noexcept {
         using master::Event;
         if (slave >= slaves_.size()) return true;
         Slave& s = slaves_[slave];
@@ -28,10 +31,14 @@ public:
         }
         if (!is_cause(event)) return true;
         if (event == Event::start_up_failed && s.count != 0) return false;
-        if (event == Event::dc_timeout || event == Event::start_up_failed) first = second = 0;  // measured, or counted
+        // measured, or counted
+        if (event == Event::dc_timeout || event == Event::start_up_failed) {
+            first = second = 0;
+        }
         const Cause cause{event, first, second};
-        for (const Cause& known : s.known)
+        for (const Cause& known : s.known) {
             if (known == cause) return false;
+        }
         s.known[s.count++ % s.known.size()] = cause;
         return true;
     }
@@ -64,12 +71,13 @@ private:
     }
     struct Cause {
         master::Event event = master::Event::scanned;  // is none
-        std::int64_t  first = 0, second = 0;
-        friend bool   operator==(const Cause&, const Cause&) = default;
+        std::int64_t first = 0;
+        std::int64_t second = 0;
+        friend bool operator==(const Cause&, const Cause&) = default;
     };
     struct Slave {
         std::array<Cause, 4> known{};
-        unsigned             count = 0;
+        unsigned count = 0;
     };
     std::vector<Slave> slaves_;
 };

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Sentences about what happened on the bus: what failed, why, what to do. For reporters and tools; nothing here is real time.
+// Sentences about what happened on the bus: what failed, why, what to do. For reporters and tools;
+// nothing here is real time.
 #pragma once
 
 #include <cstdint>
@@ -15,18 +16,20 @@ namespace hal::ethercat::config {
 struct Happened {
     master::Event event{};
     std::uint32_t slave = master::Events::bus;
-    std::int64_t  first = 0, second = 0;
+    std::int64_t first = 0;
+    std::int64_t second = 0;
 };
 
 /// Which configuration the messages advise to change.
 enum class Format : std::uint8_t { ethercat, lcec };
 
-/// Returns the sentence for an event, without a final stop; empty for one that needs none. `link` and `backup` are the addresses of the
-/// ports. [setup]
-std::string event_words(const Happened& what, const master::Setup& setup, const std::string& link, const std::string& backup = {},
-                        Format = Format::ethercat);
+/// Returns the sentence for an event, without a final stop; empty for one that needs none. `link`
+/// and `backup` are the addresses of the ports. [setup]
+std::string event_words(const Happened& what, const master::Setup& setup, const std::string& link,
+                        const std::string& backup = {}, Format = Format::ethercat);
 
-/// Returns the subject of an event for rate limiting: an event of one slave is a kind, the code that a device chooses is the detail. [setup]
+/// Returns the subject of an event for rate limiting: an event of one slave is a kind, the code
+/// that a device chooses is the detail. [setup]
 MessageSubject subject(const Happened& what);
 
 /// Returns "slave 3 (x-axis)", or "slave at position 3" where the setup does not name it. [setup]

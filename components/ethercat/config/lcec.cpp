@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// LinuxCNC's ethercat-conf.xml (the format of the lcec component): generic slaves and the class basic_cia402.
+// LinuxCNC's ethercat-conf.xml (the format of the lcec component): generic slaves and the class
+// basic_cia402.
 #include <algorithm>
 #include <cmath>
 #include <set>
@@ -19,32 +20,41 @@ using master::Type;
 class Lcec : private LcecXml {
 public:
     Lcec(std::string_view text, const std::string& path, const ReadFile& read_file)
-        : LcecXml(text), folder_(path.find('/') == path.npos ? "" : path.substr(0, path.rfind('/') + 1)), read_file_(read_file) {}
+        : LcecXml(text),
+          folder_(path.find('/') == path.npos ? "" : path.substr(0, path.rfind('/') + 1)),
+          read_file_(read_file) {}
 
     Reading read() {
         out_.lcec = true;
         pugi::xml_document document;
-        const auto         result = document.load_buffer(text_.data(), text_.size());
+        const auto result = document.load_buffer(text_.data(), text_.size());
         if (!result) {
-            const auto at = std::min(static_cast<std::size_t>(std::max<std::ptrdiff_t>(result.offset, 0)), text_.size());
-            const auto line =
-                static_cast<std::uint32_t>(1 + std::count(text_.begin(), text_.begin() + static_cast<std::ptrdiff_t>(at), '\n'));
-            report_.error(Topic::line, {line, 1, static_cast<std::uint32_t>(at), 0}, "invalid XML: " + lower(result.description()),
+            const auto at = std::min(
+                static_cast<std::size_t>(std::max<std::ptrdiff_t>(result.offset, 0)), text_.size());
+            const auto line = static_cast<std::uint32_t>(
+                1 +
+                std::count(text_.begin(), text_.begin() + static_cast<std::ptrdiff_t>(at), '\n'));
+            report_.error(Topic::line, {line, 1, static_cast<std::uint32_t>(at), 0},
+                          "invalid XML: " + lower(result.description()),
                           "the file begins with <masters>");
             return finish();
         }
         const Xml root = document.document_element();
         if (std::string_view(root.name()) != "masters") {
-            report_.error(Topic::line, esi::span_of(root, text_), "the root element is '" + std::string(root.name()) + "', not masters",
+            report_.error(Topic::line, esi::span_of(root, text_),
+                          "the root element is '" + std::string(root.name()) + "', not masters",
                           "the file begins with <masters>");
             return finish();
         }
         attributes(root, {});
         children(root, {"master"}, [&](const Xml& node) { master_of(node); });
-        if (out_.buses.empty())
+        if (out_.buses.empty()) {
             report_.error(Topic::line, esi::span_of(root, text_), "the file has no master",
                           "write <master idx=\"0\" appTimePeriod=\"1000000\">");
-        for (const Bus& bus : out_.buses) check_bus(bus, report_);
+        }
+        for (const Bus& bus : out_.buses) {
+            check_bus(bus, report_);
+        }
         return finish();
     }
 
@@ -58,151 +68,244 @@ private:
     /// A time in ns, or `*N`: N cycles.
     std::optional<std::int64_t> cycles(const Xml& node, const char* name) {
         const std::string_view value = node.attribute(name).value();
-        if (value.empty()) return {};
-        if (value.starts_with('*'))
-            if (const auto n = parse_natural(value.substr(1)); n && *n >= 1 && *n <= 1000)
+        if (value.empty()) {
+            return {};
+        }
+        if (value.starts_with('*')) {
+            if (const auto n = parse_natural(value.substr(1)); n && *n >= 1 && *n <= 1000) {
                 return static_cast<std::int64_t>(*n) * bus_->setup.cycle_ns;
-        if (const auto n = parse_natural(value); n && *n <= 1'000'000'000) return static_cast<std::int64_t>(*n);
-        error(Topic::value, node, "invalid " + std::string(name) + " '" + std::string(value) + "' of <" + node.name() + ">",
+            }
+        }
+        if (const auto n = parse_natural(value); n && *n <= 1'000'000'000) {
+            return static_cast<std::int64_t>(*n);
+        }
+        error(Topic::value, node,
+              "invalid " + std::string(name) + " '" + std::string(value) + "' of <" + node.name() +
+                  ">",
               "write a time in ns, or *1 for one cycle");
         return {};
     }
 
     void master_of(const Xml& node) {
-        attributes(node, {"idx", "name", "appTimePeriod", "refClockSyncCycles", "syncToRefClock", "refClockSlaveIdx"});
+        attributes(node, {"idx", "name", "appTimePeriod", "refClockSyncCycles", "syncToRefClock",
+                          "refClockSlaveIdx"});
         Bus bus;
         bus.at = esi::span_of(node, text_);
         const auto idx = number(node, "idx", 0, 255).value_or(0);
         bus.name = node.attribute("name") ? node.attribute("name").value() : std::to_string(idx);
-        bus.lcec = true, bus.index = static_cast<unsigned>(idx);
+        bus.lcec = true;
+        bus.index = static_cast<unsigned>(idx);
         bus.link = "sim:ethercat" + std::to_string(idx);
-        if (const auto period = number(node, "appTimePeriod", 10'000, 1'000'000'000)) bus.setup.cycle_ns = *period;
+        if (const auto period = number(node, "appTimePeriod", 10'000, 1'000'000'000)) {
+            bus.setup.cycle_ns = *period;
+        }
         bus.cycle_given = true;
         const auto sync = number(node, "refClockSyncCycles", -1, 1'000'000).value_or(0);
         const bool follow = flag(node, "syncToRefClock", sync < 0);
-        if (node.attribute("syncToRefClock") && node.attribute("refClockSyncCycles") && sync != 0 && follow != (sync < 0))
+        if (node.attribute("syncToRefClock") && node.attribute("refClockSyncCycles") && sync != 0 &&
+            follow != (sync < 0)) {
             error(Topic::value, node, "syncToRefClock contradicts the sign of refClockSyncCycles",
-                  "delete syncToRefClock; refClockSyncCycles=\"-1\" synchronises the thread to the reference clock");
-        bus.setup.lead = follow ? master::ClockLead::reference : sync > 0 ? master::ClockLead::thread : master::ClockLead::none;
+                  "delete syncToRefClock; refClockSyncCycles=\"-1\" synchronises the thread to the "
+                  "reference clock");
+        }
+        bus.setup.lead = follow     ? master::ClockLead::reference
+                         : sync > 0 ? master::ClockLead::thread
+                                    : master::ClockLead::none;
         const auto reference = number(node, "refClockSlaveIdx", -1, 65535).value_or(-1);
         bus_ = &bus;
         children(node, {"slave"}, [&](const Xml& slave) { slave_of(slave); });
-        for (std::size_t i = 0; i < bus.setup.slaves.size(); ++i)
-            if (bus.setup.slaves[i].position == reference) bus.setup.reference_slave = static_cast<std::uint16_t>(i);
-        for (const Bus& other : out_.buses)
-            if (other.name == bus.name)
-                error(Topic::slave, node, "duplicate master '" + bus.name + "'", "first in line " + std::to_string(other.at.line));
+        for (std::size_t i = 0; i < bus.setup.slaves.size(); ++i) {
+            if (bus.setup.slaves[i].position == reference) {
+                bus.setup.reference_slave = static_cast<std::uint16_t>(i);
+            }
+        }
+        for (const Bus& other : out_.buses) {
+            if (other.name == bus.name) {
+                error(Topic::slave, node, "duplicate master '" + bus.name + "'",
+                      "first in line " + std::to_string(other.at.line));
+            }
+        }
         out_.buses.push_back(std::move(bus));
     }
 
     void slave_of(const Xml& node) {
-        attributes(node, {"idx", "type", "name", "vid", "pid", "configPdos", "syncUnit", "syncUnitCycle"});
+        attributes(
+            node, {"idx", "type", "name", "vid", "pid", "configPdos", "syncUnit", "syncUnitCycle"});
         master::Slave s;
-        info_ = {}, pins_.clear(), parameters_.clear();
-        info_.at = esi::span_of(node, text_), s.line = info_.at.line;
+        info_ = {};
+        pins_.clear();
+        parameters_.clear();
+        info_.at = esi::span_of(node, text_);
+        s.line = info_.at.line;
         info_.type = node.attribute("type").value();
         const auto idx = number(node, "idx", 0, 65535, false, true);
         s.position = static_cast<std::uint16_t>(idx.value_or(0));
-        s.name = node.attribute("name") ? node.attribute("name").value() : std::to_string(s.position);
-        const bool generic = info_.type == "generic", drive = info_.type == "basic_cia402";
-        if (!generic && !drive)
+        s.name =
+            node.attribute("name") ? node.attribute("name").value() : std::to_string(s.position);
+        const bool generic = info_.type == "generic";
+        const bool drive = info_.type == "basic_cia402";
+        if (!generic && !drive) {
             error(Topic::slave, node,
-                  info_.type.empty() ? "missing attribute 'type' of <slave>" : "unsupported slave type '" + info_.type + "'",
+                  info_.type.empty() ? "missing attribute 'type' of <slave>"
+                                     : "unsupported slave type '" + info_.type + "'",
                   "write type=\"generic\" with the PDOs of the device, or type=\"basic_cia402\"");
-        if (const auto vid = number(node, "vid", 0, 0xffffffff, true, generic || drive))
+        }
+        if (const auto vid = number(node, "vid", 0, 0xffffffff, true, generic || drive)) {
             s.identity.vendor = static_cast<std::uint32_t>(*vid);
-        if (const auto pid = number(node, "pid", 0, 0xffffffff, true, generic || drive))
+        }
+        if (const auto pid = number(node, "pid", 0, 0xffffffff, true, generic || drive)) {
             s.identity.product = static_cast<std::uint32_t>(*pid);
+        }
         configure_ = flag(node, "configPdos", false);
-        if (const std::string unit = node.attribute("syncUnit").value(); !unit.empty() || node.attribute("syncUnitCycle"))
+        if (const std::string unit = node.attribute("syncUnit").value();
+            !unit.empty() || node.attribute("syncUnitCycle")) {
             domain(node, s, unit.empty() ? "default" : unit);
-        children(node, {"dcConf", "watchdog", "sdoConfig", "idnConfig", "initCmds", "modParam", "syncManager"}, [&](const Xml& child) {
+        }
+        children(
+            node,
+            {"dcConf", "watchdog", "sdoConfig", "idnConfig", "initCmds", "modParam", "syncManager"},
+            [&](const Xml& child) {
             const std::string_view name = child.name();
-            if (name == "dcConf") dc(child, s);
-            else if (name == "watchdog") watchdog(child, s);
-            else if (name == "sdoConfig") sdo(child, s);
-            else if (name == "idnConfig") idn(child, s);
-            else if (name == "initCmds") init_commands(child, s);
-            else if (name == "modParam") parameter(child, drive);
-            else if (generic) sync_manager(child, s);
-            else error(Topic::line, child, "<syncManager> applies only to type=\"generic\"", "delete it, or write type=\"generic\"");
+            if (name == "dcConf") {
+                dc(child, s);
+            } else if (name == "watchdog") {
+                watchdog(child, s);
+            } else if (name == "sdoConfig") {
+                sdo(child, s);
+            } else if (name == "idnConfig") {
+                idn(child, s);
+            } else if (name == "initCmds") {
+                init_commands(child, s);
+            } else if (name == "modParam") {
+                parameter(child, drive);
+            } else if (generic) {
+                sync_manager(child, s);
+            } else {
+                error(Topic::line, child, "<syncManager> applies only to type=\"generic\"",
+                      "delete it, or write type=\"generic\"");
+            }
         });
         if (drive) {
             std::vector<std::string> problems;
             build_cia402(parameters_, s, info_, problems);
-            for (const std::string& problem : problems) error(Topic::value, node, problem);
+            for (const std::string& problem : problems) {
+                error(Topic::value, node, problem);
+            }
         }
-        bus_->setup.slaves.push_back(std::move(s)), bus_->slaves.push_back(std::move(info_));
+        bus_->setup.slaves.push_back(std::move(s));
+        bus_->slaves.push_back(std::move(info_));
     }
 
     void domain(const Xml& node, master::Slave& s, const std::string& unit) {
-        auto&              domains = bus_->setup.domains;
+        auto& domains = bus_->setup.domains;
         const std::int64_t time = cycles(node, "syncUnitCycle").value_or(bus_->setup.cycle_ns);
-        if (time == 0 || time % bus_->setup.cycle_ns != 0)
-            return error(Topic::value, node, "syncUnitCycle is not a multiple of appTimePeriod", "write *1, *2, …");
+        if (time == 0 || time % bus_->setup.cycle_ns != 0) {
+            return error(Topic::value, node, "syncUnitCycle is not a multiple of appTimePeriod",
+                         "write *1, *2, …");
+        }
         const auto every = static_cast<unsigned>(time / bus_->setup.cycle_ns);
-        auto       at = std::find_if(domains.begin(), domains.end(), [&](const master::Domain& d) { return d.name == unit; });
-        if (at == domains.end()) at = domains.insert(at, {unit, every});
-        else if (node.attribute("syncUnitCycle")) at->every = every;
+        auto at = std::find_if(domains.begin(), domains.end(),
+                               [&](const master::Domain& d) { return d.name == unit; });
+        if (at == domains.end()) {
+            at = domains.insert(at, {unit, every});
+        } else if (node.attribute("syncUnitCycle")) {
+            at->every = every;
+        }
         s.domain = static_cast<std::uint16_t>(at - domains.begin());
     }
 
     void dc(const Xml& node, master::Slave& s) {
-        attributes(node, {"assignActivate", "sync0Cycle", "sync0Shift", "sync1Cycle", "sync1Shift"});
+        attributes(node,
+                   {"assignActivate", "sync0Cycle", "sync0Shift", "sync1Cycle", "sync1Shift"});
         master::Dc dc;
-        dc.assign_activate = static_cast<std::uint16_t>(number(node, "assignActivate", 0, 0xffff, true, true).value_or(0));
-        dc.sync0_cycle_ns = cycles(node, "sync0Cycle").value_or(0), dc.sync1_cycle_ns = cycles(node, "sync1Cycle").value_or(0);
+        dc.assign_activate = static_cast<std::uint16_t>(
+            number(node, "assignActivate", 0, 0xffff, true, true).value_or(0));
+        dc.sync0_cycle_ns = cycles(node, "sync0Cycle").value_or(0);
+
+        dc.sync1_cycle_ns = cycles(node, "sync1Cycle").value_or(0);
         dc.sync0_shift_ns = number(node, "sync0Shift", -1'000'000'000, 1'000'000'000).value_or(0);
         dc.sync1_shift_ns = number(node, "sync1Shift", -1'000'000'000, 1'000'000'000).value_or(0);
         s.dc = dc;
     }
     void watchdog(const Xml& node, master::Slave& s) {
         attributes(node, {"divider", "intervals"});
-        if (const auto n = number(node, "divider", 0, 65535)) s.watchdog.divider = static_cast<std::uint16_t>(*n);
-        if (const auto n = number(node, "intervals", 0, 65535)) s.watchdog.intervals = static_cast<std::uint16_t>(*n);
+        if (const auto n = number(node, "divider", 0, 65535)) {
+            s.watchdog.divider = static_cast<std::uint16_t>(*n);
+        }
+        if (const auto n = number(node, "intervals", 0, 65535)) {
+            s.watchdog.intervals = static_cast<std::uint16_t>(*n);
+        }
     }
     void sdo(const Xml& node, master::Slave& s) {
         attributes(node, {"idx", "subIdx"});
         StartupWrite w;
         w.line = esi::span_of(node, text_).line;
-        w.index = static_cast<std::uint16_t>(number(node, "idx", 1, 0xffff, true, true).value_or(0));
+        w.index =
+            static_cast<std::uint16_t>(number(node, "idx", 1, 0xffff, true, true).value_or(0));
         w.complete = same_word(node.attribute("subIdx").value(), "complete");
-        if (!w.complete) w.sub = static_cast<std::uint8_t>(number(node, "subIdx", 0, 0xff, true, true).value_or(0));
+        if (!w.complete) {
+            w.sub =
+                static_cast<std::uint8_t>(number(node, "subIdx", 0, 0xff, true, true).value_or(0));
+        }
         w.data = raw_data(node, "sdoDataRaw");
-        if (!w.data.empty()) s.startup.push_back(std::move(w));
+        if (!w.data.empty()) {
+            s.startup.push_back(std::move(w));
+        }
     }
-    /// LinuxCNC's lcec loads no file with this element, because it never finds `state`; here it may be missing.
+    /// LinuxCNC's lcec loads no file with this element, because it never finds `state`; here it may
+    /// be missing.
     void idn(const Xml& node, master::Slave& s) {
         attributes(node, {"drive", "idn", "state"});
         StartupWrite w;
         w.protocol = StartupWrite::Protocol::soe;
         w.line = esi::span_of(node, text_).line;
         w.sub = static_cast<std::uint8_t>(number(node, "drive", 0, 7).value_or(0));
-        const std::string_view name = trimmed(node.attribute("idn").value()), state = trimmed(node.attribute("state").value());
-        if (const auto parsed = master::parse_idn(name)) w.index = *parsed;
-        else
+        const std::string_view name = trimmed(node.attribute("idn").value());
+
+        const std::string_view state = trimmed(node.attribute("state").value());
+        if (const auto parsed = master::parse_idn(name)) {
+            w.index = *parsed;
+        } else {
             error(Topic::value, node,
-                  name.empty() ? "missing attribute 'idn' of <idnConfig>" : "invalid idn '" + std::string(name) + "' of <idnConfig>",
+                  name.empty() ? "missing attribute 'idn' of <idnConfig>"
+                               : "invalid idn '" + std::string(name) + "' of <idnConfig>",
                   "write idn=\"S-0-15\" or idn=\"P-0-150\"");
-        if (state == "SAFEOP") w.before = State::op;
-        else if (!state.empty() && state != "PREOP")
-            error(Topic::value, node, "invalid state '" + std::string(state) + "' of <idnConfig>",
-                  "write state=\"PREOP\" or state=\"SAFEOP\", the state in which the IDN is written");
+        }
+        if (state == "SAFEOP") {
+            w.before = State::op;
+        } else if (!state.empty() && state != "PREOP") {
+            error(
+                Topic::value, node, "invalid state '" + std::string(state) + "' of <idnConfig>",
+                "write state=\"PREOP\" or state=\"SAFEOP\", the state in which the IDN is written");
+        }
         w.data = raw_data(node, "idnDataRaw");
-        if (!w.data.empty()) s.startup.push_back(std::move(w));
+        if (!w.data.empty()) {
+            s.startup.push_back(std::move(w));
+        }
     }
     void init_commands(const Xml& node, master::Slave& s) {
         attributes(node, {"filename"});
-        const std::string given = node.attribute("filename").value(), path = given.starts_with('/') ? given : folder_ + given;
-        if (given.empty())
-            return error(Topic::value, node, "missing attribute 'filename' of <initCmds>", "write filename=\"drive-init.xml\"");
+        const std::string given = node.attribute("filename").value();
+
+        const std::string path = given.starts_with('/') ? given : folder_ + given;
+        if (given.empty()) {
+            return error(Topic::value, node, "missing attribute 'filename' of <initCmds>",
+                         "write filename=\"drive-init.xml\"");
+        }
         std::string text;
-        if (!read_file_(path, text))
-            return error(Topic::value, node, "cannot read '" + path + "': " + text, "write the path of a file beside this one");
-        const auto report = [&](bool is_error, std::uint32_t line, const std::string& sentence, std::string help) {
-            const std::string where = "'" + path + "', line " + std::to_string(line) + ": " + sentence;
-            if (is_error) error(Topic::value, node, where, std::move(help));
-            else report_.warning(Topic::value, esi::span_of(node, text_), where, std::move(help));
+        if (!read_file_(path, text)) {
+            return error(Topic::value, node, "cannot read '" + path + "': " + text,
+                         "write the path of a file beside this one");
+        }
+        const auto report = [&](bool is_error, std::uint32_t line, const std::string& sentence,
+                                std::string help) {
+            const std::string where =
+                "'" + path + "', line " + std::to_string(line) + ": " + sentence;
+            if (is_error) {
+                error(Topic::value, node, where, std::move(help));
+            } else {
+                report_.warning(Topic::value, esi::span_of(node, text_), where, std::move(help));
+            }
         };
         for (StartupWrite& w : read_init_commands(text, report)) {
             w.line = esi::span_of(node, text_).line;
@@ -212,29 +315,38 @@ private:
     /// Returns the bytes of the elements `name`; reports when there are none.
     std::vector<std::uint8_t> raw_data(const Xml& node, const char* name) {
         std::vector<std::uint8_t> bytes;
-        bool                      valid = true;
+        bool valid = true;
         children(node, {name}, [&](const Xml& raw) {
             attributes(raw, {"data"});
             const auto data = esi::hex_bytes(raw.attribute("data").value());
             if (data) return void(bytes.insert(bytes.end(), data->begin(), data->end()));
             valid = false;
-            error(Topic::value, raw, "invalid data '" + std::string(raw.attribute("data").value()) + "'",
+            error(Topic::value, raw,
+                  "invalid data '" + std::string(raw.attribute("data").value()) + "'",
                   "write hexadecimal bytes in the order of the wire, as in data=\"E8 03\"");
         });
-        if (bytes.empty() && valid)
+        if (bytes.empty() && valid) {
             error(Topic::value, node, "<" + std::string(node.name()) + "> has no data",
                   "write <" + std::string(name) + " data=\"E8 03\"/> in it");
+        }
         return bytes;
     }
     void parameter(const Xml& node, bool drive) {
         attributes(node, {"name", "value"});
         const std::string name = node.attribute("name").value();
-        if (!drive) return error(Topic::line, node, "<modParam> applies only to drivers such as basic_cia402", "delete it");
-        const auto               known = cia402_parameters();
+        if (!drive) {
+            return error(Topic::line, node,
+                         "<modParam> applies only to drivers such as basic_cia402", "delete it");
+        }
+        const auto known = cia402_parameters();
         std::vector<std::string> names;
-        for (const auto& p : known) names.emplace_back(p);
-        if (std::find(names.begin(), names.end(), name) == names.end())
-            return error(Topic::line, node, "unsupported modParam '" + name + "'", suggestion(name, names, "the parameters are"));
+        for (const auto& p : known) {
+            names.emplace_back(p);
+        }
+        if (std::find(names.begin(), names.end(), name) == names.end()) {
+            return error(Topic::line, node, "unsupported modParam '" + name + "'",
+                         suggestion(name, names, "the parameters are"));
+        }
         parameters_[name] = node.attribute("value").value();
     }
 
@@ -243,120 +355,178 @@ private:
         master::SyncManager sm;
         sm.number = static_cast<std::uint8_t>(number(node, "idx", 0, 15, false, true).value_or(2));
         const std::string dir = node.attribute("dir").value();
-        if (dir != "in" && dir != "out")
+        if (dir != "in" && dir != "out") {
             error(Topic::value, node, "invalid dir '" + dir + "' of <syncManager>",
                   "write dir=\"in\" for what the slave sends, or dir=\"out\"");
+        }
         sm.output = dir == "out";
         sm.write_assignment = configure_;
         children(node, {"pdo"}, [&](const Xml& pdo) {
             attributes(pdo, {"idx"});
             master::Pdo p;
-            p.index = static_cast<std::uint16_t>(number(pdo, "idx", 1, 0xffff, true, true).value_or(0));
+            p.index =
+                static_cast<std::uint16_t>(number(pdo, "idx", 1, 0xffff, true, true).value_or(0));
             p.write_mapping = configure_;
             children(pdo, {"pdoEntry"}, [&](const Xml& e) { entry(e, sm, p); });
             sm.pdos.push_back(std::move(p));
         });
-        if (!sm.pdos.empty()) s.sync_managers.push_back(std::move(sm));
+        if (!sm.pdos.empty()) {
+            s.sync_managers.push_back(std::move(sm));
+        }
     }
 
     void entry(const Xml& node, const master::SyncManager& sm, master::Pdo& to) {
         attributes(node, {"idx", "subIdx", "bitLen", "halType", "halPin", "scale", "offset"});
         master::Entry e;
-        e.index = static_cast<std::uint16_t>(number(node, "idx", 0, 0xffff, true, true).value_or(0));
-        e.sub = static_cast<std::uint8_t>(number(node, "subIdx", 0, 0xff, true, e.index != 0).value_or(0));
-        const auto bits = static_cast<std::uint16_t>(number(node, "bitLen", 1, 255, false, true).value_or(8));
+        e.index =
+            static_cast<std::uint16_t>(number(node, "idx", 0, 0xffff, true, true).value_or(0));
+        e.sub = static_cast<std::uint8_t>(
+            number(node, "subIdx", 0, 0xff, true, e.index != 0).value_or(0));
+        const auto bits =
+            static_cast<std::uint16_t>(number(node, "bitLen", 1, 255, false, true).value_or(8));
         if (std::string_view(node.attribute("halType").value()) != "complex") {
             children(node, {}, [](const Xml&) {});
             return typed(node, sm, e, bits, to);
         }
-        if (node.attribute("halPin"))
-            error(Topic::value, node, "an entry of halType complex has no pin of its own", "write halPin in its <complexEntry> elements");
-        unsigned          used = 0;
+        if (node.attribute("halPin")) {
+            error(Topic::value, node, "an entry of halType complex has no pin of its own",
+                  "write halPin in its <complexEntry> elements");
+        }
+        unsigned used = 0;
         const std::size_t first = to.entries.size();
         children(node, {"complexEntry"}, [&](const Xml& part) {
             attributes(part, {"bitLen", "halType", "halPin", "scale", "offset"});
-            const auto length = static_cast<std::uint16_t>(number(part, "bitLen", 1, 32, false, true).value_or(1));
+            const auto length =
+                static_cast<std::uint16_t>(number(part, "bitLen", 1, 32, false, true).value_or(1));
             used += length;
-            if (used <= bits) typed(part, sm, e, length, to);
-            else
-                error(Topic::value, part,
-                      "the <complexEntry> elements have more bits than their <pdoEntry>, which has " + std::to_string(bits),
-                      "correct bitLen");
+            if (used <= bits) {
+                typed(part, sm, e, length, to);
+            } else {
+                error(
+                    Topic::value, part,
+                    "the <complexEntry> elements have more bits than their <pdoEntry>, which has " +
+                        std::to_string(bits),
+                    "correct bitLen");
+            }
         });
         if (used < bits) {
             master::Entry rest = e;
             rest.bits = static_cast<std::uint16_t>(bits - used);
             to.entries.push_back(std::move(rest));
         }
-        for (std::size_t i = first; i < to.entries.size(); ++i) to.entries[i].part = i != first;
+        for (std::size_t i = first; i < to.entries.size(); ++i) {
+            to.entries[i].part = i != first;
+        }
     }
 
     /// Adds an entry, or `bits` single bits if it is a `bit` of several.
-    void typed(const Xml& node, const master::SyncManager& sm, master::Entry e, std::uint16_t bits, master::Pdo& to) {
-        const std::string type = node.attribute("halType").value(), pin = node.attribute("halPin").value();
+    void typed(const Xml& node, const master::SyncManager& sm, master::Entry e, std::uint16_t bits,
+               master::Pdo& to) {
+        const std::string type = node.attribute("halType").value();
+
+        const std::string pin = node.attribute("halPin").value();
         e.bits = bits;
         const auto real = [&](const char* name, double otherwise) {
-            const auto value = node.attribute(name) ? parse_real(trimmed(node.attribute(name).value())) : std::optional<double>(otherwise);
+            const auto value = node.attribute(name)
+                                   ? parse_real(trimmed(node.attribute(name).value()))
+                                   : std::optional<double>(otherwise);
             if (value && (std::string_view(name) != "scale" || *value != 0)) return *value;
-            error(Topic::value, node, "invalid " + std::string(name) + " '" + node.attribute(name).value() + "'",
+            error(Topic::value, node,
+                  "invalid " + std::string(name) + " '" + node.attribute(name).value() + "'",
                   "write a number other than 0");
             return otherwise;
         };
-        const bool is_float = type == "float" || type == "float-unsigned" || type == "float-ieee" || type == "float-double-ieee";
-        if ((node.attribute("scale") || node.attribute("offset")) && !is_float)
-            error(Topic::value, node, "scale and offset apply only to the float types", "write halType=\"float\"");
-        if (type == "bit") e.type = Type::bit;
-        else if (type == "s32") e.type = type_of(std::max<unsigned>(bits, 2), true);
-        else if (type == "u32" || type.empty()) e.type = type_of(std::max<unsigned>(bits, 2), false);
-        else if (is_float) {
-            e.type = type == "float-ieee"          ? Type::real32
-                     : type == "float-double-ieee" ? Type::real64
-                                                   : type_of(std::max<unsigned>(bits, 2), type == "float");
-            e.scaled = true, e.scale = real("scale", 1), e.offset = real("offset", 0);
+        const bool is_float = type == "float" || type == "float-unsigned" || type == "float-ieee" ||
+                              type == "float-double-ieee";
+        if ((node.attribute("scale") || node.attribute("offset")) && !is_float) {
+            error(Topic::value, node, "scale and offset apply only to the float types",
+                  "write halType=\"float\"");
+        }
+        if (type == "bit") {
+            e.type = Type::bit;
+        } else if (type == "s32") {
+            e.type = type_of(std::max<unsigned>(bits, 2), true);
+        } else if (type == "u32" || type.empty()) {
+            e.type = type_of(std::max<unsigned>(bits, 2), false);
+        } else if (is_float) {
+            e.type = type == "float-ieee" ? Type::real32
+                     : type == "float-double-ieee"
+                         ? Type::real64
+                         : type_of(std::max<unsigned>(bits, 2), type == "float");
+            e.scaled = true;
+            e.scale = real("scale", 1);
+            e.offset = real("offset", 0);
             // Written values are (pin + offset) * scale.
-            if (sm.output) e.scale = 1 / e.scale, e.offset = -e.offset;
-            const unsigned width = type == "float-ieee" ? 32 : type == "float-double-ieee" ? 64 : bits;
-            if (bits != width)
-                error(Topic::value, node, "halType " + type + " has " + std::to_string(width) + " bits, not " + std::to_string(bits),
+            if (sm.output) {
+                e.scale = 1 / e.scale;
+                e.offset = -e.offset;
+            }
+            const unsigned width = type == "float-ieee"          ? 32
+                                   : type == "float-double-ieee" ? 64
+                                                                 : bits;
+            if (bits != width) {
+                error(Topic::value, node,
+                      "halType " + type + " has " + std::to_string(width) + " bits, not " +
+                          std::to_string(bits),
                       "correct bitLen");
+            }
         } else {
             error(Topic::value, node, "unknown halType '" + type + "'",
-                  suggestion(type, {"bit", "s32", "u32", "float", "float-unsigned", "float-ieee", "float-double-ieee", "complex"},
+                  suggestion(type,
+                             {"bit", "s32", "u32", "float", "float-unsigned", "float-ieee",
+                              "float-double-ieee", "complex"},
                              "the types are"));
         }
         e.is_signed = is_signed(e.type);
         if (pin.empty() || e.index == 0) return void(to.entries.push_back(std::move(e)));
-        if (type.empty()) error(Topic::value, node, "pin '" + pin + "' has no halType", "write halType=\"u32\"");
+        if (type.empty()) {
+            error(Topic::value, node, "pin '" + pin + "' has no halType", "write halType=\"u32\"");
+        }
         if (e.type != Type::bit || bits == 1) {
-            if (bits > 32 && e.type != Type::real64)
-                error(Topic::value, node, "pin '" + pin + "' has " + std::to_string(bits) + " bits; 32 are possible", "delete halPin");
+            if (bits > 32 && e.type != Type::real64) {
+                error(Topic::value, node,
+                      "pin '" + pin + "' has " + std::to_string(bits) + " bits; 32 are possible",
+                      "delete halPin");
+            }
             e.name = pin;
-            if (!pins_.insert(pin).second) error(Topic::slave, node, "duplicate pin '" + pin + "' of this slave", "choose another halPin");
+            if (!pins_.insert(pin).second) {
+                error(Topic::slave, node, "duplicate pin '" + pin + "' of this slave",
+                      "choose another halPin");
+            }
             info_.pins.push_back({pin, {"", address_text(e.index, e.sub)}});
             return void(to.entries.push_back(std::move(e)));
         }
         for (unsigned i = 0; i < bits; ++i) {
             master::Entry bit = e;
-            bit.bits = 1, bit.part = i != 0;
-            if (i < 32) bit.name = pin + "-" + std::to_string(i), info_.pins.push_back({bit.name, {"", address_text(e.index, e.sub)}});
-            if (i < 32 && !pins_.insert(bit.name).second)
-                error(Topic::slave, node, "duplicate pin '" + bit.name + "' of this slave", "choose another halPin");
+            bit.bits = 1;
+            bit.part = i != 0;
+            if (i < 32) {
+                bit.name = pin + "-" + std::to_string(i);
+
+                info_.pins.push_back({bit.name, {"", address_text(e.index, e.sub)}});
+            }
+            if (i < 32 && !pins_.insert(bit.name).second) {
+                error(Topic::slave, node, "duplicate pin '" + bit.name + "' of this slave",
+                      "choose another halPin");
+            }
             to.entries.push_back(std::move(bit));
         }
     }
 
-    std::string                        folder_;  // of the file, with a slash at its end
-    const ReadFile&                    read_file_;
-    Reading                            out_;
-    Bus*                               bus_ = nullptr;
-    SlaveInfo                          info_;
-    std::set<std::string>              pins_;
+    std::string folder_;  // of the file, with a slash at its end
+    const ReadFile& read_file_;
+    Reading out_;
+    Bus* bus_ = nullptr;
+    SlaveInfo info_;
+    std::set<std::string> pins_;
     std::map<std::string, std::string> parameters_;
-    bool                               configure_ = false;
+    bool configure_ = false;
 };
 
 }  // namespace
 
-Reading read_lcec(std::string_view xml, const std::string& path, const ReadFile& read_file) { return Lcec(xml, path, read_file).read(); }
+Reading read_lcec(std::string_view xml, const std::string& path, const ReadFile& read_file) {
+    return Lcec(xml, path, read_file).read();
+}
 
 }  // namespace hal::ethercat::config

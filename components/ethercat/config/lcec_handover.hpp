@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: MIT
-// How the program lcec_conf gives the path of its file to the component lcec: in a file of the machine's process, which the program removes at
-// its end.
+// How the program lcec_conf gives the path of its file to the component lcec: in a file of the
+// machine's process, which the program removes at its end.
 #pragma once
 
 #include <string>
 
 namespace hal::ethercat::config {
 
-/// Gives the path of a configuration to the machine with this process ID, as long as this object lives. [setup]
+/// Gives the path of a configuration to the machine with this process ID, as long as this object
+/// lives. [setup]
 class LcecHandover {
 public:
     LcecHandover(long machine, const std::string& path);

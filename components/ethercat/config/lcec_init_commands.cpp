@@ -19,26 +19,40 @@ public:
 
     std::vector<StartupWrite> read() {
         pugi::xml_document document;
-        const auto         result = document.load_buffer(text_.data(), text_.size());
+        const auto result = document.load_buffer(text_.data(), text_.size());
         if (!result) {
-            const auto at = std::min(static_cast<std::size_t>(std::max<std::ptrdiff_t>(result.offset, 0)), text_.size());
-            report_(true, 1 + static_cast<std::uint32_t>(std::count(text_.begin(), text_.begin() + static_cast<std::ptrdiff_t>(at), '\n')),
-                    "invalid XML: " + std::string(result.description()), "the file begins with <EtherCATMailbox>");
+            const auto at = std::min(
+                static_cast<std::size_t>(std::max<std::ptrdiff_t>(result.offset, 0)), text_.size());
+            report_(true,
+                    1 + static_cast<std::uint32_t>(std::count(
+                            text_.begin(), text_.begin() + static_cast<std::ptrdiff_t>(at), '\n')),
+                    "invalid XML: " + std::string(result.description()),
+                    "the file begins with <EtherCATMailbox>");
             return {};
         }
         const Xml root = document.document_element();
         if (std::string_view(root.name()) != "EtherCATMailbox") {
-            error(root, "the root element is '" + std::string(root.name()) + "', not EtherCATMailbox",
+            error(root,
+                  "the root element is '" + std::string(root.name()) + "', not EtherCATMailbox",
                   "export the start-up commands of the slave in TwinCAT");
             return {};
         }
-        for (const bool soe : {false, true})
-            for (const Xml list : root.child(soe ? "SoE" : "CoE").children("InitCmds"))
-                for (const Xml command : list.children("InitCmd")) take(command, soe);
-        if (!failed_ && in_preop_.empty() && late_.empty())
-            error(root, "the file writes nothing", "it has <CoE><InitCmds><InitCmd> or <SoE><InitCmds><InitCmd>");
-        std::stable_sort(in_preop_.begin(), in_preop_.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
-        for (auto& [transition, write] : in_preop_) early_.push_back(std::move(write));
+        for (const bool soe : {false, true}) {
+            for (const Xml list : root.child(soe ? "SoE" : "CoE").children("InitCmds")) {
+                for (const Xml command : list.children("InitCmd")) {
+                    take(command, soe);
+                }
+            }
+        }
+        if (!failed_ && in_preop_.empty() && late_.empty()) {
+            error(root, "the file writes nothing",
+                  "it has <CoE><InitCmds><InitCmd> or <SoE><InitCmds><InitCmd>");
+        }
+        std::stable_sort(in_preop_.begin(), in_preop_.end(),
+                         [](const auto& a, const auto& b) { return a.first < b.first; });
+        for (auto& [transition, write] : in_preop_) {
+            early_.push_back(std::move(write));
+        }
         early_.insert(early_.end(), late_.begin(), late_.end());
         return std::move(early_);
     }
@@ -48,57 +62,78 @@ private:
         failed_ = true;
         report_(true, esi::span_of(at, text_).line, std::move(sentence), std::move(help));
     }
-    std::optional<std::int64_t> number(const Xml& command, const char* name, std::int64_t most, std::int64_t otherwise) {
+    std::optional<std::int64_t> number(const Xml& command, const char* name, std::int64_t most,
+                                       std::int64_t otherwise) {
         const Xml child = command.child(name);
         if (!child) {
             if (otherwise >= 0) return otherwise;
-            error(command, "missing <" + std::string(name) + "> in <InitCmd>", "write the number in decimal, or as #x6040");
+            error(command, "missing <" + std::string(name) + "> in <InitCmd>",
+                  "write the number in decimal, or as #x6040");
             return {};
         }
         const auto value = esi::number(trimmed(child.child_value()));
         if (value && *value >= 0 && *value <= most) return value;
-        error(child, "invalid " + std::string(name) + " '" + std::string(trimmed(child.child_value())) + "'",
-              "write a number of 0.." + std::to_string(most) + " in decimal, or as #x6040");
+        error(
+            child,
+            "invalid " + std::string(name) + " '" + std::string(trimmed(child.child_value())) + "'",
+            "write a number of 0.." + std::to_string(most) + " in decimal, or as #x6040");
         return {};
     }
     static bool yes(std::string_view text) { return same_word(text, "true") || text == "1"; }
 
     void take(const Xml& command, bool soe) {
         if (yes(trimmed(command.child_value("Disabled")))) return;
-        constexpr std::int64_t download = 1, write_request = 3;  // client command of CoE, operation code of SoE
-        const auto             operation = number(command, soe ? "OpCode" : "Ccs", 255, soe ? write_request : download);
-        const auto             index = number(command, soe ? "IDN" : "Index", 0xffff, -1);
-        const auto             sub = number(command, soe ? "DriveNo" : "SubIndex", soe ? 7 : 0xff, 0);
+        // client command of CoE, operation code of SoE
+        constexpr std::int64_t download = 1;
+        constexpr std::int64_t write_request = 3;
+        const auto operation =
+            number(command, soe ? "OpCode" : "Ccs", 255, soe ? write_request : download);
+        const auto index = number(command, soe ? "IDN" : "Index", 0xffff, -1);
+        const auto sub = number(command, soe ? "DriveNo" : "SubIndex", soe ? 7 : 0xff, 0);
         if (!operation || !index || !sub || *operation != (soe ? write_request : download)) return;
         const auto data = esi::hex_bytes(command.child_value("Data"));
-        if (!data || data->empty())
-            return error(command, std::string(data ? "missing" : "invalid") + " <Data> in <InitCmd>",
-                         "write hexadecimal bytes in the order of the wire, as in <Data>e803</Data>");
+        if (!data || data->empty()) {
+            return error(
+                command, std::string(data ? "missing" : "invalid") + " <Data> in <InitCmd>",
+                "write hexadecimal bytes in the order of the wire, as in <Data>e803</Data>");
+        }
         StartupWrite w;
         w.protocol = soe ? StartupWrite::Protocol::soe : StartupWrite::Protocol::coe;
-        w.index = static_cast<std::uint16_t>(*index), w.sub = static_cast<std::uint8_t>(*sub), w.data = *data;
+        w.index = static_cast<std::uint16_t>(*index);
+        w.sub = static_cast<std::uint8_t>(*sub);
+
+        w.data = *data;
         w.complete = !soe && yes(command.attribute("CompleteAccess").value());
-        if (!command.child("Transition")) error(command, "missing <Transition> in <InitCmd>", "write <Transition>PS</Transition>");
+        if (!command.child("Transition")) {
+            error(command, "missing <Transition> in <InitCmd>",
+                  "write <Transition>PS</Transition>");
+        }
         for (const Xml t : command.children("Transition")) {
             const std::string_view name = trimmed(t.child_value());
             w.before = name == "SO" ? State::op : State::safeop;
-            if (name == "IP" || name == "PS") in_preop_.emplace_back(name == "PS", w);
-            else if (name == "SO") late_.push_back(w);
-            else
-                report_(false, esi::span_of(t, text_).line, "a command at transition '" + std::string(name) + "' is left out",
+            if (name == "IP" || name == "PS") {
+                in_preop_.emplace_back(name == "PS", w);
+            } else if (name == "SO") {
+                late_.push_back(w);
+            } else {
+                report_(false, esi::span_of(t, text_).line,
+                        "a command at transition '" + std::string(name) + "' is left out",
                         "only IP, PS and SO are executed");
+            }
         }
     }
 
-    std::string_view                           text_;
-    const InitProblem&                         report_;
+    std::string_view text_;
+    const InitProblem& report_;
     std::vector<std::pair<bool, StartupWrite>> in_preop_;  // PS: true
-    std::vector<StartupWrite>                  early_, late_;
-    bool                                       failed_ = false;
+    std::vector<StartupWrite> early_, late_;
+    bool failed_ = false;
 };
 
 }  // namespace
 
-std::vector<StartupWrite> read_init_commands(std::string_view xml, const InitProblem& report) { return InitFile(xml, report).read(); }
+std::vector<StartupWrite> read_init_commands(std::string_view xml, const InitProblem& report) {
+    return InitFile(xml, report).read();
+}
 
 }  // namespace hal::ethercat::config

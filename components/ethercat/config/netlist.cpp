@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Writes a netlist to start from: the master, an axis for each drive of CiA 402, and the pins that are left.
+// Writes a netlist to start from: the master, an axis for each drive of CiA 402, and the pins that
+// are left.
 #include <set>
 
 #include "ethercat/config/config.hpp"
@@ -12,11 +13,16 @@ using master::Entry;
 using master::Type;
 
 /// Pins that a drive on the bus and the component cia402 have under the same name.
-constexpr const char* drive_inputs[] = {
-    "statusword", "modes-of-operation-display", "position-actual-value", "velocity-actual-value", "torque-actual-value", "error-code"};
-constexpr const char* drive_outputs[] = {"controlword",          "modes-of-operation",  "target-position", "target-velocity",
-                                         "target-torque",        "velocity-offset",     "torque-offset",   "profile-velocity",
-                                         "profile-acceleration", "profile-deceleration"};
+constexpr const char* drive_inputs[] = {"statusword",
+                                        "modes-of-operation-display",
+                                        "position-actual-value",
+                                        "velocity-actual-value",
+                                        "torque-actual-value",
+                                        "error-code"};
+constexpr const char* drive_outputs[] = {
+    "controlword",          "modes-of-operation",  "target-position", "target-velocity",
+    "target-torque",        "velocity-offset",     "torque-offset",   "profile-velocity",
+    "profile-acceleration", "profile-deceleration"};
 
 const char* type_of_pin(const Entry& e) {
     if (e.scaled || e.type == Type::real32 || e.type == Type::real64) return "float";
@@ -27,14 +33,21 @@ const char* type_of_pin(const Entry& e) {
 /// Calls `use(output, entry)` for each entry with a pin.
 template <class Use>
 void for_each_pin(const master::Slave& slave, Use use) {
-    for (const auto& sm : slave.sync_managers)
-        for (const auto& pdo : sm.pdos)
-            for (const Entry& e : pdo.entries)
-                if (!e.name.empty()) use(sm.output, e);
+    for (const auto& sm : slave.sync_managers) {
+        for (const auto& pdo : sm.pdos) {
+            for (const Entry& e : pdo.entries) {
+                if (!e.name.empty()) {
+                    use(sm.output, e);
+                }
+            }
+        }
+    }
 }
 
 std::string padded(std::string text, std::size_t width) {
-    if (text.size() < width) text.resize(width, ' ');
+    if (text.size() < width) {
+        text.resize(width, ' ');
+    }
     return text;
 }
 
@@ -55,37 +68,55 @@ public:
     /// Returns the settings and the nets; `linked` receives the pins of the bus that they use.
     std::string lines(std::set<std::string>& linked) const {
         std::string text =
-            "# --- axis " + name_ + " ---\nsetp " + name_ + ".position-scale 1      # counts per unit: see the manual of the drive\n";
-        if (has("target-velocity"))
-            text += "setp " + name_ + ".mode 9                # cyclic synchronous velocity: " + name_ + ".velocity-cmd in units/s\n";
-        else if (has("target-position"))
-            text += "setp " + name_ + ".mode 8                # cyclic synchronous position: " + name_ +
+            "# --- axis " + name_ + " ---\nsetp " + name_ +
+            ".position-scale 1      # counts per unit: see the manual of the drive\n";
+        if (has("target-velocity")) {
+            text += "setp " + name_ +
+                    ".mode 9                # cyclic synchronous velocity: " + name_ +
+                    ".velocity-cmd in units/s\n";
+        } else if (has("target-position")) {
+            text += "setp " + name_ +
+                    ".mode 8                # cyclic synchronous position: " + name_ +
                     ".position-cmd in units\n"
                     "setp " +
-                    name_ + ".max-step 1000         # units; the axis is not enabled while position-cmd is farther from position-fb\n";
-        else if (has("target-torque"))
-            text += "setp " + name_ + ".mode 10               # cyclic synchronous torque: " + name_ + ".torque-cmd\n";
-        text += net(slave_ + "-operational", first_ ? bus_ + "operational" : "", name_ + ".operational");
-        for (const char* pin : drive_inputs)
-            if (has(pin)) text += net(name_ + "-" + pin, from_bus(pin, linked), name_ + "." + pin);
-        for (const char* pin : drive_outputs)
-            if (has(pin)) text += net(name_ + "-" + pin, name_ + "." + pin, from_bus(pin, linked));
+                    name_ +
+                    ".max-step 1000         # units; the axis is not enabled while position-cmd is "
+                    "farther from position-fb\n";
+        } else if (has("target-torque")) {
+            text += "setp " + name_ +
+                    ".mode 10               # cyclic synchronous torque: " + name_ +
+                    ".torque-cmd\n";
+        }
+        text += net(slave_ + "-operational", first_ ? bus_ + "operational" : "",
+                    name_ + ".operational");
+        for (const char* pin : drive_inputs) {
+            if (has(pin)) {
+                text += net(name_ + "-" + pin, from_bus(pin, linked), name_ + "." + pin);
+            }
+        }
+        for (const char* pin : drive_outputs) {
+            if (has(pin)) {
+                text += net(name_ + "-" + pin, name_ + "." + pin, from_bus(pin, linked));
+            }
+        }
         return text + "setp " + name_ + ".enable FALSE           # TRUE switches the axis on\n\n";
     }
 
 private:
-    bool        has(const char* pin) const { return mapped_.count(prefix_ + pin) != 0; }
+    bool has(const char* pin) const { return mapped_.count(prefix_ + pin) != 0; }
     std::string from_bus(const char* pin, std::set<std::string>& linked) const {
         linked.insert(bus_ + prefix_ + pin);
         return bus_ + prefix_ + pin;
     }
-    std::string net(const std::string& signal, const std::string& from, const std::string& to) const {
-        return "net " + padded(signal, name_.size() + 28) + padded(from, bus_.size() + prefix_.size() + 26) + " => " + to + "\n";
+    std::string net(const std::string& signal, const std::string& from,
+                    const std::string& to) const {
+        return "net " + padded(signal, name_.size() + 28) +
+               padded(from, bus_.size() + prefix_.size() + 26) + " => " + to + "\n";
     }
 
-    std::string           name_, slave_;
-    bool                  first_;
-    std::string           bus_, prefix_;
+    std::string name_, slave_;
+    bool first_;
+    std::string bus_, prefix_;
     std::set<std::string> mapped_;
 };
 
@@ -94,41 +125,66 @@ private:
 std::string pin_line(const Entry& e, bool output, const std::string& slave) {
     char object[16];
     std::snprintf(object, sizeof object, "%04X:%X", e.index + 0U, e.sub + 0U);
-    return padded(output ? "in" : "out", 4) + padded(type_of_pin(e), 6) + slave + "." + e.name + "  " + object + "\n";
+    return padded(output ? "in" : "out", 4) + padded(type_of_pin(e), 6) + slave + "." + e.name +
+           "  " + object + "\n";
 }
 
 std::string netlist(const Bus& bus, const std::string& file, const std::string& segment) {
     std::vector<Axis> axes;
-    for (std::size_t n = 0; n < bus.slaves.size(); ++n)
-        for (unsigned axis = 0; axis < bus.slaves[n].cia402_axes; ++axis)
-            if (Axis one(bus.setup.slaves[n], axis, bus.slaves[n].cia402_axes); one.complete()) axes.push_back(std::move(one));
+    for (std::size_t n = 0; n < bus.slaves.size(); ++n) {
+        for (unsigned axis = 0; axis < bus.slaves[n].cia402_axes; ++axis) {
+            if (Axis one(bus.setup.slaves[n], axis, bus.slaves[n].cia402_axes); one.complete()) {
+                axes.push_back(std::move(one));
+            }
+        }
+    }
 
     std::string text = "# The master of " + file +
                        " and what is on its bus: a start. See docs/ethercat-configuration.md.\n\n"
                        "loadrt threads name1=servo-thread period1=" +
                        std::to_string(bus.setup.cycle_ns) + "\n\n";
-    if (!segment.empty()) text += "loadrt ethercat_segment devices=\"" + segment + "\" link=" + bus.link + "\n";
+    if (!segment.empty()) {
+        text += "loadrt ethercat_segment devices=\"" + segment + "\" link=" + bus.link + "\n";
+    }
     text += "loadrt ethercat config=" + file + "\n";
-    if (!axes.empty()) text += "loadrt cia402 names=";
-    for (const Axis& axis : axes) text += (&axis == &axes.front() ? "" : ",") + axis.name() + (&axis == &axes.back() ? "\n" : "");
+    if (!axes.empty()) {
+        text += "loadrt cia402 names=";
+    }
+    for (const Axis& axis : axes) {
+        text +=
+            (&axis == &axes.front() ? "" : ",") + axis.name() + (&axis == &axes.back() ? "\n" : "");
+    }
     text += "\n";
 
     std::set<std::string> linked;
-    for (const Axis& axis : axes) text += axis.lines(linked);
+    for (const Axis& axis : axes) {
+        text += axis.lines(linked);
+    }
     std::string others;
-    for (const auto& slave : bus.setup.slaves)
+    for (const auto& slave : bus.setup.slaves) {
         for_each_pin(slave, [&](bool output, const Entry& e) {
-            if (linked.count("ethercat.0." + slave.name + "." + e.name) == 0)
+            if (linked.count("ethercat.0." + slave.name + "." + e.name) == 0) {
                 others += "#   " + pin_line(e, output, "ethercat.0." + slave.name);
+            }
         });
-    if (!others.empty()) text += "# Pins that are not linked yet. in: written by the netlist, out: read by it\n" + others + "\n";
+    }
+    if (!others.empty()) {
+        text += "# Pins that are not linked yet. in: written by the netlist, out: read by it\n" +
+                others + "\n";
+    }
 
     text += "addf ethercat.0.receive servo-thread\n";
-    for (const Axis& axis : axes) text += "addf " + axis.name() + ".read-all servo-thread\n";
+    for (const Axis& axis : axes) {
+        text += "addf " + axis.name() + ".read-all servo-thread\n";
+    }
     text += "# functions of the machine: here\n";
-    for (const Axis& axis : axes) text += "addf " + axis.name() + ".write-all servo-thread\n";
+    for (const Axis& axis : axes) {
+        text += "addf " + axis.name() + ".write-all servo-thread\n";
+    }
     text += "addf ethercat.0.transmit servo-thread\n";
-    if (!segment.empty()) text += "addf ethercat-segment.0.update servo-thread\n";
+    if (!segment.empty()) {
+        text += "addf ethercat-segment.0.update servo-thread\n";
+    }
     return text + "\nstart\n";
 }
 

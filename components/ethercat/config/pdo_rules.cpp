@@ -7,67 +7,99 @@ namespace hal::ethercat::config {
 
 namespace {
 
-const std::vector<esi::Pdo>& described(const esi::Device& device, bool output) { return output ? device.rx : device.tx; }
+const std::vector<esi::Pdo>& described(const esi::Device& device, bool output) {
+    return output ? device.rx : device.tx;
+}
 
-bool names(const esi::Pdo& p, std::uint16_t other) { return std::find(p.exclude.begin(), p.exclude.end(), other) != p.exclude.end(); }
+bool names(const esi::Pdo& p, std::uint16_t other) {
+    return std::find(p.exclude.begin(), p.exclude.end(), other) != p.exclude.end();
+}
 
 bool is_assigned(const std::vector<master::SyncManager>& managers, std::uint16_t pdo) {
     return std::any_of(managers.begin(), managers.end(), [&](const master::SyncManager& sm) {
-        return std::any_of(sm.pdos.begin(), sm.pdos.end(), [&](const master::Pdo& p) { return p.index == pdo; });
+        return std::any_of(sm.pdos.begin(), sm.pdos.end(),
+                           [&](const master::Pdo& p) { return p.index == pdo; });
     });
 }
 
-std::vector<std::uint16_t> assigned_by_default(const esi::Device& device, bool output, unsigned manager) {
+std::vector<std::uint16_t> assigned_by_default(const esi::Device& device, bool output,
+                                               unsigned manager) {
     std::vector<std::uint16_t> out;
-    for (const esi::Pdo& p : described(device, output))
-        if (p.sync_manager == manager) out.push_back(p.index);
+    for (const esi::Pdo& p : described(device, output)) {
+        if (p.sync_manager == manager) {
+            out.push_back(p.index);
+        }
+    }
     return out;
 }
 
 std::string texts(const std::vector<std::uint16_t>& pdos) {
     std::string out;
-    for (const std::uint16_t p : pdos) out += (out.empty() ? "" : " ") + pdo_text(p);
+    for (const std::uint16_t p : pdos) {
+        out += (out.empty() ? "" : " ") + pdo_text(p);
+    }
     return out;
 }
 
 /// Returns what is wrong with the length of a sync manager, or an empty text.
-std::string too_long(const esi::Device& device, const std::string& type, const master::SyncManager& sm) {
-    if (sm.number >= device.sync_managers.size() || device.sync_managers[sm.number].max_size == 0) return {};
+std::string too_long(const esi::Device& device, const std::string& type,
+                     const master::SyncManager& sm) {
+    if (sm.number >= device.sync_managers.size() || device.sync_managers[sm.number].max_size == 0) {
+        return {};
+    }
     unsigned bits = 0;
-    for (const auto& p : sm.pdos)
-        for (const auto& e : p.entries) bits += e.bits;
-    const unsigned bytes = (bits + 7) / 8, most = device.sync_managers[sm.number].max_size;
-    if (bytes <= most) return {};
-    return "the objects have " + std::to_string(bytes) + " bytes; sync manager " + std::to_string(sm.number) + " of '" + type + "' takes " +
-           std::to_string(most);
+    for (const auto& p : sm.pdos) {
+        for (const auto& e : p.entries) {
+            bits += e.bits;
+        }
+    }
+    const unsigned bytes = (bits + 7) / 8;
+    const unsigned most = device.sync_managers[sm.number].max_size;
+    if (bytes <= most) {
+        return {};
+    }
+    return "the objects have " + std::to_string(bytes) + " bytes; sync manager " +
+           std::to_string(sm.number) + " of '" + type + "' takes " + std::to_string(most);
 }
 
 }  // namespace
 
 std::string pdo_text(std::uint16_t index) { return address_text(index, 0).substr(0, 4); }
 
-bool exclude_each_other(const esi::Pdo& a, const esi::Pdo& b) { return names(a, b.index) || names(b, a.index); }
+bool exclude_each_other(const esi::Pdo& a, const esi::Pdo& b) {
+    return names(a, b.index) || names(b, a.index);
+}
 
 unsigned most_entries(const esi::Device& device, std::uint16_t pdo) {
     const esi::Object* object = device.find(pdo);
     if (object == nullptr) return 0;
     unsigned highest = 0;
-    for (const esi::Value& v : object->values) highest = std::max<unsigned>(highest, v.sub);
+    for (const esi::Value& v : object->values) {
+        highest = std::max<unsigned>(highest, v.sub);
+    }
     return highest;
 }
 
 std::vector<std::uint16_t> mappable(const esi::Device& device, bool output) {
     std::vector<const esi::Pdo*> together;  // mandatory ones that are fixed are assigned as well
-    std::vector<std::uint16_t>   out;
-    const auto&                  pdos = described(device, output);
-    for (const esi::Pdo& p : pdos)
-        if (p.fixed && p.mandatory) together.push_back(&p);
+    std::vector<std::uint16_t> out;
+    const auto& pdos = described(device, output);
+    for (const esi::Pdo& p : pdos) {
+        if (p.fixed && p.mandatory) {
+            together.push_back(&p);
+        }
+    }
     const auto take = [&](auto belongs) {
         for (const esi::Pdo& p : pdos) {
             const bool excluded =
-                std::any_of(together.begin(), together.end(), [&](const esi::Pdo* other) { return exclude_each_other(p, *other); });
-            if (p.fixed || excluded || !belongs(p) || std::find(out.begin(), out.end(), p.index) != out.end()) continue;
-            together.push_back(&p), out.push_back(p.index);
+                std::any_of(together.begin(), together.end(),
+                            [&](const esi::Pdo* other) { return exclude_each_other(p, *other); });
+            if (p.fixed || excluded || !belongs(p) ||
+                std::find(out.begin(), out.end(), p.index) != out.end()) {
+                continue;
+            }
+            together.push_back(&p);
+            out.push_back(p.index);
         }
     };
     take([](const esi::Pdo& p) { return p.mandatory; });
@@ -76,40 +108,56 @@ std::vector<std::uint16_t> mappable(const esi::Device& device, bool output) {
     return out;
 }
 
-void check_pdos(const esi::Device& device, const std::string& type, const std::vector<master::SyncManager>& managers, bool output,
+void check_pdos(const esi::Device& device, const std::string& type,
+                const std::vector<master::SyncManager>& managers, bool output,
                 const std::string& key, Span at, Report& report) {
     const auto error = [&](std::string sentence, std::string help) {
         report.error(Topic::object, at, std::move(sentence), std::move(help));
     };
     std::vector<const esi::Pdo*> assigned;
-    for (const auto& sm : managers)
-        for (const auto& p : sm.pdos)
-            if (const esi::Pdo* d = device.find_pdo(p.index)) assigned.push_back(d);
-    for (std::size_t i = 0; i < assigned.size(); ++i)
-        for (std::size_t k = i + 1; k < assigned.size(); ++k)
-            if (exclude_each_other(*assigned[i], *assigned[k]))
-                error("PDOs " + pdo_text(assigned[i]->index) + " and " + pdo_text(assigned[k]->index) + " of '" + type +
-                          "' exclude each other",
+    for (const auto& sm : managers) {
+        for (const auto& p : sm.pdos) {
+            if (const esi::Pdo* d = device.find_pdo(p.index)) {
+                assigned.push_back(d);
+            }
+        }
+    }
+    for (std::size_t i = 0; i < assigned.size(); ++i) {
+        for (std::size_t k = i + 1; k < assigned.size(); ++k) {
+            if (exclude_each_other(*assigned[i], *assigned[k])) {
+                error("PDOs " + pdo_text(assigned[i]->index) + " and " +
+                          pdo_text(assigned[k]->index) + " of '" + type + "' exclude each other",
                       "assign only one of them");
-    for (const esi::Pdo& p : described(device, output))
-        if (p.mandatory && !is_assigned(managers, p.index))
+            }
+        }
+    }
+    for (const esi::Pdo& p : described(device, output)) {
+        if (p.mandatory && !is_assigned(managers, p.index)) {
             error("PDO " + pdo_text(p.index) + " of '" + type + "' must be assigned",
                   "write it as well: " + key + " = " + pdo_text(p.index));
+        }
+    }
     const bool coe = device.mailbox && device.mailbox->coe;
     for (const auto& sm : managers) {
-        if (const std::string sentence = too_long(device, type, sm); !sentence.empty()) error(sentence, "leave out objects");
+        if (const std::string sentence = too_long(device, type, sm); !sentence.empty()) {
+            error(sentence, "leave out objects");
+        }
         std::vector<std::uint16_t> wanted;
-        for (const auto& p : sm.pdos) wanted.push_back(p.index);
+        for (const auto& p : sm.pdos) {
+            wanted.push_back(p.index);
+        }
         const auto usual = assigned_by_default(device, output, sm.number);
-        if ((!coe || !device.mailbox->pdo_assign) && wanted != usual)
+        if ((!coe || !device.mailbox->pdo_assign) && wanted != usual) {
             error("the assignment of sync manager " + std::to_string(sm.number) + " of '" + type +
                       "' is fixed: " + (usual.empty() ? "no PDO" : texts(usual)),
                   "write " + key + " = default");
+        }
         for (const auto& p : sm.pdos) {
             const esi::Pdo* d = device.find_pdo(p.index);
             if (d == nullptr || p.write_mapping) continue;
-            if (const std::string sentence = esi::longer_entry(device, *d); !sentence.empty())
+            if (const std::string sentence = esi::longer_entry(device, *d); !sentence.empty()) {
                 error(sentence, "correct the description, or list the objects with another PDO");
+            }
         }
     }
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What a device description allows of PDOs: which exclude each other, which must be assigned, how many objects each takes. Everything here is
-// [setup].
+// What a device description allows of PDOs: which exclude each other, which must be assigned, how
+// many objects each takes. Everything here is [setup].
 #pragma once
 
 #include <string>
@@ -16,14 +16,18 @@ std::string pdo_text(std::uint16_t index);
 /// Returns whether a PDO names the other one in Exclude. Files often have it on one side only.
 bool exclude_each_other(const esi::Pdo&, const esi::Pdo&);
 
-/// Returns how many objects the mapping of a PDO takes: the sub-indices of its object in the dictionary; 0: unknown.
+/// Returns how many objects the mapping of a PDO takes: the sub-indices of its object in the
+/// dictionary; 0: unknown.
 unsigned most_entries(const esi::Device&, std::uint16_t pdo);
 
-/// Returns the PDOs of a direction that can be mapped anew, together: mandatory ones first, then those that are assigned by default.
+/// Returns the PDOs of a direction that can be mapped anew, together: mandatory ones first, then
+/// those that are assigned by default.
 std::vector<std::uint16_t> mappable(const esi::Device&, bool output);
 
-/// Checks what a slave has assigned in a direction against its description, and reports at `at`. `key` is "outputs" or "inputs".
-void check_pdos(const esi::Device&, const std::string& type, const std::vector<master::SyncManager>&, bool output, const std::string& key,
+/// Checks what a slave has assigned in a direction against its description, and reports at `at`.
+/// `key` is "outputs" or "inputs".
+void check_pdos(const esi::Device&, const std::string& type,
+                const std::vector<master::SyncManager>&, bool output, const std::string& key,
                 Span at, Report&);
 
 }  // namespace hal::ethercat::config

@@ -10,9 +10,9 @@ using master::Type;
 
 struct ProfileObject {
     std::uint16_t index;
-    std::uint8_t  sub;
-    Type          type;
-    const char*   name;
+    std::uint8_t sub;
+    Type type;
+    const char* name;
 };
 constexpr ProfileObject profile_objects[] = {
     {0x603f, 0, Type::u16, "error-code"},
@@ -63,12 +63,18 @@ constexpr unsigned width_of(Type t) {
 }  // namespace
 
 Known profile_object(std::uint16_t index, std::uint8_t sub, unsigned axes) {
-    if (index >= 0x1c32 && index <= 0x1c33 && sub >= 1 && sub <= 6)
+    if (index >= 0x1c32 && index <= 0x1c33 && sub >= 1 && sub <= 6) {
         return sub == 1 || sub == 4 ? Known{"", Type::u16, 16} : Known{"", Type::u32, 32};
-    for (unsigned axis = 0; axis < axes; ++axis)
-        for (const ProfileObject& o : profile_objects)
-            if (o.index + 0x800U * axis == index && o.sub == sub)
-                return {axes > 1 ? "axis-" + std::to_string(axis + 1) + "-" + o.name : std::string(o.name), o.type, width_of(o.type)};
+    }
+    for (unsigned axis = 0; axis < axes; ++axis) {
+        for (const ProfileObject& o : profile_objects) {
+            if (o.index + 0x800U * axis == index && o.sub == sub) {
+                return {axes > 1 ? "axis-" + std::to_string(axis + 1) + "-" + o.name
+                                 : std::string(o.name),
+                        o.type, width_of(o.type)};
+            }
+        }
+    }
     return {};
 }
 

@@ -15,8 +15,8 @@ inline constexpr std::uint32_t vendor = 0x00ffffff;
 
 struct PdoEntry {
     std::uint16_t index = 0;
-    std::uint8_t  sub = 0;
-    std::string   name{};
+    std::uint8_t sub = 0;
+    std::string name{};
 };
 
 /// Everything here is [setup].
@@ -24,22 +24,25 @@ class DesignBuilder {
 public:
     DesignBuilder(std::string name, std::uint32_t product, std::uint32_t revision = 1);
     Dictionary& dictionary() noexcept { return *design_.dictionary; }
-    Design&     design() noexcept { return design_; }
+    Design& design() noexcept { return design_; }
 
     /// Adds the mailbox with its sync managers 0 and 1; `bytes` for both directions.
     void mailbox(std::size_t bytes, std::uint16_t protocols, bool boot = false);
-    /// Adds a PDO whose entries are in the dictionary already. Fixed PDOs cannot be mapped anew; others hold up to `most` entries.
-    void pdo(bool output, std::uint16_t index, std::string name, const std::vector<PdoEntry>& entries, bool assigned = true,
-             unsigned most = 0);
+    /// Adds a PDO whose entries are in the dictionary already. Fixed PDOs cannot be mapped anew;
+    /// others hold up to `most` entries.
+    void pdo(bool output, std::uint16_t index, std::string name,
+             const std::vector<PdoEntry>& entries, bool assigned = true, unsigned most = 0);
     /// Offers SYNC0, and SYNC1 with `sync1`.
     void dc(bool required, bool sync1 = true);
-    /// Completes sync managers, assignment, SII; `most_*` are the largest process data, 0: as assigned.
-    Design finish(std::uint16_t alias, std::uint32_t serial, std::size_t most_output_bytes = 0, std::size_t most_input_bytes = 0);
+    /// Completes sync managers, assignment, SII; `most_*` are the largest process data, 0: as
+    /// assigned.
+    Design finish(std::uint16_t alias, std::uint32_t serial, std::size_t most_output_bytes = 0,
+                  std::size_t most_input_bytes = 0);
 
 private:
     void assignment(bool output, std::uint16_t sm);
 
-    Design      design_;
+    Design design_;
     std::size_t mailbox_bytes_ = 0;
 };
 

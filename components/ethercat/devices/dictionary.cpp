@@ -9,13 +9,17 @@
 namespace hal::ethercat::devices {
 namespace {
 
-/// Returns the bit of an access right in a state; `right` is coe::access::read_preop or write_preop.
+/// Returns the bit of an access right in a state; `right` is coe::access::read_preop or
+/// write_preop.
 std::uint16_t in_state(std::uint16_t right, State state) noexcept {
-    return static_cast<std::uint16_t>(state == State::op ? right << 2 : state == State::safeop ? right << 1 : right);
+    return static_cast<std::uint16_t>(state == State::op       ? right << 2
+                                      : state == State::safeop ? right << 1
+                                                               : right);
 }
 
 bool is_signed(std::uint16_t type) noexcept {
-    return type == coe::type::s8 || type == coe::type::s16 || type == coe::type::s32 || type == coe::type::s64;
+    return type == coe::type::s8 || type == coe::type::s16 || type == coe::type::s32 ||
+           type == coe::type::s64;
 }
 
 }  // namespace
@@ -34,86 +38,127 @@ std::uint16_t bits_of(std::uint16_t type) noexcept {
     case t::s64:
     case t::u64:
     case t::real64: return 64;
-    default: return type >= t::bit1 && type < t::bit1 + 8 ? static_cast<std::uint16_t>(type - t::bit1 + 1) : 0;
+    default:
+        return type >= t::bit1 && type < t::bit1 + 8
+                   ? static_cast<std::uint16_t>(type - t::bit1 + 1)
+                   : 0;
     }
 }
 
-DictionaryEntry& Dictionary::add(DictionaryObject& o, std::uint8_t sub, std::string name, std::uint16_t type, std::size_t bits,
-                                 std::uint16_t access) {
+DictionaryEntry& Dictionary::add(DictionaryObject& o, std::uint8_t sub, std::string name,
+                                 std::uint16_t type, std::size_t bits, std::uint16_t access) {
     DictionaryEntry e;
-    e.sub = sub, e.type = type, e.bits = static_cast<std::uint16_t>(bits), e.access = access, e.name = std::move(name);
+    e.sub = sub;
+    e.type = type;
+    e.bits = static_cast<std::uint16_t>(bits);
+    e.access = access;
+
+    e.name = std::move(name);
     e.offset = static_cast<std::uint32_t>(memory_.size());
     memory_.resize(memory_.size() + (e.bytes() + 7) / 8 * 8);
     o.entries.push_back(std::move(e));
     return o.entries.back();
 }
 
-void Dictionary::variable(std::uint16_t index, std::string name, std::uint16_t type, std::uint16_t access, std::uint64_t initial) {
+void Dictionary::variable(std::uint16_t index, std::string name, std::uint16_t type,
+                          std::uint16_t access, std::uint64_t initial) {
     DictionaryObject& o = objects_.emplace_back();
-    o.index = index, o.type = type, o.code = coe::ObjectCode::variable, o.name = name;
+    o.index = index;
+    o.type = type;
+    o.code = coe::ObjectCode::variable;
+    o.name = name;
     const auto& e = add(o, 0, std::move(name), type, bits_of(type), access);
     std::memcpy(memory_.data() + e.offset, &initial, e.bytes());
 }
 
-void Dictionary::text(std::uint16_t index, std::string name, std::string_view initial, std::uint16_t access) {
+void Dictionary::text(std::uint16_t index, std::string name, std::string_view initial,
+                      std::uint16_t access) {
     DictionaryObject& o = objects_.emplace_back();
-    o.index = index, o.type = coe::type::visible_string, o.code = coe::ObjectCode::variable, o.name = name;
-    const auto& e = add(o, 0, std::move(name), coe::type::visible_string, initial.size() * 8, access);
+    o.index = index;
+    o.type = coe::type::visible_string;
+    o.code = coe::ObjectCode::variable;
+
+    o.name = name;
+    const auto& e =
+        add(o, 0, std::move(name), coe::type::visible_string, initial.size() * 8, access);
     std::memcpy(memory_.data() + e.offset, initial.data(), initial.size());
 }
 
-void Dictionary::bytes(std::uint16_t index, std::string name, std::size_t bytes, std::uint16_t access) {
+void Dictionary::bytes(std::uint16_t index, std::string name, std::size_t bytes,
+                       std::uint16_t access) {
     DictionaryObject& o = objects_.emplace_back();
-    o.index = index, o.type = coe::type::octet_string, o.code = coe::ObjectCode::variable, o.name = name;
+    o.index = index;
+    o.type = coe::type::octet_string;
+    o.code = coe::ObjectCode::variable;
+
+    o.name = name;
     add(o, 0, std::move(name), coe::type::octet_string, bytes * 8, access);
 }
 
-void Dictionary::record(std::uint16_t index, std::string name, std::uint8_t count, coe::ObjectCode code, std::uint16_t sub0_access,
-                        std::uint16_t type) {
+void Dictionary::record(std::uint16_t index, std::string name, std::uint8_t count,
+                        coe::ObjectCode code, std::uint16_t sub0_access, std::uint16_t type) {
     DictionaryObject& o = objects_.emplace_back();
-    o.index = index, o.type = type, o.code = code, o.name = std::move(name);
+    o.index = index;
+    o.type = type;
+    o.code = code;
+    o.name = std::move(name);
     const auto& e = add(o, 0, "Number of entries", coe::type::u8, 8, sub0_access);
     memory_[e.offset] = count;
 }
 
-void Dictionary::sub(std::uint8_t sub, std::string name, std::uint16_t type, std::uint16_t access, std::uint64_t initial) {
+void Dictionary::sub(std::uint8_t sub, std::string name, std::uint16_t type, std::uint16_t access,
+                     std::uint64_t initial) {
     const auto& e = add(objects_.back(), sub, std::move(name), type, bits_of(type), access);
     std::memcpy(memory_.data() + e.offset, &initial, e.bytes());
-    if (objects_.back().type == 0) objects_.back().type = type;
+    if (objects_.back().type == 0) {
+        objects_.back().type = type;
+    }
 }
 
-void Dictionary::object(std::uint16_t index, std::string name, coe::ObjectCode code, std::uint16_t type) {
+void Dictionary::object(std::uint16_t index, std::string name, coe::ObjectCode code,
+                        std::uint16_t type) {
     DictionaryObject& o = objects_.emplace_back();
-    o.index = index, o.type = type, o.code = code, o.name = std::move(name);
+    o.index = index;
+    o.type = type;
+    o.code = code;
+    o.name = std::move(name);
 }
 
-void Dictionary::entry(std::uint8_t sub, std::string name, std::uint16_t type, std::uint16_t bits, std::uint16_t access,
-                       std::span<const std::uint8_t> initial) {
+void Dictionary::entry(std::uint8_t sub, std::string name, std::uint16_t type, std::uint16_t bits,
+                       std::uint16_t access, std::span<const std::uint8_t> initial) {
     const auto& e = add(objects_.back(), sub, std::move(name), type, bits, access);
     std::copy_n(initial.begin(), std::min(initial.size(), e.bytes()), memory_.begin() + e.offset);
 }
 
 void Dictionary::limit(std::int64_t low, std::int64_t high) {
     auto& e = objects_.back().entries.back();
-    e.limited = true, e.low = low, e.high = high;
+    e.limited = true;
+    e.low = low;
+    e.high = high;
 }
 
 void Dictionary::finish() {
-    std::stable_sort(objects_.begin(), objects_.end(), [](const auto& a, const auto& b) { return a.index < b.index; });
+    std::stable_sort(objects_.begin(), objects_.end(),
+                     [](const auto& a, const auto& b) { return a.index < b.index; });
     initial_ = memory_;
 }
 
-void Dictionary::power_on() noexcept { std::copy(initial_.begin(), initial_.end(), memory_.begin()); }
+void Dictionary::power_on() noexcept {
+    std::copy(initial_.begin(), initial_.end(), memory_.begin());
+}
 
 const DictionaryObject* Dictionary::find(std::uint16_t index) const noexcept {
-    const auto at = std::lower_bound(objects_.begin(), objects_.end(), index, [](const auto& o, std::uint16_t i) { return o.index < i; });
+    const auto at = std::lower_bound(objects_.begin(), objects_.end(), index,
+                                     [](const auto& o, std::uint16_t i) { return o.index < i; });
     return at != objects_.end() && at->index == index ? &*at : nullptr;
 }
 
 const DictionaryEntry* Dictionary::find(std::uint16_t index, std::uint8_t sub) const noexcept {
-    if (const auto* o = find(index))
-        for (const auto& e : o->entries)
+    if (const auto* o = find(index)) {
+        for (const auto& e : o->entries) {
             if (e.sub == sub) return &e;
+        }
+    }
     return nullptr;
 }
 
@@ -122,8 +167,8 @@ std::uint8_t* Dictionary::at(std::uint16_t index, std::uint8_t sub) noexcept {
     return e != nullptr ? data(*e) : nullptr;
 }
 
-std::uint32_t Dictionary::read(std::uint16_t index, std::uint8_t sub, bool complete, State state, std::span<std::uint8_t> to,
-                               std::size_t& length) const noexcept {
+std::uint32_t Dictionary::read(std::uint16_t index, std::uint8_t sub, bool complete, State state,
+                               std::span<std::uint8_t> to, std::size_t& length) const noexcept {
     length = 0;
     const auto* o = find(index);
     if (o == nullptr) return coe::abort::no_object;
@@ -143,18 +188,25 @@ std::uint32_t Dictionary::read(std::uint16_t index, std::uint8_t sub, bool compl
         if (e.sub < sub || e.sub > count(*o)) continue;
         const std::size_t bits = e.sub == 0 ? 16 : e.bits;  // sub-index 0 is padded to 16 bits
         if ((bit + bits + 7) / 8 > to.size()) return coe::abort::memory;
-        for (std::size_t i = (bit + 7) / 8; i < (bit + bits + 7) / 8; ++i) to[i] = 0;
-        if ((e.access & right) != 0) copy_bits(to.data(), bit, data(e), 0, e.bits);
+        for (std::size_t i = (bit + 7) / 8; i < (bit + bits + 7) / 8; ++i) {
+            to[i] = 0;
+        }
+        if ((e.access & right) != 0) {
+            copy_bits(to.data(), bit, data(e), 0, e.bits);
+        }
         bit += bits;
     }
     length = (bit + 7) / 8;
     return 0;
 }
 
-std::uint32_t Dictionary::check_write(std::uint16_t index, std::uint8_t sub, bool complete, State state, std::size_t bytes) const noexcept {
+std::uint32_t Dictionary::check_write(std::uint16_t index, std::uint8_t sub, bool complete,
+                                      State state, std::size_t bytes) const noexcept {
     const auto* o = find(index);
     if (o == nullptr) return coe::abort::no_object;
-    if (complete && o->code != coe::ObjectCode::variable) return sub > 1 ? coe::abort::no_complete_access : 0;
+    if (complete && o->code != coe::ObjectCode::variable) {
+        return sub > 1 ? coe::abort::no_complete_access : 0;
+    }
     const auto* e = find(index, sub);
     if (e == nullptr) return coe::abort::no_sub;
     if ((e->access & coe::access::write) == 0) return coe::abort::read_only;
@@ -164,32 +216,38 @@ std::uint32_t Dictionary::check_write(std::uint16_t index, std::uint8_t sub, boo
     return 0;
 }
 
-std::uint32_t Dictionary::write_entry(const DictionaryObject& o, const DictionaryEntry& e, State state,
-                                      std::span<const std::uint8_t> from) noexcept {
+std::uint32_t Dictionary::write_entry(const DictionaryObject& o, const DictionaryEntry& e,
+                                      State state, std::span<const std::uint8_t> from) noexcept {
     if (const auto code = check_write(o.index, e.sub, false, state, from.size())) return code;
     if (e.limited) {
         std::int64_t value = 0;
         std::memcpy(&value, from.data(), std::min<std::size_t>(from.size(), 8));
-        if (is_signed(e.type) && e.bits < 64 && (value >> (e.bits - 1) & 1) != 0) value -= std::int64_t{1} << e.bits;
+        if (is_signed(e.type) && e.bits < 64 && (value >> (e.bits - 1) & 1) != 0) {
+            value -= std::int64_t{1} << e.bits;
+        }
         if (value > e.high) return coe::abort::too_high;
         if (value < e.low) return coe::abort::too_low;
     }
-    if (guard_ != nullptr)
+    if (guard_ != nullptr) {
         if (const auto code = guard_->check(o, e, from)) return code;
+    }
     std::memcpy(data(e), from.data(), from.size());
-    if (from.size() < e.bytes()) std::memset(data(e) + from.size(), 0, e.bytes() - from.size());
+    if (from.size() < e.bytes()) {
+        std::memset(data(e) + from.size(), 0, e.bytes() - from.size());
+    }
     return 0;
 }
 
 std::uint32_t Dictionary::write_complete(const DictionaryObject& o, std::uint8_t sub, State state,
                                          std::span<const std::uint8_t> from) noexcept {
-    const auto&  sub0 = o.entries.front();
-    std::size_t  bit = 0;
+    const auto& sub0 = o.entries.front();
+    std::size_t bit = 0;
     std::uint8_t count_after = 0;
-    const bool   sets_count = sub == 0 && (sub0.access & coe::access::write) != 0;
+    const bool sets_count = sub == 0 && (sub0.access & coe::access::write) != 0;
     if (sub == 0) {
         if (from.size() < 2) return coe::abort::too_short;
-        count_after = from[0], bit = 16;
+        count_after = from[0];
+        bit = 16;
     }
     if (sets_count) {  // entries can be written only while the count is 0
         const std::uint8_t none = 0;
@@ -201,11 +259,13 @@ std::uint32_t Dictionary::write_complete(const DictionaryObject& o, std::uint8_t
             if (bit == from.size() * 8) break;
             return coe::abort::length;
         }
-        if (e.bytes() <= 8) {  // longer entries of records are texts, which are not written this way
+        // longer entries of records are texts, which are not written this way
+        if (e.bytes() <= 8) {
             std::uint8_t value[8] = {};
             copy_bits(value, 0, from.data(), bit, e.bits);
-            if ((e.access & coe::access::write) != 0)
+            if ((e.access & coe::access::write) != 0) {
                 if (const auto code = write_entry(o, e, state, {value, e.bytes()})) return code;
+            }
         }
         bit += e.bits;
     }
@@ -217,8 +277,9 @@ std::uint32_t Dictionary::write(std::uint16_t index, std::uint8_t sub, bool comp
                                 std::span<const std::uint8_t> from) noexcept {
     const auto* o = find(index);
     if (o == nullptr) return coe::abort::no_object;
-    if (complete && o->code != coe::ObjectCode::variable)
+    if (complete && o->code != coe::ObjectCode::variable) {
         return sub > 1 ? coe::abort::no_complete_access : write_complete(*o, sub, state, from);
+    }
     const auto* e = find(index, sub);
     return e == nullptr ? coe::abort::no_sub : write_entry(*o, *e, state, from);
 }

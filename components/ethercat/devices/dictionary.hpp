@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The object dictionary of an emulated slave. It is filled in setup; after finish() nothing moves, so that firmware may keep pointers.
+// The object dictionary of an emulated slave. It is filled in setup; after finish() nothing moves,
+// so that firmware may keep pointers.
 //
 //     Dictionary dictionary;
 //     dictionary.variable(0x6041, "Statusword", coe::type::u16, coe::access::read | coe::access::tx_mappable);
@@ -19,21 +20,27 @@
 namespace hal::ethercat::devices {
 
 struct DictionaryEntry {
-    std::uint8_t  sub = 0;
-    std::uint16_t type = 0, bits = 0, access = 0;
-    std::uint32_t offset = 0;      ///< of its data
-    std::string   name;
-    bool          limited = false;
-    std::int64_t  low = 0, high = 0;
+    std::uint8_t sub = 0;
+    std::uint16_t type = 0;
+    std::uint16_t bits = 0;
+    std::uint16_t access = 0;
+    std::uint32_t offset = 0;  ///< of its data
+    std::string name;
+    bool limited = false;
+    std::int64_t low = 0;
+    std::int64_t high = 0;
 
     std::size_t bytes() const noexcept { return (bits + 7U) / 8U; }
-    bool        text() const noexcept { return type == coe::type::visible_string || type == coe::type::octet_string; }
+    bool text() const noexcept {
+        return type == coe::type::visible_string || type == coe::type::octet_string;
+    }
 };
 
 struct DictionaryObject {
-    std::uint16_t                index = 0, type = 0;
-    coe::ObjectCode              code{};
-    std::string                  name;
+    std::uint16_t index = 0;
+    std::uint16_t type = 0;
+    coe::ObjectCode code{};
+    std::string name;
     std::vector<DictionaryEntry> entries;  ///< by sub-index
 };
 
@@ -41,63 +48,84 @@ struct DictionaryObject {
 class DictionaryGuard {
 public:
     virtual ~DictionaryGuard() = default;
-    /// Returns an abort code, or 0 to accept the value. Called after the checks of the dictionary. [realtime]
-    virtual std::uint32_t check(const DictionaryObject&, const DictionaryEntry&, std::span<const std::uint8_t> value) noexcept = 0;
+    /// Returns an abort code, or 0 to accept the value. Called after the checks of the dictionary.
+    /// [realtime]
+    virtual std::uint32_t check(const DictionaryObject&, const DictionaryEntry&,
+                                std::span<const std::uint8_t> value) noexcept = 0;
 };
 
 class Dictionary {
 public:
     // Setup; all [setup].
     /// Adds an object with one value.
-    void variable(std::uint16_t index, std::string name, std::uint16_t type, std::uint16_t access, std::uint64_t initial = 0);
+    void variable(std::uint16_t index, std::string name, std::uint16_t type, std::uint16_t access,
+                  std::uint64_t initial = 0);
     /// Adds an object whose value is a text of fixed length.
-    void text(std::uint16_t index, std::string name, std::string_view initial, std::uint16_t access = coe::access::read);
+    void text(std::uint16_t index, std::string name, std::string_view initial,
+              std::uint16_t access = coe::access::read);
     /// Adds an object whose value is `bytes` long.
     void bytes(std::uint16_t index, std::string name, std::size_t bytes, std::uint16_t access);
     /// Adds an object with sub-indices; sub-index 0 holds `count`.
-    void record(std::uint16_t index, std::string name, std::uint8_t count, coe::ObjectCode code = coe::ObjectCode::record,
+    void record(std::uint16_t index, std::string name, std::uint8_t count,
+                coe::ObjectCode code = coe::ObjectCode::record,
                 std::uint16_t sub0_access = coe::access::read, std::uint16_t type = 0);
     /// Adds an entry to the newest record.
-    void sub(std::uint8_t sub, std::string name, std::uint16_t type, std::uint16_t access, std::uint64_t initial = 0);
+    void sub(std::uint8_t sub, std::string name, std::uint16_t type, std::uint16_t access,
+             std::uint64_t initial = 0);
     /// Adds an object without entries; entry() adds them.
     void object(std::uint16_t index, std::string name, coe::ObjectCode code, std::uint16_t type);
     /// Adds an entry of any type and length to the newest object; `initial` may be shorter.
-    void entry(std::uint8_t sub, std::string name, std::uint16_t type, std::uint16_t bits, std::uint16_t access,
-               std::span<const std::uint8_t> initial = {});
+    void entry(std::uint8_t sub, std::string name, std::uint16_t type, std::uint16_t bits,
+               std::uint16_t access, std::span<const std::uint8_t> initial = {});
     /// Limits the newest entry.
     void limit(std::int64_t low, std::int64_t high);
     /// Sorts the objects. Nothing may be added after it.
     void finish();
 
     // Run time.
-    void                                 power_on() noexcept;  ///< Restores the initial values. [realtime]
+    /// Restores the initial values. [realtime]
+    void power_on() noexcept;
     const std::vector<DictionaryObject>& objects() const noexcept { return objects_; }
-    const DictionaryObject*              find(std::uint16_t index) const noexcept;  ///< nullptr: missing. [realtime]
-    const DictionaryEntry*               find(std::uint16_t index, std::uint8_t sub) const noexcept;  ///< nullptr: missing. [realtime]
-    std::uint8_t*                        data(const DictionaryEntry& e) noexcept { return memory_.data() + e.offset; }  ///< [realtime]
-    const std::uint8_t*                  data(const DictionaryEntry& e) const noexcept { return memory_.data() + e.offset; }
+    /// nullptr: missing. [realtime]
+    const DictionaryObject* find(std::uint16_t index) const noexcept;
+    /// nullptr: missing. [realtime]
+    const DictionaryEntry* find(std::uint16_t index, std::uint8_t sub) const noexcept;
+    /// [realtime]
+    std::uint8_t* data(const DictionaryEntry& e) noexcept { return memory_.data() + e.offset; }
+    const std::uint8_t* data(const DictionaryEntry& e) const noexcept {
+        return memory_.data() + e.offset;
+    }
     /// Returns the data of an entry; nullptr: missing. [realtime]
     std::uint8_t* at(std::uint16_t index, std::uint8_t sub) noexcept;
     /// Returns the value of sub-index 0, a count. [realtime]
-    std::uint8_t count(const DictionaryObject& o) const noexcept { return *data(o.entries.front()); }
+    std::uint8_t count(const DictionaryObject& o) const noexcept {
+        return *data(o.entries.front());
+    }
 
-    /// Reads an entry, or all entries from `sub` on, into `to`; returns an abort code, 0 with `length` if it succeeded. [realtime]
-    std::uint32_t read(std::uint16_t index, std::uint8_t sub, bool complete, State state, std::span<std::uint8_t> to,
-                       std::size_t& length) const noexcept;
+    /// Reads an entry, or all entries from `sub` on, into `to`; returns an abort code, 0 with
+    /// `length` if it succeeded. [realtime]
+    std::uint32_t read(std::uint16_t index, std::uint8_t sub, bool complete, State state,
+                       std::span<std::uint8_t> to, std::size_t& length) const noexcept;
     /// Writes an entry, or all entries from `sub` on; returns an abort code or 0. [realtime]
-    std::uint32_t write(std::uint16_t index, std::uint8_t sub, bool complete, State state, std::span<const std::uint8_t> from) noexcept;
-    /// Returns the abort code that a write of `bytes` would have before its data is known. [realtime]
-    std::uint32_t check_write(std::uint16_t index, std::uint8_t sub, bool complete, State state, std::size_t bytes) const noexcept;
-    void          guard_with(DictionaryGuard* guard) noexcept { guard_ = guard; }  ///< [setup]
+    std::uint32_t write(std::uint16_t index, std::uint8_t sub, bool complete, State state,
+                        std::span<const std::uint8_t> from) noexcept;
+    /// Returns the abort code that a write of `bytes` would have before its data is known.
+    /// [realtime]
+    std::uint32_t check_write(std::uint16_t index, std::uint8_t sub, bool complete, State state,
+                              std::size_t bytes) const noexcept;
+    void guard_with(DictionaryGuard* guard) noexcept { guard_ = guard; }  ///< [setup]
 
 private:
-    DictionaryEntry& add(DictionaryObject&, std::uint8_t sub, std::string name, std::uint16_t type, std::size_t bits, std::uint16_t access);
-    std::uint32_t    write_entry(const DictionaryObject&, const DictionaryEntry&, State, std::span<const std::uint8_t> from) noexcept;
-    std::uint32_t    write_complete(const DictionaryObject&, std::uint8_t sub, State, std::span<const std::uint8_t> from) noexcept;
+    DictionaryEntry& add(DictionaryObject&, std::uint8_t sub, std::string name, std::uint16_t type,
+                         std::size_t bits, std::uint16_t access);
+    std::uint32_t write_entry(const DictionaryObject&, const DictionaryEntry&, State,
+                              std::span<const std::uint8_t> from) noexcept;
+    std::uint32_t write_complete(const DictionaryObject&, std::uint8_t sub, State,
+                                 std::span<const std::uint8_t> from) noexcept;
 
     std::vector<DictionaryObject> objects_;
-    std::vector<std::uint8_t>     memory_, initial_;
-    DictionaryGuard*              guard_ = nullptr;
+    std::vector<std::uint8_t> memory_, initial_;
+    DictionaryGuard* guard_ = nullptr;
 };
 
 /// Returns the bits of a basic type; 0 for texts and unknown types. [any]

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// A device as a description in XML (ESI, ETG.2000) has it: its EEPROM, its object dictionary, its PDOs. Its objects keep the values
-// that are written; behaviour beyond that is not in a description.
+// A device as a description in XML (ESI, ETG.2000) has it: its EEPROM, its object dictionary, its
+// PDOs. Its objects keep the values that are written; behaviour beyond that is not in a
+// description.
 #pragma once
 
 #include <string>
@@ -11,8 +12,8 @@
 
 namespace hal::ethercat::devices {
 
-/// Returns the device that a name, an order code or a product code (0x…) means; without one, the only device. nullptr after setting `problem`.
-/// [setup]
+/// Returns the device that a name, an order code or a product code (0x…) means; without one, the
+/// only device. nullptr after setting `problem`. [setup]
 const esi::Device* find_device(const esi::File&, std::string_view wanted, std::string& problem);
 
 /// Returns what the emulation cannot do with a device; empty: nothing. [setup]

@@ -6,7 +6,8 @@
 
 namespace hal::ethercat::devices {
 
-void FoeServer::add(std::string name, std::vector<std::uint8_t> content, std::uint32_t password, bool boot_only) {
+void FoeServer::add(std::string name, std::vector<std::uint8_t> content, std::uint32_t password,
+                    bool boot_only) {
     File file{std::move(name), std::move(content), 0, password, boot_only};
     file.length = file.bytes.size();
     file.bytes.resize(std::max(file.length, most_bytes_));
@@ -14,8 +15,11 @@ void FoeServer::add(std::string name, std::vector<std::uint8_t> content, std::ui
 }
 
 std::span<const std::uint8_t> FoeServer::content(std::string_view name) const noexcept {
-    for (const auto& f : files_)
-        if (f.name == name) return {f.bytes.data(), f.length};
+    for (const auto& f : files_) {
+        if (f.name == name) {
+            return {f.bytes.data(), f.length};
+        }
+    }
     return {};
 }
 
@@ -31,15 +35,27 @@ void FoeServer::refuse(Outbox& out, foe::Error error) noexcept {
 
 void FoeServer::open(const foe::Message& m, bool write, State state, Outbox& out) noexcept {
     file_ = nullptr;
-    for (auto& f : files_)
-        if (f.name == m.text()) file_ = &f;
+    for (auto& f : files_) {
+        if (f.name == m.text()) {
+            file_ = &f;
+        }
+    }
     if (file_ == nullptr) return refuse(out, foe::Error::not_found);
-    if (file_->password != 0 && file_->password != m.value) return refuse(out, foe::Error::no_rights);
-    if (write && file_->boot_only && state != State::boot) return refuse(out, foe::Error::bootstrap_only);
-    writing_ = write, at_ = 0, busy_ = false;
+    if (file_->password != 0 && file_->password != m.value) {
+        return refuse(out, foe::Error::no_rights);
+    }
+    if (write && file_->boot_only && state != State::boot) {
+        return refuse(out, foe::Error::bootstrap_only);
+    }
+    writing_ = write;
+    at_ = 0;
+    busy_ = false;
     packet_ = write ? 0 : 1;
-    if (write) send(out, foe::Opcode::ack, 0);
-    else send_packet(out);
+    if (write) {
+        send(out, foe::Opcode::ack, 0);
+    } else {
+        send_packet(out);
+    }
 }
 
 void FoeServer::send_packet(Outbox& out) noexcept {
@@ -52,7 +68,10 @@ void FoeServer::send_packet(Outbox& out) noexcept {
 
 void FoeServer::take(const MailboxMessage& message, State state, Outbox& out) noexcept {
     const auto m = foe::read(message.payload);
-    if (!m) return out.send(MailboxType::error, write_mailbox_error(out.payload(), MailboxError::too_short));
+    if (!m) {
+        return out.send(MailboxType::error,
+                        write_mailbox_error(out.payload(), MailboxError::too_short));
+    }
     switch (m->opcode) {
     case foe::Opcode::read: return open(*m, false, state, out);
     case foe::Opcode::write: return open(*m, true, state, out);
@@ -65,11 +84,14 @@ void FoeServer::take(const MailboxMessage& message, State state, Outbox& out) no
         }
         busy_ = false;
         if (m->data.size() > file_->bytes.size() - at_) return refuse(out, foe::Error::disk_full);
-        if (!m->data.empty()) std::memcpy(file_->bytes.data() + at_, m->data.data(), m->data.size());
+        if (!m->data.empty()) {
+            std::memcpy(file_->bytes.data() + at_, m->data.data(), m->data.size());
+        }
         at_ += m->data.size();
         packet_ = m->value;
         send(out, foe::Opcode::ack, packet_);
-        if (m->data.size() < foe::packet_capacity(out.mailbox())) {  // both mailboxes have the same size
+        // both mailboxes have the same size
+        if (m->data.size() < foe::packet_capacity(out.mailbox())) {
             file_->length = at_;
             file_ = nullptr;
         }
@@ -86,7 +108,9 @@ void FoeServer::take(const MailboxMessage& message, State state, Outbox& out) no
         ++packet_;
         return send_packet(out);
     case foe::Opcode::busy:
-        if (file_ != nullptr && !writing_) send_packet(out);
+        if (file_ != nullptr && !writing_) {
+            send_packet(out);
+        }
         return;
     case foe::Opcode::error: file_ = nullptr; return;
     }

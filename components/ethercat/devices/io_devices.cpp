@@ -3,16 +3,21 @@
 
 namespace hal::ethercat::devices {
 
-IoBehaviour::IoBehaviour(std::shared_ptr<Dictionary> dictionary, std::uint16_t index, unsigned channels, bool output, bool digital)
+IoBehaviour::IoBehaviour(std::shared_ptr<Dictionary> dictionary, std::uint16_t index,
+                         unsigned channels, bool output, bool digital)
     : dictionary_(std::move(dictionary)), channels_(channels), output_(output), digital_(digital) {
-    for (unsigned n = 0; n < channels; ++n)
+    for (unsigned n = 0; n < channels; ++n) {
         data_[n] = digital ? dictionary_->at(index, static_cast<std::uint8_t>(n + 1))
                            : dictionary_->at(static_cast<std::uint16_t>(index + 0x10 * n), 1);
+    }
 }
 
 void IoBehaviour::power_on() noexcept {
-    if (output_)
-        for (auto& v : values_) v.store(0, std::memory_order_relaxed);
+    if (output_) {
+        for (auto& v : values_) {
+            v.store(0, std::memory_order_relaxed);
+        }
+    }
 }
 
 void IoBehaviour::step(Step& s) noexcept {
@@ -36,15 +41,19 @@ Parts make_coupler(const DeviceOptions& o) {
 
 Parts make_digital(const DeviceOptions& o, bool output) {
     namespace access = coe::access;
-    DesignBuilder       b(output ? "digital_out" : "digital_in", (output ? 0x0d0000U : 0x0d1000U) + o.bits);
+    DesignBuilder b(output ? "digital_out" : "digital_in",
+                    (output ? 0x0d0000U : 0x0d1000U) + o.bits);
     const std::uint16_t index = output ? 0x7000 : 0x6000;
-    const auto rights = static_cast<std::uint16_t>(output ? access::read_write | access::rx_mappable : access::read | access::tx_mappable);
-    auto&      d = b.dictionary();
+    const auto rights = static_cast<std::uint16_t>(output ? access::read_write | access::rx_mappable
+                                                          : access::read | access::tx_mappable);
+    auto& d = b.dictionary();
     d.record(index, output ? "Outputs" : "Inputs", static_cast<std::uint8_t>(o.bits));
     std::vector<PdoEntry> entries;
     for (unsigned n = 1; n <= o.bits; ++n) {
-        d.sub(static_cast<std::uint8_t>(n), (output ? "Output " : "Input ") + std::to_string(n), coe::type::boolean, rights);
-        entries.push_back({index, static_cast<std::uint8_t>(n), (output ? "Output " : "Input ") + std::to_string(n)});
+        d.sub(static_cast<std::uint8_t>(n), (output ? "Output " : "Input ") + std::to_string(n),
+              coe::type::boolean, rights);
+        entries.push_back({index, static_cast<std::uint8_t>(n),
+                           (output ? "Output " : "Input ") + std::to_string(n)});
     }
     b.pdo(output, output ? coe::rx_pdo : coe::tx_pdo, output ? "Outputs" : "Inputs", entries);
     auto design = b.finish(o.alias, o.serial);
@@ -54,21 +63,27 @@ Parts make_digital(const DeviceOptions& o, bool output) {
 
 Parts make_analog(const DeviceOptions& o, bool output) {
     namespace access = coe::access;
-    DesignBuilder b(output ? "analog_out" : "analog_in", (output ? 0x0a0000U : 0x0a1000U) + o.channels);
+    DesignBuilder b(output ? "analog_out" : "analog_in",
+                    (output ? 0x0a0000U : 0x0a1000U) + o.channels);
     b.mailbox(128, sii::coe);
     const std::uint16_t base = output ? 0x7000 : 0x6000;
-    const auto rights = static_cast<std::uint16_t>(output ? access::read_write | access::rx_mappable : access::read | access::tx_mappable);
-    auto&      d = b.dictionary();
+    const auto rights = static_cast<std::uint16_t>(output ? access::read_write | access::rx_mappable
+                                                          : access::read | access::tx_mappable);
+    auto& d = b.dictionary();
     for (unsigned n = 0; n < o.channels; ++n) {
-        d.record(static_cast<std::uint16_t>(base + 0x10 * n), "Channel " + std::to_string(n + 1), 1);
+        d.record(static_cast<std::uint16_t>(base + 0x10 * n), "Channel " + std::to_string(n + 1),
+                 1);
         d.sub(1, "Value", coe::type::s16, rights);
     }
-    for (unsigned n = 0; n < o.channels; ++n)
-        b.pdo(output, static_cast<std::uint16_t>((output ? coe::rx_pdo : coe::tx_pdo) + n), "Channel " + std::to_string(n + 1),
+    for (unsigned n = 0; n < o.channels; ++n) {
+        b.pdo(output, static_cast<std::uint16_t>((output ? coe::rx_pdo : coe::tx_pdo) + n),
+              "Channel " + std::to_string(n + 1),
               {{static_cast<std::uint16_t>(base + 0x10 * n), 1, "Value"}});
+    }
     b.dc(false);
     auto design = b.finish(o.alias, o.serial);
-    auto behaviour = std::make_unique<IoBehaviour>(design.dictionary, base, o.channels, output, false);
+    auto behaviour =
+        std::make_unique<IoBehaviour>(design.dictionary, base, o.channels, output, false);
     return {std::move(design), std::move(behaviour)};
 }
 

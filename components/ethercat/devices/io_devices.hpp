@@ -15,25 +15,29 @@ namespace hal::ethercat::devices {
 
 inline constexpr unsigned most_channels = 64;
 
-/// Terminal values of an I/O device. Inputs are written from any thread and outputs read from any thread.
+/// Terminal values of an I/O device. Inputs are written from any thread and outputs read from any
+/// thread.
 class IoBehaviour : public Behaviour {
 public:
     /// `index` is the first channel's object, at `index` + 10h * n sub 1, or, for bits, sub n + 1. [setup]
-    IoBehaviour(std::shared_ptr<Dictionary>, std::uint16_t index, unsigned channels, bool output, bool digital);
+    IoBehaviour(std::shared_ptr<Dictionary>, std::uint16_t index, unsigned channels, bool output,
+                bool digital);
     void step(Step&) noexcept override;
     void power_on() noexcept override;
     void set_input(unsigned channel, std::int32_t value) noexcept {
         values_[channel % most_channels].store(value, std::memory_order_relaxed);
     }
-    std::int32_t output(unsigned channel) const noexcept { return values_[channel % most_channels].load(std::memory_order_relaxed); }
-    unsigned     channels() const noexcept { return channels_; }
+    std::int32_t output(unsigned channel) const noexcept {
+        return values_[channel % most_channels].load(std::memory_order_relaxed);
+    }
+    unsigned channels() const noexcept { return channels_; }
 
 private:
-    std::shared_ptr<Dictionary>                          dictionary_;
-    std::array<std::uint8_t*, most_channels>             data_{};
+    std::shared_ptr<Dictionary> dictionary_;
+    std::array<std::uint8_t*, most_channels> data_{};
     std::array<std::atomic<std::int32_t>, most_channels> values_{};
-    unsigned                                             channels_;
-    bool                                                 output_, digital_;
+    unsigned channels_;
+    bool output_, digital_;
 };
 
 /// A coupler: neither mailbox nor process data.
@@ -44,22 +48,26 @@ public:
 
 /// Options of a device in a line description.
 struct DeviceOptions {
-    unsigned                         bits = 8, channels = 4, axes = 1;
-    std::uint16_t                    alias = 0;
-    std::uint32_t                    serial = 0;
-    bool                             dc_required = false;
-    std::uint32_t                    modes = 0x3a5;  ///< of a servo (6502h)
-    std::string                      file{}, device{};   ///< description of an esi device, and its name there; empty: the only one
+    unsigned bits = 8;
+    unsigned channels = 4;
+    unsigned axes = 1;
+    std::uint16_t alias = 0;
+    std::uint32_t serial = 0;
+    bool dc_required = false;
+    std::uint32_t modes = 0x3a5;  ///< of a servo (6502h)
+    /// description of an esi device, and its name there; empty: the only one
+    std::string file{};
+    std::string device{};
     std::shared_ptr<const esi::File> description{};  ///< the contents of `file`
 };
 
 /// A device: its description and its behaviour.
 struct Parts {
-    Design                     design;
+    Design design;
     std::unique_ptr<Behaviour> behaviour;
 };
-Parts make_coupler(const DeviceOptions&);                  ///< [setup]
-Parts make_digital(const DeviceOptions&, bool output);     ///< `bits` 1..64. [setup]
-Parts make_analog(const DeviceOptions&, bool output);      ///< `channels` 1..16. [setup]
+Parts make_coupler(const DeviceOptions&);  ///< [setup]
+Parts make_digital(const DeviceOptions&, bool output);  ///< `bits` 1..64. [setup]
+Parts make_analog(const DeviceOptions&, bool output);  ///< `channels` 1..16. [setup]
 
 }  // namespace hal::ethercat::devices

@@ -18,12 +18,19 @@ public:
     explicit Outbox(std::size_t messages = 4, std::size_t bytes = largest_mailbox)
         : slots_(messages), memory_(messages * bytes), bytes_(bytes) {}
     /// Forgets all messages; messages are up to `mailbox` bytes long from now on. [realtime]
-    void        clear(std::size_t mailbox) noexcept { used_ = 0, first_ = 0, mailbox_ = mailbox < bytes_ ? mailbox : bytes_; }
-    std::size_t mailbox() const noexcept { return mailbox_; }  ///< Returns the bytes of a message with its header. [realtime]
-    bool        full() const noexcept { return used_ == slots_.size(); }
-    bool        empty() const noexcept { return used_ == 0; }
+    void clear(std::size_t mailbox) noexcept {
+        used_ = 0;
+        first_ = 0;
+        mailbox_ = mailbox < bytes_ ? mailbox : bytes_;
+    }
+    /// Returns the bytes of a message with its header. [realtime]
+    std::size_t mailbox() const noexcept { return mailbox_; }
+    bool full() const noexcept { return used_ == slots_.size(); }
+    bool empty() const noexcept { return used_ == 0; }
     /// Returns where the payload of the next message goes; must not be full. [realtime]
-    std::uint8_t* payload() noexcept { return at((first_ + used_) % slots_.size()) + mailbox_header_bytes; }
+    std::uint8_t* payload() noexcept {
+        return at((first_ + used_) % slots_.size()) + mailbox_header_bytes;
+    }
     /// Queues the message whose payload was written. [realtime]
     void send(MailboxType type, std::size_t length) noexcept {
         if (full()) return;
@@ -32,14 +39,22 @@ public:
         slots_[n] = mailbox_header_bytes + length;
         ++used_;
     }
-    std::span<std::uint8_t> front() noexcept { return {at(first_), slots_[first_]}; }  ///< [realtime]
-    void                    pop() noexcept { first_ = (first_ + 1) % slots_.size(), --used_; }            ///< [realtime]
+    /// [realtime]
+    std::span<std::uint8_t> front() noexcept { return {at(first_), slots_[first_]}; }
+    /// [realtime]
+    void pop() noexcept {
+        first_ = (first_ + 1) % slots_.size();
+        --used_;
+    }
 
 private:
-    std::uint8_t*             at(std::size_t n) noexcept { return memory_.data() + n * bytes_; }
-    std::vector<std::size_t>  slots_;  ///< lengths with header
+    std::uint8_t* at(std::size_t n) noexcept { return memory_.data() + n * bytes_; }
+    std::vector<std::size_t> slots_;  ///< lengths with header
     std::vector<std::uint8_t> memory_;
-    std::size_t               bytes_ = 0, mailbox_ = 0, first_ = 0, used_ = 0;
+    std::size_t bytes_ = 0;
+    std::size_t mailbox_ = 0;
+    std::size_t first_ = 0;
+    std::size_t used_ = 0;
 };
 
 /// A mailbox protocol.
@@ -47,10 +62,12 @@ class MailboxService {
 public:
     virtual ~MailboxService() = default;
     virtual MailboxType type() const noexcept = 0;
-    virtual void        reset() noexcept {}  ///< Ends transfers; called when the mailbox starts. [realtime]
+    /// Ends transfers; called when the mailbox starts. [realtime]
+    virtual void reset() noexcept {}
     /// Takes a message and answers it. The outbox has space for two messages. [realtime]
     virtual void take(const MailboxMessage&, State, Outbox&) noexcept = 0;
-    /// Queues the next message of a long answer, if there is one; called while the outbox is empty. [realtime]
+    /// Queues the next message of a long answer, if there is one; called while the outbox is empty.
+    /// [realtime]
     virtual void pump(Outbox&) noexcept {}
 };
 

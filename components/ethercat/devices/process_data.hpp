@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The process data of an emulated slave: what the PDO mapping (1600h…, 1A00h…) and the assignment (1C10h + sync manager) make of it.
+// The process data of an emulated slave: what the PDO mapping (1600h…, 1A00h…) and the assignment
+// (1C10h + sync manager) make of it.
 #pragma once
 
 #include <cstdint>
@@ -16,28 +17,36 @@ public:
     /// `assignment` is 1C10h + the number of the sync manager; it may be missing in the dictionary. `most_bytes` limits its length. [setup]
     void attach(Dictionary&, std::uint16_t assignment, bool output, std::size_t most_bytes);
     /// Computes the copies from the present mapping. [realtime]
-    void          build() noexcept;
-    std::size_t   bytes() const noexcept { return (bits_ + 7) / 8; }  ///< Returns the length of the process data. [realtime]
-    void          unpack(std::span<const std::uint8_t> from) noexcept;  ///< Copies outputs into the dictionary. [realtime]
-    void          pack(std::span<std::uint8_t> to) const noexcept;  ///< Copies inputs out of the dictionary. [realtime]
-    void          clear() noexcept;  ///< Sets all mapped outputs to 0. [realtime]
+    void build() noexcept;
+    /// Returns the length of the process data. [realtime]
+    std::size_t bytes() const noexcept { return (bits_ + 7) / 8; }
+    /// Copies outputs into the dictionary. [realtime]
+    void unpack(std::span<const std::uint8_t> from) noexcept;
+    /// Copies inputs out of the dictionary. [realtime]
+    void pack(std::span<std::uint8_t> to) const noexcept;
+    void clear() noexcept;  ///< Sets all mapped outputs to 0. [realtime]
     std::uint16_t assignment() const noexcept { return assignment_; }
 
-    /// Checks a write to a mapping or an assignment of this direction; returns an abort code or 0. [realtime]
-    std::uint32_t check(const DictionaryObject&, const DictionaryEntry&, std::span<const std::uint8_t> value) const noexcept;
+    /// Checks a write to a mapping or an assignment of this direction; returns an abort code or 0.
+    /// [realtime]
+    std::uint32_t check(const DictionaryObject&, const DictionaryEntry&,
+                        std::span<const std::uint8_t> value) const noexcept;
 
 private:
     struct Copy {
         std::uint8_t* data = nullptr;
-        std::uint32_t bit = 0, bits = 0;
+        std::uint32_t bit = 0;
+        std::uint32_t bits = 0;
     };
     std::size_t pdo_bits(const DictionaryObject& pdo, unsigned entries) const noexcept;
-    bool        is_pdo(std::uint16_t index) const noexcept;
+    bool is_pdo(std::uint16_t index) const noexcept;
 
-    Dictionary*       dictionary_ = nullptr;
-    std::uint16_t     assignment_ = 0;
-    bool              output_ = false;
-    std::size_t       bits_ = 0, most_bytes_ = 0, used_ = 0;
+    Dictionary* dictionary_ = nullptr;
+    std::uint16_t assignment_ = 0;
+    bool output_ = false;
+    std::size_t bits_ = 0;
+    std::size_t most_bytes_ = 0;
+    std::size_t used_ = 0;
     std::vector<Copy> copies_;
 };
 

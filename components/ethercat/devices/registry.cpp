@@ -29,32 +29,40 @@ constexpr DeviceRow device_rows[] = {
 };
 
 const DeviceRow* device_row(std::string_view name) {
-    for (const auto& row : device_rows)
+    for (const auto& row : device_rows) {
         if (row.name == name) return &row;
+    }
     return nullptr;
 }
 
 bool offers(const DeviceRow& row, std::string_view option) {
     return option == "alias" || option == "serial" ||
-           (" " + std::string(row.options) + " ").find(" " + std::string(option) + " ") != std::string::npos;
+           (" " + std::string(row.options) + " ").find(" " + std::string(option) + " ") !=
+               std::string::npos;
 }
 
 std::string list_of_names() {
     std::string out;
-    for (const auto& row : device_rows) out += (out.empty() ? "" : ", ") + std::string(row.name);
+    for (const auto& row : device_rows) {
+        out += (out.empty() ? "" : ", ") + std::string(row.name);
+    }
     return out;
 }
 
 /// Sets an option; returns what is wrong with it, or an empty text.
 std::string set_option(DeviceOptions& o, std::string_view key, std::string_view value) {
     if (key == "dc") {
-        if (value != "required" && value != "optional") return "invalid value '" + std::string(value) + "' of dc; use required or optional";
+        if (value != "required" && value != "optional") {
+            return "invalid value '" + std::string(value) + "' of dc; use required or optional";
+        }
         o.dc_required = value == "required";
         return {};
     }
     if (key == "file" || key == "device") {
-        if (value.empty())
-            return "option '" + std::string(key) + "' has no value; write " + std::string(key) + (key == "file" ? "=FILE.xml" : "=NAME");
+        if (value.empty()) {
+            return "option '" + std::string(key) + "' has no value; write " + std::string(key) +
+                   (key == "file" ? "=FILE.xml" : "=NAME");
+        }
         (key == "file" ? o.file : o.device) = value;
         return {};
     }
@@ -65,38 +73,51 @@ std::string set_option(DeviceOptions& o, std::string_view key, std::string_view 
                                : key == "alias"    ? 0xffff
                                                    : 0xffffffff;
     const std::uint64_t least = key == "alias" || key == "serial" ? 0 : 1;
-    const auto          number = parse_natural(value);
-    if (!number || *number < least || *number > most)
-        return "invalid value '" + std::string(value) + "' of " + std::string(key) + "; use " + std::to_string(least) + ".." +
-               std::to_string(most);
-    if (key == "bits") o.bits = static_cast<unsigned>(*number);
-    else if (key == "channels") o.channels = static_cast<unsigned>(*number);
-    else if (key == "modes") o.modes = static_cast<std::uint32_t>(*number);
-    else if (key == "axes") o.axes = static_cast<unsigned>(*number);
-    else if (key == "alias") o.alias = static_cast<std::uint16_t>(*number);
-    else o.serial = static_cast<std::uint32_t>(*number);
+    const auto number = parse_natural(value);
+    if (!number || *number < least || *number > most) {
+        return "invalid value '" + std::string(value) + "' of " + std::string(key) + "; use " +
+               std::to_string(least) + ".." + std::to_string(most);
+    }
+    if (key == "bits") {
+        o.bits = static_cast<unsigned>(*number);
+    } else if (key == "channels") {
+        o.channels = static_cast<unsigned>(*number);
+    } else if (key == "modes") {
+        o.modes = static_cast<std::uint32_t>(*number);
+    } else if (key == "axes") {
+        o.axes = static_cast<unsigned>(*number);
+    } else if (key == "alias") {
+        o.alias = static_cast<std::uint16_t>(*number);
+    } else {
+        o.serial = static_cast<std::uint32_t>(*number);
+    }
     return {};
 }
 
-/// Reads the description of an esi device. Returns what is wrong, or an empty text; `help` has what to write.
+/// Reads the description of an esi device. Returns what is wrong, or an empty text; `help` has what
+/// to write.
 std::string read_description(DeviceOptions& o, const FindFile& find, std::string& help) {
     help = "write esi file=FILE.xml device=NAME, with the order code or product code of the device";
     if (o.file.empty()) return "an esi device needs the description of its maker";
     const std::string path = find ? find(o.file) : o.file;
-    std::string       bytes;
+    std::string bytes;
     if (!read_regular_file(path, 64'000'000, bytes)) return "cannot read '" + path + "': " + bytes;
     esi::File file = esi::read(bytes);
-    for (const esi::Message& m : file.messages)
+    for (const esi::Message& m : file.messages) {
         if (m.severity == Severity::error) {
             help = m.help;
             return "'" + path + "', line " + std::to_string(m.at.line) + ": " + m.sentence;
         }
-    std::string        problem;
+    }
+    std::string problem;
     const esi::Device* device = find_device(file, o.device, problem);
     if (device == nullptr) {
         std::string list;
-        for (const esi::Device& d : file.devices)
-            if (list.find(d.order) == std::string::npos) list += (list.empty() ? "" : ", ") + d.order;
+        for (const esi::Device& d : file.devices) {
+            if (list.find(d.order) == std::string::npos) {
+                list += (list.empty() ? "" : ", ") + d.order;
+            }
+        }
         help = "write device=NAME with one of: " + list;
         return "'" + path + "': " + problem;
     }
@@ -112,75 +133,105 @@ std::string read_description(DeviceOptions& o, const FindFile& find, std::string
 
 std::vector<std::string_view> names() {
     std::vector<std::string_view> out;
-    for (const auto& row : device_rows) out.push_back(row.name);
+    for (const auto& row : device_rows) {
+        out.push_back(row.name);
+    }
     return out;
 }
 
 std::optional<Device> make(std::string_view name, const DeviceOptions& options) {
     const auto* row = device_row(name);
-    if (row == nullptr || (row->make == make_esi_device && !options.description)) return std::nullopt;
-    Parts  parts = row->make(options);
+    if (row == nullptr || (row->make == make_esi_device && !options.description)) {
+        return std::nullopt;
+    }
+    Parts parts = row->make(options);
     Device device;
     device.name = std::string(name);
     device.sii = sii::build(parts.design.sii);
     device.dc = parts.design.dc;
-    device.firmware = std::make_unique<Firmware>(std::move(parts.design), std::move(parts.behaviour));
+    device.firmware =
+        std::make_unique<Firmware>(std::move(parts.design), std::move(parts.behaviour));
     return device;
 }
 
 FindFile beside(const std::string& path) {
-    const std::string folder = path.find('/') == std::string::npos ? "" : path.substr(0, path.rfind('/') + 1);
-    return [folder](const std::string& name) { return name.starts_with('/') ? name : folder + name; };
+    const std::string folder =
+        path.find('/') == std::string::npos ? "" : path.substr(0, path.rfind('/') + 1);
+    return
+        [folder](const std::string& name) { return name.starts_with('/') ? name : folder + name; };
 }
 
 LineDescription read_line(std::string_view text, const FindFile& find) {
-    LineDescription           out;
+    LineDescription out;
     text::Messages<LineTopic> messages;
     for (text::Lines lines(text); auto line = lines.next();) {
-        const auto  words = text::words_of(*line);
+        const auto words = text::words_of(*line);
         const auto* row = device_row(words[0].text);
         if (row == nullptr) {
-            messages.error(LineTopic::device, words[0].at, "unknown device '" + words[0].text + "'", "use one of: " + list_of_names());
+            messages.error(LineTopic::device, words[0].at, "unknown device '" + words[0].text + "'",
+                           "use one of: " + list_of_names());
             continue;
         }
         LineDescription::Slave slave{words[0].text, {}, words[0].at};
-        bool                   good = true;
+        bool good = true;
         for (std::size_t n = 1; n < words.size(); ++n) {
-            const auto        equals = words[n].text.find('=');
+            const auto equals = words[n].text.find('=');
             const std::string key = words[n].text.substr(0, equals);
-            std::string       problem;
-            if (equals == std::string::npos && device_row(words[n].text) != nullptr)
-                problem = "'" + words[n].text + "' is a device of its own; write it on the next line, or after a comma";
-            else if (equals == std::string::npos) problem = "option '" + key + "' has no value; write " + key + "=VALUE";
-            else if (!offers(*row, key)) problem = "unknown option '" + key + "' of " + words[0].text;
-            else problem = set_option(slave.options, key, std::string_view(words[n].text).substr(equals + 1));
+            std::string problem;
+            if (equals == std::string::npos && device_row(words[n].text) != nullptr) {
+                problem = "'" + words[n].text +
+                          "' is a device of its own; write it on the next line, or after a comma";
+            } else if (equals == std::string::npos) {
+                problem = "option '" + key + "' has no value; write " + key + "=VALUE";
+            } else if (!offers(*row, key)) {
+                problem = "unknown option '" + key + "' of " + words[0].text;
+            } else {
+                problem = set_option(slave.options, key,
+                                     std::string_view(words[n].text).substr(equals + 1));
+            }
             if (problem.empty()) continue;
             good = false;
-            messages.error(
-                LineTopic::option, words[n].at, problem,
-                "options of " + words[0].text + ": " + std::string(row->options) + (row->options.empty() ? "" : " ") + "alias serial");
+            messages.error(LineTopic::option, words[n].at, problem,
+                           "options of " + words[0].text + ": " + std::string(row->options) +
+                               (row->options.empty() ? "" : " ") + "alias serial");
         }
         std::string help;
-        if (good && row->make == make_esi_device)
-            if (const std::string problem = read_description(slave.options, find, help); !problem.empty())
-                good = false, messages.error(LineTopic::option, words[0].at, problem, help);
-        if (good) out.slaves.push_back(std::move(slave));
+        if (good && row->make == make_esi_device) {
+            if (const std::string problem = read_description(slave.options, find, help);
+                !problem.empty()) {
+                good = false;
+                messages.error(LineTopic::option, words[0].at, problem, help);
+            }
+        }
+        if (good) {
+            out.slaves.push_back(std::move(slave));
+        }
     }
-    if (out.slaves.empty() && !messages.failed())
-        messages.error(LineTopic::device, {}, "the line has no device", "write one device per line");
-    for (std::size_t i = 0; i < out.slaves.size(); ++i)
-        for (std::size_t k = 0; k < i; ++k)
-            if (out.slaves[i].options.alias != 0 && out.slaves[i].options.alias == out.slaves[k].options.alias)
-                messages.warning(LineTopic::option, out.slaves[i].at, "duplicate alias " + std::to_string(out.slaves[i].options.alias),
+    if (out.slaves.empty() && !messages.failed()) {
+        messages.error(LineTopic::device, {}, "the line has no device",
+                       "write one device per line");
+    }
+    for (std::size_t i = 0; i < out.slaves.size(); ++i) {
+        for (std::size_t k = 0; k < i; ++k) {
+            if (out.slaves[i].options.alias != 0 &&
+                out.slaves[i].options.alias == out.slaves[k].options.alias) {
+                messages.warning(LineTopic::option, out.slaves[i].at,
+                                 "duplicate alias " + std::to_string(out.slaves[i].options.alias),
                                  "give each device its own alias, unless the fault is wanted");
+            }
+        }
+    }
     out.messages = std::move(messages.all);
     return out;
 }
 
 std::vector<Device> make_line(const LineDescription& line) {
     std::vector<Device> out;
-    for (const auto& slave : line.slaves)
-        if (auto device = make(slave.device, slave.options)) out.push_back(std::move(*device));
+    for (const auto& slave : line.slaves) {
+        if (auto device = make(slave.device, slave.options)) {
+            out.push_back(std::move(*device));
+        }
+    }
     return out;
 }
 

@@ -24,11 +24,12 @@ namespace hal::ethercat::devices {
 
 /// An emulated slave: its firmware, and what its controller needs.
 struct Device {
-    std::string               name;                   ///< as in the registry
+    std::string name;                   ///< as in the registry
     std::unique_ptr<Firmware> firmware;
     std::vector<std::uint8_t> sii;      ///< contents of its EEPROM
-    unsigned                  ports = 2;
-    bool                      dc = false;                    ///< the controller has distributed clocks
+    unsigned ports = 2;
+    /// the controller has distributed clocks
+    bool dc = false;
 };
 
 /// Makes a device; nullopt for an unknown name.
@@ -40,16 +41,17 @@ enum class LineTopic : std::uint8_t { device, option };
 /// A line as its description has it.
 struct LineDescription {
     struct Slave {
-        std::string   device;
+        std::string device;
         DeviceOptions options;
-        text::Span    at;
+        text::Span at;
     };
-    std::vector<Slave>                    slaves;
+    std::vector<Slave> slaves;
     std::vector<text::Message<LineTopic>> messages;
 };
 /// Returns the path of a file that a description names.
 using FindFile = std::function<std::string(const std::string& name)>;
-/// Reads the description of a line; invalid lines are reported in `messages` and left out. Without `find`, paths start at the working folder.
+/// Reads the description of a line; invalid lines are reported in `messages` and left out. Without
+/// `find`, paths start at the working folder.
 LineDescription read_line(std::string_view text, const FindFile& find = {});
 /// Returns a FindFile for names relative to the folder of a file.
 FindFile beside(const std::string& path);

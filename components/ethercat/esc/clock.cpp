@@ -7,7 +7,9 @@ namespace hal::ethercat::esc {
 
 std::int64_t Clock::at(std::int64_t now_ns) const noexcept {
     const std::int64_t passed = now_ns - base_now_;
-    return base_local_ + passed + static_cast<std::int64_t>(std::floor(fraction_ + static_cast<double>(passed) * (drift_ + correction_)));
+    return base_local_ + passed +
+           static_cast<std::int64_t>(
+               std::floor(fraction_ + static_cast<double>(passed) * (drift_ + correction_)));
 }
 
 /// Beyond this many ns a time is never reached: 31 years.
@@ -15,19 +17,24 @@ static constexpr std::int64_t never_ns = 1'000'000'000'000'000'000;
 
 std::int64_t Clock::time_of(std::int64_t local_ns) const noexcept {
     const double rate = drift_ + correction_;
-    const auto   left = static_cast<std::int64_t>(static_cast<std::uint64_t>(local_ns) - static_cast<std::uint64_t>(base_local_));
+    const auto left = static_cast<std::int64_t>(static_cast<std::uint64_t>(local_ns) -
+                                                static_cast<std::uint64_t>(base_local_));
     if (left > never_ns || left < -never_ns) return INT64_MAX;
     const double ahead = (static_cast<double>(left) * rate + fraction_) / (1.0 + rate);
     std::int64_t now = base_now_ + left - static_cast<std::int64_t>(std::floor(ahead));
-    for (int i = 0; i < 4 && at(now) < local_ns; ++i) ++now;
-    for (int i = 0; i < 4 && at(now - 1) >= local_ns; ++i) --now;
+    for (int i = 0; i < 4 && at(now) < local_ns; ++i) {
+        ++now;
+    }
+    for (int i = 0; i < 4 && at(now - 1) >= local_ns; ++i) {
+        --now;
+    }
     return now;
 }
 
 void Clock::rebase(std::int64_t now_ns) noexcept {
     const std::int64_t passed = now_ns - base_now_;
-    const double       exact = fraction_ + static_cast<double>(passed) * (drift_ + correction_);
-    const double       whole = std::floor(exact);
+    const double exact = fraction_ + static_cast<double>(passed) * (drift_ + correction_);
+    const double whole = std::floor(exact);
     base_local_ += passed + static_cast<std::int64_t>(whole);
     fraction_ = exact - whole;
     base_now_ = now_ns;
@@ -35,7 +42,8 @@ void Clock::rebase(std::int64_t now_ns) noexcept {
 
 void Clock::shift(double ns, std::int64_t now_ns) noexcept {
     rebase(now_ns);
-    const double exact = fraction_ + ns, whole = std::floor(exact);
+    const double exact = fraction_ + ns;
+    const double whole = std::floor(exact);
     base_local_ += static_cast<std::int64_t>(whole);
     fraction_ = exact - whole;
 }

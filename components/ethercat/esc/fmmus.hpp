@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The FMMUs of an emulated controller: logical addresses to its memory, to the bit (ETG.1000.4, clause 6.6).
+// The FMMUs of an emulated controller: logical addresses to its memory, to the bit (ETG.1000.4,
+// clause 6.6).
 #pragma once
 
 #include <array>
@@ -14,29 +15,44 @@ public:
     static constexpr unsigned most = 16;
 
     struct Unit {
-        std::uint64_t first_bit = 0, bits = 0;  ///< logical, in bits
+        std::uint64_t first_bit = 0;
+        std::uint64_t bits = 0;  ///< logical, in bits
         std::uint32_t physical_bit = 0;
-        bool          reads = false, writes = false;
-        bool          bytes = false;                     ///< whole bytes on both sides
+        bool reads = false;
+        bool writes = false;
+        bool bytes = false;                     ///< whole bytes on both sides
     };
 
-    void connect(const std::uint8_t* memory, unsigned count) noexcept { memory_ = memory, count_ = count; }
-    void reset() noexcept { used_ = 0, first_ = ~std::uint64_t{0}, end_ = 0, overlap_ = false; }
+    void connect(const std::uint8_t* memory, unsigned count) noexcept {
+        memory_ = memory;
+        count_ = count;
+    }
+    void reset() noexcept {
+        used_ = 0;
+        first_ = ~std::uint64_t{0};
+        end_ = 0;
+        overlap_ = false;
+    }
     /// Takes the settings at 0600h-06FFh.
     void configure() noexcept;
 
     /// Returns whether an active FMMU maps a part of a datagram. Logical addresses in bytes.
-    bool        hit(std::uint64_t address, std::size_t length) const noexcept { return address < end_ && address + length > first_; }
+    bool hit(std::uint64_t address, std::size_t length) const noexcept {
+        return address < end_ && address + length > first_;
+    }
     const Unit* begin() const noexcept { return units_.data(); }
     const Unit* end() const noexcept { return units_.data() + used_; }
-    bool        overlap() const noexcept { return overlap_; }  ///< Returns whether a byte is both read and written.
+    /// Returns whether a byte is both read and written.
+    bool overlap() const noexcept { return overlap_; }
 
 private:
-    const std::uint8_t*    memory_ = nullptr;
-    unsigned               count_ = 0, used_ = 0;
+    const std::uint8_t* memory_ = nullptr;
+    unsigned count_ = 0;
+    unsigned used_ = 0;
     std::array<Unit, most> units_;  ///< active ones
-    std::uint64_t          first_ = ~std::uint64_t{0}, end_ = 0;
-    bool                   overlap_ = false;
+    std::uint64_t first_ = ~std::uint64_t{0};
+    std::uint64_t end_ = 0;
+    bool overlap_ = false;
 };
 
 }  // namespace hal::ethercat::esc

@@ -8,7 +8,8 @@
 namespace hal::ethercat::esc {
 
 namespace line_facts {
-constexpr std::int64_t  smallest_frame = 60, overhead = 4;  ///< bytes; overhead: the check sequence
+constexpr std::int64_t smallest_frame = 60;
+constexpr std::int64_t overhead = 4;  ///< bytes; overhead: the check sequence
 constexpr std::uint16_t circulating = 0x4000;
 /// Returns the port that follows in a controller: 0, 3, 1, 2.
 constexpr unsigned next_port(unsigned port) noexcept { return std::array{3U, 2U, 0U, 1U}[port]; }
@@ -17,24 +18,31 @@ constexpr unsigned next_port(unsigned port) noexcept { return std::array{3U, 2U,
 Line::Line() { nodes_.reserve(64); }
 
 bool Line::is_free(int slave, unsigned port) const noexcept {
-    if (slave < 0 || static_cast<std::size_t>(slave) >= nodes_.size() || port >= ports) return false;
+    if (slave < 0 || static_cast<std::size_t>(slave) >= nodes_.size() || port >= ports) {
+        return false;
+    }
     const Node& n = nodes_[static_cast<std::size_t>(slave)];
-    return n.controller->settings().port_kinds[port] >= PortKind::ebus && n.cables[port].slave == nowhere;
+    return n.controller->settings().port_kinds[port] >= PortKind::ebus &&
+           n.cables[port].slave == nowhere;
 }
 
 int Line::add(SlaveOnLine slave) {
     const int number = static_cast<int>(nodes_.size());
     const int parent = slave.parent == SlaveOnLine::previous ? number - 1 : slave.parent;
     if (slave.port >= ports || slave.controller.port_kinds[slave.port] < PortKind::ebus) return -1;
-    if (parent < 0 ? end_of(End::primary).slave != nowhere : !is_free(parent, slave.parent_port)) return -1;
+    if (parent < 0 ? end_of(End::primary).slave != nowhere : !is_free(parent, slave.parent_port)) {
+        return -1;
+    }
     Node node;
-    node.controller = std::make_unique<Controller>(slave.controller, std::move(slave.sii), slave.application);
+    node.controller =
+        std::make_unique<Controller>(slave.controller, std::move(slave.sii), slave.application);
     if (parent < 0) {
         node.cables[slave.port] = {at_end, static_cast<unsigned>(End::primary), slave.cable_ns};
         end_of(End::primary) = {number, slave.port, slave.cable_ns};
     } else {
         node.cables[slave.port] = {parent, slave.parent_port, slave.cable_ns};
-        nodes_[static_cast<std::size_t>(parent)].cables[slave.parent_port] = {number, slave.port, slave.cable_ns};
+        nodes_[static_cast<std::size_t>(parent)].cables[slave.parent_port] = {number, slave.port,
+                                                                              slave.cable_ns};
     }
     nodes_.push_back(std::move(node));
     update_links(static_cast<std::size_t>(number));
@@ -42,7 +50,9 @@ int Line::add(SlaveOnLine slave) {
 }
 
 bool Line::close_ring(unsigned slave, unsigned port, std::int64_t cable_ns) {
-    if (end_of(End::secondary).slave != nowhere || !is_free(static_cast<int>(slave), port)) return false;
+    if (end_of(End::secondary).slave != nowhere || !is_free(static_cast<int>(slave), port)) {
+        return false;
+    }
     nodes_[slave].cables[port] = {at_end, static_cast<unsigned>(End::secondary), cable_ns};
     end_of(End::secondary) = {static_cast<int>(slave), port, cable_ns};
     update_links(slave);
@@ -66,18 +76,25 @@ void Line::update_port(std::size_t slave, unsigned port) noexcept {
 }
 
 void Line::update_links(std::size_t slave) noexcept {
-    for (unsigned port = 0; port < ports; ++port) update_port(slave, port);
+    for (unsigned port = 0; port < ports; ++port) {
+        update_port(slave, port);
+    }
 }
 
 void Line::power_on(std::int64_t now_ns) noexcept {
-    for (std::size_t i = 0; i < nodes_.size(); ++i) set_power(i, true, now_ns);
+    for (std::size_t i = 0; i < nodes_.size(); ++i) {
+        set_power(i, true, now_ns);
+    }
 }
 
 void Line::set_power(std::size_t slave, bool on, std::int64_t now_ns) noexcept {
     Controller& c = *nodes_[slave].controller;
     if (c.powered() == on) return;
-    if (on) c.power_on(now_ns);
-    else c.power_off();
+    if (on) {
+        c.power_on(now_ns);
+    } else {
+        c.power_off();
+    }
     update_links(slave);
 }
 
@@ -85,13 +102,18 @@ void Line::set_cable(std::size_t slave, unsigned port, bool connected) noexcept 
     Connection& c = nodes_[slave].cables[port];
     if (c.slave == nowhere) return;
     c.broken = !connected;
-    if (c.slave == at_end) ends_[c.port].broken = !connected;
-    else nodes_[static_cast<std::size_t>(c.slave)].cables[c.port].broken = !connected;
+    if (c.slave == at_end) {
+        ends_[c.port].broken = !connected;
+    } else {
+        nodes_[static_cast<std::size_t>(c.slave)].cables[c.port].broken = !connected;
+    }
     update_port(slave, port);
 }
 
 void Line::set_cable(End end, bool connected) noexcept {
-    if (const Connection& c = end_of(end); c.slave >= 0) set_cable(static_cast<std::size_t>(c.slave), c.port, connected);
+    if (const Connection& c = end_of(end); c.slave >= 0) {
+        set_cable(static_cast<std::size_t>(c.slave), c.port, connected);
+    }
 }
 
 bool Line::cable(std::size_t slave, unsigned port) const noexcept {
@@ -106,27 +128,34 @@ int Line::disturb(const LineDisturbance& what) noexcept {
 }
 
 std::uint64_t Line::hits(int number) const noexcept {
-    return number >= 0 && static_cast<std::size_t>(number) < disturbance_count_ ? disturbances_[static_cast<std::size_t>(number)].hits : 0;
+    return number >= 0 && static_cast<std::size_t>(number) < disturbance_count_
+               ? disturbances_[static_cast<std::size_t>(number)].hits
+               : 0;
 }
 
 // The way of a frame.
 
 struct Line::Walk {
     std::span<std::uint8_t> frame;
-    Controller::Frame       content;
-    std::int64_t            time_ns = 0;
-    bool                    ethercat = false;   ///< a frame with datagrams
-    bool                    corrupted = false, marked = false;  ///< marked: a controller has seen the wrong check sequence
-    unsigned                copies = 1;
-    Passage                 out;
+    Controller::Frame content;
+    std::int64_t time_ns = 0;
+    bool ethercat = false;  ///< a frame with datagrams
+    /// marked: a controller has seen the wrong check sequence
+    bool corrupted = false;
+    bool marked = false;
+    unsigned copies = 1;
+    Passage out;
 };
 
 void Line::advance(std::int64_t now_ns) noexcept {
     take_commands(now_ns);
-    for (Node& n : nodes_) n.controller->advance(now_ns);
+    for (Node& n : nodes_) {
+        n.controller->advance(now_ns);
+    }
 }
 
-Line::Passage Line::process(std::span<std::uint8_t> frame, End end, std::int64_t first_bit_ns) noexcept {
+Line::Passage Line::process(std::span<std::uint8_t> frame, End end,
+                            std::int64_t first_bit_ns) noexcept {
     advance(first_bit_ns);
     Walk w;
     w.frame = frame;
@@ -140,7 +169,9 @@ Line::Passage Line::process(std::span<std::uint8_t> frame, End end, std::int64_t
         datagrams_[count++] = *d;
     }
     w.corrupted = reader.valid() && reader.malformed();
-    const auto bytes = std::max(static_cast<std::int64_t>(frame.size()), line_facts::smallest_frame) + line_facts::overhead;
+    const auto bytes =
+        std::max(static_cast<std::int64_t>(frame.size()), line_facts::smallest_frame) +
+        line_facts::overhead;
     w.content = {{datagrams_.data(), count}, bytes * 8000 / speed_, number_};
     walk(w, end_of(end));
     w.out.copies = w.copies;
@@ -158,13 +189,17 @@ void Line::walk(Walk& w, Connection from) noexcept {
             w.out.first_bit_ns = w.time_ns;
             return;
         }
-        if (from.slave < 0) return;  // a port kept open without a cable
-        const auto  slave = static_cast<std::size_t>(from.slave);
+        if (from.slave < 0) {
+            return;  // a port kept open without a cable
+        }
+        const auto slave = static_cast<std::size_t>(from.slave);
         Controller& c = *nodes_[slave].controller;
         if (!c.powered()) return;
         if (!arrive(w, from.slave, from.port)) return;
         if (!c.is_open(from.port)) {
-            if (!w.corrupted) c.frame_at_closed_port(from.port);
+            if (!w.corrupted) {
+                c.frame_at_closed_port(from.port);
+            }
             return;
         }
         const int out = exit_of(w, slave, from.port);
@@ -186,7 +221,9 @@ bool Line::arrive(Walk& w, int slave, unsigned port) noexcept {
         case LineFault::duplicate: ++w.copies; break;
         case LineFault::delay: w.time_ns += d.what.delay_ns; break;
         case LineFault::noise:
-            if (slave >= 0) nodes_[static_cast<std::size_t>(slave)].controller->count_symbol_error(port);
+            if (slave >= 0) {
+                nodes_[static_cast<std::size_t>(slave)].controller->count_symbol_error(port);
+            }
             break;
         }
     }
@@ -194,8 +231,11 @@ bool Line::arrive(Walk& w, int slave, unsigned port) noexcept {
     Controller& c = *nodes_[static_cast<std::size_t>(slave)].controller;
     c.arrive(port, w.time_ns, w.content.number);
     if (w.corrupted) {
-        if (w.marked) c.count_forwarded(port);
-        else c.count_invalid(port);
+        if (w.marked) {
+            c.count_forwarded(port);
+        } else {
+            c.count_invalid(port);
+        }
         w.marked = true;
     }
     return true;
@@ -217,20 +257,27 @@ bool Line::pass_unit(Walk& w, std::size_t slave) noexcept {
     return true;
 }
 
-/// Takes a frame through a controller from one of its ports. Returns the port where it leaves, -1 if it is destroyed.
+/// Takes a frame through a controller from one of its ports. Returns the port where it leaves, -1
+/// if it is destroyed.
 int Line::exit_of(Walk& w, std::size_t slave, unsigned port) noexcept {
     const Controller& c = *nodes_[slave].controller;
-    if (port != 0) w.time_ns += c.settings().forwarding_ns;
-    else if (!pass_unit(w, slave)) return -1;
+    if (port != 0) {
+        w.time_ns += c.settings().forwarding_ns;
+    } else if (!pass_unit(w, slave)) {
+        return -1;
+    }
     for (unsigned next = line_facts::next_port(port);; next = line_facts::next_port(next)) {
         if (c.is_open(next)) return static_cast<int>(next);
         if (next != 0) continue;
-        // Port 0 is closed: the frame comes from behind a break. On its second pass it circulates, and is destroyed.
+        // Port 0 is closed: the frame comes from behind a break. On its second pass it circulates,
+        // and is destroyed.
         if (w.ethercat && !w.content.datagrams.empty()) {
             std::uint8_t* first = w.content.datagrams.front().header;
             if ((get<std::uint16_t>(first + 6) & line_facts::circulating) != 0) return -1;
-            for (const DatagramView& d : w.content.datagrams)
-                put(d.header + 6, static_cast<std::uint16_t>(get<std::uint16_t>(d.header + 6) | line_facts::circulating));
+            for (const DatagramView& d : w.content.datagrams) {
+                put(d.header + 6, static_cast<std::uint16_t>(get<std::uint16_t>(d.header + 6) |
+                                                             line_facts::circulating));
+            }
         }
         if (!pass_unit(w, slave)) return -1;
     }

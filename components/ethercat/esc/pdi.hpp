@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What the firmware of an emulated slave sees of its EtherCAT slave controller (ESC): the process data interface.
+// What the firmware of an emulated slave sees of its EtherCAT slave controller (ESC): the process
+// data interface.
 //
 //     class Blinker : public esc::Application {
 //         void run(esc::Pdi& pdi, std::int64_t now_ns) noexcept override {
@@ -14,7 +15,8 @@
 
 namespace hal::ethercat::esc {
 
-/// The controller as its firmware sees it. The firmware works between frames; what it writes is complete for the next frame.
+/// The controller as its firmware sees it. The firmware works between frames; what it writes is
+/// complete for the next frame.
 class Pdi {
 public:
     virtual ~Pdi() = default;
@@ -28,35 +30,44 @@ public:
 
     /// Settings of a sync manager as the master wrote them.
     struct SyncManager {
-        std::uint16_t start = 0, length = 0;
-        std::uint8_t  control = 0;
-        bool          enabled = false;
-        bool          repeat_request = false;  ///< 0806h bit 1
+        std::uint16_t start = 0;
+        std::uint16_t length = 0;
+        std::uint8_t control = 0;
+        bool enabled = false;
+        bool repeat_request = false;  ///< 0806h bit 1
     };
-    virtual SyncManager sync_manager(unsigned number) const noexcept = 0;  ///< Returns the settings of a sync manager. [realtime]
+    /// Returns the settings of a sync manager. [realtime]
+    virtual SyncManager sync_manager(unsigned number) const noexcept = 0;
 
-    /// Reads what the master wrote: the newest complete buffer, or the message of a full mailbox, which is empty afterwards. Returns the
-    /// number of bytes, 0 if there is nothing new. [realtime]
+    /// Reads what the master wrote: the newest complete buffer, or the message of a full mailbox,
+    /// which is empty afterwards. Returns the number of bytes, 0 if there is nothing new.
+    /// [realtime]
     virtual std::size_t read_sync_manager(unsigned number, std::span<std::uint8_t> to) noexcept = 0;
-    /// Writes what the master reads: the next buffer, or the message of an empty mailbox. Returns false if the mailbox is full or the
-    /// sync manager is disabled. [realtime]
-    virtual bool write_sync_manager(unsigned number, std::span<const std::uint8_t> from) noexcept = 0;
+    /// Writes what the master reads: the next buffer, or the message of an empty mailbox. Returns
+    /// false if the mailbox is full or the sync manager is disabled. [realtime]
+    virtual bool write_sync_manager(unsigned number,
+                                    std::span<const std::uint8_t> from) noexcept = 0;
     /// Confirms a repeat request of the master (0807h bit 1). [realtime]
     virtual void acknowledge_repeat(unsigned number) noexcept = 0;
 
-    virtual bool watchdog_expired() const noexcept = 0;  ///< Returns whether the process data watchdog has expired (0440h). [realtime]
+    /// Returns whether the process data watchdog has expired (0440h). [realtime]
+    virtual bool watchdog_expired() const noexcept = 0;
 
     /// State of the distributed clock unit.
     struct Sync {
-        bool          active = false;  ///< SYNC0 is generated (0981h bits 0 and 1)
-        std::uint32_t sync0_cycle_ns = 0, sync1_cycle_ns = 0;
+        bool active = false;  ///< SYNC0 is generated (0981h bits 0 and 1)
+        std::uint32_t sync0_cycle_ns = 0;
+        std::uint32_t sync1_cycle_ns = 0;
         std::uint64_t pulses = 0;  ///< SYNC0 pulses so far
-        std::int64_t  last_pulse_ns = 0;  ///< time of the newest SYNC0 pulse, on the clock of run()
+        std::int64_t last_pulse_ns = 0;  ///< time of the newest SYNC0 pulse, on the clock of run()
         std::uint64_t last_pulse_dc_ns = 0;  ///< the same, system time
     };
-    virtual Sync         sync() const noexcept = 0;  ///< Returns the state of SYNC0 and SYNC1. [realtime]
-    virtual std::int64_t last_frame_ns() const noexcept = 0;  ///< Returns when the newest process data frame passed. [realtime]
-    /// Reads or writes a register or memory of the controller, without the rules of sync managers. [realtime]
+    /// Returns the state of SYNC0 and SYNC1. [realtime]
+    virtual Sync sync() const noexcept = 0;
+    /// Returns when the newest process data frame passed. [realtime]
+    virtual std::int64_t last_frame_ns() const noexcept = 0;
+    /// Reads or writes a register or memory of the controller, without the rules of sync managers.
+    /// [realtime]
     virtual std::uint8_t* memory(std::uint16_t address) noexcept = 0;
 };
 
@@ -66,8 +77,9 @@ public:
     virtual ~Application() = default;
     /// Starts as after power-on: all volatile state is lost. [realtime]
     virtual void power_on(Pdi&) noexcept = 0;
-    /// Works once; called at the end of each frame that concerns the slave, at every SYNC0 and SYNC1 pulse, when the watchdog expires, and
-    /// at least every millisecond of traffic, in order of time. [realtime]
+    /// Works once; called at the end of each frame that concerns the slave, at every SYNC0 and
+    /// SYNC1 pulse, when the watchdog expires, and at least every millisecond of traffic, in order
+    /// of time. [realtime]
     virtual void run(Pdi&, std::int64_t now_ns) noexcept = 0;
 };
 

@@ -24,123 +24,162 @@ using Message = text::Message<Topic>;
 
 struct Entry {
     std::uint16_t index = 0;  ///< 0: a gap
-    std::uint8_t  sub = 0;
+    std::uint8_t sub = 0;
     std::uint16_t bits = 0;
-    std::string   name, type;   ///< data type, such as "UINT"
+    std::string name, type;   ///< data type, such as "UINT"
 };
 
 struct Pdo {
-    std::uint16_t               index = 0;
-    std::string                 name;
+    std::uint16_t index = 0;
+    std::string name;
     std::optional<std::uint8_t> sync_manager;  ///< set: assigned by default
-    bool                        fixed = false, mandatory = false;
-    std::vector<std::uint16_t>  exclude;        ///< PDOs that cannot be assigned together with this one
-    std::vector<Entry>          entries;
-    unsigned                    bits() const;
+    bool fixed = false;
+    bool mandatory = false;
+    /// PDOs that cannot be assigned together with this one
+    std::vector<std::uint16_t> exclude;
+    std::vector<Entry> entries;
+    unsigned bits() const;
 };
 
 struct SyncManager {
-    sii::SmType   type{};
-    std::uint16_t start = 0, default_size = 0, min_size = 0, max_size = 0;
-    std::uint8_t  control = 0, enable = 0;
+    sii::SmType type{};
+    std::uint16_t start = 0;
+    std::uint16_t default_size = 0;
+    std::uint16_t min_size = 0;
+    std::uint16_t max_size = 0;
+    std::uint8_t control = 0;
+    std::uint8_t enable = 0;
 };
 
 /// A write at a transition.
 struct InitCmd {
     enum class Protocol : std::uint8_t { coe, soe } protocol = Protocol::coe;
-    std::vector<std::string>  transitions;  ///< "IP", "PS", "SO", …
-    std::uint16_t             index = 0;               ///< object or IDN
-    std::uint8_t              sub = 0;                  ///< sub-index, or the drive number of SoE
-    bool                      complete = false;
+    std::vector<std::string> transitions;  ///< "IP", "PS", "SO", …
+    std::uint16_t index = 0;               ///< object or IDN
+    std::uint8_t sub = 0;                  ///< sub-index, or the drive number of SoE
+    bool complete = false;
     std::vector<std::uint8_t> data;
-    std::string               comment;
+    std::string comment;
 };
 
 struct OpMode {
-    std::string   name, description;
+    std::string name, description;
     std::uint16_t assign_activate = 0;
-    std::int64_t  sync0_cycle_ns = 0, sync1_cycle_ns = 0;  ///< 0: the master's cycle times the factor, if that is not 0
-    int           sync0_factor = 1, sync1_factor = 0;
-    std::int64_t  sync0_shift_ns = 0, sync1_shift_ns = 0;
+    /// 0: the master's cycle times the factor, if that is not 0
+    std::int64_t sync0_cycle_ns = 0;
+    std::int64_t sync1_cycle_ns = 0;
+    int sync0_factor = 1;
+    int sync1_factor = 0;
+    std::int64_t sync0_shift_ns = 0;
+    std::int64_t sync1_shift_ns = 0;
 };
 
 /// One value of the object dictionary.
 struct Value {
-    std::uint8_t              sub = 0;
-    std::string               name, type;
-    unsigned                  bits = 0;
+    std::uint8_t sub = 0;
+    std::string name, type;
+    unsigned bits = 0;
     std::vector<std::uint8_t> initial;  ///< as on the wire; may be empty
-    bool                      readable = true, writable = false, rx_mappable = false, tx_mappable = false;
+    bool readable = true;
+    bool writable = false;
+    bool rx_mappable = false;
+    bool tx_mappable = false;
 };
 struct Object {
     enum class Code : std::uint8_t { variable = 7, array = 8, record = 9 } code = Code::variable;
-    std::uint16_t      index = 0;
-    std::string        name, type;
+    std::uint16_t index = 0;
+    std::string name, type;
     std::vector<Value> values;  ///< by sub-index
-    const Value*       find(std::uint8_t sub) const;
+    const Value* find(std::uint8_t sub) const;
 };
 
 struct Mailbox {
-    bool coe = false, foe = false, eoe = false, soe = false, aoe = false, voe = false, repeat = false;
-    bool sdo_info = false, pdo_assign = false, pdo_config = false, pdo_upload = false, complete_access = false, segmented_sdo = true;
+    bool coe = false;
+    bool foe = false;
+    bool eoe = false;
+    bool soe = false;
+    bool aoe = false;
+    bool voe = false;
+
+    bool repeat = false;
+    bool sdo_info = false;
+    bool pdo_assign = false;
+    bool pdo_config = false;
+    bool pdo_upload = false;
+
+    bool complete_access = false;
+    bool segmented_sdo = true;
     std::uint8_t soe_channels = 0;
 };
 
 struct Timeouts {  ///< ms
-    std::uint32_t preop = 3000, safeop_op = 10000, back_to_init = 5000, back_to_safeop = 200, request = 100, response = 2000;
+    std::uint32_t preop = 3000;
+    std::uint32_t safeop_op = 10000;
+    std::uint32_t back_to_init = 5000;
+    std::uint32_t back_to_safeop = 200;
+
+    std::uint32_t request = 100;
+    std::uint32_t response = 2000;
 };
 
 struct Slot {
-    std::string                name;
-    std::uint32_t              default_module = 0;
+    std::string name;
+    std::uint32_t default_module = 0;
     std::vector<std::uint32_t> modules;
 };
 
 struct Device {
-    std::string                     order, name, group, physics;   ///< physics: Y MII, K EBUS, one letter per port
-    std::uint32_t                   product = 0, revision = 0, serial = 0;
-    Timeouts                        timeouts;
-    std::vector<sii::FmmuUse>       fmmus;
-    std::vector<SyncManager>        sync_managers;
-    std::vector<Pdo>                rx, tx;
-    std::optional<Mailbox>          mailbox;
-    std::vector<InitCmd>            init_commands;
-    std::vector<OpMode>             op_modes;              ///< the first is the default; empty: no distributed clocks
-    bool                            has_dc = false;
-    std::vector<Object>             objects;               ///< by index
-    std::uint16_t                   profile = 0;                 ///< 402 for a drive
-    std::vector<Slot>               slots;
-    unsigned                        slot_pdo_increment = 1, slot_index_increment = 0;
-    std::vector<std::uint8_t>       eeprom;          ///< whole image, if the file has one
-    std::vector<std::uint8_t>       config_data, bootstrap;
-    std::size_t                     eeprom_bytes = 0;
+    /// physics: Y MII, K EBUS, one letter per port
+    std::string order, name, group, physics;
+    std::uint32_t product = 0;
+    std::uint32_t revision = 0;
+    std::uint32_t serial = 0;
+    Timeouts timeouts;
+    std::vector<sii::FmmuUse> fmmus;
+    std::vector<SyncManager> sync_managers;
+    std::vector<Pdo> rx, tx;
+    std::optional<Mailbox> mailbox;
+    std::vector<InitCmd> init_commands;
+    /// the first is the default; empty: no distributed clocks
+    std::vector<OpMode> op_modes;
+    bool has_dc = false;
+    std::vector<Object> objects;               ///< by index
+    std::uint16_t profile = 0;                 ///< 402 for a drive
+    std::vector<Slot> slots;
+    unsigned slot_pdo_increment = 1;
+    unsigned slot_index_increment = 0;
+    std::vector<std::uint8_t> eeprom;          ///< whole image, if the file has one
+    std::vector<std::uint8_t> config_data, bootstrap;
+    std::size_t eeprom_bytes = 0;
     std::vector<sii::OtherCategory> categories;
-    text::Span                      at;
+    text::Span at;
 
     const Object* find(std::uint16_t index) const;
-    const Value*  find(std::uint16_t index, std::uint8_t sub) const;
-    const Pdo*    find_pdo(std::uint16_t index) const;
+    const Value* find(std::uint16_t index, std::uint8_t sub) const;
+    const Pdo* find_pdo(std::uint16_t index) const;
 };
 
 /// A module of a modular device (ETG.5001).
 struct Module {
-    std::uint32_t        ident = 0;
-    std::string          type, name;
-    std::vector<Pdo>     rx, tx;                   ///< for slot 1; those of slot n have numbers higher by (n - 1) increments
+    std::uint32_t ident = 0;
+    std::string type, name;
+    /// for slot 1; those of slot n have numbers higher by (n - 1) increments
+    std::vector<Pdo> rx, tx;
     std::vector<InitCmd> init_commands;
-    std::vector<bool>    rx_depends, tx_depends;  ///< of each PDO: its indices depend on the slot
-    std::vector<Object>  objects;
+    std::vector<bool> rx_depends, tx_depends;  ///< of each PDO: its indices depend on the slot
+    std::vector<Object> objects;
 };
 
 struct File {
-    std::uint32_t        vendor = 0;
-    std::string          vendor_name;
-    std::vector<Device>  devices;
-    std::vector<Module>  modules;
+    std::uint32_t vendor = 0;
+    std::string vendor_name;
+    std::vector<Device> devices;
+    std::vector<Module> modules;
     std::vector<Message> messages;
 
     bool good() const { return text::good(messages); }
-    /// Returns the device with this product code: that of the given revision, else the one of the highest revision; nullptr if there is none.
+    /// Returns the device with this product code: that of the given revision, else the one of the
+    /// highest revision; nullptr if there is none.
     const Device* find(std::uint32_t product, std::optional<std::uint32_t> revision = {}) const;
     /// Returns the newest device with this order code or name; nullptr if there is none.
     const Device* find(std::string_view name) const;
@@ -149,20 +188,24 @@ struct File {
 /// Reads a file. Accepts any bytes; what is invalid is left out and reported.
 File read(std::string_view xml);
 
-/// Returns a modular device with its modules in place, one for each slot from the first on; 0: an empty slot. An unknown ident adds nothing.
+/// Returns a modular device with its modules in place, one for each slot from the first on; 0: an
+/// empty slot. An unknown ident adds nothing.
 Device with_modules(const File&, const Device&, const std::vector<std::uint32_t>& idents);
 
-/// Returns which entry of a PDO has more bits than its object in the dictionary, as a sentence; empty: none.
+/// Returns which entry of a PDO has more bits than its object in the dictionary, as a sentence;
+/// empty: none.
 std::string longer_entry(const Device&, const Pdo&);
 
 /// Returns what the SII of the device contains.
 sii::Contents sii_contents(const File&, const Device&);
-/// Returns the EEPROM image of the device: that of the file if it has a whole one, else one made from the description.
+/// Returns the EEPROM image of the device: that of the file if it has a whole one, else one made
+/// from the description.
 std::vector<std::uint8_t> sii_image(const File&, const Device&);
 
 /// Parses a number of an ESI: decimal, `#x1f` or `0x1f`, with sign. Nothing for anything else.
 std::optional<std::int64_t> number(std::string_view text);
-/// Parses hexadecimal bytes; blanks and line ends are ignored. Nothing if there is an invalid digit or half a byte.
+/// Parses hexadecimal bytes; blanks and line ends are ignored. Nothing if there is an invalid digit
+/// or half a byte.
 std::optional<std::vector<std::uint8_t>> hex_bytes(std::string_view text);
 /// Returns the length of a basic type: "UINT" 16, "BIT3" 3, "STRING(8)" 64; 0 for an unknown one.
 unsigned type_bits(std::string_view type);

@@ -11,19 +11,23 @@ namespace hal::ethercat::esi {
 
 unsigned Pdo::bits() const {
     unsigned sum = 0;
-    for (const Entry& e : entries) sum += e.bits;
+    for (const Entry& e : entries) {
+        sum += e.bits;
+    }
     return sum;
 }
 
 const Value* Object::find(std::uint8_t sub) const {
-    for (const Value& v : values)
+    for (const Value& v : values) {
         if (v.sub == sub) return &v;
+    }
     return nullptr;
 }
 
 const Object* Device::find(std::uint16_t index) const {
     const auto found =
-        std::lower_bound(objects.begin(), objects.end(), index, [](const Object& o, std::uint16_t i) { return o.index < i; });
+        std::lower_bound(objects.begin(), objects.end(), index,
+                         [](const Object& o, std::uint16_t i) { return o.index < i; });
     return found != objects.end() && found->index == index ? &*found : nullptr;
 }
 
@@ -33,9 +37,11 @@ const Value* Device::find(std::uint16_t index, std::uint8_t sub) const {
 }
 
 const Pdo* Device::find_pdo(std::uint16_t index) const {
-    for (const auto* pdos : {&rx, &tx})
-        for (const Pdo& p : *pdos)
+    for (const auto* pdos : {&rx, &tx}) {
+        for (const Pdo& p : *pdos) {
             if (p.index == index) return &p;
+        }
+    }
     return nullptr;
 }
 
@@ -44,40 +50,59 @@ const Device* File::find(std::uint32_t product, std::optional<std::uint32_t> rev
     for (const Device& d : devices) {
         if (d.product != product) continue;
         if (revision && d.revision == *revision) return &d;
-        if (best == nullptr || d.revision > best->revision) best = &d;
+        if (best == nullptr || d.revision > best->revision) {
+            best = &d;
+        }
     }
     return best;
 }
 
 const Device* File::find(std::string_view name) const {
     const Device* best = nullptr;
-    for (const Device& d : devices)
-        if ((same_word(d.order, name) || same_word(d.name, name)) && (best == nullptr || d.revision > best->revision)) best = &d;
+    for (const Device& d : devices) {
+        if ((same_word(d.order, name) || same_word(d.name, name)) &&
+            (best == nullptr || d.revision > best->revision)) {
+            best = &d;
+        }
+    }
     return best;
 }
 
-Device with_modules(const File& file, const Device& device, const std::vector<std::uint32_t>& idents) {
+Device with_modules(const File& file, const Device& device,
+                    const std::vector<std::uint32_t>& idents) {
     Device out = device;
     for (std::size_t slot = 0; slot < idents.size(); ++slot) {
-        const auto module =
-            std::find_if(file.modules.begin(), file.modules.end(), [&](const Module& m) { return m.ident == idents[slot]; });
+        const auto module = std::find_if(file.modules.begin(), file.modules.end(),
+                                         [&](const Module& m) { return m.ident == idents[slot]; });
         if (idents[slot] == 0 || module == file.modules.end()) continue;
-        const auto add = [&](const std::vector<Pdo>& from, const std::vector<bool>& depends, std::vector<Pdo>& to) {
+        const auto add = [&](const std::vector<Pdo>& from, const std::vector<bool>& depends,
+                             std::vector<Pdo>& to) {
             for (std::size_t i = 0; i < from.size(); ++i) {
                 Pdo p = from[i];
-                if (depends[i]) p.index = static_cast<std::uint16_t>(p.index + slot * device.slot_pdo_increment);
-                for (Entry& e : p.entries)
-                    if (depends[i] && e.index != 0) e.index = static_cast<std::uint16_t>(e.index + slot * device.slot_index_increment);
+                if (depends[i]) {
+                    p.index =
+                        static_cast<std::uint16_t>(p.index + slot * device.slot_pdo_increment);
+                }
+                for (Entry& e : p.entries) {
+                    if (depends[i] && e.index != 0) {
+                        e.index = static_cast<std::uint16_t>(e.index +
+                                                             slot * device.slot_index_increment);
+                    }
+                }
                 to.push_back(std::move(p));
             }
         };
-        add(module->rx, module->rx_depends, out.rx), add(module->tx, module->tx_depends, out.tx);
-        out.init_commands.insert(out.init_commands.end(), module->init_commands.begin(), module->init_commands.end());
+        add(module->rx, module->rx_depends, out.rx);
+        add(module->tx, module->tx_depends, out.tx);
+        out.init_commands.insert(out.init_commands.end(), module->init_commands.begin(),
+                                 module->init_commands.end());
         for (Object o : module->objects) {
             o.index = static_cast<std::uint16_t>(o.index + slot * device.slot_index_increment);
             if (out.find(o.index) != nullptr) continue;
             out.objects.insert(std::upper_bound(out.objects.begin(), out.objects.end(), o,
-                                                [](const Object& a, const Object& b) { return a.index < b.index; }),
+                                                [](const Object& a, const Object& b) {
+                return a.index < b.index;
+            }),
                                o);
         }
     }
@@ -89,8 +114,8 @@ std::string longer_entry(const Device& device, const Pdo& pdo) {
         const Value* value = e.index == 0 ? nullptr : device.find(e.index, e.sub);
         if (value == nullptr || value->bits == 0 || e.bits <= value->bits) continue;
         char text[96];
-        std::snprintf(text, sizeof text, "PDO %04X maps %u bits of object %04X:%X, which has %u", pdo.index, e.bits, e.index, e.sub,
-                      value->bits);
+        std::snprintf(text, sizeof text, "PDO %04X maps %u bits of object %04X:%X, which has %u",
+                      pdo.index, e.bits, e.index, e.sub, value->bits);
         return text;
     }
     return {};
@@ -101,12 +126,16 @@ namespace {
 void add_pdos(const std::vector<Pdo>& from, std::vector<sii::Pdo>& to) {
     for (const Pdo& p : from) {
         sii::Pdo out;
-        out.index = p.index, out.name = p.name;
+        out.index = p.index;
+        out.name = p.name;
         out.sync_manager = p.sync_manager.value_or(0xff);
-        out.flags = static_cast<std::uint16_t>((p.mandatory ? sii::pdo_mandatory : 0) | (p.fixed ? sii::pdo_fixed : 0));
+        out.flags = static_cast<std::uint16_t>((p.mandatory ? sii::pdo_mandatory : 0) |
+                                               (p.fixed ? sii::pdo_fixed : 0));
         for (const Entry& e : p.entries) {
-            unsigned   bits = e.bits;  // one entry holds 255 bits at most: the rest follows as gaps
-            sii::Entry first{e.index, e.sub, e.name, e.index == 0 ? std::uint8_t{0} : sii::type_number(e.type), 0, 0};
+            unsigned bits = e.bits;  // one entry holds 255 bits at most: the rest follows as gaps
+            sii::Entry first{e.index, e.sub,
+                             e.name,  e.index == 0 ? std::uint8_t{0} : sii::type_number(e.type),
+                             0,       0};
             do {
                 first.bits = static_cast<std::uint8_t>(bits > 255 ? 248 : bits);
                 bits -= first.bits;
@@ -122,41 +151,65 @@ void add_pdos(const std::vector<Pdo>& from, std::vector<sii::Pdo>& to) {
 
 sii::Contents sii_contents(const File& file, const Device& d) {
     sii::Contents out;
-    for (std::size_t i = 0; i + 1 < d.config_data.size() && i < 14; i += 2)
+    for (std::size_t i = 0; i + 1 < d.config_data.size() && i < 14; i += 2) {
         out.configuration[i / 2] = get<std::uint16_t>(d.config_data.data() + i);
-    out.vendor = file.vendor, out.product = d.product, out.revision = d.revision, out.serial = d.serial;
+    }
+    out.vendor = file.vendor;
+    out.product = d.product;
+    out.revision = d.revision;
+
+    out.serial = d.serial;
     if (d.bootstrap.size() >= 8) {
         const std::uint8_t* b = d.bootstrap.data();
-        out.boot = {{get<std::uint16_t>(b), get<std::uint16_t>(b + 2)}, {get<std::uint16_t>(b + 4), get<std::uint16_t>(b + 6)}};
+        out.boot = {{get<std::uint16_t>(b), get<std::uint16_t>(b + 2)},
+                    {get<std::uint16_t>(b + 4), get<std::uint16_t>(b + 6)}};
     }
     out.eeprom_bytes = d.eeprom_bytes;
     out.fmmus = d.fmmus;
     for (const SyncManager& s : d.sync_managers) {
         out.sync_managers.push_back({s.start, s.default_size, s.control, 0, s.enable, s.type});
-        if (s.type == sii::SmType::mailbox_out) out.mailboxes.receive = {s.start, s.default_size};
-        if (s.type == sii::SmType::mailbox_in) out.mailboxes.send = {s.start, s.default_size};
+        if (s.type == sii::SmType::mailbox_out) {
+            out.mailboxes.receive = {s.start, s.default_size};
+        }
+        if (s.type == sii::SmType::mailbox_in) {
+            out.mailboxes.send = {s.start, s.default_size};
+        }
     }
-    add_pdos(d.tx, out.tx), add_pdos(d.rx, out.rx);
-    for (const OpMode& m : d.op_modes)
-        out.dc.push_back({static_cast<std::uint32_t>(m.sync0_cycle_ns), static_cast<std::int32_t>(m.sync0_shift_ns),
-                          static_cast<std::int32_t>(m.sync1_shift_ns), static_cast<std::int16_t>(m.sync1_factor),
-                          static_cast<std::int16_t>(m.sync0_factor), m.assign_activate, m.name, m.description});
+    add_pdos(d.tx, out.tx);
+    add_pdos(d.rx, out.rx);
+    for (const OpMode& m : d.op_modes) {
+        out.dc.push_back(
+            {static_cast<std::uint32_t>(m.sync0_cycle_ns),
+             static_cast<std::int32_t>(m.sync0_shift_ns),
+             static_cast<std::int32_t>(m.sync1_shift_ns), static_cast<std::int16_t>(m.sync1_factor),
+             static_cast<std::int16_t>(m.sync0_factor), m.assign_activate, m.name, m.description});
+    }
     out.has_general = true;
     sii::General& g = out.general;
-    g.group = d.group, g.order = d.order, g.name = d.name;
+    g.group = d.group;
+    g.order = d.order;
+    g.name = d.name;
     if (d.mailbox) {
         const Mailbox& m = *d.mailbox;
-        const auto     bit = [](bool set, unsigned value) { return set ? value : 0U; };
-        out.protocols = static_cast<std::uint16_t>(bit(m.aoe, sii::aoe) | bit(m.eoe, sii::eoe) | bit(m.coe, sii::coe) |
-                                                   bit(m.foe, sii::foe) | bit(m.soe, sii::soe) | bit(m.voe, sii::voe));
-        g.coe_details =
-            static_cast<std::uint8_t>(bit(m.coe, sii::coe_sdo) | bit(m.sdo_info, sii::coe_sdo_info) |
-                                      bit(m.pdo_assign, sii::coe_pdo_assign) | bit(m.pdo_config, sii::coe_pdo_config) |
-                                      bit(m.pdo_upload, sii::coe_upload_at_start) | bit(m.complete_access, sii::coe_complete_access));
-        g.foe = m.foe, g.eoe = m.eoe, g.soe_channels = m.soe_channels;
+        const auto bit = [](bool set, unsigned value) { return set ? value : 0U; };
+        out.protocols = static_cast<std::uint16_t>(bit(m.aoe, sii::aoe) | bit(m.eoe, sii::eoe) |
+                                                   bit(m.coe, sii::coe) | bit(m.foe, sii::foe) |
+                                                   bit(m.soe, sii::soe) | bit(m.voe, sii::voe));
+        g.coe_details = static_cast<std::uint8_t>(
+            bit(m.coe, sii::coe_sdo) | bit(m.sdo_info, sii::coe_sdo_info) |
+            bit(m.pdo_assign, sii::coe_pdo_assign) | bit(m.pdo_config, sii::coe_pdo_config) |
+            bit(m.pdo_upload, sii::coe_upload_at_start) |
+            bit(m.complete_access, sii::coe_complete_access));
+        g.foe = m.foe;
+        g.eoe = m.eoe;
+        g.soe_channels = m.soe_channels;
     }
-    if (d.profile == 402) g.ds402_channels = 1;
-    for (std::size_t i = 0; i < 4 && i < d.physics.size(); ++i) g.ports[i] = d.physics[i] == 'Y' ? 1 : d.physics[i] == 'K' ? 3 : 0;
+    if (d.profile == 402) {
+        g.ds402_channels = 1;
+    }
+    for (std::size_t i = 0; i < 4 && i < d.physics.size(); ++i) {
+        g.ports[i] = d.physics[i] == 'Y' ? 1 : d.physics[i] == 'K' ? 3 : 0;
+    }
     out.others = d.categories;
     return out;
 }

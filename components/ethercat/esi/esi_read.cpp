@@ -12,28 +12,41 @@ public:
 
     File read() {
         pugi::xml_document document;
-        const auto         result = document.load_buffer(context_.text.data(), context_.text.size());
+        const auto result = document.load_buffer(context_.text.data(), context_.text.size());
         if (!result) {
-            const auto at = std::min(static_cast<std::size_t>(std::max<std::ptrdiff_t>(result.offset, 0)), context_.text.size());
+            const auto at =
+                std::min(static_cast<std::size_t>(std::max<std::ptrdiff_t>(result.offset, 0)),
+                         context_.text.size());
             text::Span span{1, 1, static_cast<std::uint32_t>(at), 0};
             span.line += static_cast<std::uint32_t>(
-                std::count(context_.text.begin(), context_.text.begin() + static_cast<std::ptrdiff_t>(at), '\n'));
-            context_.report.error(Topic::file, span, "invalid XML: " + lower(result.description()), "is it a device description?");
+                std::count(context_.text.begin(),
+                           context_.text.begin() + static_cast<std::ptrdiff_t>(at), '\n'));
+            context_.report.error(Topic::file, span, "invalid XML: " + lower(result.description()),
+                                  "is it a device description?");
             return finish();
         }
         const Xml root = document.child("EtherCATInfo");
         if (!root) {
             context_.report.error(Topic::file, {1, 1, 0, 0},
-                                  "the root element is '" + std::string(document.document_element().name()) + "', not EtherCATInfo",
+                                  "the root element is '" +
+                                      std::string(document.document_element().name()) +
+                                      "', not EtherCATInfo",
                                   "give the ESI file of the device, an XML file from its maker");
             return finish();
         }
         out_.vendor = context_.child<std::uint32_t>(root.child("Vendor"), "Id");
         out_.vendor_name = text_of(root.child("Vendor"), "Name");
         const Xml descriptions = root.child("Descriptions");
-        for (const Xml d : descriptions.child("Devices").children("Device")) device(d);
-        for (const Xml m : descriptions.child("Modules").children("Module")) module_of(m);
-        if (out_.devices.empty()) context_.report.error(Topic::file, span_of(root, context_.text), "the file describes no device");
+        for (const Xml d : descriptions.child("Devices").children("Device")) {
+            device(d);
+        }
+        for (const Xml m : descriptions.child("Modules").children("Module")) {
+            module_of(m);
+        }
+        if (out_.devices.empty()) {
+            context_.report.error(Topic::file, span_of(root, context_.text),
+                                  "the file describes no device");
+        }
         return finish();
     }
 
@@ -49,18 +62,25 @@ private:
         d.at = span_of(node, context_.text);
         const Xml type = node.child("Type");
         d.order = trimmed(type.child_value());
-        d.product = context_.attribute<std::uint32_t>(type, "ProductCode"),
+        d.product = context_.attribute<std::uint32_t>(type, "ProductCode");
+
         d.revision = context_.attribute<std::uint32_t>(type, "RevisionNo");
         d.serial = context_.attribute<std::uint32_t>(type, "SerialNo");
-        d.name = text_of(node, "Name"), d.group = text_of(node, "GroupType");
+        d.name = text_of(node, "Name");
+        d.group = text_of(node, "GroupType");
         d.physics = node.attribute("Physics").value();
         const Xml info = node.child("Info");
-        const Xml state = info.child("StateMachine").child("Timeout"), mailbox = info.child("Mailbox").child("Timeout");
+        const Xml state = info.child("StateMachine").child("Timeout");
+
+        const Xml mailbox = info.child("Mailbox").child("Timeout");
         Timeouts& t = d.timeouts;
-        t.preop = context_.child(state, "PreopTimeout", t.preop), t.safeop_op = context_.child(state, "SafeopOpTimeout", t.safeop_op);
+        t.preop = context_.child(state, "PreopTimeout", t.preop);
+
+        t.safeop_op = context_.child(state, "SafeopOpTimeout", t.safeop_op);
         t.back_to_init = context_.child(state, "BackToInitTimeout", t.back_to_init);
         t.back_to_safeop = context_.child(state, "BackToSafeopTimeout", t.back_to_safeop);
-        t.request = context_.child(mailbox, "RequestTimeout", t.request),
+        t.request = context_.child(mailbox, "RequestTimeout", t.request);
+
         t.response = context_.child(mailbox, "ResponseTimeout", t.response);
         for (const Xml f : node.children("Fmmu")) {
             const std::string use = lower(trimmed(f.child_value()));
@@ -69,67 +89,109 @@ private:
                               : use == "mboxstate" ? sii::FmmuUse::mailbox_state
                                                    : sii::FmmuUse::unused);
         }
-        for (const Xml s : node.children("Sm")) sync_manager(s, d);
-        pdos(node, "RxPdo", d.rx), pdos(node, "TxPdo", d.tx);
-        default_sync_manager(d, d.rx, sii::SmType::outputs), default_sync_manager(d, d.tx, sii::SmType::inputs);
-        if (const Xml box = node.child("Mailbox")) mailbox_of(box, d);
+        for (const Xml s : node.children("Sm")) {
+            sync_manager(s, d);
+        }
+        pdos(node, "RxPdo", d.rx);
+        pdos(node, "TxPdo", d.tx);
+        default_sync_manager(d, d.rx, sii::SmType::outputs);
+
+        default_sync_manager(d, d.tx, sii::SmType::inputs);
+        if (const Xml box = node.child("Mailbox")) {
+            mailbox_of(box, d);
+        }
         if (const Xml dc = node.child("Dc")) {
             d.has_dc = true;
-            for (const Xml mode : dc.children("OpMode")) op_mode(mode, d);
+            for (const Xml mode : dc.children("OpMode")) {
+                op_mode(mode, d);
+            }
         }
         const Xml slots = node.child("Slots");
         d.slot_pdo_increment = context_.attribute<unsigned>(slots, "SlotPdoIncrement", 1);
         d.slot_index_increment = context_.attribute<unsigned>(slots, "SlotIndexIncrement", 0);
-        for (const Xml s : slots.children("Slot")) slot(s, d);
-        for (const Xml profile : node.children("Profile")) {
-            if (d.profile == 0) d.profile = context_.child<std::uint16_t>(profile, "ProfileNo");
-            if (d.objects.empty()) d.objects = dictionary(context_, profile);
+        for (const Xml s : slots.children("Slot")) {
+            slot(s, d);
         }
-        if (const Xml eeprom = node.child("Eeprom")) eeprom_of(eeprom, d);
+        for (const Xml profile : node.children("Profile")) {
+            if (d.profile == 0) {
+                d.profile = context_.child<std::uint16_t>(profile, "ProfileNo");
+            }
+            if (d.objects.empty()) {
+                d.objects = dictionary(context_, profile);
+            }
+        }
+        if (const Xml eeprom = node.child("Eeprom")) {
+            eeprom_of(eeprom, d);
+        }
         out_.devices.push_back(std::move(d));
     }
 
     void sync_manager(const Xml& node, Device& d) {
-        SyncManager       s;
+        SyncManager s;
         const std::string type = lower(trimmed(node.child_value()));
         s.type = type == "mboxout"   ? sii::SmType::mailbox_out
                  : type == "mboxin"  ? sii::SmType::mailbox_in
                  : type == "outputs" ? sii::SmType::outputs
                  : type == "inputs"  ? sii::SmType::inputs
                                      : sii::SmType::unused;
-        s.start = context_.attribute<std::uint16_t>(node, "StartAddress"),
+        s.start = context_.attribute<std::uint16_t>(node, "StartAddress");
+
         s.default_size = context_.attribute<std::uint16_t>(node, "DefaultSize");
-        s.min_size = context_.attribute<std::uint16_t>(node, "MinSize"), s.max_size = context_.attribute<std::uint16_t>(node, "MaxSize");
-        s.control = context_.attribute<std::uint8_t>(node, "ControlByte"), s.enable = context_.attribute<std::uint8_t>(node, "Enable");
+        s.min_size = context_.attribute<std::uint16_t>(node, "MinSize");
+
+        s.max_size = context_.attribute<std::uint16_t>(node, "MaxSize");
+        s.control = context_.attribute<std::uint8_t>(node, "ControlByte");
+
+        s.enable = context_.attribute<std::uint8_t>(node, "Enable");
         d.sync_managers.push_back(s);
     }
 
-    void pdos(const Xml& node, const char* name, std::vector<Pdo>& to, std::vector<bool>* depends = nullptr) {
+    void pdos(const Xml& node, const char* name, std::vector<Pdo>& to,
+              std::vector<bool>* depends = nullptr) {
         for (const Xml p : node.children(name)) {
             Pdo pdo;
             pdo.index = context_.child<std::uint16_t>(p, "Index");
             pdo.name = text_of(p, "Name");
-            if (p.attribute("Sm")) pdo.sync_manager = context_.attribute<std::uint8_t>(p, "Sm");
-            pdo.fixed = Context::flag(p, "Fixed"), pdo.mandatory = Context::flag(p, "Mandatory");
-            for (const Xml e : p.children("Exclude"))
-                pdo.exclude.push_back(static_cast<std::uint16_t>(context_.number_of(e, "Exclude", e.child_value(), 0)));
+            if (p.attribute("Sm")) {
+                pdo.sync_manager = context_.attribute<std::uint8_t>(p, "Sm");
+            }
+            pdo.fixed = Context::flag(p, "Fixed");
+            pdo.mandatory = Context::flag(p, "Mandatory");
+            for (const Xml e : p.children("Exclude")) {
+                pdo.exclude.push_back(static_cast<std::uint16_t>(
+                    context_.number_of(e, "Exclude", e.child_value(), 0)));
+            }
             for (const Xml e : p.children("Entry")) {
                 Entry entry;
-                entry.index = context_.child<std::uint16_t>(e, "Index"), entry.sub = context_.child<std::uint8_t>(e, "SubIndex");
+                entry.index = context_.child<std::uint16_t>(e, "Index");
+
+                entry.sub = context_.child<std::uint8_t>(e, "SubIndex");
                 entry.bits = context_.child<std::uint16_t>(e, "BitLen");
-                entry.name = text_of(e, "Name"), entry.type = trimmed(e.child_value("DataType"));
-                if (entry.bits == 0) entry.bits = static_cast<std::uint16_t>(type_bits(entry.type));
-                if (entry.bits == 0) context_.warn(e, "the entry has no BitLen; it is ignored");
-                else pdo.entries.push_back(std::move(entry));
+                entry.name = text_of(e, "Name");
+                entry.type = trimmed(e.child_value("DataType"));
+                if (entry.bits == 0) {
+                    entry.bits = static_cast<std::uint16_t>(type_bits(entry.type));
+                }
+                if (entry.bits == 0) {
+                    context_.warn(e, "the entry has no BitLen; it is ignored");
+                } else {
+                    pdo.entries.push_back(std::move(entry));
+                }
             }
             const bool known =
-                pdo.index != 0 && std::any_of(to.begin(), to.end(), [&](const Pdo& other) { return other.index == pdo.index; });
-            if (pdo.index == 0) continue;  // a module's PDO by reference
+                pdo.index != 0 && std::any_of(to.begin(), to.end(), [&](const Pdo& other) {
+                return other.index == pdo.index;
+            });
+            if (pdo.index == 0) {
+                continue;  // a module's PDO by reference
+            }
             if (known) {
                 context_.warn(p, "duplicate PDO index; the first one is used");
                 continue;
             }
-            if (depends != nullptr) depends->push_back(Context::flag(p.child("Index"), "DependOnSlot"));
+            if (depends != nullptr) {
+                depends->push_back(Context::flag(p.child("Index"), "DependOnSlot"));
+            }
             to.push_back(std::move(pdo));
         }
     }
@@ -137,20 +199,32 @@ private:
     static void default_sync_manager(const Device& d, std::vector<Pdo>& to, sii::SmType type) {
         for (Pdo& p : to) {
             if (!p.mandatory || p.sync_manager) continue;
-            for (std::size_t i = 0; i < d.sync_managers.size() && !p.sync_manager; ++i)
-                if (d.sync_managers[i].type == type) p.sync_manager = static_cast<std::uint8_t>(i);
+            for (std::size_t i = 0; i < d.sync_managers.size() && !p.sync_manager; ++i) {
+                if (d.sync_managers[i].type == type) {
+                    p.sync_manager = static_cast<std::uint8_t>(i);
+                }
+            }
         }
     }
 
     void mailbox_of(const Xml& node, Device& d) {
         Mailbox m;
         m.repeat = Context::flag(node, "DataLinkLayer");
-        m.foe = node.child("FoE"), m.eoe = node.child("EoE"), m.aoe = node.child("AoE"), m.voe = node.child("VoE");
+        m.foe = node.child("FoE");
+        m.eoe = node.child("EoE");
+        m.aoe = node.child("AoE");
+
+        m.voe = node.child("VoE");
         if (const Xml coe = node.child("CoE")) {
             m.coe = true;
-            m.sdo_info = Context::flag(coe, "SdoInfo"), m.pdo_assign = Context::flag(coe, "PdoAssign"),
+            m.sdo_info = Context::flag(coe, "SdoInfo");
+
+            m.pdo_assign = Context::flag(coe, "PdoAssign");
+
             m.pdo_config = Context::flag(coe, "PdoConfig");
-            m.pdo_upload = Context::flag(coe, "PdoUpload"), m.complete_access = Context::flag(coe, "CompleteAccess");
+            m.pdo_upload = Context::flag(coe, "PdoUpload");
+
+            m.complete_access = Context::flag(coe, "CompleteAccess");
             m.segmented_sdo = Context::flag(coe, "SegmentedSdo", true);
             init_commands(coe, InitCmd::Protocol::coe, d.init_commands);
         }
@@ -165,10 +239,13 @@ private:
         for (const Xml c : node.children("InitCmd")) {
             InitCmd cmd;
             cmd.protocol = protocol;
-            for (const Xml t : c.children("Transition")) cmd.transitions.emplace_back(trimmed(t.child_value()));
+            for (const Xml t : c.children("Transition")) {
+                cmd.transitions.emplace_back(trimmed(t.child_value()));
+            }
             const bool soe = protocol == InitCmd::Protocol::soe;
             cmd.index = context_.child<std::uint16_t>(c, soe ? "IDN" : "Index");
-            cmd.sub = soe ? context_.attribute<std::uint8_t>(c, "Chn") : context_.child<std::uint8_t>(c, "SubIndex");
+            cmd.sub = soe ? context_.attribute<std::uint8_t>(c, "Chn")
+                          : context_.child<std::uint8_t>(c, "SubIndex");
             cmd.complete = Context::flag(c, "CompleteAccess");
             cmd.data = context_.bytes(c.child("Data"));
             cmd.comment = text_of(c, "Comment");
@@ -178,13 +255,16 @@ private:
 
     void op_mode(const Xml& node, Device& d) {
         OpMode m;
-        m.name = text_of(node, "Name"), m.description = text_of(node, "Desc");
+        m.name = text_of(node, "Name");
+        m.description = text_of(node, "Desc");
         m.assign_activate = context_.child<std::uint16_t>(node, "AssignActivate");
-        m.sync0_cycle_ns = context_.child<std::int64_t>(node, "CycleTimeSync0"),
+        m.sync0_cycle_ns = context_.child<std::int64_t>(node, "CycleTimeSync0");
+
         m.sync1_cycle_ns = context_.child<std::int64_t>(node, "CycleTimeSync1");
         m.sync0_factor = context_.attribute<int>(node.child("CycleTimeSync0"), "Factor", 1);
         m.sync1_factor = context_.attribute<int>(node.child("CycleTimeSync1"), "Factor", 0);
-        m.sync0_shift_ns = context_.child<std::int64_t>(node, "ShiftTimeSync0"),
+        m.sync0_shift_ns = context_.child<std::int64_t>(node, "ShiftTimeSync0");
+
         m.sync1_shift_ns = context_.child<std::int64_t>(node, "ShiftTimeSync1");
         d.op_modes.push_back(std::move(m));
     }
@@ -193,47 +273,68 @@ private:
         Slot s;
         s.name = text_of(node, "Name");
         for (const Xml m : node.children("ModuleIdent")) {
-            const auto ident = static_cast<std::uint32_t>(context_.number_of(m, "ModuleIdent", m.child_value(), 0));
+            const auto ident = static_cast<std::uint32_t>(
+                context_.number_of(m, "ModuleIdent", m.child_value(), 0));
             s.modules.push_back(ident);
-            if (Context::flag(m, "Default")) s.default_module = ident;
+            if (Context::flag(m, "Default")) {
+                s.default_module = ident;
+            }
         }
-        const unsigned count = std::clamp(context_.attribute<unsigned>(node, "MaxInstances", 1), 1U, 255U);
-        for (unsigned i = 0; i < count && d.slots.size() < 255; ++i) d.slots.push_back(s);
+        const unsigned count =
+            std::clamp(context_.attribute<unsigned>(node, "MaxInstances", 1), 1U, 255U);
+        for (unsigned i = 0; i < count && d.slots.size() < 255; ++i) {
+            d.slots.push_back(s);
+        }
     }
 
     void module_of(const Xml& node) {
         Module m;
         m.ident = context_.attribute<std::uint32_t>(node.child("Type"), "ModuleIdent");
-        m.type = trimmed(node.child_value("Type")), m.name = text_of(node, "Name");
-        pdos(node, "RxPdo", m.rx, &m.rx_depends), pdos(node, "TxPdo", m.tx, &m.tx_depends);
+        m.type = trimmed(node.child_value("Type"));
+        m.name = text_of(node, "Name");
+        pdos(node, "RxPdo", m.rx, &m.rx_depends);
+        pdos(node, "TxPdo", m.tx, &m.tx_depends);
         init_commands(node.child("Mailbox").child("CoE"), InitCmd::Protocol::coe, m.init_commands);
         m.objects = dictionary(context_, node.child("Profile"));
         out_.modules.push_back(std::move(m));
     }
 
     void eeprom_of(const Xml& node, Device& d) {
-        if (node.child("Data")) d.eeprom = context_.bytes(node.child("Data"));
-        d.eeprom_bytes = std::min<std::size_t>(context_.child<std::size_t>(node, "ByteSize"), 128 * 1024);
-        d.config_data = context_.bytes(node.child("ConfigData")), d.bootstrap = context_.bytes(node.child("BootStrap"));
+        if (node.child("Data")) {
+            d.eeprom = context_.bytes(node.child("Data"));
+        }
+        d.eeprom_bytes =
+            std::min<std::size_t>(context_.child<std::size_t>(node, "ByteSize"), 128 * 1024);
+        d.config_data = context_.bytes(node.child("ConfigData"));
+
+        d.bootstrap = context_.bytes(node.child("BootStrap"));
         for (const Xml c : node.children("Category")) {
             sii::OtherCategory category{context_.child<std::uint16_t>(c, "CatNo"), {}};
-            const auto         value = [&](const char* name, unsigned bytes) {
+            const auto value = [&](const char* name, unsigned bytes) {
                 const auto n = context_.child<std::uint64_t>(c, name);
-                for (unsigned i = 0; i < bytes; ++i) category.data.push_back(static_cast<std::uint8_t>(n >> (8 * i)));
+                for (unsigned i = 0; i < bytes; ++i) {
+                    category.data.push_back(static_cast<std::uint8_t>(n >> (8 * i)));
+                }
             };
-            if (c.child("Data")) category.data = context_.bytes(c.child("Data"));
-            else if (c.child("DataUINT")) value("DataUINT", 2);
-            else if (c.child("DataUDINT")) value("DataUDINT", 4);
-            else
-                for (const char letter : std::string_view(c.child_value("DataString")))
+            if (c.child("Data")) {
+                category.data = context_.bytes(c.child("Data"));
+            } else if (c.child("DataUINT")) {
+                value("DataUINT", 2);
+            } else if (c.child("DataUDINT")) {
+                value("DataUDINT", 4);
+            } else {
+                for (const char letter : std::string_view(c.child_value("DataString"))) {
                     category.data.push_back(static_cast<std::uint8_t>(letter));
-            if (category.data.size() <= 0xffff && category.type > 60 && category.type != 0xffff)
+                }
+            }
+            if (category.data.size() <= 0xffff && category.type > 60 && category.type != 0xffff) {
                 d.categories.push_back(std::move(category));
+            }
         }
     }
 
     Context context_;
-    File    out_;
+    File out_;
 };
 
 }  // namespace
@@ -243,27 +344,42 @@ File read(std::string_view xml) { return Reader(xml).read(); }
 std::optional<std::int64_t> number(std::string_view text) {
     text = trimmed(text);
     const bool negative = text.starts_with('-');
-    if (negative || text.starts_with('+')) text.remove_prefix(1);
+    if (negative || text.starts_with('+')) {
+        text.remove_prefix(1);
+    }
     std::string digits(text);
-    if (text.starts_with("#x") || text.starts_with("#X")) digits = "0x" + std::string(text.substr(2));
-    else if (text.starts_with("0X")) digits[1] = 'x';
+    if (text.starts_with("#x") || text.starts_with("#X")) {
+        digits = "0x" + std::string(text.substr(2));
+    } else if (text.starts_with("0X")) {
+        digits[1] = 'x';
+    }
     const auto value = parse_natural(digits);
-    if (!value) return {};
+    if (!value) {
+        return {};
+    }
     return static_cast<std::int64_t>(negative ? 0 - *value : *value);
 }
 
 std::optional<std::vector<std::uint8_t>> hex_bytes(std::string_view text) {
     std::vector<std::uint8_t> out;
-    int                       high = -1;
+    int high = -1;
     for (const char c : text) {
         const char l = lower(c);
-        const int  digit = l >= '0' && l <= '9' ? l - '0' : l >= 'a' && l <= 'f' ? l - 'a' + 10 : -1;
+        const int digit = l >= '0' && l <= '9' ? l - '0' : l >= 'a' && l <= 'f' ? l - 'a' + 10 : -1;
         if (is_blank(c) || c == '\r' || c == '\n') continue;
-        if (digit < 0) return {};
-        if (high < 0) high = digit;
-        else out.push_back(static_cast<std::uint8_t>(high << 4 | digit)), high = -1;
+        if (digit < 0) {
+            return {};
+        }
+        if (high < 0) {
+            high = digit;
+        } else {
+            out.push_back(static_cast<std::uint8_t>(high << 4 | digit));
+            high = -1;
+        }
     }
-    if (high >= 0) return {};
+    if (high >= 0) {
+        return {};
+    }
     return out;
 }
 

@@ -16,22 +16,27 @@ Bus::Bus(Setup setup_, const std::array<std::uint8_t, 6>& source, Events& events
       in_op(setup.slaves.size()),
       wkc_seen(image.domain_count(), WkcState::none) {
     constexpr std::size_t spare = 64;
-    const std::size_t     capacity = setup.most_slaves != 0 ? setup.most_slaves : setup.slaves.size() + spare;
+    const std::size_t capacity =
+        setup.most_slaves != 0 ? setup.most_slaves : setup.slaves.size() + spare;
     for (std::size_t n = 0; n < capacity; ++n) {
         devices.push_back(std::make_unique<Device>());
         devices[n]->slave.number = static_cast<std::uint16_t>(n);
         devices[n]->slave.station = static_cast<std::uint16_t>(first_station + n);
     }
     by_position.reserve(capacity);
-    status.expected =
-        static_cast<std::uint16_t>(std::count_if(setup.slaves.begin(), setup.slaves.end(), [](const Slave& s) { return !s.optional; }));
-    for (const auto& d : devices) engine.add(d->channel);
+    status.expected = static_cast<std::uint16_t>(std::count_if(
+        setup.slaves.begin(), setup.slaves.end(), [](const Slave& s) { return !s.optional; }));
+    for (const auto& d : devices) {
+        engine.add(d->channel);
+    }
     engine.add(watch_channel);
     engine.add(bus_channel);  // last: it sees what the others did in the same cycle
 }
 
 std::uint64_t Bus::dc_now() const noexcept {
-    return reference >= 0 && status.dc_time_ns != 0 ? status.dc_time_ns : static_cast<std::uint64_t>(engine.now_ns() + epoch_ns);
+    return reference >= 0 && status.dc_time_ns != 0
+               ? status.dc_time_ns
+               : static_cast<std::uint64_t>(engine.now_ns() + epoch_ns);
 }
 
 bool Bus::clocks_missing() const noexcept {
@@ -48,7 +53,9 @@ bool Bus::clocks_missing() const noexcept {
 }
 
 void Bus::leave(Device& d) noexcept {
-    d.slave.present = false, d.slave.state = State::none, d.slave.mailbox_status = nullptr;
+    d.slave.present = false;
+    d.slave.state = State::none;
+    d.slave.mailbox_status = nullptr;
     d.status.online = d.status.al_error = false;
     unsettle(d);
     note_in_op(d, false);
@@ -68,9 +75,11 @@ void Bus::note_in_op(const Device& d, bool is_in_op) noexcept {
 
 void Bus::update_status() noexcept {
     State lowest = State::op;
-    bool  all = status.scanned, any = false;
+    bool all = status.scanned;
+    bool any = false;
     for (std::size_t n = 0; n < device_of.size(); ++n) {
-        const Device* d = device_of[n] >= 0 ? devices[static_cast<std::size_t>(device_of[n])].get() : nullptr;
+        const Device* d =
+            device_of[n] >= 0 ? devices[static_cast<std::size_t>(device_of[n])].get() : nullptr;
         if (d == nullptr || !d->slave.present) {
             all &= setup.slaves[n].optional;
             continue;

@@ -22,8 +22,8 @@ struct SdoResult {
         refused,    ///< no mailbox, a mailbox error, or an answer that does not fit
     } outcome = Outcome::timed_out;
     std::uint32_t abort = 0;  ///< SDO abort code, or the code of a mailbox error
-    std::size_t   length = 0;   ///< bytes of an upload
-    explicit      operator bool() const noexcept { return outcome == Outcome::done; }
+    std::size_t length = 0;   ///< bytes of an upload
+    explicit operator bool() const noexcept { return outcome == Outcome::done; }
 };
 
 /// SDO transfers with one slave (ETG.1000.6, clause 5.6.2). The buffers must outlive the task.
@@ -31,17 +31,20 @@ class CoeAccess {
 public:
     virtual ~CoeAccess() = default;
     /// Reads an object into `to`; `complete`: all its sub-indexes. [realtime]
-    virtual Task<SdoResult> upload(Channel&, BusSlave&, std::uint16_t index, std::uint8_t sub, bool complete,
-                                   std::span<std::uint8_t> to) noexcept = 0;
+    virtual Task<SdoResult> upload(Channel&, BusSlave&, std::uint16_t index, std::uint8_t sub,
+                                   bool complete, std::span<std::uint8_t> to) noexcept = 0;
     /// Writes an object. [realtime]
-    virtual Task<SdoResult> download(Channel&, BusSlave&, std::uint16_t index, std::uint8_t sub, bool complete,
+    virtual Task<SdoResult> download(Channel&, BusSlave&, std::uint16_t index, std::uint8_t sub,
+                                     bool complete,
                                      std::span<const std::uint8_t> from) noexcept = 0;
     /// Writes a value over another protocol than CoE: SoE, AoE. [realtime]
     virtual Task<SdoResult> write_other(Channel&, BusSlave&, const StartupWrite&) noexcept {
         co_return SdoResult{SdoResult::Outcome::refused};
     }
     /// Writes the settings of the IP stack (EoE). [realtime]
-    virtual Task<SdoResult> set_ip(Channel&, BusSlave&, const eoe::Ip&) noexcept { co_return SdoResult{SdoResult::Outcome::refused}; }
+    virtual Task<SdoResult> set_ip(Channel&, BusSlave&, const eoe::Ip&) noexcept {
+        co_return SdoResult{SdoResult::Outcome::refused};
+    }
 };
 
 }  // namespace hal::ethercat::master

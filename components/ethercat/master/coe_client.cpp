@@ -11,55 +11,72 @@ namespace {
 bool accepts_sdo(const Expected& expected, std::span<const std::uint8_t> payload) noexcept {
     if (is_sdo_abort(payload, expected.first, expected.second)) return true;
     const auto sdo = coe::read_sdo(payload);
-    return sdo && coe::service_of(payload.data()) == coe::Service::sdo_response && sdo->is(static_cast<std::uint8_t>(expected.third)) &&
-           sdo->index == expected.first && sdo->sub == expected.second;
+    return sdo && coe::service_of(payload.data()) == coe::Service::sdo_response &&
+           sdo->is(static_cast<std::uint8_t>(expected.third)) && sdo->index == expected.first &&
+           sdo->sub == expected.second;
 }
 
 }  // namespace
 
 bool EmergencyQueue::take(const BusSlave& slave, const MailboxMessage& message) noexcept {
-    if (message.payload.size() < coe::header_bytes || coe::service_of(message.payload.data()) != coe::Service::emergency) return false;
+    if (message.payload.size() < coe::header_bytes ||
+        coe::service_of(message.payload.data()) != coe::Service::emergency) {
+        return false;
+    }
     if (const auto emergency = coe::read_emergency(message.payload)) {
-        if (!queue_.push({slave.number, *emergency})) ++lost_;
+        if (!queue_.push({slave.number, *emergency})) {
+            ++lost_;
+        }
     }
     return true;
 }
 
 // Some slaves send an abort as a request.
-bool is_sdo_abort(std::span<const std::uint8_t> payload, std::uint32_t index, std::uint32_t sub) noexcept {
+bool is_sdo_abort(std::span<const std::uint8_t> payload, std::uint32_t index,
+                  std::uint32_t sub) noexcept {
     const auto sdo = coe::read_sdo(payload);
-    if (!sdo || sdo->command != coe::command::abort || sdo->index != index || sdo->sub != sub) return false;
+    if (!sdo || sdo->command != coe::command::abort || sdo->index != index || sdo->sub != sub) {
+        return false;
+    }
     const auto service = coe::service_of(payload.data());
     return service == coe::Service::sdo_response || service == coe::Service::sdo_request;
 }
 
-Task<SdoResult> CoeClient::write_other(Channel& channel, BusSlave& slave, const StartupWrite& write) noexcept {
+Task<SdoResult> CoeClient::write_other(Channel& channel, BusSlave& slave,
+                                       const StartupWrite& write) noexcept {
     if (write.protocol == StartupWrite::Protocol::aoe) {
         AoeAddress address;
         address.target_port = write.port;
-        const SdoResult result = co_await aoe_.write(channel, slave, address, aoe::group_sdo,
-                                                     aoe::sdo_offset(write.index, write.sub, write.complete), write.data);
+        const SdoResult result = co_await aoe_.write(
+            channel, slave, address, aoe::group_sdo,
+            aoe::sdo_offset(write.index, write.sub, write.complete), write.data);
         co_return result;
     }
-    const SdoResult result = co_await soe_.write(channel, slave, write.sub, write.index, soe::element::value, write.data);
+    const SdoResult result = co_await soe_.write(channel, slave, write.sub, write.index,
+                                                 soe::element::value, write.data);
     co_return result;
 }
 
-Task<SdoResult> CoeClient::upload(Channel& channel, BusSlave& slave, std::uint16_t index, std::uint8_t sub, bool complete,
+Task<SdoResult> CoeClient::upload(Channel& channel, BusSlave& slave, std::uint16_t index,
+                                  std::uint8_t sub, bool complete,
                                   std::span<std::uint8_t> to) noexcept {
     SlaveMailbox* mailbox = mailboxes_.find(slave);
     if (mailbox == nullptr) co_return refused();
     SlaveMailbox::Hold hold = co_await mailbox->hold(channel);
-    coe::Sdo           request;
-    request.command = static_cast<std::uint8_t>(coe::command::upload | (complete ? coe::command::complete : 0));
-    request.index = index, request.sub = sub;
+    coe::Sdo request;
+    request.command =
+        static_cast<std::uint8_t>(coe::command::upload | (complete ? coe::command::complete : 0));
+    request.index = index;
+    request.sub = sub;
     if (mailbox->body(slave).size() < coe::sdo_bytes) co_return refused();
-    const std::size_t length = coe::write_sdo(mailbox->body(slave).data(), coe::Service::sdo_request, request);
-    SdoResult         result =
-        co_await mailbox->exchange(channel, slave, MailboxType::coe, length, {accepts_sdo, index, sub, coe::command::upload_response});
+    const std::size_t length =
+        coe::write_sdo(mailbox->body(slave).data(), coe::Service::sdo_request, request);
+    SdoResult result =
+        co_await mailbox->exchange(channel, slave, MailboxType::coe, length,
+                                   {accepts_sdo, index, sub, coe::command::upload_response});
     if (!result) co_return result;
 
-    const auto     payload = mailbox->reply().payload;
+    const auto payload = mailbox->reply().payload;
     const coe::Sdo sdo = *coe::read_sdo(payload);
     if (sdo.command == coe::command::abort) co_return aborted(sdo.value);
     if (sdo.expedited()) {
@@ -68,47 +85,60 @@ Task<SdoResult> CoeClient::upload(Channel& channel, BusSlave& slave, std::uint16
         std::memcpy(to.data(), payload.data() + coe::sdo_data, bytes);
         co_return succeeded(bytes);
     }
-    const std::size_t size = sdo.value, first = std::min(size, payload.size() - coe::sdo_bytes);
+    const std::size_t size = sdo.value;
+    const std::size_t first = std::min(size, payload.size() - coe::sdo_bytes);
     if (size > to.size()) {
-        if (first < size) co_await send_abort(channel, slave, *mailbox, index, sub, coe::abort::memory);
+        if (first < size) {
+            co_await send_abort(channel, slave, *mailbox, index, sub, coe::abort::memory);
+        }
         co_return refused(0, size);
     }
-    if (first != 0) std::memcpy(to.data(), payload.data() + coe::sdo_bytes, first);
+    if (first != 0) {
+        std::memcpy(to.data(), payload.data() + coe::sdo_bytes, first);
+    }
     if (first == size) co_return succeeded(size);
     result = co_await upload_segments(channel, slave, *mailbox, index, sub, size, first, to);
     co_return result;
 }
 
-Task<SdoResult> CoeClient::download(Channel& channel, BusSlave& slave, std::uint16_t index, std::uint8_t sub, bool complete,
+Task<SdoResult> CoeClient::download(Channel& channel, BusSlave& slave, std::uint16_t index,
+                                    std::uint8_t sub, bool complete,
                                     std::span<const std::uint8_t> from) noexcept {
     SlaveMailbox* mailbox = mailboxes_.find(slave);
     if (mailbox == nullptr) co_return refused();
     SlaveMailbox::Hold hold = co_await mailbox->hold(channel);
-    const auto         body = mailbox->body(slave);
+    const auto body = mailbox->body(slave);
     if (body.size() < coe::sdo_bytes) co_return refused();
     coe::Sdo request;
-    request.index = index, request.sub = sub;
-    std::size_t first = 0, length = coe::sdo_bytes;
+    request.index = index;
+    request.sub = sub;
+    std::size_t first = 0;
+    std::size_t length = coe::sdo_bytes;
     if (!complete && !from.empty() && from.size() <= 4) {
         request.command = coe::expedited_command(coe::command::download, from.size());
         std::memcpy(&request.value, from.data(), from.size());
         first = from.size();
     } else {
         request.command =
-            static_cast<std::uint8_t>(coe::command::download | coe::command::size_given | (complete ? coe::command::complete : 0));
+            static_cast<std::uint8_t>(coe::command::download | coe::command::size_given |
+                                      (complete ? coe::command::complete : 0));
         request.value = static_cast<std::uint32_t>(from.size());
         first = std::min(from.size(), body.size() - coe::sdo_bytes);
-        if (first != 0) std::memcpy(body.data() + coe::sdo_bytes, from.data(), first);
+        if (first != 0) {
+            std::memcpy(body.data() + coe::sdo_bytes, from.data(), first);
+        }
         length += first;
     }
     coe::write_sdo(body.data(), coe::Service::sdo_request, request);
     SdoResult result =
-        co_await mailbox->exchange(channel, slave, MailboxType::coe, length, {accepts_sdo, index, sub, coe::command::download_response});
+        co_await mailbox->exchange(channel, slave, MailboxType::coe, length,
+                                   {accepts_sdo, index, sub, coe::command::download_response});
     if (!result) co_return result;
     const coe::Sdo sdo = *coe::read_sdo(mailbox->reply().payload);
     if (sdo.command == coe::command::abort) co_return aborted(sdo.value);
     if (first < from.size()) {
-        result = co_await download_segments(channel, slave, *mailbox, index, sub, from.subspan(first));
+        result =
+            co_await download_segments(channel, slave, *mailbox, index, sub, from.subspan(first));
         if (!result) co_return result;
     }
     co_return succeeded(from.size());

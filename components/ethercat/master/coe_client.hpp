@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// CANopen over EtherCAT as the master uses it: SDO transfers, SDO information, emergencies (ETG.1000.6, clause 5.6).
+// CANopen over EtherCAT as the master uses it: SDO transfers, SDO information, emergencies
+// (ETG.1000.6, clause 5.6).
 #pragma once
 
 #include <cstdint>
@@ -16,19 +17,21 @@ namespace hal::ethercat::master {
 
 /// Entry of an object as SDO information describes it.
 struct ObjectDescription {
-    std::uint16_t   type = 0;
-    std::uint8_t    largest_sub = 0;
+    std::uint16_t type = 0;
+    std::uint8_t largest_sub = 0;
     coe::ObjectCode code{};
-    std::size_t     name_length = 0;  ///< bytes of the name in the buffer of the call
+    std::size_t name_length = 0;  ///< bytes of the name in the buffer of the call
 };
 struct EntryDescription {
-    std::uint16_t type = 0, bits = 0, access = 0;  ///< access: coe::access
-    std::size_t   name_length = 0;
+    std::uint16_t type = 0;
+    std::uint16_t bits = 0;
+    std::uint16_t access = 0;  ///< access: coe::access
+    std::size_t name_length = 0;
 };
 
 /// An emergency and its sender.
 struct EmergencyEvent {
-    std::uint16_t  slave = 0;  ///< BusSlave::number
+    std::uint16_t slave = 0;  ///< BusSlave::number
     coe::Emergency emergency;
 };
 
@@ -38,56 +41,68 @@ public:
     explicit EmergencyQueue(std::size_t capacity = 64) : queue_(capacity) {}
     /// Registers at all mailboxes. [setup]
     void attach(Mailboxes& mailboxes) noexcept {
-        for (std::size_t i = 0; i < mailboxes.size(); ++i) mailboxes.at(i).set_sink(MailboxType::coe, this);
+        for (std::size_t i = 0; i < mailboxes.size(); ++i) {
+            mailboxes.at(i).set_sink(MailboxType::coe, this);
+        }
     }
     bool take(const BusSlave&, const MailboxMessage&) noexcept override;
     /// Removes the oldest emergency; false: none. [any] one reader
-    bool          pop(EmergencyEvent& event) noexcept { return queue_.pop(event); }
-    std::uint32_t lost() const noexcept { return lost_; }  ///< Returns the number of emergencies that found the queue full.
+    bool pop(EmergencyEvent& event) noexcept { return queue_.pop(event); }
+    /// Returns the number of emergencies that found the queue full.
+    std::uint32_t lost() const noexcept { return lost_; }
 
 private:
     Queue<EmergencyEvent> queue_;
-    std::uint32_t         lost_ = 0;
+    std::uint32_t lost_ = 0;
 };
 
 /// Returns whether the payload aborts a transfer of an object. [realtime]
-bool is_sdo_abort(std::span<const std::uint8_t> payload, std::uint32_t index, std::uint32_t sub) noexcept;
+bool is_sdo_abort(std::span<const std::uint8_t> payload, std::uint32_t index,
+                  std::uint32_t sub) noexcept;
 
 /// See the top of this file. All functions [realtime].
 class CoeClient final : public CoeAccess {
 public:
     explicit CoeClient(Mailboxes& mailboxes) noexcept : mailboxes_(mailboxes) {}
 
-    Task<SdoResult> upload(Channel&, BusSlave&, std::uint16_t index, std::uint8_t sub, bool complete,
-                           std::span<std::uint8_t> to) noexcept override;
-    Task<SdoResult> download(Channel&, BusSlave&, std::uint16_t index, std::uint8_t sub, bool complete,
-                             std::span<const std::uint8_t> from) noexcept override;
-    Task<SdoResult> write_other(Channel&, BusSlave&, const StartupWrite&) noexcept override;  ///< An IDN by SoE, an object by AoE.
+    Task<SdoResult> upload(Channel&, BusSlave&, std::uint16_t index, std::uint8_t sub,
+                           bool complete, std::span<std::uint8_t> to) noexcept override;
+    Task<SdoResult> download(Channel&, BusSlave&, std::uint16_t index, std::uint8_t sub,
+                             bool complete, std::span<const std::uint8_t> from) noexcept override;
+    /// An IDN by SoE, an object by AoE.
+    Task<SdoResult> write_other(Channel&, BusSlave&, const StartupWrite&) noexcept override;
     Task<SdoResult> set_ip(Channel& channel, BusSlave& slave, const eoe::Ip& ip) noexcept override {
         return eoe_.set_ip(channel, slave, ip);
     }
 
     /// Reads a list of indexes; `length` of the result counts bytes, two for each index.
-    Task<MailboxResult> list(Channel&, BusSlave&, coe::List which, std::span<std::uint8_t> to) noexcept;
+    Task<MailboxResult> list(Channel&, BusSlave&, coe::List which,
+                             std::span<std::uint8_t> to) noexcept;
     /// Reads the description of an object and its name, not terminated, into `name`.
-    Task<MailboxResult> object(Channel&, BusSlave&, std::uint16_t index, ObjectDescription& description, std::span<char> name) noexcept;
+    Task<MailboxResult> object(Channel&, BusSlave&, std::uint16_t index,
+                               ObjectDescription& description, std::span<char> name) noexcept;
     /// Reads the description of an entry and its name, not terminated, into `name`.
-    Task<MailboxResult> entry(Channel&, BusSlave&, std::uint16_t index, std::uint8_t sub, EntryDescription& description,
-                              std::span<char> name) noexcept;
+    Task<MailboxResult> entry(Channel&, BusSlave&, std::uint16_t index, std::uint8_t sub,
+                              EntryDescription& description, std::span<char> name) noexcept;
 
 private:
-    Task<SdoResult>     upload_segments(Channel&, BusSlave&, SlaveMailbox&, std::uint16_t index, std::uint8_t sub, std::size_t size,
-                                        std::size_t first, std::span<std::uint8_t> to) noexcept;
-    Task<SdoResult>     download_segments(Channel&, BusSlave&, SlaveMailbox&, std::uint16_t index, std::uint8_t sub,
-                                          std::span<const std::uint8_t> rest) noexcept;
-    Task<>              send_abort(Channel&, BusSlave&, SlaveMailbox&, std::uint16_t index, std::uint8_t sub, std::uint32_t code) noexcept;
-    Task<MailboxResult> information(Channel&, BusSlave&, coe::Information request, std::uint32_t what, std::size_t what_bytes,
-                                    std::span<std::uint8_t> head, std::span<std::uint8_t> to) noexcept;
+    Task<SdoResult> upload_segments(Channel&, BusSlave&, SlaveMailbox&, std::uint16_t index,
+                                    std::uint8_t sub, std::size_t size, std::size_t first,
+                                    std::span<std::uint8_t> to) noexcept;
+    Task<SdoResult> download_segments(Channel&, BusSlave&, SlaveMailbox&, std::uint16_t index,
+                                      std::uint8_t sub,
+                                      std::span<const std::uint8_t> rest) noexcept;
+    Task<> send_abort(Channel&, BusSlave&, SlaveMailbox&, std::uint16_t index, std::uint8_t sub,
+                      std::uint32_t code) noexcept;
+    Task<MailboxResult> information(Channel&, BusSlave&, coe::Information request,
+                                    std::uint32_t what, std::size_t what_bytes,
+                                    std::span<std::uint8_t> head,
+                                    std::span<std::uint8_t> to) noexcept;
 
     Mailboxes& mailboxes_;
-    SoeClient  soe_{mailboxes_};
-    AoeClient  aoe_{mailboxes_};
-    EoeClient  eoe_{mailboxes_};
+    SoeClient soe_{mailboxes_};
+    AoeClient aoe_{mailboxes_};
+    EoeClient eoe_{mailboxes_};
 };
 
 }  // namespace hal::ethercat::master

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// SDO information: lists of objects, descriptions of objects and entries (ETG.1000.6, clause 5.6.3).
+// SDO information: lists of objects, descriptions of objects and entries (ETG.1000.6, clause
+// 5.6.3).
 #include <algorithm>
 #include <array>
 #include <cstring>
@@ -12,7 +13,9 @@ namespace {
 bool accepts_information(std::uint32_t response, std::span<const std::uint8_t> payload) noexcept {
     const auto header = coe::read_information(payload);
     if (!header || coe::service_of(payload.data()) != coe::Service::sdo_information) return false;
-    if (header->opcode == coe::Information::error) return payload.size() >= coe::information_header_bytes + 4;
+    if (header->opcode == coe::Information::error) {
+        return payload.size() >= coe::information_header_bytes + 4;
+    }
     return static_cast<std::uint32_t>(header->opcode) == response;
 }
 bool is_information_error(std::span<const std::uint8_t> payload) noexcept {
@@ -20,90 +23,126 @@ bool is_information_error(std::span<const std::uint8_t> payload) noexcept {
 }
 
 // Operation; list, or index and sub-index; bytes of these.
-bool accepts_first_fragment(const Expected& expected, std::span<const std::uint8_t> payload) noexcept {
-    if (!accepts_information(expected.first, payload) || payload.size() < coe::information_header_bytes) return false;
+bool accepts_first_fragment(const Expected& expected,
+                            std::span<const std::uint8_t> payload) noexcept {
+    if (!accepts_information(expected.first, payload) ||
+        payload.size() < coe::information_header_bytes) {
+        return false;
+    }
     if (is_information_error(payload)) return true;
     return payload.size() >= coe::information_header_bytes + expected.third &&
-           std::memcmp(payload.data() + coe::information_header_bytes, &expected.second, std::min(expected.third, 3U)) == 0;
+           std::memcmp(payload.data() + coe::information_header_bytes, &expected.second,
+                       std::min(expected.third, 3U)) == 0;
 }
 // Operation; fragments that the last one announced.
-bool accepts_next_fragment(const Expected& expected, std::span<const std::uint8_t> payload) noexcept {
+bool accepts_next_fragment(const Expected& expected,
+                           std::span<const std::uint8_t> payload) noexcept {
     if (!accepts_information(expected.first, payload)) return false;
-    return is_information_error(payload) || coe::read_information(payload)->fragments_left + 1U == expected.second;
+    return is_information_error(payload) ||
+           coe::read_information(payload)->fragments_left + 1U == expected.second;
 }
 
 }  // namespace
 
-// Joins the fragments of a response: the first `head.size()` bytes of the first one to `head`, all others to `to`.
-Task<MailboxResult> CoeClient::information(Channel& channel, BusSlave& slave, coe::Information request, std::uint32_t what,
-                                           std::size_t what_bytes, std::span<std::uint8_t> head, std::span<std::uint8_t> to) noexcept {
+// Joins the fragments of a response: the first `head.size()` bytes of the first one to `head`, all
+// others to `to`.
+Task<MailboxResult> CoeClient::information(Channel& channel, BusSlave& slave,
+                                           coe::Information request, std::uint32_t what,
+                                           std::size_t what_bytes, std::span<std::uint8_t> head,
+                                           std::span<std::uint8_t> to) noexcept {
     SlaveMailbox* mailbox = mailboxes_.find(slave);
     if (mailbox == nullptr) co_return refused();
     SlaveMailbox::Hold hold = co_await mailbox->hold(channel);
-    const auto         body = mailbox->body(slave);
+    const auto body = mailbox->body(slave);
     if (body.size() < coe::sdo_bytes) co_return refused();
     coe::write_information(body.data(), {request, false, 0});
     std::memcpy(body.data() + coe::information_header_bytes, &what, what_bytes);
-    MailboxResult result = co_await mailbox->send(channel, slave, MailboxType::coe, coe::information_header_bytes + what_bytes);
+    MailboxResult result = co_await mailbox->send(channel, slave, MailboxType::coe,
+                                                  coe::information_header_bytes + what_bytes);
     if (!result) co_return result;
 
     // Each fragment announces how many follow, which distinguishes a duplicate from the next one.
-    const auto  response = static_cast<coe::Information>(static_cast<unsigned>(request) + 1);
+    const auto response = static_cast<coe::Information>(static_cast<unsigned>(request) + 1);
     std::size_t used = 0;
-    bool        first = true;
-    Expected    expected{accepts_first_fragment, static_cast<std::uint32_t>(response), what, static_cast<std::uint32_t>(what_bytes)};
-    bool        overflow = false;
+    bool first = true;
+    Expected expected{accepts_first_fragment, static_cast<std::uint32_t>(response), what,
+                      static_cast<std::uint32_t>(what_bytes)};
+    bool overflow = false;
     for (;;) {
-        result = co_await mailbox->wait_for(channel, slave, MailboxType::coe, SlaveMailbox::response_timeout_ns(slave), expected);
+        result = co_await mailbox->wait_for(channel, slave, MailboxType::coe,
+                                            SlaveMailbox::response_timeout_ns(slave), expected);
         if (!result) co_return result;
         const auto payload = mailbox->reply().payload;
         const auto header = *coe::read_information(payload);
-        auto       data = payload.subspan(coe::information_header_bytes);
-        if (header.opcode == coe::Information::error) co_return aborted(get<std::uint32_t>(data.data()));
+        auto data = payload.subspan(coe::information_header_bytes);
+        if (header.opcode == coe::Information::error) {
+            co_return aborted(get<std::uint32_t>(data.data()));
+        }
         if (std::exchange(first, false)) {
             if (data.size() < head.size()) co_return refused();
             std::memcpy(head.data(), data.data(), head.size());
             data = data.subspan(head.size());
         }
-        if (data.size() > to.size() - used) overflow = true, data = data.first(to.size() - used);
-        if (!data.empty()) std::memcpy(to.data() + used, data.data(), data.size());
+        if (data.size() > to.size() - used) {
+            overflow = true;
+            data = data.first(to.size() - used);
+        }
+        if (!data.empty()) {
+            std::memcpy(to.data() + used, data.data(), data.size());
+        }
         used += data.size();
         if (!header.incomplete) break;
-        expected = {accepts_next_fragment, static_cast<std::uint32_t>(response), header.fragments_left};
-        if (header.fragments_left == 0) co_return refused();  // more was announced, and nothing follows
+        expected = {accepts_next_fragment, static_cast<std::uint32_t>(response),
+                    header.fragments_left};
+        // more was announced, and nothing follows
+        if (header.fragments_left == 0) co_return refused();
     }
     if (overflow) co_return refused(0, used);
     co_return succeeded(used);
 }
 
-Task<MailboxResult> CoeClient::list(Channel& channel, BusSlave& slave, coe::List which, std::span<std::uint8_t> to) noexcept {
+Task<MailboxResult> CoeClient::list(Channel& channel, BusSlave& slave, coe::List which,
+                                    std::span<std::uint8_t> to) noexcept {
     std::array<std::uint8_t, 2> head{};  // the type; following fragments have none
-    const MailboxResult         result =
-        co_await information(channel, slave, coe::Information::list_request, static_cast<std::uint16_t>(which), 2, head, to);
+    const MailboxResult result =
+        co_await information(channel, slave, coe::Information::list_request,
+                             static_cast<std::uint16_t>(which), 2, head, to);
     co_return result;
 }
 
-Task<MailboxResult> CoeClient::object(Channel& channel, BusSlave& slave, std::uint16_t index, ObjectDescription& description,
+Task<MailboxResult> CoeClient::object(Channel& channel, BusSlave& slave, std::uint16_t index,
+                                      ObjectDescription& description,
                                       std::span<char> name) noexcept {
-    std::array<std::uint8_t, 6>   head{};
+    std::array<std::uint8_t, 6> head{};
     const std::span<std::uint8_t> to{reinterpret_cast<std::uint8_t*>(name.data()), name.size()};
-    const MailboxResult           result = co_await information(channel, slave, coe::Information::object_request, index, 2, head, to);
+    const MailboxResult result =
+        co_await information(channel, slave, coe::Information::object_request, index, 2, head, to);
     if (result) {
-        description.type = get<std::uint16_t>(head.data() + 2), description.largest_sub = head[4];
-        description.code = static_cast<coe::ObjectCode>(head[5]), description.name_length = result.length;
+        description.type = get<std::uint16_t>(head.data() + 2);
+        description.largest_sub = head[4];
+        description.code = static_cast<coe::ObjectCode>(head[5]);
+
+        description.name_length = result.length;
     }
     co_return result;
 }
 
-Task<MailboxResult> CoeClient::entry(Channel& channel, BusSlave& slave, std::uint16_t index, std::uint8_t sub,
-                                     EntryDescription& description, std::span<char> name) noexcept {
-    std::array<std::uint8_t, 10>  head{};
+Task<MailboxResult> CoeClient::entry(Channel& channel, BusSlave& slave, std::uint16_t index,
+                                     std::uint8_t sub, EntryDescription& description,
+                                     std::span<char> name) noexcept {
+    std::array<std::uint8_t, 10> head{};
     const std::span<std::uint8_t> to{reinterpret_cast<std::uint8_t*>(name.data()), name.size()};
-    const std::uint32_t           what = index | static_cast<std::uint32_t>(sub) << 16;  // value information 0: only the name
-    const MailboxResult           result = co_await information(channel, slave, coe::Information::entry_request, what, 4, head, to);
+    // value information 0: only the name
+    const std::uint32_t what = index | static_cast<std::uint32_t>(sub) << 16;
+    const MailboxResult result =
+        co_await information(channel, slave, coe::Information::entry_request, what, 4, head, to);
     if (result) {
-        description.type = get<std::uint16_t>(head.data() + 4), description.bits = get<std::uint16_t>(head.data() + 6);
-        description.access = get<std::uint16_t>(head.data() + 8), description.name_length = result.length;
+        description.type = get<std::uint16_t>(head.data() + 4);
+
+        description.bits = get<std::uint16_t>(head.data() + 6);
+        description.access = get<std::uint16_t>(head.data() + 8);
+
+        description.name_length = result.length;
     }
     co_return result;
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Distributed clocks (ETG.1000.4, clause 6.7): delays from one latch of all receive times, offsets to the clock of the cycle, drift by the
-// reference clock's time in every cyclic frame, SYNC signals on one grid.
+// Distributed clocks (ETG.1000.4, clause 6.7): delays from one latch of all receive times, offsets
+// to the clock of the cycle, drift by the reference clock's time in every cyclic frame, SYNC
+// signals on one grid.
 #include <algorithm>
 
 #include "ethercat/master/bus.hpp"
@@ -10,7 +11,10 @@ namespace hal::ethercat::master {
 
 namespace {
 
-constexpr std::int64_t  synchronise_timeout_ns = 5'000 * millisecond, sync_start_ns = 100 * millisecond, sync_start_cycles = 10;
+constexpr std::int64_t synchronise_timeout_ns = 5'000 * millisecond;
+
+constexpr std::int64_t sync_start_ns = 100 * millisecond;
+constexpr std::int64_t sync_start_cycles = 10;
 constexpr std::uint32_t usual_hop_ns = 700;       ///< a slave and a short cable
 constexpr std::uint16_t receive_time_bytes = 32;  ///< 0900h to 091Fh
 
@@ -21,15 +25,20 @@ Task<void> read_times(Channel& c, Device& d) noexcept {
     if (a.wkc != 1) co_return;
     std::memcpy(s.receive_time.data(), c.data(), 16);
     s.local_time = get<std::uint64_t>(c.data() + 0x18);
-    if (!s.has_dc64()) s.local_time = static_cast<std::uint32_t>(s.local_time);
+    if (!s.has_dc64()) {
+        s.local_time = static_cast<std::uint32_t>(s.local_time);
+    }
     d.times_read = true;
 }
 
 Task<void> set_clock(Channel& c, Device& d, std::uint64_t offset) noexcept {
-    put(c.data(), offset), put(c.data() + 8, d.slave.delay_ns);
-    const Answer a = co_await c.exchange(Command::fpwr, at_station(d.slave.station, registers::dc_system_time_offset), 12);
+    put(c.data(), offset);
+    put(c.data() + 8, d.slave.delay_ns);
+    const Answer a = co_await c.exchange(
+        Command::fpwr, at_station(d.slave.station, registers::dc_system_time_offset), 12);
     if (a.wkc != 1) co_return;
-    co_await write<std::uint16_t>(c, d.slave, registers::dc_speed_counter_start, 0x1000);  // resets the filters
+    // resets the filters
+    co_await write<std::uint16_t>(c, d.slave, registers::dc_speed_counter_start, 0x1000);
     d.clock_set = true;
 }
 
@@ -46,14 +55,19 @@ Task<void> start_or_do(Channel& c, Bus& bus, Device& d, Make make) noexcept {
 
 Task<void> wait_for_helpers(Channel& c, Bus& bus) noexcept {
     for (const auto& d : bus.devices) {
-        while (d->helping && d->channel.busy()) co_await c.sleep(0);
+        while (d->helping && d->channel.busy()) {
+            co_await c.sleep(0);
+        }
         d->helping = false;
     }
 }
 
-/// Returns whether the delay of a slave follows from times of one latch: its own and those of all clocks between the reference and it.
+/// Returns whether the delay of a slave follows from times of one latch: its own and those of all
+/// clocks between the reference and it.
 bool has_valid_delay(const Bus& bus, const Device& d, std::size_t slaves) noexcept {
-    constexpr std::uint32_t longest_ns = 100'000, longest_per_slave_ns = 20'000;  // more: the ports are others than those that were read
+    // more: the ports are others than those that were read
+    constexpr std::uint32_t longest_ns = 100'000;
+    constexpr std::uint32_t longest_per_slave_ns = 20'000;
     if (bus.engine.redundant()) return d.times_read;
     std::size_t steps = 0;
     for (int parent = d.slave.parent; parent >= 0 && steps < slaves;
@@ -65,9 +79,12 @@ bool has_valid_delay(const Bus& bus, const Device& d, std::size_t slaves) noexce
 }
 
 int choose_reference(const Bus& bus) noexcept {
-    if (bus.setup.reference_slave && *bus.setup.reference_slave < bus.device_of.size())
-        if (const int n = bus.device_of[*bus.setup.reference_slave]; n >= 0 && bus.devices[static_cast<std::size_t>(n)]->slave.has_dc())
+    if (bus.setup.reference_slave && *bus.setup.reference_slave < bus.device_of.size()) {
+        if (const int n = bus.device_of[*bus.setup.reference_slave];
+            n >= 0 && bus.devices[static_cast<std::size_t>(n)]->slave.has_dc()) {
             return n;
+        }
+    }
     int first = -1;
     for (const std::uint16_t number : bus.by_position) {
         const Device& d = *bus.devices[number];
@@ -77,7 +94,9 @@ int choose_reference(const Bus& bus) noexcept {
         const BusSlave& s = bus.devices[number]->slave;
         if (!s.present || !s.has_dc()) continue;
         if (s.has_dc64()) return number;
-        if (first < 0) first = number;
+        if (first < 0) {
+            first = number;
+        }
     }
     return first;
 }
@@ -88,54 +107,74 @@ std::uint32_t magnitude(std::uint32_t difference) noexcept { return difference &
 }  // namespace
 
 Task<void> start_clocks(Channel& c, Bus& bus) noexcept {
-    bool any = false, wanted = false;
-    for (const Slave& s : bus.setup.slaves) wanted |= s.dc.has_value();
-    for (const std::uint16_t number : bus.by_position) any |= bus.devices[number]->slave.present && bus.devices[number]->slave.has_dc();
+    bool any = false;
+    bool wanted = false;
+    for (const Slave& s : bus.setup.slaves) {
+        wanted |= s.dc.has_value();
+    }
+    for (const std::uint16_t number : bus.by_position) {
+        any |= bus.devices[number]->slave.present && bus.devices[number]->slave.has_dc();
+    }
     if (bus.reference < 0 && (!any || !wanted)) co_return;
 
-    const int    reference_before = bus.reference;
+    const int reference_before = bus.reference;
     const Answer latched = co_await clear_all(c, registers::dc_receive_time, 4);
     if (!latched.arrived || latched.wkc == 0) co_return;
     const std::int64_t latched_ns = c.sent_ns();
     for (const std::uint16_t number : bus.by_position) {
         Device& d = *bus.devices[number];
-        if (d.slave.present && d.slave.has_dc()) co_await start_or_do(c, bus, d, [&d](Channel& on) { return read_times(on, d); });
+        if (d.slave.present && d.slave.has_dc()) {
+            co_await start_or_do(c, bus, d, [&d](Channel& on) { return read_times(on, d); });
+        }
     }
     co_await wait_for_helpers(c, bus);
     if (bus.reference < 0 || !bus.devices[static_cast<std::size_t>(bus.reference)]->slave.present) {
-        const int chosen = choose_reference(bus);  // a running clock, if there is one, so that the time of the others continues
+        // a running clock, if there is one, so that the time of the others continues
+        const int chosen = choose_reference(bus);
         if (chosen < 0) co_return;
         bus.reference = chosen;
         const Device& d = *bus.devices[static_cast<std::size_t>(bus.reference)];
         bus.report(Event::reference_clock, d, d.slave.has_dc64() ? 1 : 0);
     }
     std::array<BusSlave*, 1024> line{};
-    std::size_t                 count = 0, reference = 0;
+    std::size_t count = 0;
+    std::size_t reference = 0;
     for (const std::uint16_t number : bus.by_position) {
         if (count == line.size()) break;
-        if (number == bus.reference) reference = count;
+        if (number == bus.reference) {
+            reference = count;
+        }
         line[count++] = &bus.devices[number]->slave;
     }
-    // On a ring no frame returns to a port, so that nothing can be measured: the usual delay of a hop is taken. The error is some
-    // 100 ns for each.
-    if (bus.engine.redundant())
-        for (std::size_t n = 0; n < count; ++n)
-            line[n]->delay_ns = n > reference ? static_cast<std::uint32_t>(n - reference) * usual_hop_ns : 0;
-    else find_delays({line.data(), count}, reference);
+    // On a ring no frame returns to a port, so that nothing can be measured: the usual delay of a
+    // hop is taken. The error is some 100 ns for each.
+    if (bus.engine.redundant()) {
+        for (std::size_t n = 0; n < count; ++n) {
+            line[n]->delay_ns =
+                n > reference ? static_cast<std::uint32_t>(n - reference) * usual_hop_ns : 0;
+        }
+    } else {
+        find_delays({line.data(), count}, reference);
+    }
 
     for (const std::uint16_t number : bus.by_position) {
-        Device&   d = *bus.devices[number];
+        Device& d = *bus.devices[number];
         BusSlave& s = d.slave;
-        if (!s.present || !s.has_dc() || d.clock_set || !has_valid_delay(bus, d, count)) continue;  // never those of running slaves
+        // never those of running slaves
+        if (!s.present || !s.has_dc() || d.clock_set || !has_valid_delay(bus, d, count)) continue;
         // The frame with the latch passed this slave a delay after it passed the reference clock.
-        const auto          system = static_cast<std::uint64_t>(latched_ns + (bus.skew_ns != 0 ? bus.skew_ns : bus.epoch_ns)) + s.delay_ns;
+        const auto system = static_cast<std::uint64_t>(
+                                latched_ns + (bus.skew_ns != 0 ? bus.skew_ns : bus.epoch_ns)) +
+                            s.delay_ns;
         const std::uint64_t offset = system - s.local_time;
-        co_await start_or_do(c, bus, d, [&d, offset](Channel& on) { return set_clock(on, d, offset); });
+        co_await start_or_do(c, bus, d,
+                             [&d, offset](Channel& on) { return set_clock(on, d, offset); });
     }
     co_await wait_for_helpers(c, bus);
-    // A slave before the reference clock does not get its time, because a frame passes it first: the first clock leads again once it is set.
-    // Not in a ring, where the order depends on the side that a frame comes from.
-    if (!bus.setup.reference_slave && !bus.engine.redundant())
+    // A slave before the reference clock does not get its time, because a frame passes it first:
+    // the first clock leads again once it is set. Not in a ring, where the order depends on the
+    // side that a frame comes from.
+    if (!bus.setup.reference_slave && !bus.engine.redundant()) {
         if (const int first = choose_reference(bus); first >= 0 && first != bus.reference) {
             const Device& d = *bus.devices[static_cast<std::size_t>(first)];
             if (d.clock_set && d.slave.has_dc64()) {
@@ -143,10 +182,12 @@ Task<void> start_clocks(Channel& c, Bus& bus) noexcept {
                 bus.report(Event::reference_clock, d, 1);
             }
         }
+    }
     const BusSlave& leader = bus.devices[static_cast<std::size_t>(bus.reference)]->slave;
     bus.image.set_reference(leader.station, bus.setup.lead == ClockLead::thread);
     bus.status.dc_active = true;
-    // Until now this slave followed other times. What its filter made of them, a reference clock would keep for good.
+    // Until now this slave followed other times. What its filter made of them, a reference clock
+    // would keep for good.
     if (bus.reference != reference_before) {
         co_await c.sleep(2 * bus.setup.cycle_ns);  // frames with the other reference are back
         co_await write<std::uint16_t>(c, leader, registers::dc_speed_counter_start, 0x1000);
@@ -161,9 +202,9 @@ Task<bool> synchronise(Channel& c, Bus& bus, Device& d) noexcept {
         co_return false;
     }
     const std::int64_t until = c.now_ns() + synchronise_timeout_ns;
-    const auto         window = static_cast<std::uint32_t>(bus.setup.sync_window_ns);
-    unsigned           within = 0;
-    std::uint32_t      deviation = UINT32_MAX;
+    const auto window = static_cast<std::uint32_t>(bus.setup.sync_window_ns);
+    unsigned within = 0;
+    std::uint32_t deviation = UINT32_MAX;
     while (within < 3) {
         if (d.clock_set) {
             const Answer a = co_await read(c, d.slave, registers::dc_system_time_difference, 4);
@@ -175,8 +216,11 @@ Task<bool> synchronise(Channel& c, Bus& bus, Device& d) noexcept {
         }
         if (c.now_ns() < until) continue;
         if (deviation <= tolerable_deviation_ns) break;
-        if (deviation == UINT32_MAX) bus.report(Event::dc_not_set, d, synchronise_timeout_ns / millisecond);
-        else bus.report(Event::dc_timeout, d, deviation, window);
+        if (deviation == UINT32_MAX) {
+            bus.report(Event::dc_not_set, d, synchronise_timeout_ns / millisecond);
+        } else {
+            bus.report(Event::dc_timeout, d, deviation, window);
+        }
         d.clock_set = false;  // it is set again before the next start-up
         bus.suspicious = true;
         co_return false;
@@ -189,25 +233,36 @@ Task<bool> start_sync_signals(Channel& c, Bus& bus, Device& d) noexcept {
     const Slave& config = *bus.config(d);
     d.sync_begins_ns = 0;
     if (!config.dc || config.dc->assign_activate == 0) co_return true;
-    const Dc&  dc = *config.dc;
-    const auto cycle = static_cast<std::uint64_t>(dc.sync0_cycle_ns > 0 ? dc.sync0_cycle_ns : bus.setup.cycle_ns);
+    const Dc& dc = *config.dc;
+    const auto cycle =
+        static_cast<std::uint64_t>(dc.sync0_cycle_ns > 0 ? dc.sync0_cycle_ns : bus.setup.cycle_ns);
     co_await write<std::uint8_t>(c, d.slave, registers::dc_activation, 0);
-    if ((dc.assign_activate & 0xff) != 0)
-        co_await write(c, d.slave, registers::dc_cyclic_unit_control, static_cast<std::uint8_t>(dc.assign_activate & 0xff));
+    if ((dc.assign_activate & 0xff) != 0) {
+        co_await write(c, d.slave, registers::dc_cyclic_unit_control,
+                       static_cast<std::uint8_t>(dc.assign_activate & 0xff));
+    }
     put(c.data(), static_cast<std::uint32_t>(cycle));
-    put(c.data() + 4, static_cast<std::uint32_t>(dc.sync1_cycle_ns > 0 ? dc.sync1_cycle_ns + dc.sync1_shift_ns : dc.sync1_shift_ns));
-    Answer a = co_await c.exchange(Command::fpwr, at_station(d.slave.station, registers::dc_sync0_cycle), 8);
+    put(c.data() + 4,
+        static_cast<std::uint32_t>(dc.sync1_cycle_ns > 0 ? dc.sync1_cycle_ns + dc.sync1_shift_ns
+                                                         : dc.sync1_shift_ns));
+    Answer a = co_await c.exchange(Command::fpwr,
+                                   at_station(d.slave.station, registers::dc_sync0_cycle), 8);
     if (a.wkc != 1) co_return false;
-    // The grid of all slaves starts at system time 0, so all SYNC0 of one cycle time coincide but for their shift.
+    // The grid of all slaves starts at system time 0, so all SYNC0 of one cycle time coincide but
+    // for their shift.
     const auto grid = static_cast<std::int64_t>(cycle);
-    const auto shift = static_cast<std::uint64_t>((dc.sync0_shift_ns % grid + grid) % grid);  // of any length: it begins soon
-    // Each write takes a cycle, and some are repeated: the start must still be in the future when the unit is activated.
-    const std::int64_t  ahead = std::max(sync_start_ns, sync_start_cycles * bus.setup.cycle_ns);
-    const std::uint64_t start = (bus.dc_now() + static_cast<std::uint64_t>(ahead)) / cycle * cycle + cycle + shift;
+    // of any length: it begins soon
+    const auto shift = static_cast<std::uint64_t>((dc.sync0_shift_ns % grid + grid) % grid);
+    // Each write takes a cycle, and some are repeated: the start must still be in the future when
+    // the unit is activated.
+    const std::int64_t ahead = std::max(sync_start_ns, sync_start_cycles * bus.setup.cycle_ns);
+    const std::uint64_t start =
+        (bus.dc_now() + static_cast<std::uint64_t>(ahead)) / cycle * cycle + cycle + shift;
     d.sync_begins_ns = c.now_ns() + static_cast<std::int64_t>(start - bus.dc_now());
     a = co_await write(c, d.slave, registers::dc_start_time, start);
     if (a.wkc != 1) co_return false;
-    a = co_await write(c, d.slave, registers::dc_activation, static_cast<std::uint8_t>(dc.assign_activate >> 8));
+    a = co_await write(c, d.slave, registers::dc_activation,
+                       static_cast<std::uint8_t>(dc.assign_activate >> 8));
     co_return a.wkc == 1;
 }
 
@@ -217,12 +272,17 @@ void take_clock(Bus& bus) noexcept {
     std::uint64_t time = sample.dc_ns;
     if (!bus.devices[static_cast<std::size_t>(bus.reference)]->slave.has_dc64()) {
         const std::uint64_t guess =
-            bus.status.dc_time_ns != 0 ? bus.status.dc_time_ns : static_cast<std::uint64_t>(bus.engine.now_ns() + bus.epoch_ns);
-        const auto step = static_cast<std::int32_t>(static_cast<std::uint32_t>(time) - static_cast<std::uint32_t>(guess));
+            bus.status.dc_time_ns != 0
+                ? bus.status.dc_time_ns
+                : static_cast<std::uint64_t>(bus.engine.now_ns() + bus.epoch_ns);
+        const auto step = static_cast<std::int32_t>(static_cast<std::uint32_t>(time) -
+                                                    static_cast<std::uint32_t>(guess));
         time = guess + static_cast<std::uint64_t>(static_cast<std::int64_t>(step));
     }
     bus.status.dc_time_ns = time;
-    if (bus.devices[static_cast<std::size_t>(bus.reference)]->clock_set) bus.skew_ns = static_cast<std::int64_t>(time) - sample.sent_ns;
+    if (bus.devices[static_cast<std::size_t>(bus.reference)]->clock_set) {
+        bus.skew_ns = static_cast<std::int64_t>(time) - sample.sent_ns;
+    }
 }
 
 }  // namespace hal::ethercat::master

@@ -16,14 +16,21 @@ bool accepts_eoe(const Expected& expected, std::span<const std::uint8_t> payload
 
 }  // namespace
 
-EoeSwitch::EoeSwitch(Mailboxes& mailboxes, std::span<const EoePort> ports, std::size_t depth) : mailboxes_(mailboxes) {
+EoeSwitch::EoeSwitch(Mailboxes& mailboxes, std::span<const EoePort> ports, std::size_t depth)
+    : mailboxes_(mailboxes) {
     for (const EoePort& port : ports) {
-        while (hosts_.size() <= port.host) hosts_.push_back(std::make_unique<Host>(depth * 4));
-        if (port_by_slave_.size() <= port.slave) port_by_slave_.resize(port.slave + std::size_t{1}, -1);
+        while (hosts_.size() <= port.host) {
+            hosts_.push_back(std::make_unique<Host>(depth * 4));
+        }
+        if (port_by_slave_.size() <= port.slave) {
+            port_by_slave_.resize(port.slave + std::size_t{1}, -1);
+        }
         port_by_slave_[port.slave] = static_cast<int>(ports_.size());
         ports_.push_back(std::make_unique<Port>(port.host, depth));
     }
-    for (std::size_t n = 0; n < mailboxes.size(); ++n) mailboxes.at(n).set_sink(MailboxType::eoe, this);
+    for (std::size_t n = 0; n < mailboxes.size(); ++n) {
+        mailboxes.at(n).set_sink(MailboxType::eoe, this);
+    }
 }
 
 EoeSwitch::Port* EoeSwitch::port_of(const BusSlave& slave) const noexcept {
@@ -34,7 +41,8 @@ EoeSwitch::Port* EoeSwitch::port_of(const BusSlave& slave) const noexcept {
 
 bool EoeSwitch::pending(const BusSlave& slave) const noexcept {
     const Port* port = port_of(slave);
-    const bool  mailbox_works = slave.state == State::preop || slave.state == State::safeop || slave.state == State::op;
+    const bool mailbox_works =
+        slave.state == State::preop || slave.state == State::safeop || slave.state == State::op;
     return port != nullptr && mailbox_works && port->queue.size() != 0;
 }
 
@@ -49,7 +57,9 @@ void EoeSwitch::pump() noexcept {
         for (std::size_t left = queue.capacity(); left-- != 0;) {
             const EthernetFrame* frame = queue.front();
             if (frame == nullptr) break;
-            if (frame->length <= frame->bytes.size()) forward(n, the_host, {frame->bytes.data(), frame->length});
+            if (frame->length <= frame->bytes.size()) {
+                forward(n, the_host, {frame->bytes.data(), frame->length});
+            }
             queue.drop();
         }
     }
@@ -57,47 +67,65 @@ void EoeSwitch::pump() noexcept {
 
 bool EoeSwitch::take(const BusSlave& slave, const MailboxMessage& message) noexcept {
     const auto header = eoe::read(message.payload);
-    Port*      port = port_of(slave);
+    Port* port = port_of(slave);
     if (!header || port == nullptr) return false;
     if (header->type == eoe::Type::timestamp) return true;
     if (header->type != eoe::Type::fragment) return false;
     const auto frame = port->joiner.take(message.payload);
     if (frame.empty()) return true;
     ++port->counters.from_slave;
-    forward(port->host, static_cast<unsigned>(port_by_slave_[static_cast<std::size_t>(slave.configured)]), frame);
+    forward(port->host,
+            static_cast<unsigned>(port_by_slave_[static_cast<std::size_t>(slave.configured)]),
+            frame);
     return true;
 }
 
 EoeSwitch::Learned& EoeSwitch::slot_of(std::uint16_t host, const std::uint8_t* address) noexcept {
     unsigned sum = host;
-    for (unsigned i = 0; i < 6; ++i) sum = sum * 31 + address[i];
+    for (unsigned i = 0; i < 6; ++i) {
+        sum = sum * 31 + address[i];
+    }
     return learned_[sum % learned_.size()];
 }
 
-void EoeSwitch::forward(std::uint16_t host, unsigned from, std::span<const std::uint8_t> frame) noexcept {
+void EoeSwitch::forward(std::uint16_t host, unsigned from,
+                        std::span<const std::uint8_t> frame) noexcept {
     if (frame.size() < ethernet_addresses) return;
     const std::uint8_t* to = frame.data();
     const std::uint8_t* source = frame.data() + 6;
     if ((source[0] & 1) == 0) {
         Learned& slot = slot_of(host, source);
         std::memcpy(slot.address.data(), source, 6);
-        slot.host = host, slot.port = from, slot.used = true;
+        slot.host = host;
+        slot.port = from;
+        slot.used = true;
     }
     const Learned& known = slot_of(host, to);
-    if ((to[0] & 1) == 0 && known.used && known.host == host && std::memcmp(known.address.data(), to, 6) == 0) {
-        if (known.port != from) deliver(host, known.port, frame);
+    if ((to[0] & 1) == 0 && known.used && known.host == host &&
+        std::memcmp(known.address.data(), to, 6) == 0) {
+        if (known.port != from) {
+            deliver(host, known.port, frame);
+        }
         return;
     }
-    if (from != the_host) deliver(host, the_host, frame);
-    for (unsigned i = 0; i < ports_.size(); ++i)
-        if (i != from && ports_[i]->host == host) deliver(host, i, frame);
+    if (from != the_host) {
+        deliver(host, the_host, frame);
+    }
+    for (unsigned i = 0; i < ports_.size(); ++i) {
+        if (i != from && ports_[i]->host == host) {
+            deliver(host, i, frame);
+        }
+    }
 }
 
-void EoeSwitch::deliver(std::uint16_t host, unsigned port, std::span<const std::uint8_t> frame) noexcept {
+void EoeSwitch::deliver(std::uint16_t host, unsigned port,
+                        std::span<const std::uint8_t> frame) noexcept {
     Queue<EthernetFrame>& queue = port == the_host ? hosts_[host]->to : ports_[port]->queue;
-    EthernetFrame*        place = queue.place();
+    EthernetFrame* place = queue.place();
     if (place == nullptr) {
-        if (port != the_host) ++ports_[port]->counters.lost;
+        if (port != the_host) {
+            ++ports_[port]->counters.lost;
+        }
         return;
     }
     place->length = static_cast<std::uint16_t>(frame.size());
@@ -107,16 +135,18 @@ void EoeSwitch::deliver(std::uint16_t host, unsigned port, std::span<const std::
 
 Task<MailboxResult> EoeSwitch::serve(Channel& channel, BusSlave& slave) noexcept {
     SlaveMailbox* mailbox = mailboxes_.find(slave);
-    Port*         port = port_of(slave);
+    Port* port = port_of(slave);
     if (mailbox == nullptr || port == nullptr) co_return refused();
     const SlaveMailbox::Hold hold = co_await mailbox->hold(channel);
-    const auto               body = mailbox->body(slave);
-    const EthernetFrame*     frame = port->queue.front();
+    const auto body = mailbox->body(slave);
+    const EthernetFrame* frame = port->queue.front();
     if (frame == nullptr) co_return succeeded();
     MailboxResult result = refused();
     if (body.size() >= eoe::header_bytes + 32) {
-        eoe::Splitter splitter({frame->bytes.data(), frame->length}, port->frame++ & 15U, body.size() + mailbox_header_bytes);
-        for (std::size_t length = splitter.next(body.data()); length != 0; length = splitter.next(body.data())) {
+        eoe::Splitter splitter({frame->bytes.data(), frame->length}, port->frame++ & 15U,
+                               body.size() + mailbox_header_bytes);
+        for (std::size_t length = splitter.next(body.data()); length != 0;
+             length = splitter.next(body.data())) {
             result = co_await mailbox->send(channel, slave, MailboxType::eoe, length);
             if (!result) break;
         }
@@ -126,21 +156,28 @@ Task<MailboxResult> EoeSwitch::serve(Channel& channel, BusSlave& slave) noexcept
     co_return result;
 }
 
-Task<MailboxResult> EoeClient::set_ip(Channel& channel, BusSlave& slave, const eoe::Ip& ip) noexcept {
+Task<MailboxResult> EoeClient::set_ip(Channel& channel, BusSlave& slave,
+                                      const eoe::Ip& ip) noexcept {
     SlaveMailbox* mailbox = mailboxes_.find(slave);
     if (mailbox == nullptr) co_return refused();
     const SlaveMailbox::Hold hold = co_await mailbox->hold(channel);
-    const auto               body = mailbox->body(slave);
+    const auto body = mailbox->body(slave);
     if (body.size() < eoe::header_bytes + eoe::largest_ip) co_return refused();
     eoe::Ip all = ip;
-    all.flags |= eoe::ip_flag::mac | eoe::ip_flag::address | eoe::ip_flag::mask | eoe::ip_flag::gateway | eoe::ip_flag::dns;
-    if ((ip.flags & ~eoe::ip_flag::mac) == 0) all.flags = ip.flags;  // DHCP: the MAC address only
+    all.flags |= eoe::ip_flag::mac | eoe::ip_flag::address | eoe::ip_flag::mask |
+                 eoe::ip_flag::gateway | eoe::ip_flag::dns;
+    if ((ip.flags & ~eoe::ip_flag::mac) == 0) {
+        all.flags = ip.flags;  // DHCP: the MAC address only
+    }
     eoe::Header header;
-    header.type = eoe::Type::set_ip, header.last = true;
+    header.type = eoe::Type::set_ip;
+    header.last = true;
     eoe::write(body.data(), header);
-    const std::size_t   length = eoe::header_bytes + eoe::write_ip(body.data() + eoe::header_bytes, all);
-    const Expected      expected{accepts_eoe, static_cast<std::uint32_t>(eoe::Type::set_ip_response)};
-    const MailboxResult result = co_await mailbox->exchange(channel, slave, MailboxType::eoe, length, expected);
+    const std::size_t length =
+        eoe::header_bytes + eoe::write_ip(body.data() + eoe::header_bytes, all);
+    const Expected expected{accepts_eoe, static_cast<std::uint32_t>(eoe::Type::set_ip_response)};
+    const MailboxResult result =
+        co_await mailbox->exchange(channel, slave, MailboxType::eoe, length, expected);
     if (!result) co_return result;
     const std::uint16_t code = eoe::read(mailbox->reply().payload)->word;
     if (code != 0) co_return aborted(code);
@@ -151,15 +188,17 @@ Task<MailboxResult> EoeClient::get_ip(Channel& channel, BusSlave& slave, eoe::Ip
     SlaveMailbox* mailbox = mailboxes_.find(slave);
     if (mailbox == nullptr) co_return refused();
     const SlaveMailbox::Hold hold = co_await mailbox->hold(channel);
-    const auto               body = mailbox->body(slave);
+    const auto body = mailbox->body(slave);
     if (body.size() < eoe::header_bytes) co_return refused();
     eoe::Header header;
-    header.type = eoe::Type::get_ip, header.last = true;
+    header.type = eoe::Type::get_ip;
+    header.last = true;
     eoe::write(body.data(), header);
-    const Expected      expected{accepts_eoe, static_cast<std::uint32_t>(eoe::Type::get_ip_response)};
-    const MailboxResult result = co_await mailbox->exchange(channel, slave, MailboxType::eoe, eoe::header_bytes, expected);
+    const Expected expected{accepts_eoe, static_cast<std::uint32_t>(eoe::Type::get_ip_response)};
+    const MailboxResult result =
+        co_await mailbox->exchange(channel, slave, MailboxType::eoe, eoe::header_bytes, expected);
     if (!result) co_return result;
-    const auto          payload = mailbox->reply().payload;
+    const auto payload = mailbox->reply().payload;
     const std::uint16_t code = eoe::read(payload)->word;
     if (code != 0) co_return aborted(code);
     const auto ip = eoe::read_ip(payload.subspan(eoe::header_bytes));

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Ethernet over EtherCAT as the master uses it (ETG.1000.6, clause 5.7): the IP settings of slaves, and learning switches, each between
-// slaves and one interface of the host. The interface itself, such as a TAP, belongs to a thread that exchanges frames through two queues.
+// Ethernet over EtherCAT as the master uses it (ETG.1000.6, clause 5.7): the IP settings of slaves,
+// and learning switches, each between slaves and one interface of the host. The interface itself,
+// such as a TAP, belongs to a thread that exchanges frames through two queues.
 #pragma once
 
 #include <array>
@@ -17,28 +18,31 @@ namespace hal::ethercat::master {
 
 /// An Ethernet frame from the destination address on, without check sequence.
 struct EthernetFrame {
-    std::uint16_t                                length = 0;
+    std::uint16_t length = 0;
     std::array<std::uint8_t, eoe::largest_frame> bytes{};
 };
 
 struct EoeCounters {
-    std::uint32_t from_slave = 0, to_slave = 0;  ///< frames
-    std::uint32_t lost = 0;                      ///< frames that found a queue full
+    std::uint32_t from_slave = 0;
+    std::uint32_t to_slave = 0;  ///< frames
+    std::uint32_t lost = 0;  ///< frames that found a queue full
 };
 
 /// A slave with EoE, and the interface of the host that it is connected to.
 struct EoePort {
     std::uint16_t slave = 0;  ///< index in Setup::slaves
-    std::uint16_t host = 0;   ///< slaves of the same interface reach each other too
+    std::uint16_t host = 0;  ///< slaves of the same interface reach each other too
 };
 
 /// See the top of this file.
 class EoeSwitch final : public MailboxSink {
 public:
-    /// Allocates queues of `depth` frames for each slave in `ports`, and of four times as many for each of their interfaces. [setup]
+    /// Allocates queues of `depth` frames for each slave in `ports`, and of four times as many for
+    /// each of their interfaces. [setup]
     EoeSwitch(Mailboxes& mailboxes, std::span<const EoePort> ports, std::size_t depth = 8);
 
-    /// Moves the frames of the interfaces to the queues of the slaves. Call once per cycle. [realtime]
+    /// Moves the frames of the interfaces to the queues of the slaves. Call once per cycle.
+    /// [realtime]
     void pump() noexcept;
     /// Returns whether a slave has EoE. [realtime]
     bool has(const BusSlave& slave) const noexcept { return port_of(slave) != nullptr; }
@@ -46,13 +50,15 @@ public:
     bool pending(const BusSlave& slave) const noexcept;
     /// Sends the oldest frame for a slave. [realtime]
     Task<MailboxResult> serve(Channel&, BusSlave&) noexcept;
-    bool                take(const BusSlave&, const MailboxMessage&) noexcept override;
+    bool take(const BusSlave&, const MailboxMessage&) noexcept override;
 
-    std::size_t hosts() const noexcept { return hosts_.size(); }  ///< Returns the number of interfaces. [any]
-    /// Return the frames for an interface, read by its thread, and those from it, written by that thread. [any]
+    /// Returns the number of interfaces. [any]
+    std::size_t hosts() const noexcept { return hosts_.size(); }
+    /// Return the frames for an interface, read by its thread, and those from it, written by that
+    /// thread. [any]
     Queue<EthernetFrame>& to_host(std::size_t n = 0) noexcept { return hosts_[n]->to; }
     Queue<EthernetFrame>& from_host(std::size_t n = 0) noexcept { return hosts_[n]->from; }
-    EoeCounters           counters(const BusSlave& slave) const noexcept;        ///< [any]
+    EoeCounters counters(const BusSlave& slave) const noexcept;  ///< [any]
 
 private:
     struct Host {
@@ -61,36 +67,38 @@ private:
     };
     struct Port {
         explicit Port(std::uint16_t of, std::size_t depth) : host(of), queue(depth) {}
-        std::uint16_t        host;
+        std::uint16_t host;
         Queue<EthernetFrame> queue;
-        eoe::Joiner          joiner;
-        EoeCounters          counters;
-        std::uint8_t         frame = 0;  // number of the next one, modulo 16
+        eoe::Joiner joiner;
+        EoeCounters counters;
+        std::uint8_t frame = 0;  // number of the next one, modulo 16
     };
     struct Learned {
         std::array<std::uint8_t, 6> address{};
-        std::uint16_t               host = 0;  // of the switch
-        unsigned                    port = 0;
-        bool                        used = false;
+        std::uint16_t host = 0;  // of the switch
+        unsigned port = 0;
+        bool used = false;
     };
     static constexpr unsigned the_host = 0xffff;  // as a port of a switch
-    Port*                     port_of(const BusSlave& slave) const noexcept;
-    void                      forward(std::uint16_t host, unsigned from, std::span<const std::uint8_t> frame) noexcept;
-    Learned&                  slot_of(std::uint16_t host, const std::uint8_t* address) noexcept;
-    void                      deliver(std::uint16_t host, unsigned port, std::span<const std::uint8_t> frame) noexcept;
+    Port* port_of(const BusSlave& slave) const noexcept;
+    void forward(std::uint16_t host, unsigned from, std::span<const std::uint8_t> frame) noexcept;
+    Learned& slot_of(std::uint16_t host, const std::uint8_t* address) noexcept;
+    void deliver(std::uint16_t host, unsigned port, std::span<const std::uint8_t> frame) noexcept;
 
-    Mailboxes&                         mailboxes_;
+    Mailboxes& mailboxes_;
     std::vector<std::unique_ptr<Host>> hosts_;
     std::vector<std::unique_ptr<Port>> ports_;
-    std::vector<int>                   port_by_slave_;  // by index in Setup::slaves
-    std::array<Learned, 256>           learned_{};
+    std::vector<int> port_by_slave_;  // by index in Setup::slaves
+    std::array<Learned, 256> learned_{};
 };
 
-/// The IP settings of slaves. All functions [realtime]. A result other than ok ends as `aborted` with its code (eoe::Result).
+/// The IP settings of slaves. All functions [realtime]. A result other than ok ends as `aborted`
+/// with its code (eoe::Result).
 class EoeClient {
 public:
     explicit EoeClient(Mailboxes& mailboxes) noexcept : mailboxes_(mailboxes) {}
-    /// Writes the settings. All fields up to DNS are sent and flagged, because slaves disagree on the position of a field after a gap.
+    /// Writes the settings. All fields up to DNS are sent and flagged, because slaves disagree on
+    /// the position of a field after a gap.
     Task<MailboxResult> set_ip(Channel&, BusSlave&, const eoe::Ip&) noexcept;
     Task<MailboxResult> get_ip(Channel&, BusSlave&, eoe::Ip& to) noexcept;
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The mailbox gateway (ETG.8200): programs of vendors reach the mailboxes of slaves by UDP or TCP while the machine runs. The protocol has no
-// access control.
+// The mailbox gateway (ETG.8200): programs of vendors reach the mailboxes of slaves by UDP or TCP
+// while the machine runs. The protocol has no access control.
 #pragma once
 
 #include <array>
@@ -17,64 +17,86 @@
 
 namespace hal::ethercat::master {
 
-/// A slave as the gateway offers it: found by its station address, described in the master's own dictionary.
+/// A slave as the gateway offers it: found by its station address, described in the master's own
+/// dictionary.
 struct GatewaySlave {
-    std::uint16_t station = 0, number = 0;  ///< number: BusSlave::number
-    std::uint32_t vendor = 0, product = 0, revision = 0, serial = 0;
+    std::uint16_t station = 0;
+    std::uint16_t number = 0;  ///< number: BusSlave::number
+    std::uint32_t vendor = 0;
+    std::uint32_t product = 0;
+    std::uint32_t revision = 0;
+    std::uint32_t serial = 0;
 };
 
 /// The slaves as the cycle knows them, for the thread of the gateway.
 class GatewaySlaves {
 public:
     explicit GatewaySlaves(std::size_t most) : rows_(most) {}  ///< [setup]
-    /// Sets the slaves in the order of their positions: `slave(n)` returns the BusSlave at position n. [realtime] one thread
+    /// Sets the slaves in the order of their positions: `slave(n)` returns the BusSlave at position
+    /// n. [realtime] one thread
     template <class Slave>
     void set(std::size_t count, Slave slave) noexcept {
         count = count < rows_.size() ? count : rows_.size();
         for (std::size_t n = 0; n < count; ++n) {
             const BusSlave& s = slave(n);
-            Row&            row = rows_[n];
+            Row& row = rows_[n];
             row.station = 0;  // not valid until all of it is written
-            row.number = s.number, row.vendor = s.vendor, row.product = s.product, row.revision = s.revision, row.serial = s.serial;
+            row.number = s.number;
+            row.vendor = s.vendor;
+            row.product = s.product;
+
+            row.revision = s.revision;
+            row.serial = s.serial;
             row.station = s.station;
         }
         count_ = count;
     }
-    std::vector<GatewaySlave> all() const;  ///< Returns the slaves; one that changes at this moment is left out. [setup]
+    /// Returns the slaves; one that changes at this moment is left out. [setup]
+    std::vector<GatewaySlave> all() const;
 
 private:
     struct Row {
-        std::atomic<std::uint16_t> station{0}, number{0};
-        std::atomic<std::uint32_t> vendor{0}, product{0}, revision{0}, serial{0};
+        std::atomic<std::uint16_t> station{0};
+        std::atomic<std::uint16_t> number{0};
+        std::atomic<std::uint32_t> vendor{0};
+        std::atomic<std::uint32_t> product{0};
+        std::atomic<std::uint32_t> revision{0};
+        std::atomic<std::uint32_t> serial{0};
     };
-    std::vector<Row>         rows_;
+    std::vector<Row> rows_;
     std::atomic<std::size_t> count_{0};
 };
 
 struct GatewaySetup {
-    std::string                                address = "127.0.0.1";  ///< of the interface to listen on; "0.0.0.0": all
-    std::uint16_t                              port = 34980;  ///< 0: any free one
-    bool                                       tcp = true;
-    std::size_t                                most_clients = 16;  ///< of TCP
-    std::function<std::vector<GatewaySlave>()> slaves;  ///< Returns the slaves; called in the gateway's thread.
+    /// of the interface to listen on; "0.0.0.0": all
+    std::string address = "127.0.0.1";
+    std::uint16_t port = 34980;  ///< 0: any free one
+    bool tcp = true;
+    std::size_t most_clients = 16;  ///< of TCP
+    /// Returns the slaves; called in the gateway's thread.
+    std::function<std::vector<GatewaySlave>()> slaves;
 };
 
-/// Answers an SDO upload from the dictionary of the master (ETG.1510): names, 8000h + n configuration of slave n, F000h, F020h addresses.
+/// Answers an SDO upload from the dictionary of the master (ETG.1510): names, 8000h + n
+/// configuration of slave n, F000h, F020h addresses.
 /// `message` holds the request, and then the answer; returns its length, 0 for a message that is not understood. [any]
-std::size_t answer_for_master(std::span<const GatewaySlave> slaves, std::span<std::uint8_t> message, std::size_t length) noexcept;
+std::size_t answer_for_master(std::span<const GatewaySlave> slaves, std::span<std::uint8_t> message,
+                              std::size_t length) noexcept;
 
 /// See the top of this file. All functions [setup].
 class Gateway {
 public:
-    /// Opens the sockets and starts the thread. `problem` is set when a socket cannot be opened; then the gateway does nothing. `port` must
-    /// be used by nothing else, and its server must serve or be stopped until the gateway is destroyed.
+    /// Opens the sockets and starts the thread. `problem` is set when a socket cannot be opened;
+    /// then the gateway does nothing. `port` must be used by nothing else, and its server must
+    /// serve or be stopped until the gateway is destroyed.
     Gateway(RequestPort& port, GatewaySetup setup, std::string& problem);
     ~Gateway();
     Gateway(const Gateway&) = delete;
-    Gateway&      operator=(const Gateway&) = delete;
+    Gateway& operator=(const Gateway&) = delete;
     std::uint16_t port() const noexcept { return number_; }  ///< Returns the UDP and TCP port.
     std::uint32_t answered() const noexcept { return answered_; }
-    std::uint32_t dropped() const noexcept { return dropped_; }  ///< Returns the number of invalid requests and of those without a reply.
+    /// Returns the number of invalid requests and of those without a reply.
+    std::uint32_t dropped() const noexcept { return dropped_; }
 
 private:
     struct Sender;
@@ -87,16 +109,18 @@ private:
     void read_tcp(Client& client);
     void collect();
 
-    RequestPort&                          requests_;
-    GatewaySetup                          setup_;
-    int                                   udp_ = -1, tcp_ = -1;
-    std::uint16_t                         number_ = 0;
-    std::vector<std::unique_ptr<Client>>  clients_;
+    RequestPort& requests_;
+    GatewaySetup setup_;
+    int udp_ = -1;
+    int tcp_ = -1;
+    std::uint16_t number_ = 0;
+    std::vector<std::unique_ptr<Client>> clients_;
     std::vector<std::unique_ptr<Pending>> pending_;
-    std::uint32_t                         next_client_ = 1;
-    std::atomic<std::uint32_t>            answered_{0}, dropped_{0};
-    std::atomic<bool>                     stop_{false};
-    std::thread                           thread_;
+    std::uint32_t next_client_ = 1;
+    std::atomic<std::uint32_t> answered_{0};
+    std::atomic<std::uint32_t> dropped_{0};
+    std::atomic<bool> stop_{false};
+    std::thread thread_;
 };
 
 }  // namespace hal::ethercat::master

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The mailbox of a slave as the master uses it: one message to the slave, one from it, each a whole sync manager (ETG.1000.4, clause 5.6).
-// Lost replies are requested again, messages nobody asked for go to their sinks, late and duplicate replies are dropped and counted.
+// The mailbox of a slave as the master uses it: one message to the slave, one from it, each a whole
+// sync manager (ETG.1000.4, clause 5.6). Lost replies are requested again, messages nobody asked
+// for go to their sinks, late and duplicate replies are dropped and counted.
 //
 //     SlaveMailbox* mailbox = mailboxes.find(slave);
 //     SlaveMailbox::Hold hold = co_await mailbox->hold(channel);          // one exchange at a time
@@ -23,13 +24,16 @@
 
 namespace hal::ethercat::master {
 
-/// Result of an exchange of any mailbox protocol. `abort` has the code of that protocol if `aborted`.
+/// Result of an exchange of any mailbox protocol. `abort` has the code of that protocol if
+/// `aborted`.
 using MailboxResult = SdoResult;
 
 /// How a reply is recognised: `accepts` is given this and the payload.
 struct Expected {
     bool (*accepts)(const Expected&, std::span<const std::uint8_t>) noexcept = nullptr;
-    std::uint32_t first = 0, second = 0, third = 0;  ///< what `accepts` compares
+    std::uint32_t first = 0;
+    std::uint32_t second = 0;
+    std::uint32_t third = 0;  ///< what `accepts` compares
 };
 
 /// Takes messages that arrive without a request: emergencies, EoE frames, VoE.
@@ -42,14 +46,16 @@ public:
 
 /// Counters of a mailbox since the start. [any]
 struct MailboxCounters {
-    std::uint32_t sent = 0, received = 0;
-    std::uint32_t dropped = 0;    ///< late, duplicate or unexpected messages
+    std::uint32_t sent = 0;
+    std::uint32_t received = 0;
+    std::uint32_t dropped = 0;  ///< late, duplicate or unexpected messages
     std::uint32_t malformed = 0;  ///< messages whose length does not fit
-    std::uint32_t repeated = 0;   ///< replies requested again
-    std::uint32_t resent = 0;     ///< requests sent again
+    std::uint32_t repeated = 0;  ///< replies requested again
+    std::uint32_t resent = 0;  ///< requests sent again
 };
 
-/// See the top of this file. All functions [realtime] unless tagged otherwise, in the thread of the master's cycle.
+/// See the top of this file. All functions [realtime] unless tagged otherwise, in the thread of the
+/// master's cycle.
 class SlaveMailbox {
 public:
     static constexpr unsigned types = 16;
@@ -65,7 +71,9 @@ public:
             return *this;
         }
         ~Hold() {
-            if (mailbox_ != nullptr) mailbox_->held_ = false;
+            if (mailbox_ != nullptr) {
+                mailbox_->held_ = false;
+            }
         }
 
     private:
@@ -74,14 +82,16 @@ public:
 
     /// Waits until no other task uses the mailbox.
     Task<Hold> hold(Channel&) noexcept;
-    bool       held() const noexcept { return held_; }
+    bool held() const noexcept { return held_; }
 
     /// Returns the space for the payload of the next request.
     std::span<std::uint8_t> body(const BusSlave& slave) noexcept {
         const std::size_t size = size_of_out(slave);
-        return {request_.data() + mailbox_header_bytes, size < mailbox_header_bytes ? 0 : size - mailbox_header_bytes};
+        return {request_.data() + mailbox_header_bytes,
+                size < mailbox_header_bytes ? 0 : size - mailbox_header_bytes};
     }
-    /// Sends the payload in body(). A message whose fate is unknown is sent again with the same counter, which a slave recognises.
+    /// Sends the payload in body(). A message whose fate is unknown is sent again with the same
+    /// counter, which a slave recognises.
     Task<MailboxResult> send(Channel&, BusSlave&, MailboxType, std::size_t length) noexcept;
     /// Waits for a message that no sink consumes. Times out at `until_ns`.
     Task<MailboxResult> receive(Channel&, BusSlave&, std::int64_t until_ns) noexcept;
@@ -91,25 +101,36 @@ public:
     void still_waiting() noexcept { stale_ = false; }
     /// Counts the last reply as one that was not expected.
     void drop() noexcept { ++counters_.dropped; }
-    /// Reads the message in the mailbox, if there is one, without a request. For emergencies, EoE and VoE.
+    /// Reads the message in the mailbox, if there is one, without a request. For emergencies, EoE
+    /// and VoE.
     Task<MailboxResult> poll(Channel&, BusSlave&) noexcept;
 
     /// Sends the payload in body() and waits for the reply; all other messages are dropped.
-    Task<MailboxResult> exchange(Channel&, BusSlave&, MailboxType, std::size_t length, Expected expected) noexcept;
+    Task<MailboxResult> exchange(Channel&, BusSlave&, MailboxType, std::size_t length,
+                                 Expected expected) noexcept;
     /// Waits for a reply; all other messages are dropped. A mailbox error ends the wait.
-    Task<MailboxResult> wait_for(Channel&, BusSlave&, MailboxType, std::int64_t timeout_ns, Expected expected) noexcept;
+    Task<MailboxResult> wait_for(Channel&, BusSlave&, MailboxType, std::int64_t timeout_ns,
+                                 Expected expected) noexcept;
     /// Returns how long to wait for the reply of this slave, in ns.
     static std::int64_t response_timeout_ns(const BusSlave& slave) noexcept {
         return std::int64_t{slave.timeouts.mailbox_response} * 1'000'000;
     }
 
     /// Sets the consumer of unrequested messages of a type; nullptr: none. [setup]
-    void set_sink(MailboxType type, MailboxSink* sink) noexcept { sinks_[static_cast<unsigned>(type) % types] = sink; }
+    void set_sink(MailboxType type, MailboxSink* sink) noexcept {
+        sinks_[static_cast<unsigned>(type) % types] = sink;
+    }
     /// Sets the consumer of messages to another station than the master. [setup]
-    void                   set_router(MailboxSink* router) noexcept { router_ = router; }
+    void set_router(MailboxSink* router) noexcept { router_ = router; }
     const MailboxCounters& counters() const noexcept { return counters_; }
     /// Forgets what is under way, after the slave's sync managers were configured anew.
-    void reset() noexcept { stale_ = false, advances_ = false, repeats_counter_ = false, last_counter_ = lost_reads_ = 0; }
+    void reset() noexcept {
+        stale_ = false;
+        advances_ = false;
+        repeats_counter_ = false;
+
+        last_counter_ = lost_reads_ = 0;
+    }
 
 private:
     friend class Hold;
@@ -118,38 +139,47 @@ private:
         return slave.area().out_size <= largest_mailbox ? slave.area().out_size : largest_mailbox;
     }
     Task<Full> is_full(Channel&, BusSlave&, unsigned sync_manager, unsigned repeats = 2) noexcept;
-    Task<bool> read(Channel&, BusSlave&, std::int64_t until_ns) noexcept;   // returns whether a message is in reply_
-    Task<bool> repeat(Channel&, BusSlave&, std::int64_t until_ns) noexcept; // has the last message sent again
-    bool       accept(const BusSlave&, std::size_t size) noexcept;                // the bytes in reply_bytes_
-    bool       is_duplicate(const MailboxMessage&) noexcept;
+    // returns whether a message is in reply_
+    Task<bool> read(Channel&, BusSlave&, std::int64_t until_ns) noexcept;
+    // has the last message sent again
+    Task<bool> repeat(Channel&, BusSlave&, std::int64_t until_ns) noexcept;
+    // the bytes in reply_bytes_
+    bool accept(const BusSlave&, std::size_t size) noexcept;
+    bool is_duplicate(const MailboxMessage&) noexcept;
 
     std::array<std::uint8_t, largest_mailbox> request_{}, reply_bytes_{};
-    MailboxMessage                            reply_;
-    std::array<MailboxSink*, types>           sinks_{};
-    MailboxSink*                              router_ = nullptr;
-    MailboxCounters                           counters_;
-    std::uint64_t                             last_sum_ = 0;    // of the last message, to recognise a duplicate
-    std::uint8_t                              last_counter_ = 0, lost_reads_ = 0;
-    bool                                      advances_ = false;         // the slave counts its messages
-    bool repeats_counter_ = false;  // it sends different messages with the same counter: not to be relied on
-    bool held_ = false, stale_ = false;
+    MailboxMessage reply_;
+    std::array<MailboxSink*, types> sinks_{};
+    MailboxSink* router_ = nullptr;
+    MailboxCounters counters_;
+    // of the last message, to recognise a duplicate
+    std::uint64_t last_sum_ = 0;
+    std::uint8_t last_counter_ = 0;
+    std::uint8_t lost_reads_ = 0;
+    // the slave counts its messages
+    bool advances_ = false;
+    // it sends different messages with the same counter: not to be relied on
+    bool repeats_counter_ = false;
+    bool held_ = false;
+    bool stale_ = false;
 };
 
 /// The mailboxes of all slaves, by BusSlave::number.
 class Mailboxes {
 public:
     /// Allocates the mailboxes of slaves 0..count-1. [setup]
-    explicit Mailboxes(std::size_t count) : count_(count), mailboxes_(std::make_unique<SlaveMailbox[]>(count)) {}
+    explicit Mailboxes(std::size_t count)
+        : count_(count), mailboxes_(std::make_unique<SlaveMailbox[]>(count)) {}
     /// Returns the mailbox of a slave; nullptr if the slave has none or is unknown. [realtime]
     SlaveMailbox* find(const BusSlave& slave) noexcept {
         return slave.number < count_ && slave.area().usable() ? &mailboxes_[slave.number] : nullptr;
     }
     /// Returns the mailbox number `n`, below size(). [any]
     SlaveMailbox& at(std::size_t n) noexcept { return mailboxes_[n]; }
-    std::size_t   size() const noexcept { return count_; }
+    std::size_t size() const noexcept { return count_; }
 
 private:
-    std::size_t                     count_;
+    std::size_t count_;
     std::unique_ptr<SlaveMailbox[]> mailboxes_;
 };
 
@@ -158,8 +188,12 @@ constexpr MailboxResult refused(std::uint32_t code = 0, std::size_t length = 0) 
     return {MailboxResult::Outcome::refused, code, length};
 }
 /// Returns the result of a protocol's own error. [any]
-constexpr MailboxResult aborted(std::uint32_t code) noexcept { return {MailboxResult::Outcome::aborted, code, 0}; }
+constexpr MailboxResult aborted(std::uint32_t code) noexcept {
+    return {MailboxResult::Outcome::aborted, code, 0};
+}
 /// Returns the result of success. [any]
-constexpr MailboxResult succeeded(std::size_t length = 0) noexcept { return {MailboxResult::Outcome::done, 0, length}; }
+constexpr MailboxResult succeeded(std::size_t length = 0) noexcept {
+    return {MailboxResult::Outcome::done, 0, length};
+}
 
 }  // namespace hal::ethercat::master

@@ -9,17 +9,20 @@ namespace hal::ethercat::master {
 
 namespace {
 
-constexpr unsigned      acyclic_frames_starting = 8, acyclic_frames_operating = 2;
+constexpr unsigned acyclic_frames_starting = 8;
+constexpr unsigned acyclic_frames_operating = 2;
 constexpr std::uint64_t link_check_cycles = 64;
 
 }  // namespace
 
-Master::Master(Setup setup, const std::array<std::uint8_t, 6>& source, Events& events, CoeAccess& coe)
+Master::Master(Setup setup, const std::array<std::uint8_t, 6>& source, Events& events,
+               CoeAccess& coe)
     : bus_(std::make_unique<Bus>(std::move(setup), source, events, coe)) {}
 Master::~Master() = default;
 
 void Master::attach(ethernet::Port& primary, ethernet::Port* backup) {
-    primary_ = &primary, backup_ = backup;
+    primary_ = &primary;
+    backup_ = backup;
     bus_->engine.attach(primary, backup);
     bus_->engine.ready();
     bus_->status.redundant = backup != nullptr;
@@ -31,18 +34,27 @@ void Master::set_epoch(std::int64_t epoch_ns) { bus_->epoch_ns = epoch_ns; }
 void Master::receive(std::int64_t now_ns) noexcept {
     Bus& bus = *bus_;
     bus.engine.receive(now_ns);
-    if (!bus.bus_channel.busy()) rescan();
+    if (!bus.bus_channel.busy()) {
+        rescan();
+    }
     take_clock(bus);
     judge_counters(bus);
-    if (bus.suspicious && bus.resting && bus.bus_channel.stage() == Channel::Stage::sleeping) bus.bus_channel.wake();
-    if (const auto resumed = bus.engine.resumed(); resumed != resumed_)
-        resumed_ = resumed,
+    if (bus.suspicious && bus.resting && bus.bus_channel.stage() == Channel::Stage::sleeping) {
+        bus.bus_channel.wake();
+    }
+    if (const auto resumed = bus.engine.resumed(); resumed != resumed_) {
+        resumed_ = resumed;
+
         bus.update_status();  // only tasks change states
+    }
     if (links_checked_++ % link_check_cycles != 0) return;
     const auto link = [&](ethernet::Port* port, bool& was, std::int64_t number) {
         if (port == nullptr) return;
         const bool up = port->statistics().up;
-        if (up != was) bus.report(up ? Event::link_restored : Event::link_lost, number), bus.suspicious = true;
+        if (up != was) {
+            bus.report(up ? Event::link_restored : Event::link_lost, number);
+            bus.suspicious = true;
+        }
         was = up;
     };
     link(primary_, bus.status.link, 0);
@@ -51,9 +63,10 @@ void Master::receive(std::int64_t now_ns) noexcept {
 
 void Master::transmit(std::int64_t now_ns) noexcept {
     Bus& bus = *bus_;
-    // The time of the reference clock as this frame passes it. It is what slaves get that only the backup port reaches: the clock they follow
-    // must not change when a ring breaks.
-    const std::int64_t ahead = bus.setup.lead != ClockLead::thread && bus.skew_ns != 0 ? bus.skew_ns : bus.epoch_ns;
+    // The time of the reference clock as this frame passes it. It is what slaves get that only the
+    // backup port reaches: the clock they follow must not change when a ring breaks.
+    const std::int64_t ahead =
+        bus.setup.lead != ClockLead::thread && bus.skew_ns != 0 ? bus.skew_ns : bus.epoch_ns;
     bus.engine.transmit(now_ns, bus.exchange, !bus.status.operational,
                         bus.status.operational ? acyclic_frames_operating : acyclic_frames_starting,
                         static_cast<std::uint64_t>(now_ns + ahead));
@@ -71,24 +84,34 @@ void Master::rescan() noexcept {
     bus.watch_channel.start([&] { return watch(bus.watch_channel, bus); });
 }
 
-std::span<std::uint8_t> Master::data(std::size_t slave, std::size_t n) noexcept { return bus_->image.data(slave, n); }
+std::span<std::uint8_t> Master::data(std::size_t slave, std::size_t n) noexcept {
+    return bus_->image.data(slave, n);
+}
 
 void Master::shut_down() noexcept {
     if (primary_ == nullptr) return;
     std::array<std::uint8_t, largest_frame_bytes> buffer;
-    std::optional<FrameWriter>                    frame;
-    const auto                                    send = [&] {
-        if (frame) bus_->engine.send_now(frame->finish());
+    std::optional<FrameWriter> frame;
+    const auto send = [&] {
+        if (frame) {
+            bus_->engine.send_now(frame->finish());
+        }
         frame.reset();
     };
     for (const std::atomic<std::uint16_t>& in_op : bus_->in_op) {
         const std::uint16_t station = in_op.load(std::memory_order_relaxed);
         if (station == 0) continue;
-        if (frame && frame->space() < sizeof station) send();
-        if (!frame) frame.emplace(buffer, primary_->address(), bus_->setup.frame_bytes);
+        if (frame && frame->space() < sizeof station) {
+            send();
+        }
+        if (!frame) {
+            frame.emplace(buffer, primary_->address(), bus_->setup.frame_bytes);
+        }
         const std::uint32_t control = at_station(station, registers::al_control);
-        std::uint8_t*       data = frame->add(Command::fpwr, 0, control, sizeof station);
-        if (data != nullptr) put(data, static_cast<std::uint16_t>(State::safeop));
+        std::uint8_t* data = frame->add(Command::fpwr, 0, control, sizeof station);
+        if (data != nullptr) {
+            put(data, static_cast<std::uint16_t>(State::safeop));
+        }
     }
     send();
 }
@@ -97,16 +120,19 @@ void Master::restart() noexcept {
     Bus& bus = *bus_;
     for (const auto& device : bus.devices) {
         Device& d = *device;
-        const bool startable = d.slave.present && d.identified && !d.refused && d.slave.configured >= 0;
+        const bool startable =
+            d.slave.present && d.identified && !d.refused && d.slave.configured >= 0;
         if (!startable || bus.target(d) != State::op) continue;
         bus.unsettle(d);
-        // Nobody corrected the clocks meanwhile. On a broken ring their delays cannot be measured: they
-        // drift back into the window.
+        // Nobody corrected the clocks meanwhile. On a broken ring their delays cannot be measured:
+        // they drift back into the window.
         if (d.slave.number != bus.reference && !bus.status.ring_broken) {
             d.clock_set = false;
             d.synchronised = false;
         }
-        if (d.helping) continue;  // the supervision starts it once its channel is free
+        if (d.helping) {
+            continue;  // the supervision starts it once its channel is free
+        }
         bus.run(d, [&] { return boot(d.channel, bus, d); });
     }
     bus.suspicious = true;
@@ -119,42 +145,57 @@ void Master::set_boot(const BusSlave& slave, bool to_boot) noexcept {
 }
 void Master::set_outputs_valid(bool valid) noexcept { bus_->outputs_valid = valid; }
 
-const Setup&        Master::setup() const noexcept { return bus_->setup; }
-const BusStatus&    Master::status() const noexcept { return bus_->status; }
+const Setup& Master::setup() const noexcept { return bus_->setup; }
+const BusStatus& Master::status() const noexcept { return bus_->status; }
 const DomainStatus& Master::domain(std::size_t n) const noexcept { return bus_->image.domain(n); }
-std::uint64_t       Master::cycles_incomplete() const noexcept {
+std::uint64_t Master::cycles_incomplete() const noexcept {
     std::uint64_t sum = 0;
-    for (std::size_t n = 0; n < bus_->image.domain_count(); ++n) sum += bus_->image.domain(n).incomplete;
+    for (std::size_t n = 0; n < bus_->image.domain_count(); ++n) {
+        sum += bus_->image.domain(n).incomplete;
+    }
     return sum;
 }
 void Master::reset_domain(std::size_t n) noexcept {
     DomainStatus& d = bus_->image.domain(n);
     d.was_complete = false;
-    d.least = 0, d.changes = 0;
+    d.least = 0;
+    d.changes = 0;
 }
 const SlaveStatus& Master::slave_status(std::size_t slave) const noexcept {
     const int device = bus_->device_of[slave];
-    return device < 0 ? bus_->absent[slave] : bus_->devices[static_cast<std::size_t>(device)]->status;
+    return device < 0 ? bus_->absent[slave]
+                      : bus_->devices[static_cast<std::size_t>(device)]->status;
 }
 
 Master::Phase Master::dc_phase() const noexcept {
     const auto& sample = bus_->engine.clock();
-    if (!sample.fresh || bus_->reference < 0) return {};
+    if (!sample.fresh || bus_->reference < 0) {
+        return {};
+    }
     const std::int64_t cycle = bus_->setup.cycle_ns;
-    const std::int64_t phase = (static_cast<std::int64_t>(bus_->status.dc_time_ns) - sample.sent_after_ns) % cycle;
+    const std::int64_t phase =
+        (static_cast<std::int64_t>(bus_->status.dc_time_ns) - sample.sent_after_ns) % cycle;
     return {true, phase > cycle / 2 ? phase - cycle : phase};
 }
 
 std::size_t Master::found() const noexcept { return bus_->by_position.size(); }
-BusSlave&   Master::found(std::size_t position) noexcept { return bus_->devices[bus_->by_position[position]]->slave; }
-BusSlave*   Master::numbered(std::uint16_t number) noexcept {
-    return number < bus_->devices.size() && bus_->devices[number]->slave.present ? &bus_->devices[number]->slave : nullptr;
+BusSlave& Master::found(std::size_t position) noexcept {
+    return bus_->devices[bus_->by_position[position]]->slave;
 }
-BusSlave*   Master::slave(std::size_t slave) noexcept {
+BusSlave* Master::numbered(std::uint16_t number) noexcept {
+    return number < bus_->devices.size() && bus_->devices[number]->slave.present
+               ? &bus_->devices[number]->slave
+               : nullptr;
+}
+BusSlave* Master::slave(std::size_t slave) noexcept {
     const int device = bus_->device_of[slave];
     return device < 0 ? nullptr : &bus_->devices[static_cast<std::size_t>(device)]->slave;
 }
-Channel& Master::channel(const BusSlave& slave) noexcept { return bus_->devices[slave.number]->channel; }
-bool     Master::idle(const BusSlave& slave) const noexcept { return !bus_->devices[slave.number]->channel.busy(); }
+Channel& Master::channel(const BusSlave& slave) noexcept {
+    return bus_->devices[slave.number]->channel;
+}
+bool Master::idle(const BusSlave& slave) const noexcept {
+    return !bus_->devices[slave.number]->channel.busy();
+}
 
 }  // namespace hal::ethercat::master

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Dynamic PDO mapping (ETG.1000.6, clause 5.6.7.4): reads what the slave has, writes what differs, and reads it back. A slave accepts
-// mappings either while their PDOs are not assigned, or before the assignment is cleared: SyncManager::assignment_first selects it.
+// Dynamic PDO mapping (ETG.1000.6, clause 5.6.7.4): reads what the slave has, writes what differs,
+// and reads it back. A slave accepts mappings either while their PDOs are not assigned, or before
+// the assignment is cleared: SyncManager::assignment_first selects it.
 #include <array>
 
 #include "ethercat/master/bus.hpp"
@@ -9,79 +10,110 @@ namespace hal::ethercat::master {
 
 namespace {
 
-constexpr std::uint16_t assignment_of(unsigned manager) noexcept { return static_cast<std::uint16_t>(0x1c10 + manager); }
-constexpr std::uint32_t object_missing = 0x06020000, sub_missing = 0x06090011;
+constexpr std::uint16_t assignment_of(unsigned manager) noexcept {
+    return static_cast<std::uint16_t>(0x1c10 + manager);
+}
+constexpr std::uint32_t object_missing = 0x06020000;
+constexpr std::uint32_t sub_missing = 0x06090011;
 
 /// What comparing a list with the slave's gave.
 enum class Compared : std::uint8_t { same, differs, failed };
 
 template <class T>
-Task<SdoResult> write_value(Channel& c, Bus& bus, Device& d, std::uint16_t index, unsigned sub, T value) noexcept {
+Task<SdoResult> write_value(Channel& c, Bus& bus, Device& d, std::uint16_t index, unsigned sub,
+                            T value) noexcept {
     std::array<std::uint8_t, sizeof(T)> bytes{};
     put(bytes.data(), value);
-    const SdoResult r = co_await bus.coe.download(c, d.slave, index, static_cast<std::uint8_t>(sub), false, bytes);
-    if (!r) bus.report(Event::mapping_failed, d, static_cast<std::int64_t>(value) << 24 | index << 8 | static_cast<int>(sub), r.abort);
+    const SdoResult r =
+        co_await bus.coe.download(c, d.slave, index, static_cast<std::uint8_t>(sub), false, bytes);
+    if (!r) {
+        bus.report(Event::mapping_failed, d,
+                   static_cast<std::int64_t>(value) << 24 | index << 8 | static_cast<int>(sub),
+                   r.abort);
+    }
     co_return r;
 }
 
-/// Reads a sub-index. A missing object is an empty list (facts: outputs-only devices have no 1C13h).
-Task<SdoResult> read_value(Channel& c, Bus& bus, Device& d, std::uint16_t index, unsigned sub, std::uint32_t& value) noexcept {
+/// Reads a sub-index. A missing object is an empty list (facts: outputs-only devices have no
+/// 1C13h).
+Task<SdoResult> read_value(Channel& c, Bus& bus, Device& d, std::uint16_t index, unsigned sub,
+                           std::uint32_t& value) noexcept {
     std::array<std::uint8_t, 8> bytes{};
     value = 0;
-    SdoResult r = co_await bus.coe.upload(c, d.slave, index, static_cast<std::uint8_t>(sub), false, bytes);
-    if (r) value = get<std::uint32_t>(bytes.data());
-    if (!r && r.outcome == SdoResult::Outcome::aborted && sub == 0 && (r.abort == object_missing || r.abort == sub_missing))
+    SdoResult r =
+        co_await bus.coe.upload(c, d.slave, index, static_cast<std::uint8_t>(sub), false, bytes);
+    if (r) {
+        value = get<std::uint32_t>(bytes.data());
+    }
+    if (!r && r.outcome == SdoResult::Outcome::aborted && sub == 0 &&
+        (r.abort == object_missing || r.abort == sub_missing)) {
         r.outcome = SdoResult::Outcome::done;
+    }
     co_return r;
 }
 
 /// Compares `count` values of an object with those of `want(n)`, n from 0.
 template <class Want>
-Task<Compared> compare(Channel& c, Bus& bus, Device& d, std::uint16_t index, std::size_t count, Want want, bool report) noexcept {
+Task<Compared> compare(Channel& c, Bus& bus, Device& d, std::uint16_t index, std::size_t count,
+                       Want want, bool report) noexcept {
     std::uint32_t value = 0;
-    SdoResult     r = co_await read_value(c, bus, d, index, 0, value);
+    SdoResult r = co_await read_value(c, bus, d, index, 0, value);
     if (!r) {
         bus.report(Event::mapping_failed, d, index << 8, r.abort);
         co_return Compared::failed;
     }
     if ((value & 0xff) != count) {
-        if (report) bus.report(Event::mapping_differs, d, static_cast<std::int64_t>(count) << 24 | index << 8, value & 0xff);
+        if (report) {
+            bus.report(Event::mapping_differs, d,
+                       static_cast<std::int64_t>(count) << 24 | index << 8, value & 0xff);
+        }
         co_return Compared::differs;
     }
     for (std::size_t n = 0; n < count; ++n) {
         r = co_await read_value(c, bus, d, index, static_cast<unsigned>(n + 1), value);
         const bool same = r && value == want(n);
         if (same) continue;
-        if (report)
-            bus.report(Event::mapping_differs, d, static_cast<std::int64_t>(want(n)) << 24 | index << 8 | static_cast<int>(n + 1), value);
+        if (report) {
+            bus.report(
+                Event::mapping_differs, d,
+                static_cast<std::int64_t>(want(n)) << 24 | index << 8 | static_cast<int>(n + 1),
+                value);
+        }
         co_return Compared::differs;
     }
     co_return Compared::same;
 }
 
-Task<Compared> compare_mapping(Channel& c, Bus& bus, Device& d, const Pdo& pdo, bool report) noexcept {
+Task<Compared> compare_mapping(Channel& c, Bus& bus, Device& d, const Pdo& pdo,
+                               bool report) noexcept {
     const auto want = [&pdo](std::size_t n) { return pdo.mapping(n); };
     return compare(c, bus, d, pdo.index, pdo.mapped(), want, report);
 }
 
-Task<Compared> compare_assignment(Channel& c, Bus& bus, Device& d, const SyncManager& sm, bool report) noexcept {
+Task<Compared> compare_assignment(Channel& c, Bus& bus, Device& d, const SyncManager& sm,
+                                  bool report) noexcept {
     const auto want = [&sm](std::size_t n) { return std::uint32_t{sm.pdos[n].index}; };
     return compare(c, bus, d, assignment_of(sm.number), sm.pdos.size(), want, report);
 }
 
 /// Writes a list at once: sub-index 0 padded to 16 bits, then the values.
 template <class T, class Want>
-Task<SdoResult> write_complete(Channel& c, Bus& bus, Device& d, std::uint16_t index, std::size_t count, Want want) noexcept {
+Task<SdoResult> write_complete(Channel& c, Bus& bus, Device& d, std::uint16_t index,
+                               std::size_t count, Want want) noexcept {
     std::array<std::uint8_t, 2 + 255 * sizeof(T)> bytes{};
     bytes[0] = static_cast<std::uint8_t>(count);
-    for (std::size_t n = 0; n < count; ++n) put(&bytes[2 + n * sizeof(T)], static_cast<T>(want(n)));
-    const SdoResult r = co_await bus.coe.download(c, d.slave, index, 0, true, {bytes.data(), 2 + count * sizeof(T)});
+    for (std::size_t n = 0; n < count; ++n) {
+        put(&bytes[2 + n * sizeof(T)], static_cast<T>(want(n)));
+    }
+    const SdoResult r = co_await bus.coe.download(c, d.slave, index, 0, true,
+                                                  {bytes.data(), 2 + count * sizeof(T)});
     co_return r;
 }
 
 /// Writes a list: count 0, the values, the count.
 template <class T, class Want>
-Task<bool> write_list(Channel& c, Bus& bus, Device& d, std::uint16_t index, std::size_t count, Want want) noexcept {
+Task<bool> write_list(Channel& c, Bus& bus, Device& d, std::uint16_t index, std::size_t count,
+                      Want want) noexcept {
     SdoResult r;
     if (d.slave.complete_access && (d.slave.coe_details & 0x20) != 0) {
         r = co_await write_complete<T>(c, bus, d, index, count, want);
@@ -90,7 +122,8 @@ Task<bool> write_list(Channel& c, Bus& bus, Device& d, std::uint16_t index, std:
     r = co_await write_value<std::uint8_t>(c, bus, d, index, 0, 0);
     if (!r) co_return false;
     for (std::size_t n = 0; n < count; ++n) {
-        r = co_await write_value(c, bus, d, index, static_cast<unsigned>(n + 1), static_cast<T>(want(n)));
+        r = co_await write_value(c, bus, d, index, static_cast<unsigned>(n + 1),
+                                 static_cast<T>(want(n)));
         if (!r) co_return false;
     }
     if (count == 0) co_return true;
@@ -98,12 +131,14 @@ Task<bool> write_list(Channel& c, Bus& bus, Device& d, std::uint16_t index, std:
     co_return static_cast<bool>(r);
 }
 
-Task<bool> write_mappings(Channel& c, Bus& bus, Device& d, const SyncManager& sm, std::uint64_t which) noexcept {
+Task<bool> write_mappings(Channel& c, Bus& bus, Device& d, const SyncManager& sm,
+                          std::uint64_t which) noexcept {
     for (std::size_t n = 0; n < sm.pdos.size(); ++n) {
         if ((which >> n & 1) == 0) continue;
         const Pdo& pdo = sm.pdos[n];
         const auto want = [&pdo](std::size_t entry) { return pdo.mapping(entry); };
-        const bool ok = co_await write_list<std::uint32_t>(c, bus, d, pdo.index, pdo.mapped(), want);
+        const bool ok =
+            co_await write_list<std::uint32_t>(c, bus, d, pdo.index, pdo.mapped(), want);
         if (!ok) co_return false;
         const Compared now = co_await compare_mapping(c, bus, d, pdo, true);
         if (now != Compared::same) co_return false;
@@ -111,18 +146,22 @@ Task<bool> write_mappings(Channel& c, Bus& bus, Device& d, const SyncManager& sm
     co_return true;
 }
 
-Task<bool> map_manager(Channel& c, Bus& bus, Device& d, const SyncManager& sm, unsigned limit) noexcept {
+Task<bool> map_manager(Channel& c, Bus& bus, Device& d, const SyncManager& sm,
+                       unsigned limit) noexcept {
     std::uint64_t differing = 0;  // PDOs whose mapping differs
     for (std::size_t n = 0; n < sm.pdos.size() && n < 64; ++n) {
         const Pdo& pdo = sm.pdos[n];
         if (!pdo.write_mapping) continue;
         if (pdo.mapped() > 254 || (limit != 0 && pdo.mapped() > limit)) {
-            bus.report(Event::too_many_entries, d, pdo.index, static_cast<std::int64_t>(pdo.mapped()));
+            bus.report(Event::too_many_entries, d, pdo.index,
+                       static_cast<std::int64_t>(pdo.mapped()));
             co_return false;
         }
         const Compared now = co_await compare_mapping(c, bus, d, pdo, false);
         if (now == Compared::failed) co_return false;
-        if (now == Compared::differs) differing |= std::uint64_t{1} << n;
+        if (now == Compared::differs) {
+            differing |= std::uint64_t{1} << n;
+        }
     }
     bool assign = false;
     if (sm.write_assignment) {
@@ -132,9 +171,10 @@ Task<bool> map_manager(Channel& c, Bus& bus, Device& d, const SyncManager& sm, u
     }
     if (differing == 0 && !assign) co_return true;
 
-    // A mapping changes only while its PDO is not assigned, so the assignment is written again after any change.
+    // A mapping changes only while its PDO is not assigned, so the assignment is written again
+    // after any change.
     const std::uint16_t object = assignment_of(sm.number);
-    bool                ok = true;
+    bool ok = true;
     if (sm.assignment_first) {
         const SdoResult r = co_await write_value<std::uint8_t>(c, bus, d, object, 0, 0);
         if (!r) co_return false;
@@ -149,18 +189,24 @@ Task<bool> map_manager(Channel& c, Bus& bus, Device& d, const SyncManager& sm, u
     co_return now == Compared::same;
 }
 
-/// Compares the process data of a slave that cannot change it with what its SII states; 0 bytes there: not stated.
+/// Compares the process data of a slave that cannot change it with what its SII states; 0 bytes
+/// there: not stated.
 bool has_fixed_size(Bus& bus, Device& d, const SyncManager& sm) noexcept {
     std::size_t bits = 0;
-    for (const Pdo& pdo : sm.pdos)
-        for (const Entry& e : pdo.entries) bits += e.bits;
+    for (const Pdo& pdo : sm.pdos) {
+        for (const Entry& e : pdo.entries) {
+            bits += e.bits;
+        }
+    }
     if (d.slave.sii_sync_managers != 0 && sm.number >= d.slave.sii_sync_managers) {
         bus.report(Event::too_few_sync_managers, d, d.slave.sii_sync_managers, sm.number + 1);
         return false;
     }
-    const std::size_t fixed = sm.number < d.slave.sii_sync_managers ? d.slave.sii[sm.number].length : 0;
+    const std::size_t fixed =
+        sm.number < d.slave.sii_sync_managers ? d.slave.sii[sm.number].length : 0;
     if (fixed == 0 || fixed == (bits + 7) / 8) return true;
-    bus.report(Event::fixed_size, d, sm.number << 16 | static_cast<std::int64_t>((bits + 7) / 8), static_cast<std::int64_t>(fixed));
+    bus.report(Event::fixed_size, d, sm.number << 16 | static_cast<std::int64_t>((bits + 7) / 8),
+               static_cast<std::int64_t>(fixed));
     return false;
 }
 
@@ -170,7 +216,9 @@ Task<bool> map_process_data(Channel& c, Bus& bus, Device& d) noexcept {
     const Slave& config = *bus.config(d);
     for (const SyncManager& sm : config.sync_managers) {
         bool any = sm.write_assignment;
-        for (const Pdo& pdo : sm.pdos) any |= pdo.write_mapping;
+        for (const Pdo& pdo : sm.pdos) {
+            any |= pdo.write_mapping;
+        }
         if (!any) continue;
         if (sm.number >= d.slave.sync_managers) {
             bus.report(Event::too_few_sync_managers, d, d.slave.sync_managers, sm.number + 1);

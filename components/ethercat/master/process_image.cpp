@@ -11,9 +11,10 @@ namespace hal::ethercat::master {
 namespace {
 
 constexpr std::uint16_t clock_bytes = 8;
-constexpr std::size_t   datagram_overhead = datagram_header_bytes + wkc_bytes;
+constexpr std::size_t datagram_overhead = datagram_header_bytes + wkc_bytes;
 
-constexpr bool overlap(std::uint32_t a, std::uint32_t a_bytes, std::uint32_t b, std::uint32_t b_bytes) noexcept {
+constexpr bool overlap(std::uint32_t a, std::uint32_t a_bytes, std::uint32_t b,
+                       std::uint32_t b_bytes) noexcept {
     return a < b + b_bytes && b < a + a_bytes;
 }
 
@@ -26,37 +27,48 @@ ProcessImage::ProcessImage(const Setup& setup, const std::array<std::uint8_t, 6>
       most_(std::clamp<std::size_t>(setup.frame_bytes, 200, largest_frame_bytes)),
       write_clock_(setup.lead == ClockLead::thread) {
     lay_out(setup);
-    // Each block needs at most two datagrams and one per frame's worth of bytes; each of them could need a frame of its own.
+    // Each block needs at most two datagrams and one per frame's worth of bytes; each of them could
+    // need a frame of its own.
     std::size_t most = 1;
-    for (const Block& b : blocks_) most += 2 + 2 * (b.out_bytes / room() + b.in_bytes / room() + 2);
+    for (const Block& b : blocks_) {
+        most += 2 + 2 * (b.out_bytes / room() + b.in_bytes / room() + 2);
+    }
     datagrams_.resize(most);
     frames_.resize(most);
     build();
 }
 
-/// Data bytes of one process datagram in a frame that also carries the clock, if two of them (LWR and LRD) share the frame.
+/// Data bytes of one process datagram in a frame that also carries the clock, if two of them (LWR
+/// and LRD) share the frame.
 std::size_t ProcessImage::room() const noexcept {
     const std::size_t payload = most_ - ethernet_header_bytes - ecat_header_bytes;
-    return payload - (write_clock_ ? 2 : 1) * (clock_bytes + datagram_overhead) - 2 * datagram_overhead;
+    return payload - (write_clock_ ? 2 : 1) * (clock_bytes + datagram_overhead) -
+           2 * datagram_overhead;
 }
 
 void ProcessImage::lay_out(const Setup& setup) {
     for (std::size_t n = 0; n < slaves_.size(); ++n) {
         const Slave& slave = setup.slaves[n];
-        SlaveImage&  image = slaves_[n];
+        SlaveImage& image = slaves_[n];
         image.domain = slave.domain < domains_.size() ? slave.domain : std::uint16_t{0};
         image.no_lrw = !slave.use_lrw;
         for (const SyncManager& sm : slave.sync_managers) {
             std::uint32_t bits = 0;
-            for (const Pdo& pdo : sm.pdos)
-                for (const Entry& entry : pdo.entries) bits += entry.bits;
+            for (const Pdo& pdo : sm.pdos) {
+                for (const Entry& entry : pdo.entries) {
+                    bits += entry.bits;
+                }
+            }
             image.areas.push_back({0, (bits + 7) / 8, sm.output});
             (sm.output ? image.out_bytes : image.in_bytes) += (bits + 7) / 8;
         }
-        if (slave.mailbox_status && image.out_bytes + image.in_bytes != 0) image.mailbox_status_at = 0, image.in_bytes++;
+        if (slave.mailbox_status && image.out_bytes + image.in_bytes != 0) {
+            image.mailbox_status_at = 0;
+            image.in_bytes++;
+        }
     }
     std::uint32_t at = 0;
-    for (std::uint16_t d = 0; d < domains_.size(); ++d)
+    for (std::uint16_t d = 0; d < domains_.size(); ++d) {
         for (const bool no_lrw : {false, true}) {
             Block block;
             block.domain = d;
@@ -64,30 +76,41 @@ void ProcessImage::lay_out(const Setup& setup) {
             block.first = block.last = static_cast<std::uint16_t>(order_.size());
             for (std::uint16_t n = 0; n < slaves_.size(); ++n) {
                 const SlaveImage& image = slaves_[n];
-                if (image.domain != d || image.no_lrw != no_lrw || image.out_bytes + image.in_bytes == 0) continue;
-                if (block.out_bytes + block.in_bytes + image.out_bytes + image.in_bytes > room()) close(block, at);
-                block.out_bytes += image.out_bytes, block.in_bytes += image.in_bytes;
+                if (image.domain != d || image.no_lrw != no_lrw ||
+                    image.out_bytes + image.in_bytes == 0) {
+                    continue;
+                }
+                if (block.out_bytes + block.in_bytes + image.out_bytes + image.in_bytes > room()) {
+                    close(block, at);
+                }
+                block.out_bytes += image.out_bytes;
+                block.in_bytes += image.in_bytes;
                 order_.push_back(n);
                 block.last = static_cast<std::uint16_t>(order_.size());
             }
             close(block, at);
         }
+    }
     image_.resize(at + 1);
 }
 
 void ProcessImage::close(Block& block, std::uint32_t& at) {
     if (block.first != block.last) {
         block.at = at;
-        std::uint32_t out = at, in = at + block.out_bytes;
+        std::uint32_t out = at;
+        std::uint32_t in = at + block.out_bytes;
         for (std::uint16_t i = block.first; i < block.last; ++i) {
             SlaveImage& image = slaves_[order_[i]];
-            image.out_at = out, image.in_at = in;
+            image.out_at = out;
+            image.in_at = in;
             for (Area& area : image.areas) {
                 std::uint32_t& next = area.output ? out : in;
                 area.at = next;
                 next += area.bytes;
             }
-            if (image.mailbox_status_at >= 0) image.mailbox_status_at = in++;
+            if (image.mailbox_status_at >= 0) {
+                image.mailbox_status_at = in++;
+            }
         }
         blocks_.push_back(block);
         at += block.out_bytes + block.in_bytes;
@@ -101,21 +124,26 @@ void ProcessImage::build() noexcept {
     unsigned every = 0;
     while (true) {  // groups of equal rate, the fastest first
         unsigned next = UINT32_MAX;
-        for (const Block& b : blocks_)
-            if (b.every > every) next = std::min(next, b.every);
+        for (const Block& b : blocks_) {
+            if (b.every > every) {
+                next = std::min(next, b.every);
+            }
+        }
         if (next == UINT32_MAX) break;
         every = next;
         build_frames(every);
     }
-    if (frames_used_ == 0) build_frames(1);  // for the clock alone
+    if (frames_used_ == 0) {
+        build_frames(1);  // for the clock alone
+    }
     set_reference(reference_, write_time_);
     recount();
 }
 
 void ProcessImage::build_frames(unsigned every) noexcept {
     std::optional<FrameWriter> writer;
-    Frame*                     frame = nullptr;
-    const auto                 finish = [&] {
+    Frame* frame = nullptr;
+    const auto finish = [&] {
         if (frame == nullptr) return;
         frame->last = static_cast<unsigned>(datagrams_used_);
         frame->size = static_cast<std::uint16_t>(writer->finish().size());
@@ -128,23 +156,33 @@ void ProcessImage::build_frames(unsigned every) noexcept {
         frame->clock_write = frame->clock_read = 0;
         writer.emplace(frame->bytes, source_, most_);
         const auto clock = [&] {
-            return static_cast<std::uint16_t>(writer->add(Command::nop, 0, at_station(0, registers::dc_system_time), clock_bytes) -
+            return static_cast<std::uint16_t>(writer->add(Command::nop, 0,
+                                                          at_station(0, registers::dc_system_time),
+                                                          clock_bytes) -
                                               datagram_header_bytes - frame->bytes.data());
         };
-        if (write_clock_ && first) frame->clock_write = clock();
+        if (write_clock_ && first) {
+            frame->clock_write = clock();
+        }
         frame->clock_read = clock();
     };
     open(true);
     for (const Block& b : blocks_) {
         if (b.every != every) continue;
         bool lrw = b.out_bytes + b.in_bytes <= room() && b.out_bytes != 0 && b.in_bytes != 0;
-        for (std::uint16_t i = b.first; i < b.last; ++i) lrw &= !slaves_[order_[i]].no_lrw;
+        for (std::uint16_t i = b.first; i < b.last; ++i) {
+            lrw &= !slaves_[order_[i]].no_lrw;
+        }
         const auto piece = [&](Command command, std::uint32_t at, std::uint32_t length) {
             while (length != 0) {
-                const auto part = std::min<std::uint32_t>(length, static_cast<std::uint32_t>(room()));
-                if (writer->space() < part) open(false);
+                const auto part =
+                    std::min<std::uint32_t>(length, static_cast<std::uint32_t>(room()));
+                if (writer->space() < part) {
+                    open(false);
+                }
                 add(*writer, *frame, command, at, part, b);
-                at += part, length -= part;
+                at += part;
+                length -= part;
             }
         };
         if (lrw) {
@@ -157,8 +195,8 @@ void ProcessImage::build_frames(unsigned every) noexcept {
     finish();
 }
 
-void ProcessImage::add(FrameWriter& writer, Frame& frame, Command command, std::uint32_t at, std::uint32_t length,
-                       const Block& b) noexcept {
+void ProcessImage::add(FrameWriter& writer, Frame& frame, Command command, std::uint32_t at,
+                       std::uint32_t length, const Block& b) noexcept {
     Datagram& d = datagrams_[datagrams_used_++];
     d = {};
     const std::uint8_t* data = writer.add(command, 0, at, static_cast<std::uint16_t>(length));
@@ -166,42 +204,62 @@ void ProcessImage::add(FrameWriter& writer, Frame& frame, Command command, std::
     d.length = static_cast<std::uint16_t>(length);
     d.offset = static_cast<std::uint16_t>(data - datagram_header_bytes - frame.bytes.data());
     d.domain = b.domain;
-    d.first_slave = b.first, d.last_slave = b.last;
-    d.out_to = command == Command::lwr ? d.length : command == Command::lrw ? static_cast<std::uint16_t>(b.out_bytes) : std::uint16_t{0};
+    d.first_slave = b.first;
+    d.last_slave = b.last;
+    d.out_to = command == Command::lwr   ? d.length
+               : command == Command::lrw ? static_cast<std::uint16_t>(b.out_bytes)
+                                         : std::uint16_t{0};
     d.in_from = command == Command::lrw ? d.out_to : std::uint16_t{0};
     d.in_to = command == Command::lwr ? std::uint16_t{0} : d.length;
-    if (command == Command::lwr) d.in_from = 0;
+    if (command == Command::lwr) {
+        d.in_from = 0;
+    }
 }
 
 void ProcessImage::recount() noexcept {
     for (std::size_t n = 0; n < datagrams_used_; ++n) {
-        Datagram&      d = datagrams_[n];
-        unsigned       expected = 0, tolerance = 0;
+        Datagram& d = datagrams_[n];
+        unsigned expected = 0;
+        unsigned tolerance = 0;
         const unsigned write = d.in_to == 0 ? 1 : 2;  // LWR counts 1, the writing part of LRW 2
         for (std::uint16_t i = d.first_slave; i < d.last_slave; ++i) {
             const SlaveImage& s = slaves_[order_[i]];
-            unsigned          count = 0;
-            if (d.out_to != 0 && overlap(d.address, d.out_to, s.out_at, s.out_bytes) && s.writes) count += write;
-            if (d.in_to > d.in_from && overlap(d.address + d.in_from, d.in_to - d.in_from, s.in_at, s.in_bytes) && s.reads) count += 1;
+            unsigned count = 0;
+            if (d.out_to != 0 && overlap(d.address, d.out_to, s.out_at, s.out_bytes) && s.writes) {
+                count += write;
+            }
+            if (d.in_to > d.in_from &&
+                overlap(d.address + d.in_from, d.in_to - d.in_from, s.in_at, s.in_bytes) &&
+                s.reads) {
+                count += 1;
+            }
             (s.starting ? tolerance : expected) += count;
         }
-        d.expected = static_cast<std::uint16_t>(expected), d.tolerance = static_cast<std::uint16_t>(tolerance);
+        d.expected = static_cast<std::uint16_t>(expected);
+
+        d.tolerance = static_cast<std::uint16_t>(tolerance);
     }
 }
 
-void ProcessImage::set_counting(std::size_t slave, bool writes, bool reads, bool starting) noexcept {
+void ProcessImage::set_counting(std::size_t slave, bool writes, bool reads,
+                                bool starting) noexcept {
     SlaveImage& s = slaves_[slave];
     if (s.writes == writes && s.reads == reads && s.starting == starting) return;
-    s.writes = writes, s.reads = reads, s.starting = starting;
+    s.writes = writes;
+    s.reads = reads;
+    s.starting = starting;
     recount();
 }
 
 void ProcessImage::clear_mailbox_status(std::size_t slave) noexcept {
-    if (slaves_[slave].mailbox_status_at >= 0) image_[static_cast<std::size_t>(slaves_[slave].mailbox_status_at)] = 0;
+    if (slaves_[slave].mailbox_status_at >= 0) {
+        image_[static_cast<std::size_t>(slaves_[slave].mailbox_status_at)] = 0;
+    }
 }
 
 void ProcessImage::set_reference(std::uint16_t station, bool write_time) noexcept {
-    reference_ = station, write_time_ = write_time;
+    reference_ = station;
+    write_time_ = write_time;
     const auto address = [&](Frame& f, std::uint16_t at, Command command) {
         if (at == 0) return;
         f.bytes[at] = static_cast<std::uint8_t>(station != 0 ? command : Command::nop);
@@ -222,91 +280,119 @@ void ProcessImage::fill(Frame& frame, std::uint8_t index, std::uint64_t dc_time_
     clock(frame.clock_write);
     clock(frame.clock_read);
     for (unsigned n = frame.first; n < frame.last; ++n) {
-        Datagram&     d = datagrams_[n];
+        Datagram& d = datagrams_[n];
         std::uint8_t* header = &frame.bytes[d.offset];
         header[1] = index;
-        if (d.out_to != 0) std::memcpy(header + datagram_header_bytes, &image_[d.address], d.out_to);
-        d.sent = true, d.answered = false;
+        if (d.out_to != 0) {
+            std::memcpy(header + datagram_header_bytes, &image_[d.address], d.out_to);
+        }
+        d.sent = true;
+        d.answered = false;
     }
 }
 
-bool ProcessImage::matches(const Frame& frame, std::span<const std::uint8_t> answer) const noexcept {
+bool ProcessImage::matches(const Frame& frame,
+                           std::span<const std::uint8_t> answer) const noexcept {
     if (answer.size() < frame.size) return false;
-    // Ethertype and length, then of each datagram: command, index, address and length; the circulating bit may have been set on the way.
+    // Ethertype and length, then of each datagram: command, index, address and length; the
+    // circulating bit may have been set on the way.
     if (std::memcmp(&answer[12], &frame.bytes[12], 4) != 0) return false;
     const auto same = [&](std::uint16_t at) {
         return std::memcmp(&answer[at], &frame.bytes[at], 6) == 0 &&
-               (get<std::uint16_t>(&answer[at + 6U]) & 0x87ff) == get<std::uint16_t>(&frame.bytes[at + 6U]);
+               (get<std::uint16_t>(&answer[at + 6U]) & 0x87ff) ==
+                   get<std::uint16_t>(&frame.bytes[at + 6U]);
     };
     if (frame.clock_write != 0 && !same(frame.clock_write)) return false;
     if (!same(frame.clock_read)) return false;
-    for (unsigned n = frame.first; n < frame.last; ++n)
+    for (unsigned n = frame.first; n < frame.last; ++n) {
         if (!same(datagrams_[n].offset)) return false;
+    }
     return true;
 }
 
 void ProcessImage::take(const Frame& frame, const std::uint8_t* answer) noexcept {
     for (unsigned n = frame.first; n < frame.last; ++n) {
-        Datagram&           d = datagrams_[n];
+        Datagram& d = datagrams_[n];
         const std::uint8_t* data = answer + d.offset + datagram_header_bytes;
         d.wkc = get<std::uint16_t>(data + d.length);
         d.answered = true;
         if (d.in_to <= d.in_from) continue;
-        if (d.wkc >= d.expected && d.tolerance == 0)
-            std::memcpy(&image_[d.address + d.in_from], data + d.in_from, static_cast<std::size_t>(d.in_to - d.in_from));
-        else copy_present(d, data);
+        if (d.wkc >= d.expected && d.tolerance == 0) {
+            std::memcpy(&image_[d.address + d.in_from], data + d.in_from,
+                        static_cast<std::size_t>(d.in_to - d.in_from));
+        } else {
+            copy_present(d, data);
+        }
     }
 }
 
-/// A slave that did not take part leaves the zeros that were sent. Those are not its inputs: the last ones stay until its loss is known.
+/// A slave that did not take part leaves the zeros that were sent. Those are not its inputs: the
+/// last ones stay until its loss is known.
 void ProcessImage::copy_present(const Datagram& d, const std::uint8_t* data) noexcept {
     for (std::uint16_t i = d.first_slave; i < d.last_slave; ++i) {
         const SlaveImage& s = slaves_[order_[i]];
         if (!s.reads || s.in_bytes == 0) continue;
-        const std::uint32_t from = std::max(s.in_at, d.address + d.in_from), to = std::min(s.in_at + s.in_bytes, d.address + d.in_to);
+        const std::uint32_t from = std::max(s.in_at, d.address + d.in_from);
+
+        const std::uint32_t to = std::min(s.in_at + s.in_bytes, d.address + d.in_to);
         if (from >= to) continue;
         const std::uint8_t* inputs = data + (from - d.address);
-        if (std::any_of(inputs, inputs + (to - from), [](std::uint8_t b) { return b != 0; })) std::memcpy(&image_[from], inputs, to - from);
+        if (std::any_of(inputs, inputs + (to - from), [](std::uint8_t b) { return b != 0; })) {
+            std::memcpy(&image_[from], inputs, to - from);
+        }
     }
 }
 
-void ProcessImage::merge(const Frame& frame, std::uint8_t* first, const std::uint8_t* second) const noexcept {
+void ProcessImage::merge(const Frame& frame, std::uint8_t* first,
+                         const std::uint8_t* second) const noexcept {
     const auto add_wkc = [&](std::size_t at) {
-        put(first + at, static_cast<std::uint16_t>(get<std::uint16_t>(first + at) + get<std::uint16_t>(second + at)));
+        put(first + at, static_cast<std::uint16_t>(get<std::uint16_t>(first + at) +
+                                                   get<std::uint16_t>(second + at)));
     };
     const auto clock = [&](std::uint16_t at) {
         if (at == 0) return;
         const std::size_t wkc = at + datagram_header_bytes + clock_bytes;
-        if (get<std::uint16_t>(second + wkc) > get<std::uint16_t>(first + wkc))
-            std::memcpy(first + at + datagram_header_bytes, second + at + datagram_header_bytes, clock_bytes);
+        if (get<std::uint16_t>(second + wkc) > get<std::uint16_t>(first + wkc)) {
+            std::memcpy(first + at + datagram_header_bytes, second + at + datagram_header_bytes,
+                        clock_bytes);
+        }
         add_wkc(wkc);
     };
     clock(frame.clock_write);
     clock(frame.clock_read);
     for (unsigned n = frame.first; n < frame.last; ++n) {
-        const Datagram&   d = datagrams_[n];
+        const Datagram& d = datagrams_[n];
         const std::size_t data = d.offset + datagram_header_bytes;
-        for (std::size_t i = d.in_from; i < d.in_to; ++i) first[data + i] |= second[data + i];
+        for (std::size_t i = d.in_from; i < d.in_to; ++i) {
+            first[data + i] |= second[data + i];
+        }
         add_wkc(data + d.length);
     }
 }
 
 void ProcessImage::settle() noexcept {
-    for (DomainStatus& d : domains_) d.fresh = false;
+    for (DomainStatus& d : domains_) {
+        d.fresh = false;
+    }
     bool any = false;
     for (std::size_t n = 0; n < datagrams_used_; ++n) {
         const Datagram& d = datagrams_[n];
         if (!d.sent) continue;
         DomainStatus& s = domains_[d.domain];
-        if (!s.fresh) s.wkc = s.expected = 0, s.fresh = true;
+        if (!s.fresh) {
+            s.wkc = s.expected = 0;
+            s.fresh = true;
+        }
         any = true;
     }
     if (!any) return;
-    for (DomainStatus& s : domains_) s.ok = true;
+    for (DomainStatus& s : domains_) {
+        s.ok = true;
+    }
     for (std::size_t n = 0; n < datagrams_used_; ++n) {
         Datagram& d = datagrams_[n];
         if (!d.sent) continue;
-        DomainStatus&       s = domains_[d.domain];
+        DomainStatus& s = domains_[d.domain];
         const std::uint16_t wkc = d.answered ? d.wkc : std::uint16_t{0};
         s.wkc = static_cast<std::uint16_t>(s.wkc + wkc);
         s.expected = static_cast<std::uint16_t>(s.expected + d.expected);
@@ -316,17 +402,27 @@ void ProcessImage::settle() noexcept {
     for (DomainStatus& s : domains_) {
         if (!s.fresh) continue;
         ++s.exchanges;
-        const WkcState state = s.ok && s.expected != 0 ? WkcState::complete : s.wkc == 0 ? WkcState::none : WkcState::part;
+        const WkcState state = s.ok && s.expected != 0 ? WkcState::complete
+                               : s.wkc == 0            ? WkcState::none
+                                                       : WkcState::part;
         if (state == WkcState::complete) {
-            if (!s.was_complete) s.was_complete = true, s.least = s.wkc, s.changes = 0;
+            if (!s.was_complete) {
+                s.was_complete = true;
+                s.least = s.wkc;
+                s.changes = 0;
+            }
             s.bad_cycles = 0;
         } else {
-            if (s.expected != 0) ++s.incomplete;
+            if (s.expected != 0) {
+                ++s.incomplete;
+            }
             ++s.bad_cycles;
         }
         if (s.was_complete) {
             s.least = std::min(s.least, s.wkc);
-            if (state != s.state) ++s.changes;
+            if (state != s.state) {
+                ++s.changes;
+            }
         }
         s.state = state;
     }

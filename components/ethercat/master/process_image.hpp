@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Layout of the process data: the logical address space, and the frames that carry it, prebuilt so that a cycle only copies data.
+// Layout of the process data: the logical address space, and the frames that carry it, prebuilt so
+// that a cycle only copies data.
 //
-// Each domain is a list of blocks. A block holds the outputs of some slaves, then their inputs, and fits one datagram: LRW, or LWR and LRD
-// where a slave does not support LRW. Inputs and outputs have different addresses, so the input bytes of a frame leave as zeros, and the
-// answers of two frames that went round a ring from both ends can be ORed. Only a slave with more data than a frame holds is cut.
+// Each domain is a list of blocks. A block holds the outputs of some slaves, then their inputs, and
+// fits one datagram: LRW, or LWR and LRD where a slave does not support LRW. Inputs and outputs
+// have different addresses, so the input bytes of a frame leave as zeros, and the answers of two
+// frames that went round a ring from both ends can be ORed. Only a slave with more data than a
+// frame holds is cut.
 #pragma once
 
 #include <array>
@@ -22,47 +25,68 @@ class ProcessImage {
 public:
     /// Process data of one sync manager: one FMMU.
     struct Area {
-        std::uint32_t at = 0, bytes = 0;  ///< logical address, which is the offset in the image too
-        bool          output = false;
+        std::uint32_t at = 0;
+        std::uint32_t bytes = 0;  ///< logical address, which is the offset in the image too
+        bool output = false;
     };
     struct SlaveImage {
-        std::uint32_t     out_at = 0, out_bytes = 0, in_at = 0, in_bytes = 0;  ///< in_bytes with the mailbox status
-        std::int64_t      mailbox_status_at = -1;  ///< address of the copy of 080Dh; -1: none
-        std::vector<Area> areas;              ///< one for each of Slave::sync_managers
-        bool              writes = false, reads = false;   ///< its FMMUs are set, so it counts in the working counter
-        bool              starting = false;                ///< its FMMUs are being set: it may count or not
-        bool              no_lrw = false;
-        std::uint16_t     domain = 0;
+        /// in_bytes with the mailbox status
+        std::uint32_t out_at = 0;
+        std::uint32_t out_bytes = 0;
+        std::uint32_t in_at = 0;
+        std::uint32_t in_bytes = 0;
+        std::int64_t mailbox_status_at = -1;  ///< address of the copy of 080Dh; -1: none
+        std::vector<Area> areas;  ///< one for each of Slave::sync_managers
+        /// its FMMUs are set, so it counts in the working counter
+        bool writes = false;
+        bool reads = false;
+        /// its FMMUs are being set: it may count or not
+        bool starting = false;
+        bool no_lrw = false;
+        std::uint16_t domain = 0;
     };
     struct Datagram {
         std::uint32_t address = 0;
-        std::uint16_t length = 0, offset = 0;            ///< offset of its header in the frame
-        std::uint16_t in_from = 0, in_to = 0;            ///< input bytes in its data
-        std::uint16_t out_to = 0;                        ///< output bytes in its data: [0, out_to)
-        std::uint16_t expected = 0, tolerance = 0, wkc = 0;
+        std::uint16_t length = 0;
+        std::uint16_t offset = 0;  ///< offset of its header in the frame
+        std::uint16_t in_from = 0;
+        std::uint16_t in_to = 0;  ///< input bytes in its data
+        std::uint16_t out_to = 0;  ///< output bytes in its data: [0, out_to)
+        std::uint16_t expected = 0;
+        std::uint16_t tolerance = 0;
+        std::uint16_t wkc = 0;
         std::uint16_t domain = 0;
-        std::uint16_t first_slave = 0, last_slave = 0;   ///< in order of the layout
-        bool          sent = false, answered = false;             ///< since settle()
+        std::uint16_t first_slave = 0;
+        std::uint16_t last_slave = 0;  ///< in order of the layout
+        bool sent = false;
+        bool answered = false;  ///< since settle()
     };
     struct Frame {
         std::array<std::uint8_t, largest_frame_bytes> bytes{};
-        std::uint16_t                                 size = 0;
-        unsigned                                      every = 1;
-        unsigned                                      first = 0, last = 0;                    ///< datagrams [first, last)
-        std::uint16_t                                 clock_write = 0, clock_read = 0;   ///< offsets of the datagrams to 0910h; 0: none
+        std::uint16_t size = 0;
+        unsigned every = 1;
+        /// datagrams [first, last)
+        unsigned first = 0;
+        unsigned last = 0;
+        /// offsets of the datagrams to 0910h; 0: none
+        std::uint16_t clock_write = 0;
+        std::uint16_t clock_read = 0;
     };
 
     explicit ProcessImage(const Setup& setup, const std::array<std::uint8_t, 6>& source);
 
-    /// Returns the process data of sync manager `n` of `Setup::slaves[slave].sync_managers`. [realtime]
+    /// Returns the process data of sync manager `n` of `Setup::slaves[slave].sync_managers`.
+    /// [realtime]
     std::span<std::uint8_t> data(std::size_t slave, std::size_t n) noexcept {
         const Area& area = slaves_[slave].areas[n];
         return {image_.data() + area.at, area.bytes};
     }
-    const SlaveImage& slave(std::size_t n) const noexcept { return slaves_[n]; }  ///< Returns the layout of a slave. [realtime]
+    /// Returns the layout of a slave. [realtime]
+    const SlaveImage& slave(std::size_t n) const noexcept { return slaves_[n]; }
     /// Returns where 080Dh of a slave is copied to, or nullptr. [realtime]
     const std::uint8_t* mailbox_status(std::size_t n) const noexcept {
-        return slaves_[n].mailbox_status_at < 0 ? nullptr : image_.data() + slaves_[n].mailbox_status_at;
+        return slaves_[n].mailbox_status_at < 0 ? nullptr
+                                                : image_.data() + slaves_[n].mailbox_status_at;
     }
 
     /// Marks a slave that does not support LRW; follow with build(). [realtime]
@@ -71,56 +95,71 @@ public:
     void build() noexcept;
     /// Changes how a slave counts in the working counters. [realtime]
     void set_counting(std::size_t slave, bool writes, bool reads, bool starting) noexcept;
-    /// Clears the inputs of a lost slave's mailbox status, so that no client waits for a missing mail. [realtime]
+    /// Clears the inputs of a lost slave's mailbox status, so that no client waits for a missing
+    /// mail. [realtime]
     void clear_mailbox_status(std::size_t slave) noexcept;
     /// Addresses the datagrams of the reference clock; 0: nobody. [realtime]
     void set_reference(std::uint16_t station, bool write_time) noexcept;
 
     std::span<Frame> frames() noexcept { return {frames_.data(), frames_used_}; }  ///< [realtime]
-    /// Copies outputs into a frame that is about to leave, with its index and the time for the reference clock. [realtime]
+    /// Copies outputs into a frame that is about to leave, with its index and the time for the
+    /// reference clock. [realtime]
     void fill(Frame& frame, std::uint8_t index, std::uint64_t dc_time_ns) noexcept;
     /// Returns whether `answer` has the datagrams of `frame`. [realtime]
     bool matches(const Frame& frame, std::span<const std::uint8_t> answer) const noexcept;
     /// Takes the inputs and counters of an answer that matches. [realtime]
     void take(const Frame& frame, const std::uint8_t* answer) noexcept;
-    /// ORs the inputs of `second` into `first` and adds the working counters: both halves of a broken ring. [realtime]
+    /// ORs the inputs of `second` into `first` and adds the working counters: both halves of a
+    /// broken ring. [realtime]
     void merge(const Frame& frame, std::uint8_t* first, const std::uint8_t* second) const noexcept;
 
-    std::span<const Datagram>      datagrams() const noexcept { return {datagrams_.data(), datagrams_used_}; }  ///< [realtime]
-    std::span<const std::uint16_t> order() const noexcept { return order_; }  ///< slaves in order of the layout. [realtime]
-    DomainStatus&                  domain(std::size_t n) noexcept { return domains_[n]; }      ///< [realtime]
-    std::size_t                    domain_count() const noexcept { return domains_.size(); }     ///< [realtime]
-    /// Sums the counters of the datagrams sent since the last call, per domain; a datagram without answer counts 0. [realtime]
+    /// [realtime]
+    std::span<const Datagram> datagrams() const noexcept {
+        return {datagrams_.data(), datagrams_used_};
+    }
+    /// slaves in order of the layout. [realtime]
+    std::span<const std::uint16_t> order() const noexcept { return order_; }
+    /// [realtime]
+    DomainStatus& domain(std::size_t n) noexcept { return domains_[n]; }
+    /// [realtime]
+    std::size_t domain_count() const noexcept { return domains_.size(); }
+    /// Sums the counters of the datagrams sent since the last call, per domain; a datagram without
+    /// answer counts 0. [realtime]
     void settle() noexcept;
 
 private:
     struct Block {
-        std::uint32_t at = 0, out_bytes = 0, in_bytes = 0;
-        std::uint16_t first = 0, last = 0;  ///< in order_
+        std::uint32_t at = 0;
+        std::uint32_t out_bytes = 0;
+        std::uint32_t in_bytes = 0;
+        std::uint16_t first = 0;
+        std::uint16_t last = 0;  ///< in order_
         std::uint16_t domain = 0;
-        unsigned      every = 1;
+        unsigned every = 1;
     };
-    void        lay_out(const Setup&);
-    void        close(Block&, std::uint32_t& at);
-    void        recount() noexcept;
-    void        build_frames(unsigned every) noexcept;
-    void        add(FrameWriter&, Frame&, Command, std::uint32_t at, std::uint32_t length, const Block&) noexcept;
-    void        copy_present(const Datagram&, const std::uint8_t* data) noexcept;
+    void lay_out(const Setup&);
+    void close(Block&, std::uint32_t& at);
+    void recount() noexcept;
+    void build_frames(unsigned every) noexcept;
+    void add(FrameWriter&, Frame&, Command, std::uint32_t at, std::uint32_t length,
+             const Block&) noexcept;
+    void copy_present(const Datagram&, const std::uint8_t* data) noexcept;
     std::size_t room() const noexcept;
 
-    std::vector<SlaveImage>     slaves_;
-    std::vector<std::uint16_t>  order_;
-    std::vector<Block>          blocks_;
-    std::vector<std::uint8_t>   image_;
-    std::vector<Datagram>       datagrams_;
-    std::vector<Frame>          frames_;
-    std::vector<DomainStatus>   domains_;
-    std::size_t                 datagrams_used_ = 0, frames_used_ = 0;
+    std::vector<SlaveImage> slaves_;
+    std::vector<std::uint16_t> order_;
+    std::vector<Block> blocks_;
+    std::vector<std::uint8_t> image_;
+    std::vector<Datagram> datagrams_;
+    std::vector<Frame> frames_;
+    std::vector<DomainStatus> domains_;
+    std::size_t datagrams_used_ = 0;
+    std::size_t frames_used_ = 0;
     std::array<std::uint8_t, 6> source_;
-    std::size_t                 most_;  ///< bytes of the longest frame
-    bool                        write_clock_ = false;
-    std::uint16_t               reference_ = 0;
-    bool                        write_time_ = false;
+    std::size_t most_;  ///< bytes of the longest frame
+    bool write_clock_ = false;
+    std::uint16_t reference_ = 0;
+    bool write_time_ = false;
 };
 
 }  // namespace hal::ethercat::master

@@ -10,7 +10,7 @@ namespace hal::ethercat::master {
 namespace {
 
 using Stage = MailboxRequest::Stage;
-constexpr std::int64_t  eoe_poll_interval_ns = 10'000'000;
+constexpr std::int64_t eoe_poll_interval_ns = 10'000'000;
 constexpr MailboxResult nobody{MailboxResult::Outcome::lost, 0, 0};
 
 // Type, 1 for CoE: the reply to a request of the gateway, never an unrequested message.
@@ -42,7 +42,9 @@ bool RequestPort::finished(MailboxRequest& request) const noexcept {
 }
 
 void RequestPort::wait(MailboxRequest& request) const noexcept {
-    while (!finished(request)) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    while (!finished(request)) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
 }
 
 RequestServer::RequestServer(Mailboxes& mailboxes, Find find, std::size_t workers)
@@ -55,12 +57,16 @@ RequestServer::RequestServer(Mailboxes& mailboxes, Find find, std::size_t worker
       eoe_(mailboxes),
       voe_(mailboxes),
       slots_(mailboxes.size()) {
-    for (std::size_t i = 0; i < std::max<std::size_t>(workers, 1); ++i) workers_.push_back(std::make_unique<Worker>());
+    for (std::size_t i = 0; i < std::max<std::size_t>(workers, 1); ++i) {
+        workers_.push_back(std::make_unique<Worker>());
+    }
 }
 
 RequestServer::~RequestServer() { stop(); }
 
-RequestPort& RequestServer::open(std::size_t capacity) { return *ports_.emplace_back(std::make_unique<RequestPort>(capacity)); }
+RequestPort& RequestServer::open(std::size_t capacity) {
+    return *ports_.emplace_back(std::make_unique<RequestPort>(capacity));
+}
 
 void RequestServer::finish(MailboxRequest& request, const MailboxResult& result) noexcept {
     request.result = result;
@@ -68,7 +74,9 @@ void RequestServer::finish(MailboxRequest& request, const MailboxResult& result)
 }
 
 void RequestServer::finish(Worker& worker) noexcept {
-    if (worker.request != nullptr) finish(*std::exchange(worker.request, nullptr), nobody);
+    if (worker.request != nullptr) {
+        finish(*std::exchange(worker.request, nullptr), nobody);
+    }
     slots_[worker.slave].busy = false;
 }
 
@@ -91,50 +99,64 @@ void RequestServer::collect() noexcept {
 void RequestServer::step(std::int64_t now_ns) noexcept {
     collect();
     constexpr std::size_t looked_at = 16;  // slots in a cycle while nothing is requested
-    const std::size_t     most = waiting_ != 0 ? slots_.size() : std::min(slots_.size(), looked_at);
-    std::size_t           at = 0;
+    const std::size_t most = waiting_ != 0 ? slots_.size() : std::min(slots_.size(), looked_at);
+    std::size_t at = 0;
     for (const auto& worker : workers_) {
         if (worker->channel.busy()) continue;
         for (; at < most; ++at) {
             const std::size_t n = (next_slot_ + at) % slots_.size();
-            Slot&             slot = slots_[n];
+            Slot& slot = slots_[n];
             if (slot.busy) continue;
             BusSlave* slave = find_(static_cast<std::uint16_t>(n));
             if (slave == nullptr || mailboxes_.find(*slave) == nullptr) {
-                for (; slot.first != nullptr; --waiting_)
-                    finish(*std::exchange(slot.first, slot.first->next), slave == nullptr ? nobody : refused());
+                for (; slot.first != nullptr; --waiting_) {
+                    finish(*std::exchange(slot.first, slot.first->next),
+                           slave == nullptr ? nobody : refused());
+                }
                 slot.last = nullptr;
                 continue;
             }
-            const bool full = slave->mailbox_status != nullptr && (*slave->mailbox_status & 0x08) != 0;
-            const bool frames = !full && switch_ != nullptr && switch_->pending(*slave);  // what it sent comes first: it may wait for that
-            const auto interval =
-                switch_ != nullptr && switch_->has(*slave) ? std::min(poll_interval_ns_, eoe_poll_interval_ns) : poll_interval_ns_;
-            const bool due =
-                slave->mailbox_status == nullptr && poll_interval_ns_ != 0 && slave->present && now_ns - slot.polled_ns >= interval;
+            const bool full =
+                slave->mailbox_status != nullptr && (*slave->mailbox_status & 0x08) != 0;
+            // what it sent comes first: it may wait for that
+            const bool frames = !full && switch_ != nullptr && switch_->pending(*slave);
+            const auto interval = switch_ != nullptr && switch_->has(*slave)
+                                      ? std::min(poll_interval_ns_, eoe_poll_interval_ns)
+                                      : poll_interval_ns_;
+            const bool due = slave->mailbox_status == nullptr && poll_interval_ns_ != 0 &&
+                             slave->present && now_ns - slot.polled_ns >= interval;
             if (slot.first == nullptr && !frames && !full && !due) continue;
-            if (slot.first == nullptr && mailboxes_.at(n).held()) continue;  // its holder reads the mailbox
-            slot.busy = true, slot.polled_ns = now_ns;
+            // its holder reads the mailbox
+            if (slot.first == nullptr && mailboxes_.at(n).held()) continue;
+            slot.busy = true;
+            slot.polled_ns = now_ns;
             worker->slave = static_cast<std::uint16_t>(n);
             worker->channel.set_now(now_ns);
             if (slot.first != nullptr) {
                 worker->request = std::exchange(slot.first, slot.first->next);
                 --waiting_;
-                if (slot.first == nullptr) slot.last = nullptr;
+                if (slot.first == nullptr) {
+                    slot.last = nullptr;
+                }
                 worker->request->stage = Stage::running;
                 worker->channel.start([&] { return serve(worker->channel, *worker, *slave); });
             } else {
-                worker->channel.start([&] { return serve_unrequested(worker->channel, *worker, *slave, frames); });
+                worker->channel.start(
+                    [&] { return serve_unrequested(worker->channel, *worker, *slave, frames); });
             }
             ++at;
             break;
         }
     }
-    if (!slots_.empty()) next_slot_ = (next_slot_ + at) % slots_.size();
+    if (!slots_.empty()) {
+        next_slot_ = (next_slot_ + at) % slots_.size();
+    }
 }
 
 void RequestServer::stop() noexcept {
-    for (const auto& port : ports_) port->closed_ = true;
+    for (const auto& port : ports_) {
+        port->closed_ = true;
+    }
     for (const auto& worker : workers_) {
         if (!worker->channel.busy()) continue;
         worker->channel.stop();
@@ -142,46 +164,73 @@ void RequestServer::stop() noexcept {
     }
     collect();
     for (auto& slot : slots_) {
-        while (slot.first != nullptr) finish(*std::exchange(slot.first, slot.first->next), nobody);
+        while (slot.first != nullptr) {
+            finish(*std::exchange(slot.first, slot.first->next), nobody);
+        }
         slot.last = nullptr;
     }
     waiting_ = 0;
 }
 
 Task<> RequestServer::serve(Channel& channel, Worker& worker, BusSlave& slave) noexcept {
-    FoeProgress&        progress = worker.request->progress != nullptr ? *worker.request->progress : worker.progress;
+    FoeProgress& progress =
+        worker.request->progress != nullptr ? *worker.request->progress : worker.progress;
     const MailboxResult result = co_await execute(channel, slave, *worker.request, progress);
     slots_[worker.slave].busy = false;
     finish(*std::exchange(worker.request, nullptr), result);
 }
 
-Task<> RequestServer::serve_unrequested(Channel& channel, Worker& worker, BusSlave& slave, bool frames) noexcept {
+Task<> RequestServer::serve_unrequested(Channel& channel, Worker& worker, BusSlave& slave,
+                                        bool frames) noexcept {
     if (frames) {
         co_await switch_->serve(channel, slave);
     } else {
-        SlaveMailbox&            mailbox = mailboxes_.at(slave.number);
+        SlaveMailbox& mailbox = mailboxes_.at(slave.number);
         const SlaveMailbox::Hold hold = co_await mailbox.hold(channel);
         co_await mailbox.poll(channel, slave);
     }
     slots_[worker.slave].busy = false;
 }
 
-Task<MailboxResult> RequestServer::execute(Channel& channel, BusSlave& slave, MailboxRequest& r, FoeProgress& progress) noexcept {
+Task<MailboxResult> RequestServer::execute(Channel& channel, BusSlave& slave, MailboxRequest& r,
+                                           FoeProgress& progress) noexcept {
     using Kind = MailboxRequest::Kind;
     const std::span<char> name{reinterpret_cast<char*>(r.data.data()), r.data.size()};
-    MailboxResult         result = refused();
+    MailboxResult result = refused();
     switch (r.kind) {
-    case Kind::sdo_upload: result = co_await coe_.upload(channel, slave, r.index, r.sub, r.complete, r.data); break;
-    case Kind::sdo_download: result = co_await coe_.download(channel, slave, r.index, r.sub, r.complete, r.data); break;
-    case Kind::object_list: result = co_await coe_.list(channel, slave, static_cast<coe::List>(r.index), r.data); break;
-    case Kind::object: result = co_await coe_.object(channel, slave, r.index, r.object, name); break;
-    case Kind::entry: result = co_await coe_.entry(channel, slave, r.index, r.sub, r.entry, name); break;
-    case Kind::foe_read: result = co_await foe_.read(channel, slave, r.name, r.foe, r.data, progress); break;
-    case Kind::foe_write: result = co_await foe_.write(channel, slave, r.name, r.foe, r.data, progress); break;
-    case Kind::soe_read: result = co_await soe_.read(channel, slave, r.sub, r.index, r.elements, r.data); break;
-    case Kind::soe_write: result = co_await soe_.write(channel, slave, r.sub, r.index, r.elements, r.data); break;
-    case Kind::aoe_read: result = co_await aoe_.read(channel, slave, r.aoe, r.group, r.offset, r.data); break;
-    case Kind::aoe_write: result = co_await aoe_.write(channel, slave, r.aoe, r.group, r.offset, r.data); break;
+    case Kind::sdo_upload:
+        result = co_await coe_.upload(channel, slave, r.index, r.sub, r.complete, r.data);
+        break;
+    case Kind::sdo_download:
+        result = co_await coe_.download(channel, slave, r.index, r.sub, r.complete, r.data);
+        break;
+    case Kind::object_list:
+        result = co_await coe_.list(channel, slave, static_cast<coe::List>(r.index), r.data);
+        break;
+    case Kind::object:
+        result = co_await coe_.object(channel, slave, r.index, r.object, name);
+        break;
+    case Kind::entry:
+        result = co_await coe_.entry(channel, slave, r.index, r.sub, r.entry, name);
+        break;
+    case Kind::foe_read:
+        result = co_await foe_.read(channel, slave, r.name, r.foe, r.data, progress);
+        break;
+    case Kind::foe_write:
+        result = co_await foe_.write(channel, slave, r.name, r.foe, r.data, progress);
+        break;
+    case Kind::soe_read:
+        result = co_await soe_.read(channel, slave, r.sub, r.index, r.elements, r.data);
+        break;
+    case Kind::soe_write:
+        result = co_await soe_.write(channel, slave, r.sub, r.index, r.elements, r.data);
+        break;
+    case Kind::aoe_read:
+        result = co_await aoe_.read(channel, slave, r.aoe, r.group, r.offset, r.data);
+        break;
+    case Kind::aoe_write:
+        result = co_await aoe_.write(channel, slave, r.aoe, r.group, r.offset, r.data);
+        break;
     case Kind::voe_send: result = co_await voe_.send(channel, slave, r.voe, r.data); break;
     case Kind::set_ip: result = co_await eoe_.set_ip(channel, slave, r.ip); break;
     case Kind::get_ip: result = co_await eoe_.get_ip(channel, slave, r.ip); break;
@@ -190,24 +239,33 @@ Task<MailboxResult> RequestServer::execute(Channel& channel, BusSlave& slave, Ma
     co_return result;
 }
 
-Task<MailboxResult> RequestServer::pass(Channel& channel, BusSlave& slave, MailboxRequest& r) noexcept {
+Task<MailboxResult> RequestServer::pass(Channel& channel, BusSlave& slave,
+                                        MailboxRequest& r) noexcept {
     const auto request = read_mailbox(r.data.first(std::min(r.length, r.data.size())));
     if (!request) co_return refused();
-    SlaveMailbox&            mailbox = mailboxes_.at(slave.number);
+    SlaveMailbox& mailbox = mailboxes_.at(slave.number);
     const SlaveMailbox::Hold hold = co_await mailbox.hold(channel);
-    const auto               body = mailbox.body(slave);
-    const std::size_t        length = request->payload.size();
+    const auto body = mailbox.body(slave);
+    const std::size_t length = request->payload.size();
     if (length > body.size()) co_return refused(0, length);
-    if (length != 0) std::memcpy(body.data(), request->payload.data(), length);
-    const Expected      expected{accepts_reply, static_cast<std::uint32_t>(request->type)};
-    const MailboxResult result = co_await mailbox.exchange(channel, slave, request->type, length, expected);
-    const bool          fault = result.outcome == MailboxResult::Outcome::refused && result.abort != 0;  // is a reply, too
+    if (length != 0) {
+        std::memcpy(body.data(), request->payload.data(), length);
+    }
+    const Expected expected{accepts_reply, static_cast<std::uint32_t>(request->type)};
+    const MailboxResult result =
+        co_await mailbox.exchange(channel, slave, request->type, length, expected);
+    // is a reply, too
+    const bool fault = result.outcome == MailboxResult::Outcome::refused && result.abort != 0;
     if (!result && !fault) co_return result;
     const MailboxMessage& reply = mailbox.reply();
-    const std::size_t     bytes = mailbox_header_bytes + reply.payload.size();
+    const std::size_t bytes = mailbox_header_bytes + reply.payload.size();
     if (bytes > r.data.size()) co_return refused(0, bytes);
-    write_mailbox_header(r.data.data(), reply.payload.size(), request->station, reply.type, reply.counter);
-    if (!reply.payload.empty()) std::memcpy(r.data.data() + mailbox_header_bytes, reply.payload.data(), reply.payload.size());
+    write_mailbox_header(r.data.data(), reply.payload.size(), request->station, reply.type,
+                         reply.counter);
+    if (!reply.payload.empty()) {
+        std::memcpy(r.data.data() + mailbox_header_bytes, reply.payload.data(),
+                    reply.payload.size());
+    }
     co_return succeeded(bytes);
 }
 

@@ -12,14 +12,15 @@ namespace hal::ethercat::master {
 
 /// Four words of the SII.
 struct SiiData {
-    bool                         ok = false;
-    std::uint16_t                control = 0;  ///< 0502h as last read, for messages
+    bool ok = false;
+    std::uint16_t control = 0;  ///< 0502h as last read, for messages
     std::array<std::uint16_t, 4> words{};
 };
 
 /// Reads four words from word address `word` on. [realtime]
 Task<SiiData> sii_read(Channel&, std::uint16_t station, std::uint32_t word) noexcept;
 /// Writes a word; waits until the EEPROM has stored it. [realtime]
-Task<bool> sii_write(Channel&, std::uint16_t station, std::uint32_t word, std::uint16_t value) noexcept;
+Task<bool> sii_write(Channel&, std::uint16_t station, std::uint32_t word,
+                     std::uint16_t value) noexcept;
 
 }  // namespace hal::ethercat::master

@@ -13,10 +13,10 @@ constexpr std::int64_t retry_after_ns = 1'000 * millisecond;
 constexpr std::uint16_t code(State state) noexcept { return static_cast<std::uint16_t>(state); }
 
 Task<bool> bring_up(Channel& c, Bus& bus, Device& d) noexcept {
-    const Slave*    config = bus.config(d);
-    const State     last = bus.target(d);
+    const Slave* config = bus.config(d);
+    const State last = bus.target(d);
     const Timeouts& t = d.slave.timeouts;
-    const auto      done = [&](State reached) {
+    const auto done = [&](State reached) {
         if (reached != last) return false;
         d.settled = config != nullptr;
         d.status.operational = d.settled && reached == State::op;
@@ -40,7 +40,9 @@ Task<bool> bring_up(Channel& c, Bus& bus, Device& d) noexcept {
     }
     ok = co_await request_state(c, bus, d, State::preop, t.to_preop);
     if (!ok) co_return false;
-    if (config == nullptr) co_return true;  // not in the setup: stays here for tools
+    if (config == nullptr) {
+        co_return true;  // not in the setup: stays here for tools
+    }
 
     ok = co_await startup_writes(c, bus, d, State::safeop);
     if (!ok) co_return false;
@@ -57,14 +59,22 @@ Task<bool> bring_up(Channel& c, Bus& bus, Device& d) noexcept {
     ok = co_await request_state(c, bus, d, State::safeop, t.to_safeop_op);
     if (!ok) co_return false;
     const auto& image = bus.image.slave(static_cast<std::size_t>(d.slave.configured));
-    bus.image.set_counting(static_cast<std::size_t>(d.slave.configured), image.writes, image.reads, false);
+    bus.image.set_counting(static_cast<std::size_t>(d.slave.configured), image.writes, image.reads,
+                           false);
     if (done(State::safeop)) co_return true;
 
     ok = co_await startup_writes(c, bus, d, State::op);
     if (!ok) co_return false;
-    for (unsigned cycles = 0; cycles < 3 || !bus.outputs_valid; ++cycles) co_await c.sleep(0);  // valid outputs reach it before OP
-    if (d.sync_begins_ns > c.now_ns()) co_await c.sleep_until(d.sync_begins_ns + bus.setup.cycle_ns);  // after the first one
-    ok = co_await synchronise(c, bus, d);  // a clock may have jumped while the slave waited for its SYNC signals
+    // valid outputs reach it before OP
+    for (unsigned cycles = 0; cycles < 3 || !bus.outputs_valid; ++cycles) {
+        co_await c.sleep(0);
+    }
+    // after the first one
+    if (d.sync_begins_ns > c.now_ns()) {
+        co_await c.sleep_until(d.sync_begins_ns + bus.setup.cycle_ns);
+    }
+    // a clock may have jumped while the slave waited for its SYNC signals
+    ok = co_await synchronise(c, bus, d);
     if (!ok) co_return false;
     bus.note_in_op(d, true);
     ok = co_await request_state(c, bus, d, State::op, t.to_safeop_op);
@@ -80,19 +90,23 @@ Task<bool> read_state(Channel& c, Bus&, Device& d) noexcept {
     const auto status = get<std::uint16_t>(c.data());
     d.slave.state = d.status.state = static_cast<State>(status & 0x0f);
     d.slave.al_failed = d.status.al_error = (status & al_error) != 0;
-    d.slave.al_code = d.status.al_code = d.slave.al_failed ? get<std::uint16_t>(c.data() + 4) : std::uint16_t{0};
+    d.slave.al_code = d.status.al_code =
+        d.slave.al_failed ? get<std::uint16_t>(c.data() + 4) : std::uint16_t{0};
     co_return true;
 }
 
-Task<bool> request_state(Channel& c, Bus& bus, Device& d, State state, std::uint32_t timeout_ms) noexcept {
+Task<bool> request_state(Channel& c, Bus& bus, Device& d, State state,
+                         std::uint32_t timeout_ms) noexcept {
     bool answers = co_await read_state(c, bus, d);
     if (answers && d.slave.state == state && !d.slave.al_failed) co_return true;
-    // A request for INIT acknowledges whatever went before; other requests start from a state without error.
-    const auto   control = static_cast<std::uint16_t>(code(state) | (state == State::init || d.slave.al_failed ? al_error : 0));
+    // A request for INIT acknowledges whatever went before; other requests start from a state
+    // without error.
+    const auto control = static_cast<std::uint16_t>(
+        code(state) | (state == State::init || d.slave.al_failed ? al_error : 0));
     const Answer a = co_await write(c, d.slave, registers::al_control, control);
     if (!answers || a.wkc != 1) co_return false;
     const std::int64_t until = c.now_ns() + timeout_ms * millisecond;
-    unsigned           silent = 0;
+    unsigned silent = 0;
     while (c.now_ns() < until && silent < 3) {
         answers = co_await read_state(c, bus, d);
         silent = answers ? 0 : silent + 1;
@@ -108,7 +122,9 @@ Task<bool> request_state(Channel& c, Bus& bus, Device& d, State state, std::uint
             co_return true;
         }
     }
-    if (silent < 3) bus.report(Event::state_timeout, d, code(state), code(d.slave.state));
+    if (silent < 3) {
+        bus.report(Event::state_timeout, d, code(state), code(d.slave.state));
+    }
     co_return false;
 }
 
@@ -135,8 +151,11 @@ Task<void> boot(Channel& c, Bus& bus, Device& d) noexcept {
     d.attempts = 0;
     if (!d.settled) co_return;
     const std::int64_t took_ms = (c.now_ns() - d.began_ns) / millisecond;
-    if (d.status.operational) bus.report(Event::slave_operational, d, d.slave.position, took_ms);
-    else bus.report(Event::slave_settled, d, code(d.slave.state), took_ms);
+    if (d.status.operational) {
+        bus.report(Event::slave_operational, d, d.slave.position, took_ms);
+    } else {
+        bus.report(Event::slave_settled, d, code(d.slave.state), took_ms);
+    }
 }
 
 }  // namespace hal::ethercat::master

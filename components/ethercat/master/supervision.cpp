@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The work for the whole bus: scan, start-up of all slaves at once, then the watch for slaves that fail, go, or return.
+// The work for the whole bus: scan, start-up of all slaves at once, then the watch for slaves that
+// fail, go, or return.
 #include <algorithm>
 
 #include "ethercat/master/bus.hpp"
@@ -9,23 +10,29 @@ namespace hal::ethercat::master {
 
 namespace {
 
-constexpr std::int64_t  look_every_ns = 10 * millisecond, empty_retry_ns = 100 * millisecond, rediscover_every_ns = 50 * millisecond;
-constexpr std::int64_t  counters_every_ns = 1'000 * millisecond, clocks_every_ns = 100 * millisecond;
+constexpr std::int64_t look_every_ns = 10 * millisecond;
+constexpr std::int64_t empty_retry_ns = 100 * millisecond;
+
+constexpr std::int64_t rediscover_every_ns = 50 * millisecond;
+constexpr std::int64_t counters_every_ns = 1'000 * millisecond;
+constexpr std::int64_t clocks_every_ns = 100 * millisecond;
 constexpr std::uint16_t spare_station = 0x0fff;
-constexpr std::uint8_t  counter_high = 0x80;
+constexpr std::uint8_t counter_high = 0x80;
 /// In a second: fewer may be damaged or late ones.
 constexpr std::uint64_t other_master_frames = 10;
 
 /// Finds the tree; `changed`: the ports may have changed since the slaves were identified.
 Task<void> find_ports(Channel& c, Bus& bus, bool changed) noexcept {
     std::array<BusSlave*, 1024> line{};
-    std::size_t                 count = 0;
+    std::size_t count = 0;
     for (const std::uint16_t number : bus.by_position) {
         BusSlave& s = bus.devices[number]->slave;
         if (count == line.size()) break;
         if (changed && s.present) {
             const Answer a = co_await read(c, s, registers::dl_status, 2);
-            if (a.wkc == 1) s.dl_status = get<std::uint16_t>(c.data());
+            if (a.wkc == 1) {
+                s.dl_status = get<std::uint16_t>(c.data());
+            }
         }
         line[count++] = &s;
     }
@@ -35,63 +42,87 @@ Task<void> find_ports(Channel& c, Bus& bus, bool changed) noexcept {
 void start(Bus& bus, Device& d) noexcept {
     if (d.refused || !d.identified) return;
     if (d.slave.configured < 0) {
-        if (bus.setup.accept_other_slaves || bus.setup.slaves.empty()) bus.run(d, [&] { return boot(d.channel, bus, d); });
+        if (bus.setup.accept_other_slaves || bus.setup.slaves.empty()) {
+            bus.run(d, [&] { return boot(d.channel, bus, d); });
+        }
         return;
     }
     bus.run(d, [&] { return boot(d.channel, bus, d); });
 }
 
-/// Identifies a slave without known address at a position, and makes it one of those that are missing. Returns its device, or -1.
+/// Identifies a slave without known address at a position, and makes it one of those that are
+/// missing. Returns its device, or -1.
 Task<int> take_in(Channel& c, Bus& bus, std::uint16_t position) noexcept {
     BusSlave found;
-    found.station = spare_station, found.position = position;
+    found.station = spare_station;
+    found.position = position;
     // One that was not accepted before keeps the spare address; two of them would both answer.
     co_await write<std::uint16_t>(c, found, registers::station_address, 0);
     put(c.data(), spare_station);
-    Answer a = co_await c.exchange(Command::apwr, at_position(position, registers::station_address), 2);
+    Answer a =
+        co_await c.exchange(Command::apwr, at_position(position, registers::station_address), 2);
     if (a.wkc != 1) co_return -1;
     const bool identified = co_await identify(c, bus, found);
     if (!identified) co_return -1;
     Device* place = nullptr;
-    int     configured = -1;
+    int configured = -1;
     for (std::size_t n = 0; n < bus.setup.slaves.size() && place == nullptr; ++n) {
         const Slave& want = bus.setup.slaves[n];
-        Device*      before = bus.device_of[n] >= 0 ? bus.devices[static_cast<std::size_t>(bus.device_of[n])].get() : nullptr;
+        Device* before = bus.device_of[n] >= 0
+                             ? bus.devices[static_cast<std::size_t>(bus.device_of[n])].get()
+                             : nullptr;
         if (before != nullptr && before->slave.present) continue;
-        if (!is_at_its_place(want, found) && !(want.optional && !want.identity.alias && !want.identity.device_id)) continue;
+        if (!is_at_its_place(want, found) &&
+            !(want.optional && !want.identity.alias && !want.identity.device_id)) {
+            continue;
+        }
         if (!matches(bus, want, found, nullptr)) continue;
         configured = static_cast<int>(n);
         place = before;
-        if (place == nullptr)
-            for (const auto& d : bus.devices)
+        if (place == nullptr) {
+            for (const auto& d : bus.devices) {
                 if (!d->slave.present && d->slave.configured < 0) {
                     place = d.get();
                     break;
                 }
+            }
+        }
     }
     if (place == nullptr) {
-        for (std::size_t n = 0; n < bus.setup.slaves.size(); ++n) {  // the position is known, the slave is another one
+        // the position is known, the slave is another one
+        for (std::size_t n = 0; n < bus.setup.slaves.size(); ++n) {
             const int device = bus.device_of[n];
-            if (bus.setup.slaves[n].position != position || (device >= 0 && bus.devices[static_cast<std::size_t>(device)]->slave.present))
+            if (bus.setup.slaves[n].position != position ||
+                (device >= 0 && bus.devices[static_cast<std::size_t>(device)]->slave.present)) {
                 continue;
-            if (device >= 0 && found.product != bus.unknown_product)
-                matches(bus, bus.setup.slaves[n], found, bus.devices[static_cast<std::size_t>(device)].get());
+            }
+            if (device >= 0 && found.product != bus.unknown_product) {
+                matches(bus, bus.setup.slaves[n], found,
+                        bus.devices[static_cast<std::size_t>(device)].get());
+            }
         }
-        if (std::exchange(bus.unknown_product, found.product) != found.product)
-            bus.events.report(Event::unknown_slave, Events::of_position + position, found.vendor, found.product);
+        if (std::exchange(bus.unknown_product, found.product) != found.product) {
+            bus.events.report(Event::unknown_slave, Events::of_position + position, found.vendor,
+                              found.product);
+        }
         co_return -1;
     }
     Device& d = *place;
-    found.station = d.slave.station, found.number = d.slave.number;
-    found.configured = configured, found.present = true;
+    found.station = d.slave.station;
+    found.number = d.slave.number;
+    found.configured = configured;
+    found.present = true;
     found.timeouts = bus.setup.slaves[static_cast<std::size_t>(configured)].timeouts;
     found.complete_access = bus.setup.slaves[static_cast<std::size_t>(configured)].complete_access;
     put(c.data(), found.station);
-    a = co_await c.exchange(Command::fpwr, at_station(spare_station, registers::station_address), 2);
+    a = co_await c.exchange(Command::fpwr, at_station(spare_station, registers::station_address),
+                            2);
     if (a.wkc != 1) co_return -1;
     d.slave = found;
     bus.device_of[static_cast<std::size_t>(configured)] = d.slave.number;
-    d.identified = true, d.refused = false, d.clock_set = d.synchronised = false;
+    d.identified = true;
+    d.refused = false;
+    d.clock_set = d.synchronised = false;
     d.status.online = true;
     bus.unknown_product = 0;
     co_return d.slave.number;
@@ -99,24 +130,26 @@ Task<int> take_in(Channel& c, Bus& bus, std::uint16_t position) noexcept {
 
 /// Walks along the line after a change, and takes in slaves that are new or returned.
 Task<bool> rediscover(Channel& c, Bus& bus, unsigned count) noexcept {
-    bool                        returned = false;
+    bool returned = false;
     std::vector<std::uint16_t>& line = bus.by_position;
     line.clear();  // capacity: all devices
     for (unsigned n = 0; n < count && n < bus.devices.size(); ++n) {
-        const auto   position = static_cast<std::uint16_t>(n);
-        const Answer a = co_await c.exchange(Command::aprd, at_position(n, registers::station_address), 2);
+        const auto position = static_cast<std::uint16_t>(n);
+        const Answer a =
+            co_await c.exchange(Command::aprd, at_position(n, registers::station_address), 2);
         if (!a.arrived || a.wkc != 1) break;
-        const auto  station = get<std::uint16_t>(c.data());
+        const auto station = get<std::uint16_t>(c.data());
         std::size_t number = static_cast<std::size_t>(station) - first_station;
-        const bool  known = station >= first_station && number < bus.devices.size() &&
-                           (bus.devices[number]->identified || bus.devices[number]->slave.present) &&
-                           std::find(line.begin(), line.end(), number) == line.end();
+        const bool known =
+            station >= first_station && number < bus.devices.size() &&
+            (bus.devices[number]->identified || bus.devices[number]->slave.present) &&
+            std::find(line.begin(), line.end(), number) == line.end();
         if (!known) {
             const int taken = co_await take_in(c, bus, position);
             if (taken < 0) continue;
             number = static_cast<std::size_t>(taken);
         }
-        Device&    d = *bus.devices[number];
+        Device& d = *bus.devices[number];
         const bool back = !d.slave.present || !known;
         d.slave.position = position;
         line.push_back(static_cast<std::uint16_t>(number));
@@ -133,7 +166,9 @@ Task<bool> rediscover(Channel& c, Bus& bus, unsigned count) noexcept {
 void start_returned(Bus& bus) noexcept {
     for (const std::uint16_t number : bus.by_position) {
         Device& d = *bus.devices[number];
-        if (d.slave.present && !d.settled && !d.channel.busy()) start(bus, d);
+        if (d.slave.present && !d.settled && !d.channel.busy()) {
+            start(bus, d);
+        }
     }
 }
 
@@ -141,10 +176,12 @@ void start_returned(Bus& bus) noexcept {
 
 Task<void> check(Channel& c, Bus& bus, Device& d) noexcept {
     unsigned silent = 0;
-    bool     here = false;
+    bool here = false;
     while (!here && silent < 3) {
         here = co_await read_state(c, bus, d);
-        if (!here) ++silent;
+        if (!here) {
+            ++silent;
+        }
     }
     if (!here) {
         bus.leave(d);
@@ -155,7 +192,8 @@ Task<void> check(Channel& c, Bus& bus, Device& d) noexcept {
     const bool settles = bus.config(d) != nullptr && !d.to_boot;
     if (d.slave.state == bus.target(d) && !d.slave.al_failed && (d.settled || !settles)) co_return;
     if (d.settled) {
-        const auto status = static_cast<std::uint16_t>(static_cast<unsigned>(d.slave.state) | (d.slave.al_failed ? al_error : 0U));
+        const auto status = static_cast<std::uint16_t>(static_cast<unsigned>(d.slave.state) |
+                                                       (d.slave.al_failed ? al_error : 0U));
         bus.report(Event::fell_back, d, status, d.slave.al_code);
     }
     bus.unsettle(d);
@@ -173,50 +211,63 @@ Task<void> supervise(Channel& c, Bus& bus) noexcept {
     co_await find_ports(c, bus, false);
     bus.exchange = !bus.setup.slaves.empty();
     co_await start_clocks(c, bus);
-    for (const std::uint16_t number : bus.by_position) start(bus, *bus.devices[number]);
+    for (const std::uint16_t number : bus.by_position) {
+        start(bus, *bus.devices[number]);
+    }
 
     std::int64_t rediscovered = c.now_ns();
     while (true) {
         bus.resting = true;
-        if (!bus.suspicious) co_await c.sleep(look_every_ns);
+        if (!bus.suspicious) {
+            co_await c.sleep(look_every_ns);
+        }
         bus.resting = bus.suspicious = false;
         std::memset(c.data(), 0, 6);
-        const Answer   a = co_await c.exchange(Command::brd, at_position(0, registers::al_status), 6);
+        const Answer a = co_await c.exchange(Command::brd, at_position(0, registers::al_status), 6);
         const unsigned count = a.arrived ? a.wkc : 0;
-        const auto     states = get<std::uint16_t>(c.data());
+        const auto states = get<std::uint16_t>(c.data());
         bus.status.responding = static_cast<std::uint16_t>(count);
-        if (bus.engine.redundant()) judge_ring(bus, count);
+        if (bus.engine.redundant()) {
+            judge_ring(bus, count);
+        }
         // On a broken ring the delays are others; they are frozen until it is closed.
         if (bus.clocks_missing() && !bus.status.ring_broken) {
-            co_await find_ports(c, bus, true);  // a cable may have been closed without any slave lost
+            // a cable may have been closed without any slave lost
+            co_await find_ports(c, bus, true);
             co_await start_clocks(c, bus);
         }
 
         unsigned present = 0;
-        bool     at_rest = true;
-        for (const auto& device : bus.devices) {  // not by position: one that lost its address has none
+        bool at_rest = true;
+        // not by position: one that lost its address has none
+        for (const auto& device : bus.devices) {
             const Device& d = *device;
             present += d.slave.present ? 1 : 0;
             at_rest &= !d.slave.present || d.settled;
         }
-        const bool all_fine =
-            at_rest && count == bus.known && present == count && states == static_cast<std::uint16_t>(State::op);
+        const bool all_fine = at_rest && count == bus.known && present == count &&
+                              states == static_cast<std::uint16_t>(State::op);
         if (all_fine && bus.status.wkc_state != WkcState::part) continue;
 
         for (const auto& device : bus.devices) {
             Device& d = *device;
-            if (d.slave.present && !d.channel.busy() && !d.refused && d.identified && (d.slave.configured >= 0 || count < present))
+            if (d.slave.present && !d.channel.busy() && !d.refused && d.identified &&
+                (d.slave.configured >= 0 || count < present)) {
                 bus.run(d, [&] { return check(d.channel, bus, d); });
+            }
         }
         if (count != bus.known || present < count) {
-            if (count != bus.known) bus.report(Event::topology_changed, bus.known, count);
+            if (count != bus.known) {
+                bus.report(Event::topology_changed, bus.known, count);
+            }
             bus.known = count;
         }
         const bool somebody_waits = present < count || bus.status.responding > present;
         if (!somebody_waits || c.now_ns() - rediscovered < rediscover_every_ns) continue;
         rediscovered = c.now_ns();
-        const bool returned =
-            co_await rediscover(c, bus, bus.status.ring_broken ? static_cast<unsigned>(bus.status.break_after + 1) : count);
+        const bool returned = co_await rediscover(
+            c, bus,
+            bus.status.ring_broken ? static_cast<unsigned>(bus.status.break_after + 1) : count);
         if (!returned) continue;
         co_await find_ports(c, bus, true);
         start_returned(bus);
@@ -229,41 +280,59 @@ static Task<void> resynchronise(Channel& c, Bus& bus, Device& d) noexcept {
     bus.unsettle(d);
     d.began_ns = c.now_ns();
     bool ok = co_await request_state(c, bus, d, State::safeop, d.slave.timeouts.op_to_safeop);
-    if (ok) ok = co_await synchronise(c, bus, d);
-    if (ok) ok = co_await request_state(c, bus, d, State::op, d.slave.timeouts.to_safeop_op);
+    if (ok) {
+        ok = co_await synchronise(c, bus, d);
+    }
+    if (ok) {
+        ok = co_await request_state(c, bus, d, State::op, d.slave.timeouts.to_safeop_op);
+    }
     if (!ok) {
         co_await boot(c, bus, d);
         co_return;
     }
     d.settled = true;
     d.status.operational = true;
-    bus.report(Event::slave_operational, d, d.slave.position, (c.now_ns() - d.began_ns) / millisecond);
+    bus.report(Event::slave_operational, d, d.slave.position,
+               (c.now_ns() - d.began_ns) / millisecond);
 }
 
-/// Reports a slave that is not in step for some time although it is in OP, and stops it where the setup requires it; reports it when it is again.
+/// Reports a slave that is not in step for some time although it is in OP, and stops it where the
+/// setup requires it; reports it when it is again.
 static void judge_clock(Bus& bus, Device& d, std::int64_t now_ns) noexcept {
-    const Slave*       config = bus.config(d);
-    const std::int64_t window = std::max(bus.setup.sync_window_ns, tolerable_deviation_ns), deviation = d.status.dc_deviation_ns;
-    if (config == nullptr || !config->dc || d.slave.number == bus.reference || !d.status.operational) {
-        d.drifted = false, d.drifts_since_ns = 0;
+    const Slave* config = bus.config(d);
+    const std::int64_t window = std::max(bus.setup.sync_window_ns, tolerable_deviation_ns);
+
+    const std::int64_t deviation = d.status.dc_deviation_ns;
+    if (config == nullptr || !config->dc || d.slave.number == bus.reference ||
+        !d.status.operational) {
+        d.drifted = false;
+        d.drifts_since_ns = 0;
     } else if (deviation > window) {
-        if (d.drifts_since_ns == 0) d.drifts_since_ns = now_ns;
-        if (d.drifted || now_ns - d.drifts_since_ns < bus.setup.dc_loss_ns || d.channel.busy()) return;
+        if (d.drifts_since_ns == 0) {
+            d.drifts_since_ns = now_ns;
+        }
+        if (d.drifted || now_ns - d.drifts_since_ns < bus.setup.dc_loss_ns || d.channel.busy()) {
+            return;
+        }
         d.drifted = true;
         bus.report(Event::dc_lost, d, deviation, window);
-        if (bus.setup.dc_loss == DcLoss::safeop) bus.run(d, [&] { return resynchronise(d.channel, bus, d); });
+        if (bus.setup.dc_loss == DcLoss::safeop) {
+            bus.run(d, [&] { return resynchronise(d.channel, bus, d); });
+        }
     } else if (!d.drifted) {
         d.drifts_since_ns = 0;
     } else if (deviation <= bus.setup.sync_window_ns) {
         bus.report(Event::dc_recovered, d, deviation, (now_ns - d.drifts_since_ns) / millisecond);
-        d.drifted = false, d.drifts_since_ns = 0;
+        d.drifted = false;
+        d.drifts_since_ns = 0;
     }
 }
 
 /// Reads the deviation of every clock that is set.
 static Task<void> look_at_clocks(Channel& c, Bus& bus) noexcept {
     std::uint32_t largest = 0;
-    bool          any = false, all = true;
+    bool any = false;
+    bool all = true;
     for (const auto& device : bus.devices) {
         Device& d = *device;
         if (!d.slave.present || !d.identified) continue;
@@ -274,20 +343,27 @@ static Task<void> look_at_clocks(Channel& c, Bus& bus) noexcept {
         if (a.wkc != 1) continue;
         d.status.dc_deviation_ns = get<std::uint32_t>(c.data()) & 0x7fff'ffff;
         judge_clock(bus, d, c.now_ns());
-        if (d.slave.number != bus.reference) largest = std::max(largest, d.status.dc_deviation_ns);
+        if (d.slave.number != bus.reference) {
+            largest = std::max(largest, d.status.dc_deviation_ns);
+        }
         any = true;
     }
     bus.status.dc_deviation_ns = any ? largest : UINT32_MAX;
     const bool synchronised = any && all && largest <= bus.setup.sync_window_ns;
-    if (synchronised && !bus.status.dc_synchronised) bus.report(Event::dc_synchronised, largest);
+    if (synchronised && !bus.status.dc_synchronised) {
+        bus.report(Event::dc_synchronised, largest);
+    }
     bus.status.dc_synchronised = synchronised;
 }
 
-/// Returns whether a clock of the line may be far beyond the window: one datagram reads them all, as the OR of their deviations.
+/// Returns whether a clock of the line may be far beyond the window: one datagram reads them all,
+/// as the OR of their deviations.
 static Task<bool> may_drift(Channel& c, Bus& bus) noexcept {
     std::memset(c.data(), 0, 4);
-    const Answer a = co_await c.exchange(Command::brd, at_position(0, registers::dc_system_time_difference), 4);
-    co_return a.wkc != 0 && (get<std::uint32_t>(c.data()) & 0x7fff'ffff) > std::max(bus.setup.sync_window_ns, tolerable_deviation_ns);
+    const Answer a =
+        co_await c.exchange(Command::brd, at_position(0, registers::dc_system_time_difference), 4);
+    co_return a.wkc != 0 && (get<std::uint32_t>(c.data()) & 0x7fff'ffff) >
+                                std::max(bus.setup.sync_window_ns, tolerable_deviation_ns);
 }
 
 /// Returns what is at the other end of the cable at a port, as events name slaves.
@@ -296,18 +372,24 @@ std::uint32_t neighbour(const Bus& bus, const Device& d, unsigned port) noexcept
     const int other = d.slave.neighbour[port];
     if (other < 0) return Events::nothing;
     const BusSlave& s = bus.devices[static_cast<std::size_t>(other)]->slave;
-    return s.configured >= 0 ? static_cast<std::uint32_t>(s.configured) : Events::of_position + s.position;
+    return s.configured >= 0 ? static_cast<std::uint32_t>(s.configured)
+                             : Events::of_position + s.position;
 }
 
 Task<void> watch(Channel& c, Bus& bus) noexcept {
-    std::uint64_t foreign = bus.status.foreign, control = bus.status.foreign_control;
-    bool          other = false;
+    std::uint64_t foreign = bus.status.foreign;
+    std::uint64_t control = bus.status.foreign_control;
+    bool other = false;
     while (true) {
-        const std::int64_t  began = c.now_ns();
+        const std::int64_t began = c.now_ns();
         const std::uint64_t more = bus.status.foreign - std::exchange(foreign, bus.status.foreign);
-        const std::uint64_t controls = bus.status.foreign_control - std::exchange(control, bus.status.foreign_control);
-        const bool was_other = std::exchange(other, controls >= other_master_frames || (other && more >= other_master_frames));
-        if (other && !was_other) bus.report(Event::other_master, static_cast<std::int64_t>(more));
+        const std::uint64_t controls =
+            bus.status.foreign_control - std::exchange(control, bus.status.foreign_control);
+        const bool was_other = std::exchange(
+            other, controls >= other_master_frames || (other && more >= other_master_frames));
+        if (other && !was_other) {
+            bus.report(Event::other_master, static_cast<std::int64_t>(more));
+        }
         for (const auto& device : bus.devices) {
             Device& d = *device;
             if (!d.slave.present || !d.identified) continue;
@@ -317,44 +399,63 @@ Task<void> watch(Channel& c, Bus& bus) noexcept {
                 std::memcpy(now.data(), c.data(), now.size());
                 bool high = false;
                 for (unsigned p = 0; p < 4; ++p) {
-                    PortErrors&                       e = d.status.ports[p];
-                    std::array<std::uint8_t, 4>&      last = d.last_errors[p];
-                    const std::array<std::uint8_t, 4> values{now[2 * p], now[2 * p + 1], now[8 + p], now[16 + p]};
-                    const auto                        add = [&](std::uint64_t& sum, std::size_t n) {
+                    PortErrors& e = d.status.ports[p];
+                    std::array<std::uint8_t, 4>& last = d.last_errors[p];
+                    const std::array<std::uint8_t, 4> values{now[2 * p], now[2 * p + 1], now[8 + p],
+                                                             now[16 + p]};
+                    const auto add = [&](std::uint64_t& sum, std::size_t n) {
                         sum += values[n] >= last[n] ? values[n] - last[n] : values[n];
                         high |= values[n] > counter_high;
                     };
                     const PortErrors before = e;
-                    add(e.invalid_frames, 0), add(e.rx_errors, 1), add(e.forwarded, 2), add(e.lost_links, 3);
+                    add(e.invalid_frames, 0);
+                    add(e.rx_errors, 1);
+                    add(e.forwarded, 2);
+
+                    add(e.lost_links, 3);
                     last = values;
-                    const std::uint64_t damaged = e.invalid_frames + e.rx_errors - before.invalid_frames - before.rx_errors;
-                    if (damaged > e.forwarded - before.forwarded)  // forwarded ones were damaged on an earlier cable
-                        bus.report(Event::damaged_frames, d, p | std::int64_t{neighbour(bus, d, p)} << 8,
+                    const std::uint64_t damaged =
+                        e.invalid_frames + e.rx_errors - before.invalid_frames - before.rx_errors;
+                    if (damaged >
+                        e.forwarded -
+                            before.forwarded) {  // forwarded ones were damaged on an earlier cable
+                        bus.report(Event::damaged_frames, d,
+                                   p | std::int64_t{neighbour(bus, d, p)} << 8,
                                    static_cast<std::int64_t>(damaged));
+                    }
                 }
                 if (high) {  // they stop at FFh
                     std::memset(c.data(), 0, 20);
-                    co_await c.exchange(Command::fpwr, at_station(d.slave.station, registers::rx_errors), 20);
-                    for (auto& last : d.last_errors) last.fill(0);
+                    co_await c.exchange(Command::fpwr,
+                                        at_station(d.slave.station, registers::rx_errors), 20);
+                    for (auto& last : d.last_errors) {
+                        last.fill(0);
+                    }
                 }
             }
         }
         co_await look_at_clocks(c, bus);
         while (c.now_ns() - began < counters_every_ns) {
-            const std::int64_t pause = std::min(clocks_every_ns, began + counters_every_ns - c.now_ns());
+            const std::int64_t pause =
+                std::min(clocks_every_ns, began + counters_every_ns - c.now_ns());
             co_await c.sleep(pause);
-            const bool any = std::any_of(bus.devices.begin(), bus.devices.end(), [](const auto& d) { return d->clock_set; });
+            const bool any = std::any_of(bus.devices.begin(), bus.devices.end(),
+                                         [](const auto& d) { return d->clock_set; });
             if (!any || pause < clocks_every_ns) continue;
             const bool looks = co_await may_drift(c, bus);
-            const bool drifts = std::any_of(bus.devices.begin(), bus.devices.end(), [](const auto& d) { return d->drifts_since_ns != 0; });
-            if (looks || drifts) co_await look_at_clocks(c, bus);
+            const bool drifts = std::any_of(bus.devices.begin(), bus.devices.end(),
+                                            [](const auto& d) { return d->drifts_since_ns != 0; });
+            if (looks || drifts) {
+                co_await look_at_clocks(c, bus);
+            }
         }
     }
 }
 
 void judge_counters(Bus& bus) noexcept {
     bus.status.wkc = bus.status.wkc_expected = 0;
-    bool part = false, any = false;
+    bool part = false;
+    bool any = false;
     for (std::size_t n = 0; n < bus.image.domain_count(); ++n) {
         const DomainStatus& d = bus.image.domain(n);
         bus.status.wkc = static_cast<std::uint16_t>(bus.status.wkc + d.wkc);
@@ -362,12 +463,16 @@ void judge_counters(Bus& bus) noexcept {
         part |= d.expected != 0 && d.state != WkcState::complete;
         any |= d.state == WkcState::complete;
         if (!d.fresh || d.expected == 0) continue;
-        WkcState&  seen = bus.wkc_seen[n];
+        WkcState& seen = bus.wkc_seen[n];
         const bool complete = d.state == WkcState::complete;
         if (complete != (seen == WkcState::complete)) {
-            if (complete || seen != WkcState::none || d.was_complete)
-                bus.report(complete ? Event::wkc_complete : Event::wkc_incomplete, static_cast<std::int64_t>(n << 16 | d.wkc), d.expected);
-            if (!complete) bus.suspicious = true;
+            if (complete || seen != WkcState::none || d.was_complete) {
+                bus.report(complete ? Event::wkc_complete : Event::wkc_incomplete,
+                           static_cast<std::int64_t>(n << 16 | d.wkc), d.expected);
+            }
+            if (!complete) {
+                bus.suspicious = true;
+            }
             seen = complete ? WkcState::complete : WkcState::part;
         }
     }

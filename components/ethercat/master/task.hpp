@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Sequential work of the master, such as the start-up of a slave, spread over cycles: coroutines that wait for the answer of a datagram.
-// Their frames come from the memory of the Channel they work on, so that they run in real time without allocation.
+// Sequential work of the master, such as the start-up of a slave, spread over cycles: coroutines
+// that wait for the answer of a datagram. Their frames come from the memory of the Channel they
+// work on, so that they run in real time without allocation.
 //
 //     Task<bool> set_address(Channel& channel, std::uint16_t position, std::uint16_t address) {
 //         put(channel.data(), address);
@@ -8,7 +9,8 @@
 //         co_return answer.wkc == 1;
 //     }
 //
-// A task takes `Channel&` as its first parameter (after `this`), which is how its frame finds its memory. It is started with
+// A task takes `Channel&` as its first parameter (after `this`), which is how its frame finds its
+// memory. It is started with
 // `channel.start()` or awaited by another task of the same channel.
 #pragma once
 
@@ -31,14 +33,20 @@ public:
     explicit TaskMemory(std::size_t bytes) : bytes_(bytes) {}
     void* take(std::size_t size) noexcept {
         size = round(size);
-        if (used_ + size > bytes_.size()) std::terminate();  // the deepest chain of tasks is fixed; the tests run all of them
+        // the deepest chain of tasks is fixed; the tests run all of them
+        if (used_ + size > bytes_.size()) {
+            std::terminate();
+        }
         void* at = bytes_.data() + used_;
         used_ += size;
-        if (used_ > most_) most_ = used_;
+        if (used_ > most_) {
+            most_ = used_;
+        }
         return at;
     }
-    void        give_back(std::size_t size) noexcept { used_ -= round(size); }
-    std::size_t most() const noexcept { return most_; }  ///< Returns the largest use so far, in bytes. [any]
+    void give_back(std::size_t size) noexcept { used_ -= round(size); }
+    /// Returns the largest use so far, in bytes. [any]
+    std::size_t most() const noexcept { return most_; }
 
 private:
     static std::size_t round(std::size_t size) noexcept { return (size + 15) / 16 * 16; }
@@ -46,7 +54,8 @@ private:
         std::byte bytes[16];
     };
     std::vector<std::byte> bytes_;
-    std::size_t            used_ = 0, most_ = 0;
+    std::size_t used_ = 0;
+    std::size_t most_ = 0;
 };
 
 namespace detail {
@@ -66,14 +75,15 @@ struct PromiseBase {
         void await_resume() const noexcept {}
     };
     std::suspend_always initial_suspend() const noexcept { return {}; }
-    Return              final_suspend() const noexcept { return {}; }
-    void                unhandled_exception() const noexcept { std::terminate(); }  // tasks do not throw
+    Return final_suspend() const noexcept { return {}; }
+    // tasks do not throw
+    void unhandled_exception() const noexcept { std::terminate(); }
 
     /// Header in front of a frame: whose memory it is.
     static constexpr std::size_t header = 16;
-    static void*                 take(Channel& channel, std::size_t size) noexcept {
+    static void* take(Channel& channel, std::size_t size) noexcept {
         TaskMemory& memory = memory_of(channel);
-        auto*       at = static_cast<std::byte*>(memory.take(size + header));
+        auto* at = static_cast<std::byte*>(memory.take(size + header));
         *reinterpret_cast<TaskMemory**>(at) = &memory;
         return at + header;
     }
@@ -96,7 +106,8 @@ struct Promise;
 
 }  // namespace detail
 
-/// A piece of sequential work that ends with a T. Move-only; destroyed with its work unfinished, it ends the work where it waits.
+/// A piece of sequential work that ends with a T. Move-only; destroyed with its work unfinished, it
+/// ends the work where it waits.
 template <class T = void>
 class [[nodiscard]] Task {
 public:
@@ -107,23 +118,31 @@ public:
     explicit Task(Handle handle) noexcept : handle_(handle) {}
     Task(Task&& o) noexcept : handle_(std::exchange(o.handle_, {})) {}
     Task& operator=(Task&& o) noexcept {
-        if (this != &o) reset(), handle_ = std::exchange(o.handle_, {});
+        if (this != &o) {
+            reset();
+            handle_ = std::exchange(o.handle_, {});
+        }
         return *this;
     }
     ~Task() { reset(); }
 
-    bool                    await_ready() const noexcept { return false; }
+    bool await_ready() const noexcept { return false; }
     std::coroutine_handle<> await_suspend(std::coroutine_handle<> caller) noexcept {
         handle_.promise().caller = caller;
         return handle_;
     }
     T await_resume() noexcept { return handle_.promise().result(); }
 
-    bool done() const noexcept { return !handle_ || handle_.done(); }  ///< Returns whether there is no work left. [realtime]
-    T    result() noexcept { return handle_.promise().result(); }         ///< Returns the result of finished work. [realtime]
-    void begin() noexcept { handle_.resume(); }                        ///< Runs up to the first wait. [realtime]
+    /// Returns whether there is no work left. [realtime]
+    bool done() const noexcept { return !handle_ || handle_.done(); }
+    /// Returns the result of finished work. [realtime]
+    T result() noexcept { return handle_.promise().result(); }
+    /// Runs up to the first wait. [realtime]
+    void begin() noexcept { handle_.resume(); }
     void reset() noexcept {
-        if (handle_) std::exchange(handle_, {}).destroy();
+        if (handle_) {
+            std::exchange(handle_, {}).destroy();
+        }
     }
 
 private:
@@ -134,16 +153,20 @@ namespace detail {
 
 template <class T>
 struct Promise : PromiseBase {
-    T       value{};
-    Task<T> get_return_object() noexcept { return Task<T>(std::coroutine_handle<Promise>::from_promise(*this)); }
-    void    return_value(T v) noexcept { value = std::move(v); }
-    T       result() noexcept { return std::move(value); }
+    T value{};
+    Task<T> get_return_object() noexcept {
+        return Task<T>(std::coroutine_handle<Promise>::from_promise(*this));
+    }
+    void return_value(T v) noexcept { value = std::move(v); }
+    T result() noexcept { return std::move(value); }
 };
 template <>
 struct Promise<void> : PromiseBase {
-    Task<void> get_return_object() noexcept { return Task<void>(std::coroutine_handle<Promise>::from_promise(*this)); }
-    void       return_void() const noexcept {}
-    void       result() const noexcept {}
+    Task<void> get_return_object() noexcept {
+        return Task<void>(std::coroutine_handle<Promise>::from_promise(*this));
+    }
+    void return_void() const noexcept {}
+    void result() const noexcept {}
 };
 
 }  // namespace detail

@@ -11,8 +11,10 @@ namespace hal::ethercat::master {
 namespace {
 
 constexpr std::size_t first_datagram = ethernet_header_bytes + ecat_header_bytes;
-constexpr std::size_t frame_overhead = 24,
-                      datagram_overhead = datagram_header_bytes + 2;  ///< preamble, check sequence, gap; header and counter
+constexpr std::size_t frame_overhead = 24;
+                      /// preamble, check sequence, gap; header and counter
+
+constexpr std::size_t datagram_overhead = datagram_header_bytes + 2;
 constexpr std::int64_t acyclic_timeout_ns = 2'000'000;
 
 constexpr bool counts_positions(Command c) noexcept {
@@ -20,24 +22,27 @@ constexpr bool counts_positions(Command c) noexcept {
 }
 /// The data sent does not matter, and bytes that no slave touches must return as zeros.
 constexpr bool only_reads(Command c) noexcept {
-    return c == Command::aprd || c == Command::fprd || c == Command::brd || c == Command::lrd || c == Command::nop;
+    return c == Command::aprd || c == Command::fprd || c == Command::brd || c == Command::lrd ||
+           c == Command::nop;
 }
 
-/// Returns whether a frame of another program is that of a master: it exchanges process data, distributes time or sets registers. `hal ethercat`
-/// beside a running master only reads, for which it sets those of the EEPROM and latches receive times.
+/// Returns whether a frame of another program is that of a master: it exchanges process data,
+/// distributes time or sets registers. `hal ethercat` beside a running master only reads, for which
+/// it sets those of the EEPROM and latches receive times.
 bool controls_slaves(std::span<const std::uint8_t> bytes) noexcept {
     const auto command = static_cast<Command>(bytes[first_datagram]);
     if (is_logical(command) || command == Command::frmw || command == Command::armw) return true;
     const auto address = get<std::uint16_t>(&bytes[first_datagram + 4]);
     const bool of_reading =
-        (address >= registers::eeprom_configuration && address < registers::eeprom_data + 8) || address == registers::dc_receive_time;
+        (address >= registers::eeprom_configuration && address < registers::eeprom_data + 8) ||
+        address == registers::dc_receive_time;
     return !only_reads(command) && !of_reading;
 }
 
 /// Returns whether a slave counted in the frame.
 bool passed_a_slave(std::span<const std::uint8_t> bytes) noexcept {
     for (std::size_t at = first_datagram; at + datagram_overhead <= bytes.size();) {
-        const auto        length = get<std::uint16_t>(&bytes[at + 6]);
+        const auto length = get<std::uint16_t>(&bytes[at + 6]);
         const std::size_t counter = at + datagram_header_bytes + (length & 0x7ff);
         if (counter + 2 > bytes.size()) return false;
         if (get<std::uint16_t>(&bytes[counter]) != 0) return true;
@@ -60,27 +65,35 @@ bool asks_for_safeop(std::span<const std::uint8_t> bytes) noexcept {
 }  // namespace
 
 void WireEngine::attach(ethernet::Port& primary, ethernet::Port* backup) {
-    primary_ = &primary, backup_ = backup;
-    // Slaves work at 100 Mbit/s; only an emulated line is faster. What does not fit into a cycle would delay the process data of the next.
+    primary_ = &primary;
+    backup_ = backup;
+    // Slaves work at 100 Mbit/s; only an emulated line is faster. What does not fit into a cycle
+    // would delay the process data of the next.
     const std::int64_t speed = primary.statistics().speed != 0 ? primary.statistics().speed : 100;
     wire_bytes_ = static_cast<std::size_t>(setup_.cycle_ns * speed / 8000 * 4 / 5);
     // Masters that begin at the same time must not take each other's frames for their own.
-    for (const std::uint8_t byte : primary.address()) next_index_ = static_cast<std::uint8_t>(next_index_ * 31 + byte);
-    if (backup != nullptr) halves_.resize(image_.datagrams().size() + 1 + setup_.slaves.size());
+    for (const std::uint8_t byte : primary.address()) {
+        next_index_ = static_cast<std::uint8_t>(next_index_ * 31 + byte);
+    }
+    if (backup != nullptr) {
+        halves_.resize(image_.datagrams().size() + 1 + setup_.slaves.size());
+    }
 }
 
 void WireEngine::add(Channel& channel) { channels_.push_back(&channel); }
 
 void WireEngine::ready() {
     active_.assign((channels_.size() + 7) / 8 * 8, 0);
-    for (std::size_t n = 0; n < channels_.size(); ++n) channels_[n]->set_active_flag(&active_[n]);
+    for (std::size_t n = 0; n < channels_.size(); ++n) {
+        channels_[n]->set_active_flag(&active_[n]);
+    }
     acyclic_.resize(4 * most_acyclic);
 }
 
 int WireEngine::take_index() noexcept {
     for (std::size_t tries = 0; tries < indexes; ++tries) {
         const std::uint8_t index = next_index_++;
-        Flight&            f = flights_[index];
+        Flight& f = flights_[index];
         if (f.kind != Flight::Kind::none && f.kind != Flight::Kind::expired) continue;
         f = {};
         return index;
@@ -89,22 +102,29 @@ int WireEngine::take_index() noexcept {
 }
 
 bool WireEngine::idle() const noexcept {
-    return std::none_of(flights_.begin(), flights_.end(), [](const Flight& f) { return f.kind == Flight::Kind::cyclic; });
+    return std::none_of(flights_.begin(), flights_.end(),
+                        [](const Flight& f) { return f.kind == Flight::Kind::cyclic; });
 }
 
 std::uint8_t WireEngine::send(std::span<const std::uint8_t> frame, bool backup) noexcept {
     std::uint8_t copies = 0;
-    const auto   out = [&](ethernet::Port* port) {
-        if (port->send(frame, {}, now_ns_) == ethernet::Sent::queued) ++copies, ++status_.frames_sent;
-        else ++status_.send_failures;
+    const auto out = [&](ethernet::Port* port) {
+        if (port->send(frame, {}, now_ns_) == ethernet::Sent::queued) {
+            ++copies;
+            ++status_.frames_sent;
+        } else {
+            ++status_.send_failures;
+        }
     };
     out(primary_);
-    if (backup && backup_ != nullptr) out(backup_);
+    if (backup && backup_ != nullptr) {
+        out(backup_);
+    }
     return copies;
 }
 
-void WireEngine::transmit(std::int64_t now_ns, bool process_data, bool all_domains, unsigned acyclic_frames,
-                          std::uint64_t dc_time_ns) noexcept {
+void WireEngine::transmit(std::int64_t now_ns, bool process_data, bool all_domains,
+                          unsigned acyclic_frames, std::uint64_t dc_time_ns) noexcept {
     // Another thread takes the slaves out of OP at this moment.
     if (sending_.test_and_set(std::memory_order_acquire)) return;
     sent_after_ns_ = now_ns - cycle_start_ns_;
@@ -121,8 +141,12 @@ void WireEngine::transmit(std::int64_t now_ns, bool process_data, bool all_domai
             Flight& f = flights_[static_cast<std::size_t>(index)];
             f.copies = send({frame.bytes.data(), frame.size}, true);
             cyclic_bytes += frame.size + frame_overhead;
-            f.place = static_cast<std::uint16_t>(n), f.sent_ns = now_ns;
-            if (f.copies != 0) f.kind = Flight::Kind::cyclic, ++in_flight_;
+            f.place = static_cast<std::uint16_t>(n);
+            f.sent_ns = now_ns;
+            if (f.copies != 0) {
+                f.kind = Flight::Kind::cyclic;
+                ++in_flight_;
+            }
         }
         ++cycle_;
     }
@@ -135,7 +159,9 @@ void WireEngine::send_now(std::span<const std::uint8_t> frame) noexcept {
     for (ethernet::Port* port : {primary_, backup_}) {
         if (port == nullptr) continue;
         const ethernet::Sent sent = port->send(frame, {}, ethernet::unclocked);
-        if (sent == ethernet::Sent::queued) unmatched_.fetch_add(1, std::memory_order_relaxed);
+        if (sent == ethernet::Sent::queued) {
+            unmatched_.fetch_add(1, std::memory_order_relaxed);
+        }
     }
     sending_.clear(std::memory_order_release);
 }
@@ -148,25 +174,35 @@ void WireEngine::send_acyclic(unsigned frames, std::size_t bytes) noexcept {
         const int index = take_index();
         if (index < 0) return;
         bool backup = false;
-        if (!pack(frame, static_cast<std::uint8_t>(index), backup, bytes, std::exchange(first, false))) return;
+        if (!pack(frame, static_cast<std::uint8_t>(index), backup, bytes,
+                  std::exchange(first, false))) {
+            return;
+        }
         bytes -= std::min<std::size_t>(bytes, frame.size + frame_overhead);
         Flight& f = flights_[static_cast<std::size_t>(index)];
         f.copies = send({frame.bytes.data(), frame.size}, backup);
-        f.place = static_cast<std::uint16_t>(place), f.sent_ns = now_ns_;
-        f.kind = Flight::Kind::acyclic, ++in_flight_;
+        f.place = static_cast<std::uint16_t>(place);
+        f.sent_ns = now_ns_;
+        f.kind = Flight::Kind::acyclic;
+        ++in_flight_;
         frame.free = false;
         --frames;
     }
 }
 
-/// Fills a frame of at most `most` bytes on the wire with waiting datagrams, in turn; the `first` one of a cycle may be longer. Those that count positions do not share a frame with others, as they leave on one port.
-bool WireEngine::pack(AcyclicFrame& frame, std::uint8_t index, bool& backup, std::size_t most, bool first) noexcept {
+/// Fills a frame of at most `most` bytes on the wire with waiting datagrams, in turn; the `first`
+/// one of a cycle may be longer. Those that count positions do not share a frame with others, as
+/// they leave on one port.
+bool WireEngine::pack(AcyclicFrame& frame, std::uint8_t index, bool& backup, std::size_t most,
+                      bool first) noexcept {
     FrameWriter writer(frame.bytes, primary_->address());
     frame.count = 0;
-    std::size_t       bytes = first_datagram + frame_overhead;
+    std::size_t bytes = first_datagram + frame_overhead;
     const std::size_t channels = channels_.size();
-    std::size_t       at = next_channel_ < channels ? next_channel_ : 0, next = at;
-    for (std::size_t seen = 0; seen < channels && frame.count < most_items; ++seen, at = at + 1 == channels ? 0 : at + 1) {
+    std::size_t at = next_channel_ < channels ? next_channel_ : 0;
+    std::size_t next = at;
+    for (std::size_t seen = 0; seen < channels && frame.count < most_items;
+         ++seen, at = at + 1 == channels ? 0 : at + 1) {
         if (active_[at] == 0) continue;
         Channel& c = *channels_[at];
         if (c.stage() != Channel::Stage::waiting) continue;
@@ -178,12 +214,17 @@ bool WireEngine::pack(AcyclicFrame& frame, std::uint8_t index, bool& backup, std
         if (c.length() > writer.space() || (c.length() == 0 && writer.space() == 0)) continue;
         std::uint8_t* data = writer.add(c.command(), index, c.address(), c.length());
         if (data == nullptr) continue;
-        if (!only_reads(c.command())) std::memcpy(data, c.data(), c.length());
+        if (!only_reads(c.command())) {
+            std::memcpy(data, c.data(), c.length());
+        }
         backup = both;
         bytes += needed;
-        if (c.command() == Command::brd && c.address() == at_position(0, registers::al_status)) primary_wkc_ = -1;
+        if (c.command() == Command::brd && c.address() == at_position(0, registers::al_status)) {
+            primary_wkc_ = -1;
+        }
         c.set_sent(now_ns_);
-        frame.items[frame.count++] = {&c, c.generation(), static_cast<std::uint16_t>(data - frame.bytes.data()), c.length()};
+        frame.items[frame.count++] = {
+            &c, c.generation(), static_cast<std::uint16_t>(data - frame.bytes.data()), c.length()};
         next = at + 1;
     }
     next_channel_ = next;
@@ -196,31 +237,48 @@ void WireEngine::receive(std::int64_t now_ns) noexcept {
     now_ns_ = cycle_start_ns_ = now_ns;
     clock_.fresh = false;
     drain(*primary_, 0);
-    if (backup_ != nullptr) drain(*backup_, 1);
-    if (in_flight_ != 0) expire();
+    if (backup_ != nullptr) {
+        drain(*backup_, 1);
+    }
+    if (in_flight_ != 0) {
+        expire();
+    }
     image_.settle();
     wake();
 }
 
 void WireEngine::drain(ethernet::Port& port, unsigned number) noexcept {
-    while (const auto arrival = port.receive(now_ns_)) arrived(arrival->bytes, number);
+    while (const auto arrival = port.receive(now_ns_)) {
+        arrived(arrival->bytes, number);
+    }
 }
 
 void WireEngine::arrived(std::span<const std::uint8_t> bytes, unsigned number) noexcept {
-    if (bytes.size() < ethernet::smallest_frame || bytes[12] != ethertype >> 8 || bytes[13] != (ethertype & 0xff)) return;
+    if (bytes.size() < ethernet::smallest_frame || bytes[12] != ethertype >> 8 ||
+        bytes[13] != (ethertype & 0xff)) {
+        return;
+    }
     Flight& f = flights_[bytes[first_datagram + 1]];
     switch (f.kind) {
     case Flight::Kind::none:
-        if (f.merged) ++status_.duplicates;
-        else count_foreign(bytes);
+        if (f.merged) {
+            ++status_.duplicates;
+        } else {
+            count_foreign(bytes);
+        }
         return;
     case Flight::Kind::expired: return count_late();
     case Flight::Kind::cyclic:
         if (!image_.matches(image_.frames()[f.place], bytes)) break;
-        if (accept(f, number)) arrived_cyclic(f, bytes);
+        if (accept(f, number)) {
+            arrived_cyclic(f, bytes);
+        }
         return;
     case Flight::Kind::complete:  // the frame that it would be compared with may have left again
-        if (accept(f, number)) f.kind = Flight::Kind::none, --in_flight_;
+        if (accept(f, number)) {
+            f.kind = Flight::Kind::none;
+            --in_flight_;
+        }
         return;
     case Flight::Kind::acyclic: return arrived_acyclic(f, bytes, number);
     }
@@ -232,13 +290,15 @@ void WireEngine::count_late() noexcept {
     missing_ -= missing_ != 0 ? 1 : 0;
 }
 
-/// Counts a frame whose index is free, or that of another frame. As long as own frames are missing, one with the own address is taken for one
-/// of them: it returned after its index was used again. One with another address that passed no slave comes from a master at the far end.
+/// Counts a frame whose index is free, or that of another frame. As long as own frames are missing,
+/// one with the own address is taken for one of them: it returned after its index was used again.
+/// One with another address that passed no slave comes from a master at the far end.
 void WireEngine::count_foreign(std::span<const std::uint8_t> bytes) noexcept {
-    constexpr std::uint8_t set_by_slaves = 0x02;  // ETG.1000.4: the first one marks the source address as locally administered
-    const auto&            address = primary_->address();
-    const bool             own =
-        ((bytes[6] ^ address[0]) & ~set_by_slaves) == 0 && std::equal(address.begin() + 1, address.end(), bytes.begin() + 7);
+    // ETG.1000.4: the first one marks the source address as locally administered
+    constexpr std::uint8_t set_by_slaves = 0x02;
+    const auto& address = primary_->address();
+    const bool own = ((bytes[6] ^ address[0]) & ~set_by_slaves) == 0 &&
+                     std::equal(address.begin() + 1, address.end(), bytes.begin() + 7);
     const bool passed = passed_a_slave(bytes);
     if (own && asks_for_safeop(bytes) && unmatched_.load(std::memory_order_relaxed) != 0) {
         unmatched_.fetch_sub(1, std::memory_order_relaxed);
@@ -265,17 +325,24 @@ void WireEngine::arrived_cyclic(Flight& f, std::span<const std::uint8_t> bytes) 
     const ProcessImage::Frame& frame = image_.frames()[f.place];
     if (backup_ == nullptr) return complete_cyclic(f, bytes.data());
     auto& half = halves_[f.place];
-    if (!f.merged) std::memcpy(half.data(), bytes.data(), frame.size);
-    else image_.merge(frame, half.data(), bytes.data());
+    if (!f.merged) {
+        std::memcpy(half.data(), bytes.data(), frame.size);
+    } else {
+        image_.merge(frame, half.data(), bytes.data());
+    }
     f.merged = true;
-    if (f.copies == 0) complete_cyclic(f, half.data());
+    if (f.copies == 0) {
+        complete_cyclic(f, half.data());
+    }
 }
 
 void WireEngine::complete_cyclic(Flight& f, const std::uint8_t* answer) noexcept {
     const ProcessImage::Frame& frame = image_.frames()[f.place];
     image_.take(frame, answer);
     const std::uint8_t* time = answer + frame.clock_read + datagram_header_bytes;
-    if (get<std::uint16_t>(time + 8) != 0 && !clock_.fresh) clock_ = {true, get<std::uint64_t>(time), f.sent_ns, sent_after_ns_};
+    if (get<std::uint16_t>(time + 8) != 0 && !clock_.fresh) {
+        clock_ = {true, get<std::uint64_t>(time), f.sent_ns, sent_after_ns_};
+    }
     f.merged = true;
     if (f.copies != 0) {
         f.kind = Flight::Kind::complete;
@@ -285,39 +352,60 @@ void WireEngine::complete_cyclic(Flight& f, const std::uint8_t* answer) noexcept
     --in_flight_;
 }
 
-void WireEngine::arrived_acyclic(Flight& f, std::span<const std::uint8_t> bytes, unsigned number) noexcept {
+void WireEngine::arrived_acyclic(Flight& f, std::span<const std::uint8_t> bytes,
+                                 unsigned number) noexcept {
     AcyclicFrame& frame = acyclic_[f.place];
-    const auto    same = [&](const Item& item) {
+    const auto same = [&](const Item& item) {
         const std::size_t at = item.offset - datagram_header_bytes;
         return bytes[at] == frame.bytes[at] && bytes[at + 1] == frame.bytes[at + 1] &&
                get<std::uint16_t>(&bytes[at + 4]) == get<std::uint16_t>(&frame.bytes[at + 4]) &&
-               (get<std::uint16_t>(&bytes[at + 6]) & 0x87ff) == get<std::uint16_t>(&frame.bytes[at + 6]);
+               (get<std::uint16_t>(&bytes[at + 6]) & 0x87ff) ==
+                   get<std::uint16_t>(&frame.bytes[at + 6]);
     };
     if (bytes.size() < frame.size || std::memcmp(&bytes[12], &frame.bytes[12], 4) != 0 ||
-        !std::all_of(frame.items.begin(), frame.items.begin() + static_cast<std::ptrdiff_t>(frame.count), same)) {
+        !std::all_of(frame.items.begin(),
+                     frame.items.begin() + static_cast<std::ptrdiff_t>(frame.count), same)) {
         count_foreign(bytes);
         return;
     }
     if (!accept(f, number)) return;
-    if (number == 0)  // how far the primary port reaches
-        for (std::size_t n = 0; n < frame.count; ++n)
-            if (const std::uint8_t* d = &bytes[frame.items[n].offset]; d[-10] == static_cast<std::uint8_t>(Command::brd))
-                if (get<std::uint16_t>(d - 6) == registers::al_status) primary_wkc_ = get<std::uint16_t>(d + frame.items[n].length);
-    if (!f.merged) std::memcpy(frame.answer.data(), bytes.data(), frame.size);
-    else merge_acyclic(frame, bytes.data());
+    if (number == 0) {  // how far the primary port reaches
+        for (std::size_t n = 0; n < frame.count; ++n) {
+            if (const std::uint8_t* d = &bytes[frame.items[n].offset];
+                d[-10] == static_cast<std::uint8_t>(Command::brd)) {
+                if (get<std::uint16_t>(d - 6) == registers::al_status) {
+                    primary_wkc_ = get<std::uint16_t>(d + frame.items[n].length);
+                }
+            }
+        }
+    }
+    if (!f.merged) {
+        std::memcpy(frame.answer.data(), bytes.data(), frame.size);
+    } else {
+        merge_acyclic(frame, bytes.data());
+    }
     f.merged = true;
-    if (f.copies == 0) complete_acyclic(f);
+    if (f.copies == 0) {
+        complete_acyclic(f);
+    }
 }
 
 void WireEngine::merge_acyclic(AcyclicFrame& frame, const std::uint8_t* second) noexcept {
     for (std::size_t n = 0; n < frame.count; ++n) {
-        const Item&         item = frame.items[n];
-        std::uint8_t*       to = &frame.answer[item.offset];
+        const Item& item = frame.items[n];
+        std::uint8_t* to = &frame.answer[item.offset];
         const std::uint8_t* from = second + item.offset;
-        const auto          wkc = get<std::uint16_t>(to + item.length), more = get<std::uint16_t>(from + item.length);
-        if (frame.bytes[item.offset - datagram_header_bytes] == static_cast<std::uint8_t>(Command::brd))
-            for (std::size_t i = 0; i < item.length; ++i) to[i] |= from[i];
-        else if (wkc == 0 && more != 0) std::memcpy(to, from, item.length);
+        const auto wkc = get<std::uint16_t>(to + item.length);
+
+        const auto more = get<std::uint16_t>(from + item.length);
+        if (frame.bytes[item.offset - datagram_header_bytes] ==
+            static_cast<std::uint8_t>(Command::brd)) {
+            for (std::size_t i = 0; i < item.length; ++i) {
+                to[i] |= from[i];
+            }
+        } else if (wkc == 0 && more != 0) {
+            std::memcpy(to, from, item.length);
+        }
         put(to + item.length, static_cast<std::uint16_t>(wkc + more));
     }
 }
@@ -328,8 +416,11 @@ void WireEngine::complete_acyclic(Flight& f) noexcept {
     --in_flight_;
     for (std::size_t n = 0; n < frame.count; ++n) {
         const Item& item = frame.items[n];
-        Channel&    c = *item.channel;
-        if (c.stage() != Channel::Stage::sent || c.generation() != item.generation || c.length() != item.length) continue;
+        Channel& c = *item.channel;
+        if (c.stage() != Channel::Stage::sent || c.generation() != item.generation ||
+            c.length() != item.length) {
+            continue;
+        }
         c.set_now(now_ns_);
         std::memcpy(c.data(), &frame.answer[item.offset], item.length);
         ++resumed_;
@@ -345,10 +436,12 @@ void WireEngine::expire(Flight& f) noexcept {
 }
 
 void WireEngine::expire() noexcept {
-    const std::int64_t timeout = std::max({acyclic_timeout_ns, 2 * setup_.cycle_ns, setup_.frame_timeout_ns});
+    const std::int64_t timeout =
+        std::max({acyclic_timeout_ns, 2 * setup_.cycle_ns, setup_.frame_timeout_ns});
     for (Flight& f : flights_) {
         if (f.kind == Flight::Kind::cyclic) {
-            if (f.merged && backup_ != nullptr) {  // the other copy is late or lost: this cycle does without it
+            // the other copy is late or lost: this cycle does without it
+            if (f.merged && backup_ != nullptr) {
                 complete_cyclic(f, halves_[f.place].data());
             } else if (now_ns_ - f.sent_ns >= setup_.frame_timeout_ns) {
                 expire(f);
@@ -358,8 +451,11 @@ void WireEngine::expire() noexcept {
             if (now_ns_ - f.sent_ns < setup_.frame_timeout_ns + setup_.cycle_ns) continue;
             expire(f);
             ++status_.lost;
-        } else if (f.kind == Flight::Kind::acyclic && (f.copies == 0 || now_ns_ - f.sent_ns >= timeout)) {
-            if (f.copies != 0) ++status_.lost;
+        } else if (f.kind == Flight::Kind::acyclic &&
+                   (f.copies == 0 || now_ns_ - f.sent_ns >= timeout)) {
+            if (f.copies != 0) {
+                ++status_.lost;
+            }
             if (f.merged) {
                 complete_acyclic(f);
                 continue;
@@ -369,7 +465,10 @@ void WireEngine::expire() noexcept {
             frame.free = true;
             for (std::size_t n = 0; n < frame.count; ++n) {
                 Channel& c = *frame.items[n].channel;
-                if (c.stage() != Channel::Stage::sent || c.generation() != frame.items[n].generation) continue;
+                if (c.stage() != Channel::Stage::sent ||
+                    c.generation() != frame.items[n].generation) {
+                    continue;
+                }
                 c.set_now(now_ns_);
                 ++resumed_;
                 c.lose();
@@ -385,8 +484,13 @@ void WireEngine::wake() noexcept {
             if (active_[n] == 0) continue;
             Channel& c = *channels_[n];
             c.set_now(now_ns_);
-            if (c.stage() == Channel::Stage::sleeping && c.until_ns() <= now_ns_) ++resumed_, c.wake();
-            if (c.stage() == Channel::Stage::idle) active_[n] = 0;
+            if (c.stage() == Channel::Stage::sleeping && c.until_ns() <= now_ns_) {
+                ++resumed_;
+                c.wake();
+            }
+            if (c.stage() == Channel::Stage::idle) {
+                active_[n] = 0;
+            }
         }
     }
 }

@@ -7,9 +7,12 @@ namespace {
 struct Names {
     using BusPins = hal::ethercat::BusPins;
     using SlavePins = hal::ethercat::SlavePins;
-    static constexpr const char *own = "ethercat.0", *receive = "receive", *transmit = "transmit", *file = "";
-    static constexpr bool        shared = false;
-    static std::string           function(const std::string& instance, const char* name) { return instance + "." + name; }
+    static constexpr const char *own = "ethercat.0", *receive = "receive", *transmit = "transmit",
+                                *file = "";
+    static constexpr bool shared = false;
+    static std::string function(const std::string& instance, const char* name) {
+        return instance + "." + name;
+    }
 };
 using Ethercat = hal::ethercat::MasterComponent<Names>;
 

@@ -23,29 +23,39 @@ struct EthercatArguments {
     EthercatArguments(hal::Component& component, const char* usual_file, bool lcec)
         : component_(component), usual_file_(usual_file), lcec_(lcec) {}
 
-    hal::Component&   component_;
-    const char*       usual_file_;  ///< without `config`
-    const bool        lcec_;
+    hal::Component& component_;
+    const char* usual_file_;  ///< without `config`
+    const bool lcec_;
     hal::TextArgument file{component_,
                            "config",
                            usual_file_,
-                           "configuration file NAME.ethercat, or LinuxCNC's ethercat-conf.xml; a list makes an instance of each",
+                           "configuration file NAME.ethercat, or LinuxCNC's ethercat-conf.xml; a "
+                           "list makes an instance of each",
                            {.per_instance = true}};
-    hal::TextArgument link{
-        component_, "link", "", "link address, overrides the configuration: eth:enp3s0, sim:NAME, …", {.per_instance = true}};
+    hal::TextArgument link{component_,
+                           "link",
+                           "",
+                           "link address, overrides the configuration: eth:enp3s0, sim:NAME, …",
+                           {.per_instance = true}};
     hal::TextArgument backup{
-        component_, "backup", "", "link address of the port that closes a ring, overrides the configuration", {.per_instance = true}};
+        component_,
+        "backup",
+        "",
+        "link address of the port that closes a ring, overrides the configuration",
+        {.per_instance = true}};
     hal::TextArgument gateway{component_,
                               "gateway",
                               "",
-                              "address of the mailbox gateway, overrides the configuration: 127.0.0.1, 127.0.0.1:34980, none",
+                              "address of the mailbox gateway, overrides the configuration: "
+                              "127.0.0.1, 127.0.0.1:34980, none",
                               {.per_instance = true}};
-    hal::Argument     number{component_,
+    hal::Argument number{component_,
                          "master",
                          lcec_ ? -1 : 0,
-                         lcec_ ? "which master of the configuration, from 0; -1: lcec.N drives number N, and there is an instance for each"
-                                   : "of a configuration with several masters: which one, from 0",
-                             {.per_instance = true, .min = lcec_ ? -1 : 0, .max = 63}};
+                         lcec_ ? "which master of the configuration, from 0; -1: lcec.N drives "
+                                 "number N, and there is an instance for each"
+                               : "of a configuration with several masters: which one, from 0",
+                         {.per_instance = true, .min = lcec_ ? -1 : 0, .max = 63}};
 
     hal::Argument cycle{component_,
                         "cycle",
@@ -53,71 +63,121 @@ struct EthercatArguments {
                         "cycle time in ns, overrides the configuration; 0: as there",
                         {.per_instance = true, .min = 0, .max = 1'000'000'000}};
 
-    /// Reads the configuration. Reports every problem with its place in the file where the host can show it. Throws hal::ArgumentError, or the
-    /// exception that ends the constructor once the problems are reported. [setup]
+    /// Reads the configuration. Reports every problem with its place in the file where the host can
+    /// show it. Throws hal::ArgumentError, or the exception that ends the constructor once the
+    /// problems are reported. [setup]
     config::Bus read() const {
         const hal::Texts texts(component_);
-        if (!texts.offered() && file.get() == usual_file_) return {};  // only its documentation is wanted
-        if (file.get().empty()) throw std::invalid_argument("missing configuration; type: loadrt ethercat config=FILE.ethercat");
-        const std::string handed = lcec_ && file.get() == usual_file_ ? config::lcec_configuration(getpid()) : std::string();
+        // only its documentation is wanted
+        if (!texts.offered() && file.get() == usual_file_) {
+            return {};
+        }
+        if (file.get().empty()) {
+            throw std::invalid_argument(
+                "missing configuration; type: loadrt ethercat config=FILE.ethercat");
+        }
+        const std::string handed = lcec_ && file.get() == usual_file_
+                                       ? config::lcec_configuration(getpid())
+                                       : std::string();
         const std::string path = handed.empty() ? texts.find(file.get()) : handed;
-        std::string       text;
-        if (!config::read_from_disk(path, text))
-            throw hal::ArgumentError("config", "config=" + file.get() + ": cannot read file '" + path + "': " + text,
-                                     lcec_ ? "write its name: loadusr -W lcec_conf FILE.xml, or loadrt lcec config=FILE.xml" : "");
+        std::string text;
+        if (!config::read_from_disk(path, text)) {
+            throw hal::ArgumentError(
+                "config", "config=" + file.get() + ": cannot read file '" + path + "': " + text,
+                lcec_ ? "write its name: loadusr -W lcec_conf FILE.xml, or loadrt lcec "
+                        "config=FILE.xml"
+                      : "");
+        }
         config::Reading reading = config::read(text, path);
         report(texts, reading, path, text);
-        const auto wanted = number >= 0 ? static_cast<std::size_t>(number) : own_master(reading.buses.size());
-        if (wanted >= reading.buses.size())
-            throw hal::ArgumentError("master", "master=" + std::to_string(wanted) + ": the configuration has " +
-                                                   std::to_string(reading.buses.size()) +
-                                                   (reading.buses.size() == 1 ? " master" : " masters"));
-        config::Bus        bus = std::move(reading.buses[wanted]);
-        const std::int64_t cycle_ns = cycle;
-        if (cycle_ns != 0 && reading.lcec)
+        const auto wanted =
+            number >= 0 ? static_cast<std::size_t>(number) : own_master(reading.buses.size());
+        if (wanted >= reading.buses.size()) {
             throw hal::ArgumentError(
-                "cycle", "cycle=" + std::to_string(cycle_ns) + ": the cycle of this format is appTimePeriod; change it in the file");
-        if (cycle_ns != 0) bus.setup.cycle_ns = cycle_ns;
-        if (!link.get().empty()) bus.link = link.get();
-        else if (reading.lcec && texts.offered()) find_links(path, bus);
-        if (!backup.get().empty()) bus.backup = backup.get();
-        if (!gateway.get().empty() && !config::read_gateway(gateway.get(), bus))
-            throw hal::ArgumentError("gateway", "gateway=" + gateway.get() + ": expected none, or an IPv4 address and perhaps a port",
+                "master", "master=" + std::to_string(wanted) + ": the configuration has " +
+                              std::to_string(reading.buses.size()) +
+                              (reading.buses.size() == 1 ? " master" : " masters"));
+        }
+        config::Bus bus = std::move(reading.buses[wanted]);
+        const std::int64_t cycle_ns = cycle;
+        if (cycle_ns != 0 && reading.lcec) {
+            throw hal::ArgumentError(
+                "cycle", "cycle=" + std::to_string(cycle_ns) +
+                             ": the cycle of this format is appTimePeriod; change it in the file");
+        }
+        if (cycle_ns != 0) {
+            bus.setup.cycle_ns = cycle_ns;
+        }
+        if (!link.get().empty()) {
+            bus.link = link.get();
+        } else if (reading.lcec && texts.offered()) {
+            find_links(path, bus);
+        }
+        if (!backup.get().empty()) {
+            bus.backup = backup.get();
+        }
+        if (!gateway.get().empty() && !config::read_gateway(gateway.get(), bus)) {
+            throw hal::ArgumentError("gateway",
+                                     "gateway=" + gateway.get() +
+                                         ": expected none, or an IPv4 address and perhaps a port",
                                      "write gateway=127.0.0.1:34980");
+        }
         return bus;
     }
 
 private:
-    /// Returns which master an instance lcec.N drives: N. The first one lets the host make one for each. [setup]
+    /// Returns which master an instance lcec.N drives: N. The first one lets the host make one for
+    /// each. [setup]
     static std::size_t own_master(std::size_t masters) {
         const std::string name = hal::own_name("lcec.0");
-        const auto        n = name.starts_with("lcec.") ? parse_natural(std::string_view(name).substr(5)) : std::nullopt;
-        if (!n) return 0;  // names= has another name
-        if (const auto* naming = hal::extension<hal_naming>(HAL_NAMING); naming != nullptr && *n == 0 && masters > 1)
+        const auto n = name.starts_with("lcec.") ? parse_natural(std::string_view(name).substr(5))
+                                                 : std::nullopt;
+        if (!n) {
+            return 0;  // names= has another name
+        }
+        if (const auto* naming = hal::extension<hal_naming>(HAL_NAMING);
+            naming != nullptr && *n == 0 && masters > 1) {
             naming->count(hal::detail::creating, "master", masters);
+        }
         return static_cast<std::size_t>(*n);
     }
     static void find_links(const std::string& path, config::Bus& bus) {
         const std::size_t slash = path.rfind('/');
-        config::IghLinks  found = config::find_igh_links(slash == path.npos ? "." : path.substr(0, slash), bus.index);
-        if (!found.problem.empty())
-            throw hal::ArgumentError("link", found.problem, "correct the file, or write link=eth:enp3s0; `ip link` lists the addresses");
-        if (found.file.empty())
-            throw hal::ArgumentError("link",
-                                     "link= is missing: this format has no interface, and no file ethercat.conf has MASTER" +
-                                         std::to_string(bus.index) + "_DEVICE",
-                                     "write link=eth:enp3s0, or link=sim:NAME for an emulated line; or MASTER" + std::to_string(bus.index) +
-                                         "_DEVICE=\"enp3s0\" in an ethercat.conf beside '" + path + "'");
-        bus.link = std::move(found.link), bus.backup = std::move(found.backup);
+        config::IghLinks found =
+            config::find_igh_links(slash == path.npos ? "." : path.substr(0, slash), bus.index);
+        if (!found.problem.empty()) {
+            throw hal::ArgumentError(
+                "link", found.problem,
+                "correct the file, or write link=eth:enp3s0; `ip link` lists the addresses");
+        }
+        if (found.file.empty()) {
+            throw hal::ArgumentError(
+                "link",
+                "link= is missing: this format has no interface, and no file ethercat.conf has "
+                "MASTER" +
+                    std::to_string(bus.index) + "_DEVICE",
+                "write link=eth:enp3s0, or link=sim:NAME for an emulated line; or MASTER" +
+                    std::to_string(bus.index) + "_DEVICE=\"enp3s0\" in an ethercat.conf beside '" +
+                    path + "'");
+        }
+        bus.link = std::move(found.link);
+        bus.backup = std::move(found.backup);
     }
-    static void report(const hal::Texts& texts, const config::Reading& reading, const std::string& path, const std::string& text) {
-        if (!texts.offered() && !reading.good()) throw std::invalid_argument(config::to_string(reading, path));
+    static void report(const hal::Texts& texts, const config::Reading& reading,
+                       const std::string& path, const std::string& text) {
+        if (!texts.offered() && !reading.good()) {
+            throw std::invalid_argument(config::to_string(reading, path));
+        }
         texts.begin(path, text);
-        for (const config::Message& m : reading.messages)
-            if (m.severity != hal::Severity::note)
-                texts.report(static_cast<hal_severity>(m.severity), config::code_of(m.topic), m.at.offset, m.at.offset + m.at.length,
-                             m.sentence, m.label, m.help);
-        if (!reading.good()) hal::Texts::fail();
+        for (const config::Message& m : reading.messages) {
+            if (m.severity != hal::Severity::note) {
+                texts.report(static_cast<hal_severity>(m.severity), config::code_of(m.topic),
+                             m.at.offset, m.at.offset + m.at.length, m.sentence, m.label, m.help);
+            }
+        }
+        if (!reading.good()) {
+            hal::Texts::fail();
+        }
     }
 };
 

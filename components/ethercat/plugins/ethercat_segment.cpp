@@ -22,77 +22,127 @@ class EthercatSegment : public hal::Component {
 public:
     explicit EthercatSegment(const hal_host* host) : Component(host) {
         std::string text = devices_.get();
-        for (char& c : text)
-            if (c == ',') c = '\n';
-        const devices::LineDescription description = 
-            devices::read_line(text, [texts = hal::Texts(*this)](const std::string& name) { return texts.find(name); });
-        for (const auto& m : description.messages)
-            if (m.severity == hal::Severity::error)  // duplicate aliases may be wanted
-                throw hal::ArgumentError("devices", "devices=\"" + devices_.get() + "\": " + m.sentence + "; " + m.help);
+        for (char& c : text) {
+            if (c == ',') {
+                c = '\n';
+            }
+        }
+        const devices::LineDescription description = devices::read_line(
+            text,
+            [texts = hal::Texts(*this)](const std::string& name) { return texts.find(name); });
+        for (const auto& m : description.messages) {
+            if (m.severity == hal::Severity::error) {  // duplicate aliases may be wanted
+                throw hal::ArgumentError(
+                    "devices", "devices=\"" + devices_.get() + "\": " + m.sentence + "; " + m.help);
+            }
+        }
         line_devices_ = devices::make_line(description);
-        for (std::size_t n = 0; n < line_devices_.size(); ++n) declare(n);
+        for (std::size_t n = 0; n < line_devices_.size(); ++n) {
+            declare(n);
+        }
     }
 
     void start() {
         hal::ethernet::Options options;
         options.promiscuous = true;
         options.send_capacity = options.receive_capacity = 256;
-        if (link_.get() == backup_.get()) throw std::runtime_error("backup=" + backup_.get() + " is the link itself; choose another name");
+        if (link_.get() == backup_.get()) {
+            throw std::runtime_error("backup=" + backup_.get() +
+                                     " is the link itself; choose another name");
+        }
         primary_ = open(link_.get(), options);
-        if (!backup_.get().empty()) secondary_ = open(backup_.get(), options);
+        if (!backup_.get().empty()) {
+            secondary_ = open(backup_.get(), options);
+        }
         line_.emplace();
-        frames_ = 0, silent_ = 0;
-        for (devices::Device& d : line_devices_) line_->add({.controller = {.dc = d.dc}, .sii = d.sii, .application = d.firmware.get()});
-        if (secondary_ && !line_devices_.empty() && !line_->close_ring(static_cast<unsigned>(line_devices_.size() - 1), 1))
-            throw std::runtime_error("backup=" + backup_.get() + ": the last device has no second port; put one with two ports at the end");
+        frames_ = 0;
+        silent_ = 0;
+        for (devices::Device& d : line_devices_) {
+            line_->add({.controller = {.dc = d.dc}, .sii = d.sii, .application = d.firmware.get()});
+        }
+        if (secondary_ && !line_devices_.empty() &&
+            !line_->close_ring(static_cast<unsigned>(line_devices_.size() - 1), 1)) {
+            throw std::runtime_error(
+                "backup=" + backup_.get() +
+                ": the last device has no second port; put one with two ports at the end");
+        }
         const std::int64_t now = primary_->segment()->time_ns();
         line_->power_on(now == hal::ethernet::unclocked ? 0 : now);
         connection_ = std::make_unique<esc::LineOnSegments>(*line_, *primary_, secondary_.get());
-        if (!connection_->connected()) throw std::runtime_error(link_.get() + " already has emulated slaves; choose another name");
-        for (EmulatedSlavePins& pins : slaves_) pins.forget();
+        if (!connection_->connected()) {
+            throw std::runtime_error(link_.get() +
+                                     " already has emulated slaves; choose another name");
+        }
+        for (EmulatedSlavePins& pins : slaves_) {
+            pins.forget();
+        }
         unposted_ = true;
     }
 
     void stop() noexcept {
         connection_.reset();
         line_.reset();
-        primary_.reset(), secondary_.reset();
+        primary_.reset();
+        secondary_.reset();
     }
 
     void update(hal::Cycle cycle) noexcept {
         if (!line_) return;
         primary_->receive(cycle.start_ns());  // frames of a master that is gone pass too
-        silent_ = line_->frames() == frames_ ? silent_ + 1 : 0, frames_ = line_->frames();
-        if (silent_ >= silent_cycles)
-            line_->advance(cycle.start_ns());  // frames move its time; without them its watchdogs run all the same
+        silent_ = line_->frames() == frames_ ? silent_ + 1 : 0;
+        frames_ = line_->frames();
+        if (silent_ >= silent_cycles) {
+            line_->advance(
+                cycle
+                    .start_ns());  // frames move its time; without them its watchdogs run all the same
+        }
         bool disturbed = unposted_;
         for (unsigned n = 0; n < slaves_.size(); ++n) {
             EmulatedSlavePins& pins = slaves_[n];
             pins.post_changes(*line_, n);
             disturbed |= pins.frames_changed();
             set_faults(pins, *line_devices_[n].firmware);
-            pins.state = pins.power ? static_cast<std::uint32_t>(line_devices_[n].firmware->state()) : 0U;
+            pins.state =
+                pins.power ? static_cast<std::uint32_t>(line_devices_[n].firmware->state()) : 0U;
         }
-        if (disturbed) unposted_ = !post_disturbances();
+        if (disturbed) {
+            unposted_ = !post_disturbances();
+        }
         for (EmulatedAxisPins& pins : axes_) {
-            pins.position = pins.axis.position(), pins.velocity = pins.axis.velocity(), pins.statusword = pins.axis.statusword();
+            pins.position = pins.axis.position();
+            pins.velocity = pins.axis.velocity();
+
+            pins.statusword = pins.axis.statusword();
             pins.axis.set_inputs(pins.inputs);
-            if (pins.error_code != pins.was_error && pins.error_code != 0) pins.axis.fail(static_cast<std::uint16_t>(pins.error_code));
+            if (pins.error_code != pins.was_error && pins.error_code != 0) {
+                pins.axis.fail(static_cast<std::uint16_t>(pins.error_code));
+            }
             pins.was_error = pins.error_code;
         }
-        for (auto& c : digital_in_) c.io.set_input(c.number, c.pin ? 1 : 0);
-        for (auto& c : digital_out_) c.pin = c.io.output(c.number) != 0;
-        for (auto& c : analog_in_) c.io.set_input(c.number, c.pin);
-        for (auto& c : analog_out_) c.pin = c.io.output(c.number);
+        for (auto& c : digital_in_) {
+            c.io.set_input(c.number, c.pin ? 1 : 0);
+        }
+        for (auto& c : digital_out_) {
+            c.pin = c.io.output(c.number) != 0;
+        }
+        for (auto& c : analog_in_) {
+            c.io.set_input(c.number, c.pin);
+        }
+        for (auto& c : analog_out_) {
+            c.pin = c.io.output(c.number);
+        }
     }
 
 private:
     static constexpr unsigned silent_cycles = 10;
 
-    /// Replaces the disturbances of frames by those that the pins ask for. Returns whether the line took them all. [realtime]
+    /// Replaces the disturbances of frames by those that the pins ask for. Returns whether the line
+    /// took them all. [realtime]
     bool post_disturbances() noexcept {
         bool posted = line_->post({.kind = esc::LineCommand::Kind::calm});
-        for (unsigned n = 0; n < slaves_.size(); ++n) posted = posted && slaves_[n].post_disturbances(*line_, n);
+        for (unsigned n = 0; n < slaves_.size(); ++n) {
+            posted = posted && slaves_[n].post_disturbances(*line_, n);
+        }
         return posted;
     }
 
@@ -100,19 +150,26 @@ private:
     static void set_faults(EmulatedSlavePins& pins, devices::Firmware& firmware) noexcept {
         devices::FirmwareFaults& faults = firmware.faults();
         for (const State state : {State::preop, State::safeop, State::op}) {
-            const bool          rejected = pins.reject_state == static_cast<std::uint32_t>(state);
-            const std::uint32_t code = rejected ? std::clamp<std::uint32_t>(pins.reject_code, 1, 0xffff) : 0U;
+            const bool rejected = pins.reject_state == static_cast<std::uint32_t>(state);
+            const std::uint32_t code =
+                rejected ? std::clamp<std::uint32_t>(pins.reject_code, 1, 0xffff) : 0U;
             faults.reject[state].store(static_cast<std::uint16_t>(code), std::memory_order_relaxed);
         }
-        if (pins.fail_code != pins.was_fail && pins.fail_code != 0 && firmware.state() == State::op)
-            faults.fail.store(static_cast<std::uint16_t>(std::min<std::uint32_t>(pins.fail_code, 0xffff)), std::memory_order_relaxed);
+        if (pins.fail_code != pins.was_fail && pins.fail_code != 0 &&
+            firmware.state() == State::op) {
+            faults.fail.store(
+                static_cast<std::uint16_t>(std::min<std::uint32_t>(pins.fail_code, 0xffff)),
+                std::memory_order_relaxed);
+        }
         pins.was_fail = pins.fail_code;
         faults.mailbox_delay_ns.store(nanoseconds(pins.mailbox_delay), std::memory_order_relaxed);
     }
 
-    static std::unique_ptr<hal::ethernet::Port> open(const std::string& address, const hal::ethernet::Options& options) {
-        if (!hal::ethernet::describe(address).in_memory)
+    static std::unique_ptr<hal::ethernet::Port> open(const std::string& address,
+                                                     const hal::ethernet::Options& options) {
+        if (!hal::ethernet::describe(address).in_memory) {
             throw std::runtime_error(address + " is not a segment in memory; write link=sim:NAME");
+        }
         auto opened = hal::ethernet::open(address, options);
         if (!opened) throw std::runtime_error(opened.problem);
         return std::move(opened.port);
@@ -121,53 +178,69 @@ private:
     /// Declares the pins of a device. [setup]
     void declare(std::size_t n) {
         const devices::Device& device = line_devices_[n];
-        const std::string      name = "slave-" + std::to_string(n);
+        const std::string name = "slave-" + std::to_string(n);
         slaves_.emplace_back(*this, update_, name);
         devices::Behaviour& behaviour = device.firmware->behaviour();
         if (auto* servo = dynamic_cast<devices::Servo*>(&behaviour)) {
-            for (unsigned a = 0; a < servo->axes(); ++a)
-                axes_.emplace_back(*this, update_, name + (servo->axes() > 1 ? ".axis-" + std::to_string(a) + "." : "."), servo->axis(a));
+            for (unsigned a = 0; a < servo->axes(); ++a) {
+                axes_.emplace_back(
+                    *this, update_,
+                    name + (servo->axes() > 1 ? ".axis-" + std::to_string(a) + "." : "."),
+                    servo->axis(a));
+            }
         } else if (auto* io = dynamic_cast<devices::IoBehaviour*>(&behaviour)) {
             for (unsigned c = 0; c < io->channels(); ++c) {
                 const std::string number = (c < 10 ? "0" : "") + std::to_string(c);
-                if (device.name == "digital_in")
-                    digital_in_.emplace_back(*this, update_, name + ".in-" + number, "terminal of the input", *io, c);
-                else if (device.name == "digital_out")
-                    digital_out_.emplace_back(*this, update_, name + ".out-" + number, "terminal of the output", *io, c);
-                else if (device.name == "analog_in")
-                    analog_in_.emplace_back(*this, update_, name + ".analog-in-" + number, "terminal of the input, in counts", *io, c);
-                else analog_out_.emplace_back(*this, update_, name + ".analog-out-" + number, "terminal of the output, in counts", *io, c);
+                if (device.name == "digital_in") {
+                    digital_in_.emplace_back(*this, update_, name + ".in-" + number,
+                                             "terminal of the input", *io, c);
+                } else if (device.name == "digital_out") {
+                    digital_out_.emplace_back(*this, update_, name + ".out-" + number,
+                                              "terminal of the output", *io, c);
+                } else if (device.name == "analog_in") {
+                    analog_in_.emplace_back(*this, update_, name + ".analog-in-" + number,
+                                            "terminal of the input, in counts", *io, c);
+                } else {
+                    analog_out_.emplace_back(*this, update_, name + ".analog-out-" + number,
+                                             "terminal of the output, in counts", *io, c);
+                }
             }
         }
     }
 
     hal::TextArgument devices_{
         *this, "devices", "coupler",
-        "devices along the line, separated by commas: coupler, digital_in bits=16, digital_out bits=8, analog_in channels=4, "
-        "analog_out channels=2, servo axes=1, mailbox_device, esi file=drive.xml device=NAME; all take alias= and serial=, a servo dc=required and modes= (6502h)"};
+        "devices along the line, separated by commas: coupler, digital_in bits=16, digital_out "
+        "bits=8, analog_in channels=4, "
+        "analog_out channels=2, servo axes=1, mailbox_device, esi file=drive.xml device=NAME; all "
+        "take alias= and serial=, a servo dc=required and modes= (6502h)"};
     hal::TextArgument link_{*this, "link", "sim:ethercat", "segment in memory where the master is"};
-    hal::TextArgument backup_{*this, "backup", "", "segment in memory of the master's second port, which closes a ring"};
-    hal::Function update_{*this, "update", &EthercatSegment::update, "copies values between pins and devices; in the thread of the master"};
+    hal::TextArgument backup_{*this, "backup", "",
+                              "segment in memory of the master's second port, which closes a ring"};
+    hal::Function update_{*this, "update", &EthercatSegment::update,
+                          "copies values between pins and devices; in the thread of the master"};
 
     std::vector<devices::Device> line_devices_;
     // Deques: a pin may not move once it is declared.
-    std::deque<EmulatedSlavePins>                  slaves_;
-    std::deque<EmulatedAxisPins>                   axes_;
-    std::deque<ChannelPin<hal::In<bool>>>          digital_in_;
-    std::deque<ChannelPin<hal::Out<bool>>>         digital_out_;
-    std::deque<ChannelPin<hal::In<std::int32_t>>>  analog_in_;
+    std::deque<EmulatedSlavePins> slaves_;
+    std::deque<EmulatedAxisPins> axes_;
+    std::deque<ChannelPin<hal::In<bool>>> digital_in_;
+    std::deque<ChannelPin<hal::Out<bool>>> digital_out_;
+    std::deque<ChannelPin<hal::In<std::int32_t>>> analog_in_;
     std::deque<ChannelPin<hal::Out<std::int32_t>>> analog_out_;
-    std::unique_ptr<hal::ethernet::Port>           primary_, secondary_;
-    std::optional<esc::Line>                       line_;
-    std::uint64_t                                  frames_ = 0;
-    unsigned                                       silent_ = 0;
-    bool                                           unposted_ = false;  ///< disturbances that the line did not take yet
-    std::unique_ptr<esc::LineOnSegments>           connection_;
+    std::unique_ptr<hal::ethernet::Port> primary_, secondary_;
+    std::optional<esc::Line> line_;
+    std::uint64_t frames_ = 0;
+    unsigned silent_ = 0;
+    /// disturbances that the line did not take yet
+    bool unposted_ = false;
+    std::unique_ptr<esc::LineOnSegments> connection_;
 };
 
 }  // namespace
 
-HAL_COMPONENT(EthercatSegment, "ethercat_segment", "Emulated EtherCAT slaves on a segment in memory", R"(
+HAL_COMPONENT(EthercatSegment, "ethercat_segment",
+              "Emulated EtherCAT slaves on a segment in memory", R"(
 A line of EtherCAT slaves for machines without the hardware: controllers with registers, sync managers, FMMUs, EEPROM, watchdog and distributed
 clocks, and the firmware of couplers, digital and analogue I/O and CiA 402 servo drives. Frames are answered while they pass, with the delays of
 cables and devices, at the same times in every run of `hal sim`.

@@ -7,9 +7,12 @@ namespace {
 struct Names {
     using BusPins = hal::ethercat::LcecBusPins;
     using SlavePins = hal::ethercat::LcecSlavePins;
-    static constexpr const char *own = "lcec.0", *receive = "read-all", *transmit = "write-all", *file = "ethercat-conf.xml";
-    static constexpr bool        shared = true;
-    static std::string           function(const std::string&, const char* name) { return std::string("lcec.") + name; }
+    static constexpr const char *own = "lcec.0", *receive = "read-all", *transmit = "write-all",
+                                *file = "ethercat-conf.xml";
+    static constexpr bool shared = true;
+    static std::string function(const std::string&, const char* name) {
+        return std::string("lcec.") + name;
+    }
 };
 using Lcec = hal::ethercat::MasterComponent<Names>;
 

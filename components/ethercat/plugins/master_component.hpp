@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The master as a HAL component; `Names` gives it the pins and functions of `ethercat` or of `lcec`.
+// The master as a HAL component; `Names` gives it the pins and functions of `ethercat` or of
+// `lcec`.
 #pragma once
 
 #include <pthread.h>
@@ -49,36 +50,47 @@ public:
             slaves_.emplace_back(*this, receive_, slave.name);
             for (std::size_t n = 0; n < slave.sync_managers.size(); ++n) {
                 std::size_t at = 0;
-                for (const master::Pdo& pdo : slave.sync_managers[n].pdos)
+                for (const master::Pdo& pdo : slave.sync_managers[n].pdos) {
                     for (const master::Entry& e : pdo.entries) {
-                        entries_.declare(slave.name + ".", e, slave.sync_managers[n].output, places_.size(), at);
+                        entries_.declare(slave.name + ".", e, slave.sync_managers[n].output,
+                                         places_.size(), at);
                         at += e.bits;
                     }
+                }
                 places_.push_back({s, n});
             }
             const std::string who = config::slave_words(static_cast<std::uint32_t>(s), bus_.setup);
             lost_words_.push_back(who + " does not answer; its inputs keep their last values");
-            identity_words_.push_back(who + " is not the device of the configuration; it stays in INIT");
+            identity_words_.push_back(who +
+                                      " is not the device of the configuration; it stays in INIT");
             missing_words_.push_back(who + " is not on the bus");
             ambiguous_words_.push_back(who + " is not unique; no slave with its number is started");
             failed_words_.push_back(who + " did not start; it is tried again");
             const bool stops = bus_.setup.dc_loss == master::DcLoss::safeop;
-            clock_words_.push_back(who + " is out of step, its clock deviates by {} us" +
-                                   (stops ? "; its outputs are off until it is in step again" : ""));
-            left_words_.push_back(who + " left its state with AL status code {x}; its outputs are off");
+            clock_words_.push_back(
+                who + " is out of step, its clock deviates by {} us" +
+                (stops ? "; its outputs are off until it is in step again" : ""));
+            left_words_.push_back(who +
+                                  " left its state with AL status code {x}; its outputs are off");
         }
         areas_.resize(places_.size());
-        period_words_ = "the period of the thread is {} us, the cycle of the configuration " + std::to_string(bus_.setup.cycle_ns / 1000) +
-                        " us; change one of them: " + (bus_.lcec ? "appTimePeriod of <master>" : "cycle in [bus]") +
+        period_words_ = "the period of the thread is {} us, the cycle of the configuration " +
+                        std::to_string(bus_.setup.cycle_ns / 1000) + " us; change one of them: " +
+                        (bus_.lcec ? "appTimePeriod of <master>" : "cycle in [bus]") +
                         "; nothing is exchanged";
         unknown_words_ = "a slave on " + bus_.link + " is not in the configuration";
         nobody_words_ = "no slave answers on " + bus_.link;
         link_words_ = bus_.link + " has no link; no process data is exchanged";
         other_words_ = "another EtherCAT master sends on " + bus_.link + "; the slaves obey both";
-        const std::string receive = Names::function(name_, Names::receive), transmit = Names::function(name_, Names::transmit);
-        no_transmit_words_ = "'" + receive + "' runs, but '" + transmit + "' does not; nothing is sent; type: addf " + transmit + " THREAD";
-        no_receive_words_ = "'" + transmit + "' runs, but '" + receive + "' does not; nothing is sent; type: addf " + receive + " THREAD";
-        apart_words_ = "'" + receive + "' and '" + transmit + "' are in different threads; nothing is sent; type: delf " + transmit +
+        const std::string receive = Names::function(name_, Names::receive);
+
+        const std::string transmit = Names::function(name_, Names::transmit);
+        no_transmit_words_ = "'" + receive + "' runs, but '" + transmit +
+                             "' does not; nothing is sent; type: addf " + transmit + " THREAD";
+        no_receive_words_ = "'" + transmit + "' runs, but '" + receive +
+                            "' does not; nothing is sent; type: addf " + receive + " THREAD";
+        apart_words_ = "'" + receive + "' and '" + transmit +
+                       "' are in different threads; nothing is sent; type: delf " + transmit +
                        " THREAD, and add it to the thread of the other";
     }
 
@@ -86,17 +98,26 @@ public:
         faults_ = hal::extension<hal_faults>("hal.faults/1");
         hal::ethernet::Options options;
         options.types = {ethertype};
-        auto              primary = open(bus_.link, options);
+        auto primary = open(bus_.link, options);
         decltype(primary) backup;
-        if (!bus_.backup.empty()) backup = open(bus_.backup, options);
-        if (bus_.setup.lead == master::ClockLead::reference && has_clocks()) clock_.emplace().claim();
-        primary_ = std::move(primary), backup_ = std::move(backup);
+        if (!bus_.backup.empty()) {
+            backup = open(bus_.backup, options);
+        }
+        if (bus_.setup.lead == master::ClockLead::reference && has_clocks()) {
+            clock_.emplace().claim();
+        }
+        primary_ = std::move(primary);
+        backup_ = std::move(backup);
         simulated_ = primary_->description().simulated;
         mailboxes_ = std::make_unique<master::Mailboxes>(bus_.setup.slaves.size() + spare_slaves);
-        emergencies_ = std::make_unique<Emergencies>(bus_.setup.slaves.size(), static_cast<master::Events&>(*this));
-        for (std::size_t n = 0; n < mailboxes_->size(); ++n) mailboxes_->at(n).set_sink(MailboxType::coe, emergencies_.get());
-        server_ = std::make_unique<master::RequestServer>(
-            *mailboxes_, [this](std::uint16_t n) { return master_->status().scanned ? master_->numbered(n) : nullptr; }, 2);
+        emergencies_ = std::make_unique<Emergencies>(bus_.setup.slaves.size(),
+                                                     static_cast<master::Events&>(*this));
+        for (std::size_t n = 0; n < mailboxes_->size(); ++n) {
+            mailboxes_->at(n).set_sink(MailboxType::coe, emergencies_.get());
+        }
+        server_ = std::make_unique<master::RequestServer>(*mailboxes_, [this](std::uint16_t n) {
+            return master_->status().scanned ? master_->numbered(n) : nullptr;
+        }, 2);
         server_->set_poll_interval(emergencies_every_ns);
         if (has_eoe()) {
             eoe_ = std::make_unique<EoeInterfaces>(name_, bus_, *mailboxes_);
@@ -104,12 +125,23 @@ public:
             eoe_->start();
         }
         master::Setup setup = bus_.setup;
-        for (const auto* port : {primary_.get(), backup_.get()})
-            if (port != nullptr) setup.frame_bytes = std::min(setup.frame_bytes, hal::ethernet::header_bytes + port->statistics().mtu);
-        master_ = std::make_unique<Master>(std::move(setup), primary_->address(), static_cast<master::Events&>(*this), server_->coe());
-        for (std::size_t n = 0; n < server_->workers(); ++n) master_->add(server_->channel(n));
-        for (std::size_t n = 0; n < places_.size(); ++n) areas_[n] = master_->data(places_[n].slave, places_[n].sync_manager);
-        if (!simulated_) master_->set_epoch(since_2000_ns() - hal::monotonic_ns());
+        for (const auto* port : {primary_.get(), backup_.get()}) {
+            if (port != nullptr) {
+                setup.frame_bytes = std::min(setup.frame_bytes,
+                                             hal::ethernet::header_bytes + port->statistics().mtu);
+            }
+        }
+        master_ = std::make_unique<Master>(std::move(setup), primary_->address(),
+                                           static_cast<master::Events&>(*this), server_->coe());
+        for (std::size_t n = 0; n < server_->workers(); ++n) {
+            master_->add(server_->channel(n));
+        }
+        for (std::size_t n = 0; n < places_.size(); ++n) {
+            areas_[n] = master_->data(places_[n].slave, places_[n].sync_manager);
+        }
+        if (!simulated_) {
+            master_->set_epoch(since_2000_ns() - hal::monotonic_ns());
+        }
         period_reported_ = was_fresh_ = unknown_raised_ = false;
         failed_.assign(bus_.setup.slaves.size(), Event::slave_operational);
         slave_faults_.resize(bus_.setup.slaves.size());
@@ -120,13 +152,19 @@ public:
         filter_ = config::EventFilter(bus_.setup.slaves.size());
         discipline_.lose();
         reporter_.start();
-        if (!bus_.gateway.empty()) open_gateway();
+        if (!bus_.gateway.empty()) {
+            open_gateway();
+        }
         master_->attach(*primary_, backup_.get());
     }
 
     void stop() noexcept {
-        if (primary_ && master_) release_slaves();
-        if (server_) server_->stop();
+        if (primary_ && master_) {
+            release_slaves();
+        }
+        if (server_) {
+            server_->stop();
+        }
         gateway_.reset();
         eoe_.reset();
         master_.reset();
@@ -135,7 +173,8 @@ public:
         emergencies_.reset();
         clock_.reset();
         reporter_.stop();
-        primary_.reset(), backup_.reset();
+        primary_.reset();
+        backup_.reset();
     }
 
     void receive(hal::Cycle cycle) noexcept {
@@ -146,57 +185,87 @@ public:
         }
         unreceived_ = 0;
         receiver_.store(pthread_self(), std::memory_order_relaxed);
-        if (unreceived_fault_.lasts()) unreceived_fault_.end(faults_, this);
-        if (++unsent_ == tolerated_cycles) begin(unsent_fault_, no_transmit_words_);
+        if (unreceived_fault_.lasts()) {
+            unreceived_fault_.end(faults_, this);
+        }
+        if (++unsent_ == tolerated_cycles) {
+            begin(unsent_fault_, no_transmit_words_);
+        }
         if (idle_cycles_.fetch_add(1, std::memory_order_relaxed) >= tolerated_cycles) {
             show_offline(cycle);
             return;
         }
         now_ns_ = cycle.start_ns();
         master_->receive(cycle.start_ns());
-        if (interrupted_.exchange(false, std::memory_order_acquire)) resume();
+        if (interrupted_.exchange(false, std::memory_order_acquire)) {
+            resume();
+        }
         end_faults();
         follow(cycle);
         bus_pins_.show(master_->status(), master_->cycles_incomplete());
-        for (std::size_t n = 0; n < slaves_.size(); ++n) slaves_[n].show(master_->slave_status(n), emergencies_->of(n));
-        if (gateway_ && std::exchange(slaves_changed_, false))
-            gateway_slaves_->set(master_->found(), [this](std::size_t n) -> const master::BusSlave& { return master_->found(n); });
+        for (std::size_t n = 0; n < slaves_.size(); ++n) {
+            slaves_[n].show(master_->slave_status(n), emergencies_->of(n));
+        }
+        if (gateway_ && std::exchange(slaves_changed_, false)) {
+            gateway_slaves_->set(
+                master_->found(),
+                [this](std::size_t n) -> const master::BusSlave& { return master_->found(n); });
+        }
         entries_.show(areas_);
     }
 
     void transmit(hal::Cycle cycle) noexcept {
         if (!master_ || !fits(cycle)) return;
         unsent_ = 0;
-        if (unsent_fault_.lasts()) unsent_fault_.end(faults_, this);
-        if (++unreceived_ == tolerated_cycles) begin(unreceived_fault_, no_receive_words_);
+        if (unsent_fault_.lasts()) {
+            unsent_fault_.end(faults_, this);
+        }
+        if (++unreceived_ == tolerated_cycles) {
+            begin(unreceived_fault_, no_receive_words_);
+        }
         apart_ = receiver_.load(std::memory_order_relaxed) == pthread_self() ? 0 : apart_ + 1;
-        if (apart_ == tolerated_cycles) begin(apart_fault_, apart_words_);
-        else if (apart_ == 0 && apart_fault_.lasts()) apart_fault_.end(faults_, this);
-        if (unreceived_ > 2 || apart_ > 2) return;  // outputs must not move without their inputs
+        if (apart_ == tolerated_cycles) {
+            begin(apart_fault_, apart_words_);
+        } else if (apart_ == 0 && apart_fault_.lasts()) {
+            apart_fault_.end(faults_, this);
+        }
+        if (unreceived_ > 2 || apart_ > 2) {
+            return;  // outputs must not move without their inputs
+        }
         idle_cycles_.store(0, std::memory_order_relaxed);
         // The thread was declared hung, but its cycle goes on.
         if (interrupted_.load(std::memory_order_acquire)) return;
         entries_.take(areas_);
-        if (eoe_) eoe_->step(*master_);
+        if (eoe_) {
+            eoe_->step(*master_);
+        }
         server_->step(cycle.start_ns());
         master_->transmit(cycle.start_ns());
     }
 
     void make_safe(hal::Cycle) noexcept {
         interrupted_.store(true, std::memory_order_release);
-        if (master_) master_->shut_down();
+        if (master_) {
+            master_->shut_down();
+        }
     }
 
 private:
-    static constexpr unsigned     tolerated_cycles = 100;  ///< without the other function, while the netlist is loaded
-    static constexpr std::int64_t emergencies_every_ns = 100'000'000;  ///< a mailbox whose state is not in the process data is looked at
-    static constexpr double       not_a_number = std::numeric_limits<double>::quiet_NaN();
+    /// without the other function, while the netlist is loaded
+    static constexpr unsigned tolerated_cycles = 100;
+    /// a mailbox whose state is not in the process data is looked at
+    static constexpr std::int64_t emergencies_every_ns = 100'000'000;
+    static constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
     struct Place {
-        std::size_t slave = 0, sync_manager = 0;
+        std::size_t slave = 0;
+        std::size_t sync_manager = 0;
     };
 
-    static std::unique_ptr<hal::ethernet::Port> open(const std::string& address, const hal::ethernet::Options& options) {
-        if (hal::ethernet::describe(address).recorded) throw std::runtime_error(config::recorded_words(address));
+    static std::unique_ptr<hal::ethernet::Port> open(const std::string& address,
+                                                     const hal::ethernet::Options& options) {
+        if (hal::ethernet::describe(address).recorded) {
+            throw std::runtime_error(config::recorded_words(address));
+        }
         auto opened = hal::ethernet::open(address, options);
         if (!opened) throw std::runtime_error(opened.problem);
         return std::move(opened.port);
@@ -204,9 +273,11 @@ private:
 
     /// Lets other programs reach the mailboxes of the slaves. [setup]
     void open_gateway() {
-        gateway_slaves_ = std::make_unique<master::GatewaySlaves>(bus_.setup.slaves.size() + spare_slaves);
+        gateway_slaves_ =
+            std::make_unique<master::GatewaySlaves>(bus_.setup.slaves.size() + spare_slaves);
         master::GatewaySetup setup;
-        setup.address = bus_.gateway, setup.port = bus_.gateway_port;
+        setup.address = bus_.gateway;
+        setup.port = bus_.gateway_port;
         setup.slaves = [this] { return gateway_slaves_->all(); };
         std::string problem;
         gateway_ = std::make_unique<master::Gateway>(server_->open(), std::move(setup), problem);
@@ -219,32 +290,41 @@ private:
     }
 
     bool has_eoe() const {
-        for (const master::Slave& s : bus_.setup.slaves)
+        for (const master::Slave& s : bus_.setup.slaves) {
             if (s.eoe) return true;
+        }
         return false;
     }
     bool has_clocks() const {
-        for (const master::Slave& s : bus_.setup.slaves)
+        for (const master::Slave& s : bus_.setup.slaves) {
             if (s.dc) return true;
+        }
         return false;
     }
 
-    /// Returns whether the thread has the period of the configuration; otherwise nothing is exchanged. [realtime]
+    /// Returns whether the thread has the period of the configuration; otherwise nothing is
+    /// exchanged. [realtime]
     bool fits(hal::Cycle cycle) noexcept {
         if (cycle.period_ns() == bus_.setup.cycle_ns) {
-            if (period_fault_.lasts()) period_fault_.end(faults_, this);
+            if (period_fault_.lasts()) {
+                period_fault_.end(faults_, this);
+            }
             period_reported_ = false;
             return true;
         }
-        if (!std::exchange(period_reported_, true)) begin(period_fault_, period_words_, static_cast<double>(cycle.period_ns()) * 1e-3);
+        if (!std::exchange(period_reported_, true)) {
+            begin(period_fault_, period_words_, static_cast<double>(cycle.period_ns()) * 1e-3);
+        }
         return false;
     }
-    /// Takes the slaves to SAFE-OP once, and shows them as offline while no process data is exchanged. They are
-    /// started again by the next exchange. [realtime]
+    /// Takes the slaves to SAFE-OP once, and shows them as offline while no process data is
+    /// exchanged. They are started again by the next exchange. [realtime]
     void show_offline(hal::Cycle cycle) noexcept {
         if (!interrupted_.load(std::memory_order_relaxed)) {
             make_safe(cycle);
-            if (clock_ && was_fresh_) discipline_.lose();
+            if (clock_ && was_fresh_) {
+                discipline_.lose();
+            }
             was_fresh_ = false;
         }
         master::BusStatus network = master_->status();
@@ -266,7 +346,7 @@ private:
     /// Returns the time of the clocks of the slaves: ns since 2000-01-01. [setup]
     static std::int64_t since_2000_ns() noexcept {
         constexpr std::int64_t year_2000_s = 946'684'800;
-        timespec               now{};
+        timespec now{};
         clock_gettime(CLOCK_REALTIME, &now);
         return (now.tv_sec - year_2000_s) * 1'000'000'000 + now.tv_nsec;
     }
@@ -282,40 +362,60 @@ private:
     void follow(hal::Cycle cycle) noexcept {
         const Master::Phase phase = master_->dc_phase();
         if (!phase.fresh) {
-            if (clock_ && was_fresh_) discipline_.lose();
+            if (clock_ && was_fresh_) {
+                discipline_.lose();
+            }
             was_fresh_ = false;
             return;
         }
         was_fresh_ = true;
         bus_pins_.phase = static_cast<std::int32_t>(phase.error_ns);
-        if (clock_) clock_->step(discipline_.follow(-phase.error_ns, cycle.period_ns(), clock_->limit_ns()));
+        if (clock_) {
+            clock_->step(
+                discipline_.follow(-phase.error_ns, cycle.period_ns(), clock_->limit_ns()));
+        }
     }
 
     /// Takes all slaves to INIT, where outputs are off. [setup]
     void release_slaves() noexcept {
         std::array<std::uint8_t, largest_frame_bytes> buffer{};
-        FrameWriter                                   frame(buffer, primary_->address());
-        if (std::uint8_t* data = frame.add(Command::bwr, 0, at_position(0, registers::al_control), 2))
+        FrameWriter frame(buffer, primary_->address());
+        if (std::uint8_t* data =
+                frame.add(Command::bwr, 0, at_position(0, registers::al_control), 2)) {
             put<std::uint16_t>(data, static_cast<std::uint16_t>(State::init) | al_error);
-        primary_->send(frame.finish(), {}, simulated_ ? hal::ethernet::unclocked : hal::monotonic_ns());
+        }
+        primary_->send(frame.finish(), {},
+                       simulated_ ? hal::ethernet::unclocked : hal::monotonic_ns());
     }
 
-    void begin(hal::LastingFault& fault, const std::string& reason, double detail = not_a_number) noexcept {
+    void begin(hal::LastingFault& fault, const std::string& reason,
+               double detail = not_a_number) noexcept {
         fault.begin(faults_, this, reason.c_str(), detail);
     }
 
     /// Raises and ends the faults of a slave, which last until it is operational. [realtime]
-    void slave_event(Event event, std::uint32_t slave, std::int64_t first, std::int64_t second) noexcept {
-        if (event == Event::slave_lost) begin(slave_faults_[slave], lost_words_[slave]);
-        if (event == Event::fell_back) begin(slave_faults_[slave], left_words_[slave], static_cast<double>(second));
-        if (event == Event::dc_lost) begin(clock_faults_[slave], clock_words_[slave], static_cast<double>(first) * 1e-3);
-        if (event == Event::dc_recovered) clock_faults_[slave].end(faults_, this);
+    void slave_event(Event event, std::uint32_t slave, std::int64_t first,
+                     std::int64_t second) noexcept {
+        if (event == Event::slave_lost) {
+            begin(slave_faults_[slave], lost_words_[slave]);
+        }
+        if (event == Event::fell_back) {
+            begin(slave_faults_[slave], left_words_[slave], static_cast<double>(second));
+        }
+        if (event == Event::dc_lost) {
+            begin(clock_faults_[slave], clock_words_[slave], static_cast<double>(first) * 1e-3);
+        }
+        if (event == Event::dc_recovered) {
+            clock_faults_[slave].end(faults_, this);
+        }
         const std::string* const reason = start_words(event, slave);
         if (reason != nullptr && failed_[slave] != event) {  // not at each try
             begin(slave_faults_[slave], *reason);
             failed_[slave] = event;
         }
-        if (event == Event::slave_settled) failed_[slave] = Event::slave_operational;
+        if (event == Event::slave_settled) {
+            failed_[slave] = Event::slave_operational;
+        }
         if (event != Event::slave_operational) return;
         failed_[slave] = event;
         slave_faults_[slave].end(faults_, this);
@@ -324,12 +424,24 @@ private:
 
     /// Raises and ends the faults of the bus. [realtime]
     void bus_event(Event event, std::int64_t first) noexcept {
-        if (event == Event::unknown_slave && !std::exchange(unknown_raised_, true)) begin(unknown_fault_, unknown_words_);
-        if (event == Event::scanned) unknown_raised_ = false;
-        if (event == Event::no_slaves) begin(nobody_fault_, nobody_words_);
-        if (event == Event::scanned && first > 0) nobody_fault_.end(faults_, this);
-        if (event == Event::link_lost && first == 0) begin(link_fault_, link_words_);
-        if (event == Event::link_restored && first == 0) link_fault_.end(faults_, this);
+        if (event == Event::unknown_slave && !std::exchange(unknown_raised_, true)) {
+            begin(unknown_fault_, unknown_words_);
+        }
+        if (event == Event::scanned) {
+            unknown_raised_ = false;
+        }
+        if (event == Event::no_slaves) {
+            begin(nobody_fault_, nobody_words_);
+        }
+        if (event == Event::scanned && first > 0) {
+            nobody_fault_.end(faults_, this);
+        }
+        if (event == Event::link_lost && first == 0) {
+            begin(link_fault_, link_words_);
+        }
+        if (event == Event::link_restored && first == 0) {
+            link_fault_.end(faults_, this);
+        }
         if (event == Event::other_master) {
             begin(other_fault_, other_words_);
             other_seen_ns_ = now_ns_;
@@ -339,7 +451,9 @@ private:
     /// Ends faults that no event ends. [realtime]
     void end_faults() noexcept {
         constexpr std::int64_t repeated_within_ns = 3'000'000'000;
-        if (other_fault_.lasts() && now_ns_ - other_seen_ns_ > repeated_within_ns) other_fault_.end(faults_, this);
+        if (other_fault_.lasts() && now_ns_ - other_seen_ns_ > repeated_within_ns) {
+            other_fault_.end(faults_, this);
+        }
     }
 
     /// Returns why a slave is not started; nullptr: the event is another one. [realtime]
@@ -357,66 +471,86 @@ private:
     }
 
     // Events of the master. [realtime]
-    void report(Event event, std::uint32_t slave, std::int64_t first, std::int64_t second) noexcept override {
-        if (filter_.is_new(event, slave, first, second)) reporter_.tell({event, slave, first, second});
+    void report(Event event, std::uint32_t slave, std::int64_t first,
+                std::int64_t second) noexcept override {
+        if (filter_.is_new(event, slave, first, second)) {
+            reporter_.tell({event, slave, first, second});
+        }
         const bool named = slave < slaves_.size();
-        if (event == Event::scanned || event == Event::topology_changed || event == Event::slave_returned || event == Event::slave_lost)
+        if (event == Event::scanned || event == Event::topology_changed ||
+            event == Event::slave_returned || event == Event::slave_lost) {
             slaves_changed_ = true;
-        if (named) slave_event(event, slave, first, second);
+        }
+        if (named) {
+            slave_event(event, slave, first, second);
+        }
         bus_event(event, first);
     }
 
-    const std::string       name_ = hal::own_name(Names::own);
-    EthercatArguments       arguments_{*this, Names::file, Names::shared};
-    config::Bus             bus_ = arguments_.read();
-    hal::Function           receive_{*this,
-                           Names::receive,
-                           &MasterComponent::receive,
-                           "takes the inputs of the slaves; first in the thread, whose period is the cycle",
-                                     {.shared = Names::shared}};
-    hal::Function           transmit_{*this,
-                            Names::transmit,
-                            &MasterComponent::transmit,
-                            "sends the outputs of the slaves, starts and watches them; last in the thread",
-                                      {.shared = Names::shared}};
-    hal::Emergency          emergency_{*this, &MasterComponent::make_safe,
-                              "takes the slaves to SAFE-OP at once, where outputs are off; they are started again "
-                              "when the thread runs again"};
+    const std::string name_ = hal::own_name(Names::own);
+    EthercatArguments arguments_{*this, Names::file, Names::shared};
+    config::Bus bus_ = arguments_.read();
+    hal::Function receive_{
+        *this,
+        Names::receive,
+        &MasterComponent::receive,
+        "takes the inputs of the slaves; first in the thread, whose period is the cycle",
+        {.shared = Names::shared}};
+    hal::Function transmit_{
+        *this,
+        Names::transmit,
+        &MasterComponent::transmit,
+        "sends the outputs of the slaves, starts and watches them; last in the thread",
+        {.shared = Names::shared}};
+    hal::Emergency emergency_{
+        *this, &MasterComponent::make_safe,
+        "takes the slaves to SAFE-OP at once, where outputs are off; they are started again "
+        "when the thread runs again"};
     typename Names::BusPins bus_pins_{*this, receive_};
     std::deque<typename Names::SlavePins> slaves_;
-    EntryPins                             entries_{*this, receive_, transmit_};
-    std::vector<Place>                    places_;  // of the process data, in the order of areas_
-    std::vector<std::span<std::uint8_t>>  areas_;
-    std::vector<std::string> lost_words_, left_words_, clock_words_, identity_words_, missing_words_, ambiguous_words_, failed_words_;
-    std::vector<Event>       failed_;  // why a slave is not started, or slave_operational
-    std::string              unknown_words_, nobody_words_, link_words_, period_words_, other_words_, no_transmit_words_, no_receive_words_,
-        apart_words_;
-    config::EventFilter    filter_{0};
-    unsigned               unsent_ = 0, unreceived_ = 0, apart_ = 0;
-    std::atomic<unsigned>  idle_cycles_{0};  ///< cycles of receive() since transmit() last exchanged process data
+    EntryPins entries_{*this, receive_, transmit_};
+    std::vector<Place> places_;  // of the process data, in the order of areas_
+    std::vector<std::span<std::uint8_t>> areas_;
+    std::vector<std::string> lost_words_, left_words_, clock_words_, identity_words_,
+        missing_words_, ambiguous_words_, failed_words_;
+    std::vector<Event> failed_;  // why a slave is not started, or slave_operational
+    std::string unknown_words_, nobody_words_, link_words_, period_words_, other_words_,
+        no_transmit_words_, no_receive_words_, apart_words_;
+    config::EventFilter filter_{0};
+    unsigned unsent_ = 0;
+    unsigned unreceived_ = 0;
+    unsigned apart_ = 0;
+    /// cycles of receive() since transmit() last exchanged process data
+    std::atomic<unsigned> idle_cycles_{0};
     std::atomic<pthread_t> receiver_{};
-    std::atomic<bool>      interrupted_{false};  ///< set by make_safe() in any thread, taken by receive()
+    /// set by make_safe() in any thread, taken by receive()
+    std::atomic<bool> interrupted_{false};
 
-    std::unique_ptr<hal::ethernet::Port>   primary_, backup_;
-    std::unique_ptr<master::Mailboxes>     mailboxes_;
-    std::unique_ptr<Emergencies>           emergencies_;
+    std::unique_ptr<hal::ethernet::Port> primary_, backup_;
+    std::unique_ptr<master::Mailboxes> mailboxes_;
+    std::unique_ptr<Emergencies> emergencies_;
     std::unique_ptr<master::RequestServer> server_;
-    std::unique_ptr<Master>                master_;
-    std::unique_ptr<EoeInterfaces>         eoe_;
+    std::unique_ptr<Master> master_;
+    std::unique_ptr<EoeInterfaces> eoe_;
     std::unique_ptr<master::GatewaySlaves> gateway_slaves_;
-    std::unique_ptr<master::Gateway>       gateway_;
-    bool                                   slaves_changed_ = false;
-    std::optional<hal::DisciplinedClock>   clock_;
-    hal::Discipline                        discipline_;
-    hal::Reporter<config::Happened>        reporter_{name_, [this](const config::Happened& h) {
-        return config::event_words(h, bus_.setup, bus_.link, bus_.backup, bus_.lcec ? config::Format::lcec : config::Format::ethercat);
+    std::unique_ptr<master::Gateway> gateway_;
+    bool slaves_changed_ = false;
+    std::optional<hal::DisciplinedClock> clock_;
+    hal::Discipline discipline_;
+    hal::Reporter<config::Happened> reporter_{name_, [this](const config::Happened& h) {
+        return config::event_words(h, bus_.setup, bus_.link, bus_.backup,
+                                   bus_.lcec ? config::Format::lcec : config::Format::ethercat);
     }, 256, [](const config::Happened& h, const std::string&) { return config::subject(h); }};
-    const hal_faults*                      faults_ = nullptr;
-    std::vector<hal::LastingFault>         slave_faults_, clock_faults_;  // by slave
-    hal::LastingFault                      unsent_fault_, unreceived_fault_, apart_fault_, period_fault_, unknown_fault_, nobody_fault_,
-        link_fault_, other_fault_;
-    std::int64_t                           now_ns_ = 0, other_seen_ns_ = 0;
-    bool                                   unknown_raised_ = false, was_fresh_ = false, simulated_ = false, period_reported_ = false;
+    const hal_faults* faults_ = nullptr;
+    std::vector<hal::LastingFault> slave_faults_, clock_faults_;  // by slave
+    hal::LastingFault unsent_fault_, unreceived_fault_, apart_fault_, period_fault_, unknown_fault_,
+        nobody_fault_, link_fault_, other_fault_;
+    std::int64_t now_ns_ = 0;
+    std::int64_t other_seen_ns_ = 0;
+    bool unknown_raised_ = false;
+    bool was_fresh_ = false;
+    bool simulated_ = false;
+    bool period_reported_ = false;
 };
 
 }  // namespace hal::ethercat

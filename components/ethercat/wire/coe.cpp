@@ -6,7 +6,7 @@ namespace hal::ethercat::coe {
 const char* abort_text(std::uint32_t code) noexcept {
     static constexpr struct {
         std::uint32_t code;
-        const char*   text;
+        const char* text;
     } rows[] = {
         {abort::toggle, "toggle bit did not change"},
         {abort::timeout, "SDO protocol timeout"},
@@ -39,15 +39,16 @@ const char* abort_text(std::uint32_t code) noexcept {
         {abort::state, "data cannot be stored in the present state of the device"},
         {abort::no_dictionary, "object dictionary missing"},
     };
-    for (const auto& row : rows)
+    for (const auto& row : rows) {
         if (row.code == code) return row.text;
+    }
     return "unknown abort code";
 }
 
 const char* type_name(std::uint16_t t) noexcept {
     static constexpr struct {
         std::uint16_t type;
-        const char*   text;
+        const char* text;
     } rows[] = {
         {type::boolean, "BOOL"},
         {type::s8, "SINT"},
@@ -79,8 +80,9 @@ const char* type_name(std::uint16_t t) noexcept {
         {type::identity, "IDENTITY"},
         {type::pdo_parameter, "PDO_PARAMETER"},
     };
-    for (const auto& row : rows)
+    for (const auto& row : rows) {
         if (row.type == t) return row.text;
+    }
     return "";
 }
 

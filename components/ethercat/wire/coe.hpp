@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// CANopen over EtherCAT (ETG.1000.6, clause 5.6): SDO requests and responses, SDO information, emergencies. All offsets are from the start
-// of
-// the payload of the mailbox, which begins with the CoE header.
+// CANopen over EtherCAT (ETG.1000.6, clause 5.6): SDO requests and responses, SDO information,
+// emergencies. All offsets are from the start of the payload of the mailbox, which begins with the
+// CoE header.
 #pragma once
 
 #include <cstddef>
@@ -26,7 +26,9 @@ enum class Service : std::uint8_t {
     sdo_information = 8
 };
 /// Returns the service of a message; its CoE header must be complete. [realtime]
-inline Service service_of(const std::uint8_t* payload) noexcept { return static_cast<Service>(get<std::uint16_t>(payload) >> 12); }
+inline Service service_of(const std::uint8_t* payload) noexcept {
+    return static_cast<Service>(get<std::uint16_t>(payload) >> 12);
+}
 /// Writes the CoE header. [realtime]
 inline void write_header(std::uint8_t* to, Service service) noexcept {
     put(to, static_cast<std::uint16_t>(static_cast<unsigned>(service) << 12));
@@ -34,37 +36,61 @@ inline void write_header(std::uint8_t* to, Service service) noexcept {
 
 // SDO: CoE header, u8 command, u16 index, u8 sub-index, 4 bytes of data or size; data.
 inline constexpr std::size_t sdo_bytes = 10;                 ///< payload of the short forms
-inline constexpr std::size_t sdo_data = 6;                   ///< offset of expedited data, of the size, of the abort code
+/// offset of expedited data, of the size, of the abort code
+inline constexpr std::size_t sdo_data = 6;
 inline constexpr std::size_t segment_data = 3;               ///< offset of the data of a segment
-inline constexpr std::size_t smallest_segment = 10;          ///< payload of a segment: shorter data is padded, and its unused bytes are
+/// payload of a segment: shorter data is padded, and its unused bytes are
+inline constexpr std::size_t smallest_segment = 10;
     ///< counted
 /// Returns the data bytes that the first message of a normal transfer holds. [any]
-constexpr std::size_t normal_capacity(std::size_t mailbox) noexcept { return mailbox - mailbox_header_bytes - sdo_bytes; }
+constexpr std::size_t normal_capacity(std::size_t mailbox) noexcept {
+    return mailbox - mailbox_header_bytes - sdo_bytes;
+}
 /// Returns the data bytes that a segment holds. [any]
-constexpr std::size_t segment_capacity(std::size_t mailbox) noexcept { return mailbox - mailbox_header_bytes - segment_data; }
+constexpr std::size_t segment_capacity(std::size_t mailbox) noexcept {
+    return mailbox - mailbox_header_bytes - segment_data;
+}
 
 /// Bits of the SDO command.
 namespace command {
-inline constexpr std::uint8_t size_given = 0x01, expedited = 0x02, complete = 0x10, toggle = 0x10, last_segment = 0x01, specifier = 0xe0;
+inline constexpr std::uint8_t size_given = 0x01;
+inline constexpr std::uint8_t expedited = 0x02;
+inline constexpr std::uint8_t complete = 0x10;
+inline constexpr std::uint8_t toggle = 0x10;
+
+inline constexpr std::uint8_t last_segment = 0x01;
+inline constexpr std::uint8_t specifier = 0xe0;
 // requests
-inline constexpr std::uint8_t download_segment = 0x00, download = 0x20, upload = 0x40, upload_segment = 0x60, abort = 0x80;
+inline constexpr std::uint8_t download_segment = 0x00;
+inline constexpr std::uint8_t download = 0x20;
+inline constexpr std::uint8_t upload = 0x40;
+
+inline constexpr std::uint8_t upload_segment = 0x60;
+inline constexpr std::uint8_t abort = 0x80;
 // responses
-inline constexpr std::uint8_t upload_segment_response = 0x00, download_segment_response = 0x20, upload_response = 0x40,
-                              download_response = 0x60;
+inline constexpr std::uint8_t upload_segment_response = 0x00;
+inline constexpr std::uint8_t download_segment_response = 0x20;
+
+inline constexpr std::uint8_t upload_response = 0x40;
+inline constexpr std::uint8_t download_response = 0x60;
 }  // namespace command
 
 /// Fields of an SDO that is not a segment.
 struct Sdo {
-    std::uint8_t  command = 0;
+    std::uint8_t command = 0;
     std::uint16_t index = 0;
-    std::uint8_t  sub = 0;
+    std::uint8_t sub = 0;
     std::uint32_t value = 0;  ///< expedited data, size of the whole transfer, or abort code
 
-    bool is(std::uint8_t specifier) const noexcept { return (command & command::specifier) == specifier; }
+    bool is(std::uint8_t specifier) const noexcept {
+        return (command & command::specifier) == specifier;
+    }
     bool expedited() const noexcept { return (command & command::expedited) != 0; }
     bool complete() const noexcept { return (command & command::complete) != 0; }
     /// Returns the bytes of expedited data: 1..4.
-    std::size_t expedited_bytes() const noexcept { return (command & command::size_given) != 0 ? 4U - (command >> 2 & 3U) : 4U; }
+    std::size_t expedited_bytes() const noexcept {
+        return (command & command::size_given) != 0 ? 4U - (command >> 2 & 3U) : 4U;
+    }
 };
 /// Reads an SDO; nullopt if the payload is too short. [realtime]
 inline std::optional<Sdo> read_sdo(std::span<const std::uint8_t> payload) noexcept {
@@ -81,43 +107,89 @@ inline std::size_t write_sdo(std::uint8_t* to, Service service, const Sdo& sdo) 
     put(to + sdo_data, sdo.value);
     return sdo_bytes;
 }
-/// Returns the command of an expedited transfer of 1..4 bytes: 2Fh for one byte of a download. [any]
+/// Returns the command of an expedited transfer of 1..4 bytes: 2Fh for one byte of a download.
+/// [any]
 constexpr std::uint8_t expedited_command(std::uint8_t specifier, std::size_t bytes) noexcept {
-    return static_cast<std::uint8_t>(specifier | (4 - bytes) << 2 | command::expedited | command::size_given);
+    return static_cast<std::uint8_t>(specifier | (4 - bytes) << 2 | command::expedited |
+                                     command::size_given);
 }
-/// Writes a segment with its CoE header: data of 0..capacity bytes, padded to 7; returns the length of the payload. [realtime]
-inline std::size_t write_segment(std::uint8_t* to, Service service, std::uint8_t specifier, bool toggle, bool last,
+/// Writes a segment with its CoE header: data of 0..capacity bytes, padded to 7; returns the length
+/// of the payload. [realtime]
+inline std::size_t write_segment(std::uint8_t* to, Service service, std::uint8_t specifier,
+                                 bool toggle, bool last,
                                  std::span<const std::uint8_t> data) noexcept {
     write_header(to, service);
     const std::size_t unused = data.size() < 7 ? 7 - data.size() : 0;
-    to[2] = static_cast<std::uint8_t>(specifier | (toggle ? command::toggle : 0) | unused << 1 | (last ? command::last_segment : 0));
-    if (!data.empty()) std::memcpy(to + segment_data, data.data(), data.size());
-    if (unused != 0) std::memset(to + segment_data + data.size(), 0, unused);
+    to[2] = static_cast<std::uint8_t>(specifier | (toggle ? command::toggle : 0) | unused << 1 |
+                                      (last ? command::last_segment : 0));
+    if (!data.empty()) {
+        std::memcpy(to + segment_data, data.data(), data.size());
+    }
+    if (unused != 0) {
+        std::memset(to + segment_data + data.size(), 0, unused);
+    }
     return segment_data + data.size() + unused;
 }
-/// Returns the data of a segment; the number of unused bytes counts only in the shortest message. Empty for a payload that is too short.
-/// [realtime]
+/// Returns the data of a segment; the number of unused bytes counts only in the shortest message.
+/// Empty for a payload that is too short. [realtime]
 inline std::span<const std::uint8_t> segment_of(std::span<const std::uint8_t> payload) noexcept {
-    if (payload.size() <= segment_data) return {};
+    if (payload.size() <= segment_data) {
+        return {};
+    }
     const std::size_t unused = payload.size() == smallest_segment ? payload[2] >> 1 & 7U : 0;
     return payload.subspan(segment_data, payload.size() - segment_data - unused);
 }
 
 /// SDO abort codes.
 namespace abort {
-inline constexpr std::uint32_t toggle = 0x05030000, timeout = 0x05040000, command = 0x05040001, memory = 0x05040005, access = 0x06010000,
-                               write_only = 0x06010001, read_only = 0x06010002, sub0_not_zero = 0x06010003, no_complete_access = 0x06010004,
-                               too_long_for_mailbox = 0x06010005, mapped = 0x06010006, no_object = 0x06020000, not_mappable = 0x06040041,
-                               pdo_too_long = 0x06040042, parameter = 0x06040043, internal = 0x06040047, hardware = 0x06060000,
-                               length = 0x06070010, too_long = 0x06070012, too_short = 0x06070013, no_sub = 0x06090011, range = 0x06090030,
-                               too_high = 0x06090031, too_low = 0x06090032, max_below_min = 0x06090036, general = 0x08000000,
-                               store = 0x08000020, local_control = 0x08000021, state = 0x08000022, no_dictionary = 0x08000023;
-}
-/// Returns the meaning of an abort code, as in "object does not exist"; "unknown abort code" for others. [any]
+inline constexpr std::uint32_t toggle = 0x05030000;
+inline constexpr std::uint32_t timeout = 0x05040000;
+inline constexpr std::uint32_t command = 0x05040001;
+
+inline constexpr std::uint32_t memory = 0x05040005;
+inline constexpr std::uint32_t access = 0x06010000;
+inline constexpr std::uint32_t write_only = 0x06010001;
+
+inline constexpr std::uint32_t read_only = 0x06010002;
+inline constexpr std::uint32_t sub0_not_zero = 0x06010003;
+
+inline constexpr std::uint32_t no_complete_access = 0x06010004;
+inline constexpr std::uint32_t too_long_for_mailbox = 0x06010005;
+
+inline constexpr std::uint32_t mapped = 0x06010006;
+inline constexpr std::uint32_t no_object = 0x06020000;
+
+inline constexpr std::uint32_t not_mappable = 0x06040041;
+inline constexpr std::uint32_t pdo_too_long = 0x06040042;
+
+inline constexpr std::uint32_t parameter = 0x06040043;
+inline constexpr std::uint32_t internal = 0x06040047;
+inline constexpr std::uint32_t hardware = 0x06060000;
+
+inline constexpr std::uint32_t length = 0x06070010;
+inline constexpr std::uint32_t too_long = 0x06070012;
+inline constexpr std::uint32_t too_short = 0x06070013;
+
+inline constexpr std::uint32_t no_sub = 0x06090011;
+inline constexpr std::uint32_t range = 0x06090030;
+inline constexpr std::uint32_t too_high = 0x06090031;
+
+inline constexpr std::uint32_t too_low = 0x06090032;
+inline constexpr std::uint32_t max_below_min = 0x06090036;
+
+inline constexpr std::uint32_t general = 0x08000000;
+inline constexpr std::uint32_t store = 0x08000020;
+inline constexpr std::uint32_t local_control = 0x08000021;
+
+inline constexpr std::uint32_t state = 0x08000022;
+inline constexpr std::uint32_t no_dictionary = 0x08000023;
+}  // namespace abort
+/// Returns the meaning of an abort code, as in "object does not exist"; "unknown abort code" for
+/// others. [any]
 const char* abort_text(std::uint32_t code) noexcept;
 
 // SDO information: CoE header, u8 opcode (bit 7: incomplete), u8 0, u16 fragments left; data.
-inline constexpr std::size_t  information_header_bytes = 6;
+inline constexpr std::size_t information_header_bytes = 6;
 inline constexpr std::uint8_t information_incomplete = 0x80;
 enum class Information : std::uint8_t {
     list_request = 1,
@@ -129,22 +201,32 @@ enum class Information : std::uint8_t {
     error = 7
 };
 /// Lists of objects.
-enum class List : std::uint16_t { lengths = 0, all = 1, rx_mappable = 2, tx_mappable = 3, backup = 4, settings = 5 };
+enum class List : std::uint16_t {
+    lengths = 0,
+    all = 1,
+    rx_mappable = 2,
+    tx_mappable = 3,
+    backup = 4,
+    settings = 5
+};
 struct InformationHeader {
-    Information   opcode{};
-    bool          incomplete = false;
+    Information opcode{};
+    bool incomplete = false;
     std::uint16_t fragments_left = 0;
 };
 /// Reads the header of SDO information; nullopt if the payload is too short. [realtime]
-inline std::optional<InformationHeader> read_information(std::span<const std::uint8_t> payload) noexcept {
+inline std::optional<InformationHeader> read_information(
+    std::span<const std::uint8_t> payload) noexcept {
     if (payload.size() < information_header_bytes) return std::nullopt;
-    return InformationHeader{static_cast<Information>(payload[2] & 0x7f), (payload[2] & information_incomplete) != 0,
+    return InformationHeader{static_cast<Information>(payload[2] & 0x7f),
+                             (payload[2] & information_incomplete) != 0,
                              get<std::uint16_t>(payload.data() + 4)};
 }
 /// Writes the CoE header and that of SDO information. [realtime]
 inline void write_information(std::uint8_t* to, InformationHeader h) noexcept {
     write_header(to, Service::sdo_information);
-    to[2] = static_cast<std::uint8_t>(static_cast<unsigned>(h.opcode) | (h.incomplete ? information_incomplete : 0U));
+    to[2] = static_cast<std::uint8_t>(static_cast<unsigned>(h.opcode) |
+                                      (h.incomplete ? information_incomplete : 0U));
     to[3] = 0;
     put(to + 4, h.fragments_left);
 }
@@ -152,31 +234,65 @@ inline void write_information(std::uint8_t* to, InformationHeader h) noexcept {
 enum class ObjectCode : std::uint8_t { variable = 7, array = 8, record = 9 };
 /// Indices of basic data types (ETG.1020).
 namespace type {
-inline constexpr std::uint16_t boolean = 0x0001, s8 = 0x0002, s16 = 0x0003, s32 = 0x0004, u8 = 0x0005, u16 = 0x0006, u32 = 0x0007,
-                               real32 = 0x0008, visible_string = 0x0009, octet_string = 0x000a, real64 = 0x0011, s64 = 0x0015, u64 = 0x001b,
-                               bit1 = 0x0030;
-inline constexpr std::uint16_t pdo_mapping = 0x0021, identity = 0x0023, command_parameter = 0x0025, pdo_parameter = 0x0027;
+inline constexpr std::uint16_t boolean = 0x0001;
+inline constexpr std::uint16_t s8 = 0x0002;
+inline constexpr std::uint16_t s16 = 0x0003;
+inline constexpr std::uint16_t s32 = 0x0004;
+
+inline constexpr std::uint16_t u8 = 0x0005;
+inline constexpr std::uint16_t u16 = 0x0006;
+inline constexpr std::uint16_t u32 = 0x0007;
+inline constexpr std::uint16_t real32 = 0x0008;
+
+inline constexpr std::uint16_t visible_string = 0x0009;
+inline constexpr std::uint16_t octet_string = 0x000a;
+inline constexpr std::uint16_t real64 = 0x0011;
+
+inline constexpr std::uint16_t s64 = 0x0015;
+inline constexpr std::uint16_t u64 = 0x001b;
+inline constexpr std::uint16_t bit1 = 0x0030;
+inline constexpr std::uint16_t pdo_mapping = 0x0021;
+inline constexpr std::uint16_t identity = 0x0023;
+inline constexpr std::uint16_t command_parameter = 0x0025;
+
+inline constexpr std::uint16_t pdo_parameter = 0x0027;
 }  // namespace type
 /// Returns the name of a basic data type, as in "UDINT"; "" for unknown ones. [any]
 const char* type_name(std::uint16_t type) noexcept;
 /// Bits of the access rights of an entry.
 namespace access {
-inline constexpr std::uint16_t read_preop = 0x01, read_safeop = 0x02, read_op = 0x04, write_preop = 0x08, write_safeop = 0x10,
-                               write_op = 0x20, rx_mappable = 0x40, tx_mappable = 0x80, backup = 0x100, setting = 0x200;
-inline constexpr std::uint16_t read = 0x07, write = 0x38, read_write = 0x3f;
+inline constexpr std::uint16_t read_preop = 0x01;
+inline constexpr std::uint16_t read_safeop = 0x02;
+inline constexpr std::uint16_t read_op = 0x04;
+
+inline constexpr std::uint16_t write_preop = 0x08;
+inline constexpr std::uint16_t write_safeop = 0x10;
+inline constexpr std::uint16_t write_op = 0x20;
+
+inline constexpr std::uint16_t rx_mappable = 0x40;
+inline constexpr std::uint16_t tx_mappable = 0x80;
+inline constexpr std::uint16_t backup = 0x100;
+
+inline constexpr std::uint16_t setting = 0x200;
+inline constexpr std::uint16_t read = 0x07;
+inline constexpr std::uint16_t write = 0x38;
+inline constexpr std::uint16_t read_write = 0x3f;
 }  // namespace access
-// After the header of SDO information:
-// list request u16 type; list response u16 type, then u16 indices; object request u16 index;
-// object response u16 index, u16 type, u8 largest sub-index, u8 object code, name; entry request u16 index, u8 sub, u8 value info;
-// entry response u16 index, u8 sub, u8 value info, u16 type, u16 bits, u16 access, name; error u32 abort code.
-inline constexpr std::size_t object_name = information_header_bytes + 6, entry_name = information_header_bytes + 10;  ///< offsets of names
+// After the header of SDO information: list request u16 type; list response u16 type, then u16
+// indices; object request u16 index; object response u16 index, u16 type, u8 largest sub-index, u8
+// object code, name; entry request u16 index, u8 sub, u8 value info; entry response u16 index, u8
+// sub, u8 value info, u16 type, u16 bits, u16 access, name; error u32 abort code.
+/// offsets of names
+inline constexpr std::size_t object_name = information_header_bytes + 6;
+
+inline constexpr std::size_t entry_name = information_header_bytes + 10;
 
 /// An emergency: CoE header, u16 code, u8 error register, 5 bytes.
 inline constexpr std::size_t emergency_bytes = 10;
 struct Emergency {
     std::uint16_t code = 0;
-    std::uint8_t  error_register = 0;
-    std::uint8_t  data[5] = {};
+    std::uint8_t error_register = 0;
+    std::uint8_t data[5] = {};
 };
 /// Reads an emergency; nullopt if the payload is too short. [realtime]
 inline std::optional<Emergency> read_emergency(std::span<const std::uint8_t> payload) noexcept {
@@ -196,15 +312,23 @@ inline std::size_t write_emergency(std::uint8_t* to, const Emergency& e) noexcep
 
 /// An entry of a PDO mapping: index << 16 | sub << 8 | bits.
 struct Mapping {
-    std::uint16_t           index = 0;
-    std::uint8_t            sub = 0, bits = 0;
+    std::uint16_t index = 0;
+    std::uint8_t sub = 0;
+    std::uint8_t bits = 0;
     constexpr std::uint32_t raw() const noexcept {
-        return static_cast<std::uint32_t>(index) << 16 | static_cast<std::uint32_t>(sub) << 8 | bits;
+        return static_cast<std::uint32_t>(index) << 16 | static_cast<std::uint32_t>(sub) << 8 |
+               bits;
     }
     static constexpr Mapping of(std::uint32_t raw) noexcept {
-        return {static_cast<std::uint16_t>(raw >> 16), static_cast<std::uint8_t>(raw >> 8), static_cast<std::uint8_t>(raw)};
+        return {static_cast<std::uint16_t>(raw >> 16), static_cast<std::uint8_t>(raw >> 8),
+                static_cast<std::uint8_t>(raw)};
     }
 };
-inline constexpr std::uint16_t rx_pdo = 0x1600, tx_pdo = 0x1a00, sync_manager_types = 0x1c00, assignment = 0x1c10;  ///< assignment + number
+/// assignment + number
+inline constexpr std::uint16_t rx_pdo = 0x1600;
+inline constexpr std::uint16_t tx_pdo = 0x1a00;
+inline constexpr std::uint16_t sync_manager_types = 0x1c00;
+
+inline constexpr std::uint16_t assignment = 0x1c10;
 
 }  // namespace hal::ethercat::coe

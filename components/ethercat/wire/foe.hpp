@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// File access over EtherCAT (ETG.1000.6, clause 5.8). All offsets are from the start of the payload of the mailbox.
+// File access over EtherCAT (ETG.1000.6, clause 5.8). All offsets are from the start of the payload
+// of the mailbox.
 #pragma once
 
 #include <cstddef>
@@ -16,25 +17,34 @@ namespace hal::ethercat::foe {
 inline constexpr std::size_t header_bytes = 6;
 enum class Opcode : std::uint8_t { read = 1, write = 2, data = 3, ack = 4, error = 5, busy = 6 };
 /// Returns the data bytes of a full packet: a shorter packet ends the file. [any]
-constexpr std::size_t packet_capacity(std::size_t mailbox) noexcept { return mailbox - mailbox_header_bytes - header_bytes; }
+constexpr std::size_t packet_capacity(std::size_t mailbox) noexcept {
+    return mailbox - mailbox_header_bytes - header_bytes;
+}
 
 struct Message {
-    Opcode                        opcode{};
-    std::uint32_t                 value = 0;  ///< password, packet number (the first is 1; 0 acknowledges a write request) or error code
+    Opcode opcode{};
+    /// password, packet number (the first is 1; 0 acknowledges a write request) or error code
+    std::uint32_t value = 0;
     std::span<const std::uint8_t> data;  ///< file name, data or text
-    std::string_view              text() const noexcept { return {reinterpret_cast<const char*>(data.data()), data.size()}; }
-    std::uint16_t                 done() const noexcept { return static_cast<std::uint16_t>(value); }  ///< Returns the progress of busy.
-    std::uint16_t entire() const noexcept { return static_cast<std::uint16_t>(value >> 16); }  ///< Returns the end of that progress, often
+    std::string_view text() const noexcept {
+        return {reinterpret_cast<const char*>(data.data()), data.size()};
+    }
+    /// Returns the progress of busy.
+    std::uint16_t done() const noexcept { return static_cast<std::uint16_t>(value); }
+    /// Returns the end of that progress, often
+    std::uint16_t entire() const noexcept { return static_cast<std::uint16_t>(value >> 16); }
     ///< 100.
 };
 /// Reads a message; nullopt if the payload is too short. [realtime]
 inline std::optional<Message> read(std::span<const std::uint8_t> payload) noexcept {
     if (payload.size() < header_bytes) return std::nullopt;
-    return Message{static_cast<Opcode>(payload[0]), get<std::uint32_t>(payload.data() + 2), payload.subspan(header_bytes)};
+    return Message{static_cast<Opcode>(payload[0]), get<std::uint32_t>(payload.data() + 2),
+                   payload.subspan(header_bytes)};
 }
 /// Writes the header of a message. [realtime]
 inline void write_header(std::uint8_t* to, Opcode opcode, std::uint32_t value) noexcept {
-    to[0] = static_cast<std::uint8_t>(opcode), to[1] = 0;
+    to[0] = static_cast<std::uint8_t>(opcode);
+    to[1] = 0;
     put(to + 2, value);
 }
 

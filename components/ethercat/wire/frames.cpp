@@ -6,21 +6,28 @@
 namespace hal::ethercat {
 
 const char* to_string(Command command) noexcept {
-    static constexpr std::array<const char*, 15> names{"NOP", "APRD", "APWR", "APRW", "FPRD", "FPWR", "FPRW", "BRD",
-                                                       "BWR", "BRW",  "LRD",  "LWR",  "LRW",  "ARMW", "FRMW"};
-    const auto                                   number = static_cast<std::size_t>(command);
+    static constexpr std::array<const char*, 15> names{"NOP",  "APRD", "APWR", "APRW", "FPRD",
+                                                       "FPWR", "FPRW", "BRD",  "BWR",  "BRW",
+                                                       "LRD",  "LWR",  "LRW",  "ARMW", "FRMW"};
+    const auto number = static_cast<std::size_t>(command);
     return number < names.size() ? names[number] : "unknown";
 }
 
 FrameReader::FrameReader(std::span<std::uint8_t> frame) noexcept {
     constexpr std::uint16_t ipv4 = 0x0800;
-    constexpr std::size_t   ip_header_bytes = 20, udp_header_bytes = 8;
+    constexpr std::size_t ip_header_bytes = 20;
+    constexpr std::size_t udp_header_bytes = 8;
     if (frame.size() < ethernet_header_bytes + ecat_header_bytes) return;
-    const auto  big_endian = [&](std::size_t at) { return static_cast<std::uint16_t>(frame[at] << 8 | frame[at + 1]); };
+    const auto big_endian = [&](std::size_t at) {
+        return static_cast<std::uint16_t>(frame[at] << 8 | frame[at + 1]);
+    };
     std::size_t at = ethernet_header_bytes;
     if (big_endian(12) == ipv4) {
         if (frame.size() < at + ip_header_bytes + udp_header_bytes + ecat_header_bytes) return;
-        if (frame[at] != 0x45 || frame[at + 9] != 17 || big_endian(at + ip_header_bytes + 2) != ethertype) return;
+        if (frame[at] != 0x45 || frame[at + 9] != 17 ||
+            big_endian(at + ip_header_bytes + 2) != ethertype) {
+            return;
+        }
         at += ip_header_bytes + udp_header_bytes;
     } else if (big_endian(12) != ethertype) {
         return;
@@ -39,11 +46,12 @@ std::optional<DatagramView> FrameReader::next() noexcept {
     if (!valid_ || !more_) return std::nullopt;
     const auto left = static_cast<std::size_t>(end_ - at_);
     if (left < datagram_header_bytes + wkc_bytes) {
-        malformed_ = true, more_ = false;
+        malformed_ = true;
+        more_ = false;
         return std::nullopt;
     }
     DatagramView d;
-    const auto   flags = get<std::uint16_t>(at_ + 6);
+    const auto flags = get<std::uint16_t>(at_ + 6);
     d.command = static_cast<Command>(at_[0]);
     d.index = at_[1];
     d.address = get<std::uint32_t>(at_ + 2);
@@ -53,19 +61,21 @@ std::optional<DatagramView> FrameReader::next() noexcept {
     d.header = at_;
     d.data = at_ + datagram_header_bytes;
     if (left < datagram_header_bytes + d.length + wkc_bytes) {
-        malformed_ = true, more_ = false;
+        malformed_ = true;
+        more_ = false;
         return std::nullopt;
     }
     at_ = d.data + d.length + wkc_bytes;
     return d;
 }
 
-FrameWriter::FrameWriter(std::span<std::uint8_t, largest_frame_bytes> buffer, const std::array<std::uint8_t, 6>& source,
-                         std::size_t most) noexcept
+FrameWriter::FrameWriter(std::span<std::uint8_t, largest_frame_bytes> buffer,
+                         const std::array<std::uint8_t, 6>& source, std::size_t most) noexcept
     : buffer_(buffer), most_(std::min(most, largest_frame_bytes)) {
     std::fill_n(buffer_.begin(), 6, std::uint8_t{0xff});
     std::copy(source.begin(), source.end(), buffer_.begin() + 6);
-    buffer_[12] = ethertype >> 8, buffer_[13] = ethertype & 0xff;
+    buffer_[12] = ethertype >> 8;
+    buffer_[13] = ethertype & 0xff;
 }
 
 std::size_t FrameWriter::space() const noexcept {
@@ -73,9 +83,12 @@ std::size_t FrameWriter::space() const noexcept {
     return most_ > used_ + overhead ? most_ - used_ - overhead : 0;
 }
 
-std::uint8_t* FrameWriter::add(Command command, std::uint8_t index, std::uint32_t address, std::uint16_t length) noexcept {
+std::uint8_t* FrameWriter::add(Command command, std::uint8_t index, std::uint32_t address,
+                               std::uint16_t length) noexcept {
     if (length > space()) return nullptr;
-    if (last_ != nullptr) last_[7] |= 0x80;
+    if (last_ != nullptr) {
+        last_[7] |= 0x80;
+    }
     last_ = buffer_.data() + used_;
     last_[0] = static_cast<std::uint8_t>(command);
     last_[1] = index;
@@ -91,8 +104,11 @@ std::uint8_t* FrameWriter::add(Command command, std::uint8_t index, std::uint32_
 std::span<const std::uint8_t> FrameWriter::finish() noexcept {
     constexpr std::size_t smallest = 60;
     put(buffer_.data() + ethernet_header_bytes,
-        static_cast<std::uint16_t>((used_ - ethernet_header_bytes - ecat_header_bytes) | static_cast<unsigned>(Protocol::datagrams) << 12));
-    if (used_ < smallest) std::fill(buffer_.data() + used_, buffer_.data() + smallest, std::uint8_t{0});
+        static_cast<std::uint16_t>((used_ - ethernet_header_bytes - ecat_header_bytes) |
+                                   static_cast<unsigned>(Protocol::datagrams) << 12));
+    if (used_ < smallest) {
+        std::fill(buffer_.data() + used_, buffer_.data() + smallest, std::uint8_t{0});
+    }
     return {buffer_.data(), std::max(used_, smallest)};
 }
 

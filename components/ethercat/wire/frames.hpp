@@ -20,8 +20,12 @@
 namespace hal::ethercat {
 
 inline constexpr std::uint16_t ethertype = 0x88a4;  ///< also the UDP port, 34980
-inline constexpr std::size_t   ethernet_header_bytes = 14, ecat_header_bytes = 2, datagram_header_bytes = 10, wkc_bytes = 2;
-inline constexpr std::size_t   largest_frame_bytes = 1514;  ///< without check sequence
+inline constexpr std::size_t ethernet_header_bytes = 14;
+inline constexpr std::size_t ecat_header_bytes = 2;
+
+inline constexpr std::size_t datagram_header_bytes = 10;
+inline constexpr std::size_t wkc_bytes = 2;
+inline constexpr std::size_t largest_frame_bytes = 1514;  ///< without check sequence
 /// Data bytes of the only datagram of a frame: 1500 - 2 - 12.
 inline constexpr std::size_t largest_datagram_data = 1486;
 
@@ -46,24 +50,32 @@ enum class Command : std::uint8_t {
     frmw = 14
 };
 /// Returns "APRD" and the like, "unknown" for an undefined number. [any]
-const char*    to_string(Command) noexcept;
-constexpr bool is_logical(Command c) noexcept { return c == Command::lrd || c == Command::lwr || c == Command::lrw; }  ///< [any]
+const char* to_string(Command) noexcept;
+/// [any]
+constexpr bool is_logical(Command c) noexcept {
+    return c == Command::lrd || c == Command::lwr || c == Command::lrw;
+}
 
 /// A datagram in a frame. The pointers point into the frame.
 struct DatagramView {
-    Command       command{};
-    std::uint8_t  index = 0;
-    std::uint32_t address = 0;  ///< logical; or position or station in bits 0-15, register in bits 16-31
+    Command command{};
+    std::uint8_t index = 0;
+    /// logical; or position or station in bits 0-15, register in bits 16-31
+    std::uint32_t address = 0;
     std::uint16_t length = 0;
-    bool          circulating = false, more = false;
+    bool circulating = false;
+    bool more = false;
     std::uint8_t* header = nullptr;
     std::uint8_t* data = nullptr;
 
-    std::uint16_t position() const noexcept { return static_cast<std::uint16_t>(address); }          ///< or station address
-    std::uint16_t register_address() const noexcept { return static_cast<std::uint16_t>(address >> 16); }
+    /// or station address
+    std::uint16_t position() const noexcept { return static_cast<std::uint16_t>(address); }
+    std::uint16_t register_address() const noexcept {
+        return static_cast<std::uint16_t>(address >> 16);
+    }
     std::uint16_t event() const noexcept { return get<std::uint16_t>(header + 8); }
     std::uint16_t wkc() const noexcept { return get<std::uint16_t>(data + length); }
-    void          set_wkc(std::uint16_t wkc) const noexcept { put(data + length, wkc); }
+    void set_wkc(std::uint16_t wkc) const noexcept { put(data + length, wkc); }
 };
 
 /// Reads the datagrams of a frame. Accepts any bytes. [realtime]
@@ -73,40 +85,48 @@ public:
     explicit FrameReader(std::span<std::uint8_t> frame) noexcept;
     /// Returns whether the header is that of a frame with datagrams.
     bool valid() const noexcept { return valid_; }
-    /// Returns the next datagram; nullopt at the end, or where the lengths do not fit (then malformed() is true).
+    /// Returns the next datagram; nullopt at the end, or where the lengths do not fit (then
+    /// malformed() is true).
     std::optional<DatagramView> next() noexcept;
-    bool                        malformed() const noexcept { return malformed_; }
+    bool malformed() const noexcept { return malformed_; }
 
 private:
     std::uint8_t* at_ = nullptr;
     std::uint8_t* end_ = nullptr;
-    bool          valid_ = false, malformed_ = false, more_ = true;
+    bool valid_ = false;
+    bool malformed_ = false;
+    bool more_ = true;
 };
 
 /// Writes a frame of datagrams into a buffer of largest_frame_bytes. [realtime]
 class FrameWriter {
 public:
     /// `most`: bytes of the longest frame.
-    FrameWriter(std::span<std::uint8_t, largest_frame_bytes> buffer, const std::array<std::uint8_t, 6>& source,
+    FrameWriter(std::span<std::uint8_t, largest_frame_bytes> buffer,
+                const std::array<std::uint8_t, 6>& source,
                 std::size_t most = largest_frame_bytes) noexcept;
-    /// Adds a datagram with zeroed data and WKC 0. Returns its data, or nullptr if the frame has no space left.
-    std::uint8_t* add(Command command, std::uint8_t index, std::uint32_t address, std::uint16_t length) noexcept;
+    /// Adds a datagram with zeroed data and WKC 0. Returns its data, or nullptr if the frame has no
+    /// space left.
+    std::uint8_t* add(Command command, std::uint8_t index, std::uint32_t address,
+                      std::uint16_t length) noexcept;
     /// Returns the space left for data of one more datagram; 0: none.
     std::size_t space() const noexcept;
-    bool        empty() const noexcept { return last_ == nullptr; }
+    bool empty() const noexcept { return last_ == nullptr; }
     /// Returns the complete frame, padded to 60 bytes.
     std::span<const std::uint8_t> finish() noexcept;
 
 private:
     std::span<std::uint8_t, largest_frame_bytes> buffer_;
-    std::size_t                                  most_;
-    std::size_t                                  used_ = ethernet_header_bytes + ecat_header_bytes;
-    std::uint8_t*                                last_ = nullptr;  ///< header of the last datagram
+    std::size_t most_;
+    std::size_t used_ = ethernet_header_bytes + ecat_header_bytes;
+    std::uint8_t* last_ = nullptr;  ///< header of the last datagram
 };
 
-/// Returns the address bits of a datagram to a position (0, 1, 2 … along the line) or station address. [any]
+/// Returns the address bits of a datagram to a position (0, 1, 2 … along the line) or station
+/// address. [any]
 constexpr std::uint32_t at_position(unsigned position, std::uint16_t address) noexcept {
-    return static_cast<std::uint16_t>(-static_cast<int>(position)) | static_cast<std::uint32_t>(address) << 16;
+    return static_cast<std::uint16_t>(-static_cast<int>(position)) |
+           static_cast<std::uint32_t>(address) << 16;
 }
 constexpr std::uint32_t at_station(std::uint16_t station, std::uint16_t address) noexcept {
     return station | static_cast<std::uint32_t>(address) << 16;

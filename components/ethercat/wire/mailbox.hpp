@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The mailbox header (ETG.1000.4, clause 5.6) that every mailbox protocol follows, and mailbox errors.
+// The mailbox header (ETG.1000.4, clause 5.6) that every mailbox protocol follows, and mailbox
+// errors.
 //
 //     if (auto message = read_mailbox(bytes)) take(message->type, message->payload);
 #pragma once
@@ -17,7 +18,15 @@ inline constexpr std::size_t mailbox_header_bytes = 6;
 inline constexpr std::size_t smallest_mailbox = 16;   ///< bytes: a header and an SDO of 10 bytes
 inline constexpr std::size_t largest_mailbox = 1486;  ///< bytes of one datagram
 
-enum class MailboxType : std::uint8_t { error = 0, aoe = 1, eoe = 2, coe = 3, foe = 4, soe = 5, voe = 15 };
+enum class MailboxType : std::uint8_t {
+    error = 0,
+    aoe = 1,
+    eoe = 2,
+    coe = 3,
+    foe = 4,
+    soe = 5,
+    voe = 15
+};
 /// Returns "CoE" and the like, "unknown protocol" for an undefined number. [any]
 constexpr const char* to_string(MailboxType type) noexcept {
     switch (type) {
@@ -34,15 +43,23 @@ constexpr const char* to_string(MailboxType type) noexcept {
 
 /// Bits of the protocols in the SII (word 1Ch).
 namespace mailbox_protocol {
-inline constexpr std::uint16_t aoe = 0x01, eoe = 0x02, coe = 0x04, foe = 0x08, soe = 0x10, voe = 0x20;
-}
+inline constexpr std::uint16_t aoe = 0x01;
+inline constexpr std::uint16_t eoe = 0x02;
+inline constexpr std::uint16_t coe = 0x04;
+inline constexpr std::uint16_t foe = 0x08;
+inline constexpr std::uint16_t soe = 0x10;
+
+inline constexpr std::uint16_t voe = 0x20;
+}  // namespace mailbox_protocol
 
 /// A message of a mailbox. The payload points into the mailbox.
 struct MailboxMessage {
-    std::uint16_t                 station = 0;  ///< of the sender or, in a gateway, of the receiver; 0: the master
-    std::uint8_t                  channel = 0, priority = 0;
-    MailboxType                   type{};
-    std::uint8_t                  counter = 0;   ///< 1..7, 0: not counted
+    /// of the sender or, in a gateway, of the receiver; 0: the master
+    std::uint16_t station = 0;
+    std::uint8_t channel = 0;
+    std::uint8_t priority = 0;
+    MailboxType type{};
+    std::uint8_t counter = 0;   ///< 1..7, 0: not counted
     std::span<const std::uint8_t> payload;
 };
 
@@ -53,15 +70,16 @@ inline std::optional<MailboxMessage> read_mailbox(std::span<const std::uint8_t> 
     if (length > bytes.size() - mailbox_header_bytes) return std::nullopt;
     MailboxMessage m;
     m.station = get<std::uint16_t>(bytes.data() + 2);
-    m.channel = bytes[4] & 0x3f, m.priority = bytes[4] >> 6;
+    m.channel = bytes[4] & 0x3f;
+    m.priority = bytes[4] >> 6;
     m.type = static_cast<MailboxType>(bytes[5] & 0x0f);
     m.counter = bytes[5] >> 4 & 7;
     m.payload = bytes.subspan(mailbox_header_bytes, length);
     return m;
 }
 /// Writes the header of a message whose payload of `length` bytes follows it. [realtime]
-inline void write_mailbox_header(std::uint8_t* to, std::size_t length, std::uint16_t station, MailboxType type,
-                                 std::uint8_t counter) noexcept {
+inline void write_mailbox_header(std::uint8_t* to, std::size_t length, std::uint16_t station,
+                                 MailboxType type, std::uint8_t counter) noexcept {
     put(to, static_cast<std::uint16_t>(length));
     put(to + 2, station);
     to[4] = 0;
@@ -87,15 +105,21 @@ enum class MailboxError : std::uint16_t {
 inline constexpr std::size_t mailbox_error_bytes = 4;
 /// Returns the meaning of a mailbox error, as in "protocol not supported". [any]
 constexpr const char* to_string(MailboxError error) noexcept {
-    constexpr const char* words[] = {
-        "invalid error code",     "syntax error",      "protocol not supported", "invalid channel",   "service not supported",
-        "invalid mailbox header", "message too short", "no memory in the slave", "inconsistent size", "service already in progress"};
+    constexpr const char* words[] = {"invalid error code",     "syntax error",
+                                     "protocol not supported", "invalid channel",
+                                     "service not supported",  "invalid mailbox header",
+                                     "message too short",      "no memory in the slave",
+                                     "inconsistent size",      "service already in progress"};
     const auto n = static_cast<unsigned>(error);
     return words[n <= 9 ? n : 0];
 }
 /// Returns the code of a mailbox error; nullopt if the payload is not one. [realtime]
-inline std::optional<MailboxError> read_mailbox_error(std::span<const std::uint8_t> payload) noexcept {
-    if (payload.size() < mailbox_error_bytes || (get<std::uint16_t>(payload.data()) & 0x7fff) != 1) return std::nullopt;
+inline std::optional<MailboxError> read_mailbox_error(
+    std::span<const std::uint8_t> payload) noexcept {
+    if (payload.size() < mailbox_error_bytes ||
+        (get<std::uint16_t>(payload.data()) & 0x7fff) != 1) {
+        return std::nullopt;
+    }
     return static_cast<MailboxError>(get<std::uint16_t>(payload.data() + 2));
 }
 /// Writes the payload of a mailbox error; returns its length. [realtime]
@@ -117,6 +141,9 @@ inline std::optional<VoeHeader> read_voe(std::span<const std::uint8_t> payload) 
     return VoeHeader{get<std::uint32_t>(payload.data()), get<std::uint16_t>(payload.data() + 4)};
 }
 /// Writes the header of VoE. [realtime]
-inline void write_voe(std::uint8_t* to, VoeHeader h) noexcept { put(to, h.vendor), put(to + 4, h.type); }
+inline void write_voe(std::uint8_t* to, VoeHeader h) noexcept {
+    put(to, h.vendor);
+    put(to + 4, h.type);
+}
 
 }  // namespace hal::ethercat

@@ -10,19 +10,23 @@ namespace hal::ethercat::sii {
 
 namespace {
 
-constexpr std::size_t most_bytes = 128 * 1024, header_bytes = 4, categories_at = 2 * word_categories;
+constexpr std::size_t most_bytes = 128 * 1024;
+constexpr std::size_t header_bytes = 4;
+
+constexpr std::size_t categories_at = 2 * word_categories;
 
 /// CoE basic types: number, name.
 struct BasicType {
     std::uint8_t number;
-    const char*  name;
+    const char* name;
 };
 constexpr BasicType basic_types[] = {
-    {0x01, "BOOL"},  {0x02, "SINT"}, {0x03, "INT"},    {0x04, "DINT"},   {0x05, "USINT"},  {0x06, "UINT"},
-    {0x07, "UDINT"}, {0x08, "REAL"}, {0x10, "INT24"},  {0x11, "LREAL"},  {0x12, "INT40"},  {0x13, "INT48"},
-    {0x14, "INT56"}, {0x15, "LINT"}, {0x16, "UINT24"}, {0x18, "UINT40"}, {0x19, "UINT48"}, {0x1a, "UINT56"},
-    {0x1b, "ULINT"}, {0x1e, "BYTE"}, {0x1f, "WORD"},   {0x20, "DWORD"},  {0x30, "BIT1"},   {0x31, "BIT2"},
-    {0x32, "BIT3"},  {0x33, "BIT4"}, {0x34, "BIT5"},   {0x35, "BIT6"},   {0x36, "BIT7"},   {0x37, "BIT8"},
+    {0x01, "BOOL"},   {0x02, "SINT"},   {0x03, "INT"},    {0x04, "DINT"},  {0x05, "USINT"},
+    {0x06, "UINT"},   {0x07, "UDINT"},  {0x08, "REAL"},   {0x10, "INT24"}, {0x11, "LREAL"},
+    {0x12, "INT40"},  {0x13, "INT48"},  {0x14, "INT56"},  {0x15, "LINT"},  {0x16, "UINT24"},
+    {0x18, "UINT40"}, {0x19, "UINT48"}, {0x1a, "UINT56"}, {0x1b, "ULINT"}, {0x1e, "BYTE"},
+    {0x1f, "WORD"},   {0x20, "DWORD"},  {0x30, "BIT1"},   {0x31, "BIT2"},  {0x32, "BIT3"},
+    {0x33, "BIT4"},   {0x34, "BIT5"},   {0x35, "BIT6"},   {0x36, "BIT7"},  {0x37, "BIT8"},
 };
 
 /// Reads fields up to the end of a category; what lies behind it reads as 0.
@@ -32,7 +36,9 @@ public:
     template <class T>
     T take() noexcept {
         T value{};
-        if (bytes_.size() >= sizeof(T)) value = get<T>(bytes_.data());
+        if (bytes_.size() >= sizeof(T)) {
+            value = get<T>(bytes_.data());
+        }
         bytes_ = bytes_.subspan(std::min(sizeof(T), bytes_.size()));
         return value;
     }
@@ -41,10 +47,14 @@ public:
         length = std::min(length, bytes_.size());
         std::string out(reinterpret_cast<const char*>(bytes_.data()), length);
         bytes_ = bytes_.subspan(length);
-        while (!out.empty() && out.back() == '\0') out.pop_back();
+        while (!out.empty() && out.back() == '\0') {
+            out.pop_back();
+        }
         return out;
     }
-    void skip(std::size_t bytes) noexcept { bytes_ = bytes_.subspan(std::min(bytes, bytes_.size())); }
+    void skip(std::size_t bytes) noexcept {
+        bytes_ = bytes_.subspan(std::min(bytes, bytes_.size()));
+    }
 
 private:
     std::span<const std::uint8_t> bytes_;
@@ -58,37 +68,57 @@ public:
         configuration();
         // Strings first: other categories refer to them, and may come before them.
         each([&](std::uint16_t type, Fields data) {
-            if (static_cast<Category>(type) == Category::strings && strings_.empty()) strings(data);
+            if (static_cast<Category>(type) == Category::strings && strings_.empty()) {
+                strings(data);
+            }
         });
         each([&](std::uint16_t type, Fields data) { category(type, data); });
-        if (cut_) out_.problems.push_back("the last category is longer than the image");
-        else if (!ended_ && image_.size() > categories_at) out_.problems.push_back("the categories have no end mark");
+        if (cut_) {
+            out_.problems.push_back("the last category is longer than the image");
+        } else if (!ended_ && image_.size() > categories_at) {
+            out_.problems.push_back("the categories have no end mark");
+        }
         return std::move(out_);
     }
 
 private:
     std::uint16_t word(std::size_t address) const {
-        return 2 * address + 2 <= image_.size() ? get<std::uint16_t>(image_.data() + 2 * address) : std::uint16_t{0};
+        return 2 * address + 2 <= image_.size() ? get<std::uint16_t>(image_.data() + 2 * address)
+                                                : std::uint16_t{0};
     }
-    std::uint32_t number(std::size_t address) const { return word(address) | static_cast<std::uint32_t>(word(address + 1)) << 16; }
-    Mailboxes     mailboxes(std::size_t at) const { return {{word(at), word(at + 1)}, {word(at + 2), word(at + 3)}}; }
+    std::uint32_t number(std::size_t address) const {
+        return word(address) | static_cast<std::uint32_t>(word(address + 1)) << 16;
+    }
+    Mailboxes mailboxes(std::size_t at) const {
+        return {{word(at), word(at + 1)}, {word(at + 2), word(at + 3)}};
+    }
 
     void configuration() {
-        if (image_.size() < categories_at)
-            out_.problems.push_back("the image has " + std::to_string(image_.size()) + " bytes; at least 128 are expected");
-        for (std::size_t i = 0; i < 7; ++i) out_.configuration[i] = word(i);
+        if (image_.size() < categories_at) {
+            out_.problems.push_back("the image has " + std::to_string(image_.size()) +
+                                    " bytes; at least 128 are expected");
+        }
+        for (std::size_t i = 0; i < 7; ++i) {
+            out_.configuration[i] = word(i);
+        }
         const std::uint16_t stored = word(word_checksum);
-        out_.checksum_valid = image_.size() >= 16 && (stored == 0x88a4 || (stored & 0xff) == checksum(image_));
+        out_.checksum_valid =
+            image_.size() >= 16 && (stored == 0x88a4 || (stored & 0xff) == checksum(image_));
         if (image_.size() >= 16 && !out_.checksum_valid) {
             char text[96];
-            std::snprintf(text, sizeof text, "the checksum is 0x%02X; 0x%02X is expected", stored & 0xffU, checksum(image_) + 0U);
+            std::snprintf(text, sizeof text, "the checksum is 0x%02X; 0x%02X is expected",
+                          stored & 0xffU, checksum(image_) + 0U);
             out_.problems.emplace_back(text);
         }
-        out_.vendor = number(word_vendor), out_.product = number(word_product);
-        out_.revision = number(word_revision), out_.serial = number(word_serial);
+        out_.vendor = number(word_vendor);
+        out_.product = number(word_product);
+        out_.revision = number(word_revision);
+        out_.serial = number(word_serial);
         out_.execution_delay = word(0x10);
-        out_.port_delay = {static_cast<std::int16_t>(word(0x11)), static_cast<std::int16_t>(word(0x12))};
-        out_.boot = mailboxes(word_boot_mailbox), out_.mailboxes = mailboxes(word_mailbox);
+        out_.port_delay = {static_cast<std::int16_t>(word(0x11)),
+                           static_cast<std::int16_t>(word(0x12))};
+        out_.boot = mailboxes(word_boot_mailbox);
+        out_.mailboxes = mailboxes(word_mailbox);
         out_.protocols = word(word_protocols);
         out_.eeprom_bytes = (word(word_size) + std::size_t{1}) * 128;
         out_.version = word(word_version);
@@ -135,44 +165,60 @@ private:
                 const auto use = data.take<std::uint8_t>();
                 out_.fmmus.push_back(use <= 3 ? static_cast<FmmuUse>(use) : FmmuUse::unused);
             }
-            while (!out_.fmmus.empty() && out_.fmmus.back() == FmmuUse::unused) out_.fmmus.pop_back();  // padding
+            // padding
+            while (!out_.fmmus.empty() && out_.fmmus.back() == FmmuUse::unused) {
+                out_.fmmus.pop_back();
+            }
             return;
         case Category::sync_manager:
             while (data.left() >= 8) {
-                SyncManager s{data.take<std::uint16_t>(), data.take<std::uint16_t>(), data.take<std::uint8_t>(),
-                              data.take<std::uint8_t>(),  data.take<std::uint8_t>(),  SmType::unused};
-                const auto  kind = data.take<std::uint8_t>();
-                if (kind <= 4) s.type = static_cast<SmType>(kind);
+                SyncManager s{data.take<std::uint16_t>(), data.take<std::uint16_t>(),
+                              data.take<std::uint8_t>(),  data.take<std::uint8_t>(),
+                              data.take<std::uint8_t>(),  SmType::unused};
+                const auto kind = data.take<std::uint8_t>();
+                if (kind <= 4) {
+                    s.type = static_cast<SmType>(kind);
+                }
                 out_.sync_managers.push_back(s);
             }
             return;
         case Category::tx_pdo: return pdo(data, out_.tx);
         case Category::rx_pdo: return pdo(data, out_.rx);
         case Category::dc:
-            while (data.left() >= 24) dc(data);
+            while (data.left() >= 24) {
+                dc(data);
+            }
             return;
         default: break;
         }
         OtherCategory other{type, {}};
-        while (data.left() != 0) other.data.push_back(data.take<std::uint8_t>());
+        while (data.left() != 0) {
+            other.data.push_back(data.take<std::uint8_t>());
+        }
         out_.others.push_back(std::move(other));
     }
 
     void general(Fields& data) {
         General& g = out_.general;
         out_.has_general = true;
-        g.group = name(data.take<std::uint8_t>()), g.image = name(data.take<std::uint8_t>());
-        g.order = name(data.take<std::uint8_t>()), g.name = name(data.take<std::uint8_t>());
+        g.group = name(data.take<std::uint8_t>());
+        g.image = name(data.take<std::uint8_t>());
+        g.order = name(data.take<std::uint8_t>());
+        g.name = name(data.take<std::uint8_t>());
         data.skip(1);
         g.coe_details = data.take<std::uint8_t>();
-        g.foe = data.take<std::uint8_t>() != 0, g.eoe = data.take<std::uint8_t>() != 0;
-        g.soe_channels = data.take<std::uint8_t>(), g.ds402_channels = data.take<std::uint8_t>();
+        g.foe = data.take<std::uint8_t>() != 0;
+        g.eoe = data.take<std::uint8_t>() != 0;
+        g.soe_channels = data.take<std::uint8_t>();
+        g.ds402_channels = data.take<std::uint8_t>();
         data.skip(1);
         g.flags = data.take<std::uint8_t>();
         g.ebus_ma = data.take<std::int16_t>();
         data.skip(2);
         const auto ports = data.take<std::uint16_t>();
-        for (unsigned i = 0; i < 4; ++i) g.ports[i] = static_cast<std::uint8_t>(ports >> (4 * i) & 15);
+        for (unsigned i = 0; i < 4; ++i) {
+            g.ports[i] = static_cast<std::uint8_t>(ports >> (4 * i) & 15);
+        }
     }
 
     void pdo(Fields& data, std::vector<Pdo>& to) {
@@ -180,19 +226,26 @@ private:
             Pdo p;
             p.index = data.take<std::uint16_t>();
             const unsigned count = data.take<std::uint8_t>();
-            p.sync_manager = data.take<std::uint8_t>(), p.sync = data.take<std::uint8_t>();
+            p.sync_manager = data.take<std::uint8_t>();
+            p.sync = data.take<std::uint8_t>();
             p.name = name(data.take<std::uint8_t>());
             p.flags = data.take<std::uint16_t>();
-            if (p.index == 0) break;  // padding
+            if (p.index == 0) {
+                break;  // padding
+            }
             for (unsigned i = 0; i < count; ++i) {
                 if (data.left() < 8) {
                     out_.problems.push_back("a PDO has fewer entries than it states");
                     break;
                 }
                 Entry e;
-                e.index = data.take<std::uint16_t>(), e.sub = data.take<std::uint8_t>();
+                e.index = data.take<std::uint16_t>();
+                e.sub = data.take<std::uint8_t>();
                 e.name = name(data.take<std::uint8_t>());
-                e.type = data.take<std::uint8_t>(), e.bits = data.take<std::uint8_t>(), e.flags = data.take<std::uint16_t>();
+                e.type = data.take<std::uint8_t>();
+                e.bits = data.take<std::uint8_t>();
+
+                e.flags = data.take<std::uint16_t>();
                 p.entries.push_back(std::move(e));
             }
             to.push_back(std::move(p));
@@ -202,19 +255,22 @@ private:
     void dc(Fields& data) {
         DcMode m;
         m.sync0_cycle_ns = data.take<std::uint32_t>();
-        m.sync0_shift_ns = data.take<std::int32_t>(), m.sync1_shift_ns = data.take<std::int32_t>();
+        m.sync0_shift_ns = data.take<std::int32_t>();
+        m.sync1_shift_ns = data.take<std::int32_t>();
         m.sync1_factor = data.take<std::int16_t>();
         m.assign_activate = data.take<std::uint16_t>();
         m.sync0_factor = data.take<std::int16_t>();
-        m.name = name(data.take<std::uint8_t>()), m.description = name(data.take<std::uint8_t>());
+        m.name = name(data.take<std::uint8_t>());
+        m.description = name(data.take<std::uint8_t>());
         data.skip(4);
         out_.dc.push_back(std::move(m));
     }
 
     std::span<const std::uint8_t> image_;
-    Contents                      out_;
-    std::vector<std::string>      strings_;
-    bool                          ended_ = false, cut_ = false;
+    Contents out_;
+    std::vector<std::string> strings_;
+    bool ended_ = false;
+    bool cut_ = false;
 };
 
 }  // namespace
@@ -223,7 +279,9 @@ std::uint8_t checksum(std::span<const std::uint8_t> image) noexcept {
     unsigned crc = 0xff;
     for (const std::uint8_t byte : image.first(std::min<std::size_t>(14, image.size()))) {
         crc ^= byte;
-        for (int bit = 0; bit < 8; ++bit) crc = (crc & 0x80) != 0 ? (crc << 1 ^ 0x07) & 0xff : crc << 1;
+        for (int bit = 0; bit < 8; ++bit) {
+            crc = (crc & 0x80) != 0 ? (crc << 1 ^ 0x07) & 0xff : crc << 1;
+        }
     }
     return static_cast<std::uint8_t>(crc);
 }
@@ -231,24 +289,30 @@ std::uint8_t checksum(std::span<const std::uint8_t> image) noexcept {
 std::size_t bytes_needed(std::span<const std::uint8_t> read) noexcept {
     std::size_t at = categories_at;
     while (at + 2 <= read.size() && at < most_bytes) {
-        if (get<std::uint16_t>(read.data() + at) == static_cast<std::uint16_t>(Category::end)) return at + 2;
+        if (get<std::uint16_t>(read.data() + at) == static_cast<std::uint16_t>(Category::end)) {
+            return at + 2;
+        }
         if (at + header_bytes > read.size()) return at + header_bytes;
         at += header_bytes + 2 * std::size_t{get<std::uint16_t>(read.data() + at + 2)};
     }
     return std::min(at + header_bytes, most_bytes);
 }
 
-Contents parse(std::span<const std::uint8_t> image) { return Parser(image.first(std::min(image.size(), most_bytes))).parse(); }
+Contents parse(std::span<const std::uint8_t> image) {
+    return Parser(image.first(std::min(image.size(), most_bytes))).parse();
+}
 
 std::uint8_t type_number(std::string_view name) noexcept {
-    for (const auto& t : basic_types)
+    for (const auto& t : basic_types) {
         if (name == t.name) return t.number;
+    }
     return name == "BIT" ? 0x30 : 0;
 }
 
 const char* type_name(std::uint8_t number) noexcept {
-    for (const auto& t : basic_types)
+    for (const auto& t : basic_types) {
         if (number == t.number) return t.name;
+    }
     return "";
 }
 

@@ -10,7 +10,8 @@ namespace hal::ethercat::sii {
 
 namespace {
 
-constexpr std::size_t longest_string = 255, most_strings = 255;
+constexpr std::size_t longest_string = 255;
+constexpr std::size_t most_strings = 255;
 
 class Builder {
 public:
@@ -21,11 +22,17 @@ public:
         // The other categories first: they collect the strings.
         std::vector<std::uint8_t> rest;
         std::swap(out_, rest);
-        if (from_.has_general) general();
+        if (from_.has_general) {
+            general();
+        }
         fmmus();
         sync_managers();
-        for (const Pdo& p : from_.tx) pdo(p, Category::tx_pdo);
-        for (const Pdo& p : from_.rx) pdo(p, Category::rx_pdo);
+        for (const Pdo& p : from_.tx) {
+            pdo(p, Category::tx_pdo);
+        }
+        for (const Pdo& p : from_.rx) {
+            pdo(p, Category::rx_pdo);
+        }
         dc();
         for (const OtherCategory& o : from_.others) {
             begin(o.type);
@@ -53,7 +60,9 @@ private:
         start_ = out_.size();
     }
     void end(std::uint8_t padding = 0) {
-        if ((out_.size() - start_) % 2 != 0) out_.push_back(padding);
+        if ((out_.size() - start_) % 2 != 0) {
+            out_.push_back(padding);
+        }
         put(out_.data() + start_ - 2, static_cast<std::uint16_t>((out_.size() - start_) / 2));
     }
     std::uint8_t string(const std::string& text) {
@@ -70,13 +79,25 @@ private:
         return string(text);
     }
 
-    void mailboxes(const Mailboxes& m) { add(m.receive.start), add(m.receive.size), add(m.send.start), add(m.send.size); }
+    void mailboxes(const Mailboxes& m) {
+        add(m.receive.start);
+        add(m.receive.size);
+        add(m.send.start);
+        add(m.send.size);
+    }
     void head() {
-        for (const std::uint16_t w : from_.configuration) add(w);
+        for (const std::uint16_t w : from_.configuration) {
+            add(w);
+        }
         add<std::uint16_t>(checksum(out_));
-        add(from_.vendor), add(from_.product), add(from_.revision), add(from_.serial);
-        add(from_.execution_delay), add(from_.port_delay[0]), add(from_.port_delay[1]), add<std::uint16_t>(0);
-        mailboxes(from_.boot), mailboxes(from_.mailboxes);
+        add(from_.vendor);
+        add(from_.product);
+        add(from_.revision);
+        add(from_.serial);
+        add(from_.execution_delay), add(from_.port_delay[0]), add(from_.port_delay[1]),
+            add<std::uint16_t>(0);
+        mailboxes(from_.boot);
+        mailboxes(from_.mailboxes);
         add(from_.protocols);
         out_.resize(2 * word_size, 0);
         add<std::uint16_t>(0);  // the size, set when it is known
@@ -95,15 +116,22 @@ private:
     void general() {
         const General& g = from_.general;
         begin(static_cast<std::uint16_t>(Category::general));
-        const std::uint8_t order = string(g.order);  // the first string, which SOEM shows as the name
+        // the first string, which SOEM shows as the name
+        const std::uint8_t order = string(g.order);
         const std::uint8_t group = string(g.group);
-        add(group), add(string(g.image)), add(order), add(string(g.name));
+        add(group);
+        add(string(g.image));
+        add(order);
+        add(string(g.name));
         add<std::uint8_t>(0);
-        add(g.coe_details), add<std::uint8_t>(g.foe), add<std::uint8_t>(g.eoe), add(g.soe_channels), add(g.ds402_channels);
+        add(g.coe_details), add<std::uint8_t>(g.foe), add<std::uint8_t>(g.eoe), add(g.soe_channels),
+            add(g.ds402_channels);
         add<std::uint8_t>(0);
         add(g.flags), add(g.ebus_ma), add(group), add<std::uint8_t>(0);
         unsigned ports = 0;
-        for (unsigned i = 0; i < 4; ++i) ports |= (g.ports[i] & 15U) << (4 * i);
+        for (unsigned i = 0; i < 4; ++i) {
+            ports |= (g.ports[i] & 15U) << (4 * i);
+        }
         add(static_cast<std::uint16_t>(ports));
         out_.resize(start_ + 32, 0);
         end();
@@ -111,23 +139,43 @@ private:
     void fmmus() {
         if (from_.fmmus.empty()) return;
         begin(static_cast<std::uint16_t>(Category::fmmu));
-        for (const FmmuUse use : from_.fmmus) add(static_cast<std::uint8_t>(use));
+        for (const FmmuUse use : from_.fmmus) {
+            add(static_cast<std::uint8_t>(use));
+        }
         end(0xff);
     }
     void sync_managers() {
         if (from_.sync_managers.empty()) return;
         begin(static_cast<std::uint16_t>(Category::sync_manager));
-        for (const SyncManager& s : from_.sync_managers)
-            add(s.start), add(s.length), add(s.control), add(s.status), add(s.enable), add(static_cast<std::uint8_t>(s.type));
+        for (const SyncManager& s : from_.sync_managers) {
+            add(s.start);
+            add(s.length);
+            add(s.control);
+            add(s.status);
+            add(s.enable);
+
+            add(static_cast<std::uint8_t>(s.type));
+        }
         end();
     }
     void pdo(const Pdo& p, Category category) {
         const std::size_t count = std::min<std::size_t>(p.entries.size(), 255);
         begin(static_cast<std::uint16_t>(category));
-        add(p.index), add(static_cast<std::uint8_t>(count)), add(p.sync_manager), add(p.sync), add(name(p.name)), add(p.flags);
+        add(p.index);
+        add(static_cast<std::uint8_t>(count));
+        add(p.sync_manager);
+        add(p.sync);
+
+        add(name(p.name));
+        add(p.flags);
         for (std::size_t i = 0; i < count; ++i) {
             const Entry& e = p.entries[i];
-            add(e.index), add(e.sub), add(name(e.name)), add(e.type), add(e.bits), add(e.flags);
+            add(e.index);
+            add(e.sub);
+            add(name(e.name));
+            add(e.type);
+            add(e.bits);
+            add(e.flags);
         }
         end();
     }
@@ -135,34 +183,49 @@ private:
         if (from_.dc.empty()) return;
         begin(static_cast<std::uint16_t>(Category::dc));
         for (const DcMode& m : from_.dc) {
-            add(m.sync0_cycle_ns), add(m.sync0_shift_ns), add(m.sync1_shift_ns), add(m.sync1_factor), add(m.assign_activate);
-            add(m.sync0_factor), add(string(m.name)), add(string(m.description)), add<std::uint32_t>(0);
+            add(m.sync0_cycle_ns);
+            add(m.sync0_shift_ns);
+            add(m.sync1_shift_ns);
+
+            add(m.sync1_factor);
+            add(m.assign_activate);
+            add(m.sync0_factor), add(string(m.name)), add(string(m.description)),
+                add<std::uint32_t>(0);
         }
         end();
     }
 
-    const Contents&                     from_;
-    std::size_t                         names_;
-    std::vector<std::uint8_t>           out_;
-    std::vector<std::string>            strings_;
+    const Contents& from_;
+    std::size_t names_;
+    std::vector<std::uint8_t> out_;
+    std::vector<std::string> strings_;
     std::map<std::string, std::uint8_t> numbers_;
-    std::size_t                         start_ = 0;
+    std::size_t start_ = 0;
 };
 
 }  // namespace
 
 std::vector<std::uint8_t> build(const Contents& from) {
     std::size_t names = 0;
-    for (const auto* pdos : {&from.tx, &from.rx})
-        for (const Pdo& p : *pdos) names += 1 + p.entries.size();
+    for (const auto* pdos : {&from.tx, &from.rx}) {
+        for (const Pdo& p : *pdos) {
+            names += 1 + p.entries.size();
+        }
+    }
     auto image = Builder(from, names).build();
-    if (from.eeprom_bytes != 0 && image.size() > from.eeprom_bytes) {  // as many names as fit, at least none
+    // as many names as fit, at least none
+    if (from.eeprom_bytes != 0 && image.size() > from.eeprom_bytes) {
         std::size_t fit = 0;
-        for (std::size_t step = names; step != 0; step /= 2)
-            while (fit + step <= names && Builder(from, fit + step).build().size() <= from.eeprom_bytes) fit += step;
+        for (std::size_t step = names; step != 0; step /= 2) {
+            while (fit + step <= names &&
+                   Builder(from, fit + step).build().size() <= from.eeprom_bytes) {
+                fit += step;
+            }
+        }
         image = Builder(from, fit).build();
     }
-    const std::size_t size = std::max((image.size() + 127) / 128 * 128, from.eeprom_bytes / 128 * 128);
+    const std::size_t size =
+        std::max((image.size() + 127) / 128 * 128, from.eeprom_bytes / 128 * 128);
     put(image.data() + 2 * word_size, static_cast<std::uint16_t>(size / 128 - 1));
     image.resize(size, 0xff);
     return image;

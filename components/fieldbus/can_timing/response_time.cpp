@@ -1,15 +1,17 @@
 // SPDX-License-Identifier: MIT
-// With C the longest time of a frame, T period, J jitter, B the longest frame of lower priority, t_bit the time of one bit, and E(t) the time
-// that errors take within t:
+// With C the longest time of a frame, T period, J jitter, B the longest frame of lower priority,
+// t_bit the time of one bit, and E(t) the time that errors take within t:
 //   busy period      t  = E(t) + B + sum over m and all of higher priority k of ceil((t + J_k) / T_k) C_k
 //   instances        Q  = ceil((t + J_m) / T_m)
 //   queue of q < Q   w  = E(w + C_m) + B + q C_m + sum over all of higher priority k of ceil((w + J_k + t_bit) / T_k) C_k
 //   response         R  = max over q of J_m + w - q T_m + C_m
 //   errors           E(t) = (burst + ceil(t / T_error) - 1) (31 t_bit + longest frame of m and all of higher priority)
-// each solved by iteration from the smallest value. Looking at the first instance only (Tindell 1994) is not enough: a frame on the wire
-// cannot be interrupted, so that an instance may delay its successor.
+// each solved by iteration from the smallest value. Looking at the first instance only (Tindell
+// 1994) is not enough: a frame on the wire cannot be interrupted, so that an instance may delay its
+// successor.
 //
-// A queue in order of arrival with the messages M, whose lowest priority has L, and f_k the time for which k waits in such a queue itself:
+// A queue in order of arrival with the messages M, whose lowest priority has L, and f_k the time
+// for which k waits in such a queue itself:
 //   w = E(w + Cmax_M) + max(B_L, Cmax_M) + Csum_M - Cmin_M + sum over k outside M above L of ceil((w + J_k + f_k + t_bit) / T_k) C_k
 //   R_m = J_m + w + Cmin_M, and f_m = w; repeated for all queues until nothing changes. Other messages use max(B, C) and one instance.
 #include "fieldbus/can_timing/response_time.hpp"
@@ -26,12 +28,16 @@ namespace {
 
 /// Longer than any useful answer, and far from the ends of the numbers.
 constexpr std::int64_t horizon = 3'600'000'000'000;
-/// After an error: flags of both sides, delimiter and intermission, and the pause of an error-passive sender (ISO 11898-1).
+/// After an error: flags of both sides, delimiter and intermission, and the pause of an
+/// error-passive sender (ISO 11898-1).
 constexpr unsigned error_bits = 31;
 
 struct Item {
-    std::int64_t  c = 0, t = 0, j = 0, limit = 0;
-    std::int64_t  f = 0;  ///< time in a queue in order of arrival
+    std::int64_t c = 0;
+    std::int64_t t = 0;
+    std::int64_t j = 0;
+    std::int64_t limit = 0;
+    std::int64_t f = 0;  ///< time in a queue in order of arrival
     std::uint32_t fifo = 0;
 };
 
@@ -42,22 +48,31 @@ std::int64_t bit_time(const Bus& bus) { return can::duration_ns({1, 0}, bus.bit_
 /// The time that errors take, for a message and those of higher priority.
 struct ErrorTime {
     ErrorTime(const Bus& bus, std::int64_t longest)
-        : errors(bus.errors), each(bus.errors.burst == 0 ? 0 : can::duration_ns({error_bits, 0}, bus.bit_rate) + longest) {}
+        : errors(bus.errors),
+          each(bus.errors.burst == 0 ? 0
+                                     : can::duration_ns({error_bits, 0}, bus.bit_rate) + longest) {}
     std::int64_t operator()(std::int64_t t) const {
         if (each == 0) return 0;
-        const std::int64_t more = errors.period > 0 ? ceil_div(std::max<std::int64_t>(t, 1), errors.period) - 1 : 0;
+        const std::int64_t more =
+            errors.period > 0 ? ceil_div(std::max<std::int64_t>(t, 1), errors.period) - 1 : 0;
         return std::min(horizon, (errors.burst + more) * each);
     }
-    double load() const { return each == 0 || errors.period <= 0 ? 0.0 : static_cast<double>(each) / static_cast<double>(errors.period); }
+    double load() const {
+        return each == 0 || errors.period <= 0
+                   ? 0.0
+                   : static_cast<double>(each) / static_cast<double>(errors.period);
+    }
     Errors errors;
     std::int64_t each;
 };
 
-/// Iterates `t = constant + E(t + behind) + sum` from `from` until it no longer grows; -1 beyond the horizon. The sum counts the items that
+/// Iterates `t = constant + E(t + behind) + sum` from `from` until it no longer grows; -1 beyond
+/// the horizon. The sum counts the items that
 /// `counts` accepts.
 template <class Counts>
-std::int64_t settle(std::int64_t from, std::int64_t constant, std::int64_t extra, std::int64_t behind, const ErrorTime& errors,
-                    std::span<const Item> higher, Counts counts) {
+std::int64_t settle(std::int64_t from, std::int64_t constant, std::int64_t extra,
+                    std::int64_t behind, const ErrorTime& errors, std::span<const Item> higher,
+                    Counts counts) {
     for (std::int64_t t = from;;) {
         std::int64_t next = constant + errors(t + behind);
         for (const Item& k : higher) {
@@ -73,35 +88,50 @@ std::int64_t settle(std::int64_t from, std::int64_t constant, std::int64_t extra
 constexpr auto all = [](const Item&) { return true; };
 
 struct Worst {
-    std::int64_t response = -1, queued = 0, instance = 0, errors = 0;
+    std::int64_t response = -1;
+    std::int64_t queued = 0;
+    std::int64_t instance = 0;
+    std::int64_t errors = 0;
 };
 
 double use_of(std::span<const Item> items) {
     double use = 0;
-    for (const Item& k : items) use += static_cast<double>(k.c) / static_cast<double>(k.t);
+    for (const Item& k : items) {
+        use += static_cast<double>(k.c) / static_cast<double>(k.t);
+    }
     return use;
 }
 
 std::int64_t longest_of(std::span<const Item> items) {
     std::int64_t longest = 0;
-    for (const Item& k : items) longest = std::max(longest, k.c);
+    for (const Item& k : items) {
+        longest = std::max(longest, k.c);
+    }
     return longest;
 }
 
 /// The exact analysis. `busy`: those of higher priority, and behind them m itself.
 Worst worst_of(const Item& m, std::int64_t blocking, std::span<const Item> busy, const Bus& bus) {
     const ErrorTime errors(bus, longest_of(busy));
-    if (use_of(busy) + errors.load() >= 1.0) return {};
+    if (use_of(busy) + errors.load() >= 1.0) {
+        return {};
+    }
     const std::int64_t t = settle(m.c, blocking, 0, 0, errors, busy, all);
-    if (t < 0) return {};
-    const auto         above = busy.first(busy.size() - 1);
-    Worst              worst;
+    if (t < 0) {
+        return {};
+    }
+    const auto above = busy.first(busy.size() - 1);
+    Worst worst;
     const std::int64_t instances = ceil_div(t + m.j, m.t);
     for (std::int64_t q = 0, w = 0; q < instances; ++q) {
         const std::int64_t constant = blocking + q * m.c;
         w = settle(std::max(w, constant), constant, bit_time(bus), m.c, errors, above, all);
-        if (w < 0) return {};
-        if (const std::int64_t r = m.j + w - q * m.t + m.c; r > worst.response) worst = {r, w, q, errors(w + m.c)};
+        if (w < 0) {
+            return {};
+        }
+        if (const std::int64_t r = m.j + w - q * m.t + m.c; r > worst.response) {
+            worst = {r, w, q, errors(w + m.c)};
+        }
     }
     return worst;
 }
@@ -110,7 +140,9 @@ std::vector<Item> items_of(std::span<const Message> messages, const Bus& bus) {
     std::vector<Item> items(messages.size());
     for (std::size_t i = 0; i < messages.size(); ++i) {
         const Message& m = messages[i];
-        const auto bits = m.bits != 0 ? can::Bits{m.bits, 0} : can::worst_case_bits(m.bytes, m.extended, m.fd, m.bit_rate_switch, m.remote);
+        const auto bits = m.bits != 0 ? can::Bits{m.bits, 0}
+                                      : can::worst_case_bits(m.bytes, m.extended, m.fd,
+                                                             m.bit_rate_switch, m.remote);
         items[i] = {can::duration_ns(bits, bus.bit_rate, bus.data_rate),
                     std::clamp<std::int64_t>(m.period, 1, horizon),
                     std::clamp<std::int64_t>(m.jitter, 0, horizon),
@@ -123,7 +155,9 @@ std::vector<Item> items_of(std::span<const Message> messages, const Bus& bus) {
 
 can::Frame frame_of(const Message& m) {
     can::Frame f;
-    f.id = m.id, f.extended = m.extended, f.remote = m.remote;
+    f.id = m.id;
+    f.extended = m.extended;
+    f.remote = m.remote;
     return f;
 }
 
@@ -132,12 +166,15 @@ class WithQueues {
 public:
     WithQueues(std::vector<Item>& sorted, std::span<const std::int64_t> blocking, const Bus& bus)
         : items_(sorted), blocking_(blocking), bus_(bus), worst_(sorted.size()) {
-        for (std::size_t rank = 0; rank < items_.size(); ++rank)
+        for (std::size_t rank = 0; rank < items_.size(); ++rank) {
             if (const std::uint32_t number = items_[rank].fifo; number != 0) {
                 Queue& q = queues_[number];
-                q.last = rank, q.most = std::max(q.most, items_[rank].c), q.sum += items_[rank].c;
+                q.last = rank;
+                q.most = std::max(q.most, items_[rank].c);
+                q.sum += items_[rank].c;
                 q.least = q.least == 0 ? items_[rank].c : std::min(q.least, items_[rank].c);
             }
+        }
     }
     /// Returns the answer for each rank.
     const std::vector<Worst>& compute() {
@@ -146,12 +183,18 @@ public:
             for (auto& [number, q] : queues_) {
                 const std::int64_t w = time_in(number, q);
                 if (w == q.time) continue;
-                q.time = w, changed = true;
-                for (Item& item : items_)
-                    if (item.fifo == number) item.f = w < 0 ? horizon : w;
+                q.time = w;
+                changed = true;
+                for (Item& item : items_) {
+                    if (item.fifo == number) {
+                        item.f = w < 0 ? horizon : w;
+                    }
+                }
             }
         }
-        for (std::size_t rank = 0; rank < items_.size(); ++rank) worst_[rank] = answer(rank);
+        for (std::size_t rank = 0; rank < items_.size(); ++rank) {
+            worst_[rank] = answer(rank);
+        }
         return worst_;
     }
     std::int64_t others(std::size_t rank) const {
@@ -161,43 +204,54 @@ public:
 
 private:
     struct Queue {
-        std::size_t  last = 0;
-        std::int64_t most = 0, least = 0, sum = 0, time = 0;
+        std::size_t last = 0;
+        std::int64_t most = 0;
+        std::int64_t least = 0;
+        std::int64_t sum = 0;
+        std::int64_t time = 0;
     };
 
     std::int64_t time_in(std::uint32_t number, const Queue& q) const {
-        const auto      above = std::span<const Item>(items_).first(q.last + 1);
+        const auto above = std::span<const Item>(items_).first(q.last + 1);
         const ErrorTime errors(bus_, longest_of(above));
         if (use_of(above) + errors.load() >= 1.0) return -1;
         const std::int64_t constant = std::max(blocking_[q.last], q.most) + q.sum - q.least;
-        return settle(constant, constant, bit_time(bus_), q.most, errors, above, [&](const Item& k) { return k.fifo != number; });
+        return settle(constant, constant, bit_time(bus_), q.most, errors, above,
+                      [&](const Item& k) { return k.fifo != number; });
     }
     Worst answer(std::size_t rank) const {
-        const Item&     m = items_[rank];
-        const auto      busy = std::span<const Item>(items_).first(rank + 1);
+        const Item& m = items_[rank];
+        const auto busy = std::span<const Item>(items_).first(rank + 1);
         const ErrorTime errors(bus_, longest_of(busy));
-        Worst           worst;
+        Worst worst;
         if (m.fifo != 0) {
             const Queue& q = queues_.at(m.fifo);
-            if (q.time >= 0) worst = {m.j + q.time + q.least, q.time, 0, errors(q.time + q.most)};
+            if (q.time >= 0) {
+                worst = {m.j + q.time + q.least, q.time, 0, errors(q.time + q.most)};
+            }
         } else if (use_of(busy) + errors.load() < 1.0) {
             const std::int64_t constant = std::max(blocking_[rank], m.c);
-            const std::int64_t w = settle(constant, constant, bit_time(bus_), m.c, errors, busy.first(rank), all);
-            if (w >= 0) worst = {m.j + w + m.c, w, 0, errors(w + m.c)};
+            const std::int64_t w =
+                settle(constant, constant, bit_time(bus_), m.c, errors, busy.first(rank), all);
+            if (w >= 0) {
+                worst = {m.j + w + m.c, w, 0, errors(w + m.c)};
+            }
         }
         return worst;
     }
 
-    std::vector<Item>&             items_;
-    std::span<const std::int64_t>  blocking_;
-    const Bus&                     bus_;
+    std::vector<Item>& items_;
+    std::span<const std::int64_t> blocking_;
+    const Bus& bus_;
     std::map<std::uint32_t, Queue> queues_;
-    std::vector<Worst>             worst_;
+    std::vector<Worst> worst_;
 };
 
 }  // namespace
 
-bool before(const Message& a, const Message& b) noexcept { return can::arbitration_rank(frame_of(a)) < can::arbitration_rank(frame_of(b)); }
+bool before(const Message& a, const Message& b) noexcept {
+    return can::arbitration_rank(frame_of(a)) < can::arbitration_rank(frame_of(b));
+}
 
 std::int64_t times_before(const Message& other, std::int64_t queued, const Bus& bus) {
     return ceil_div(queued + other.jitter + bit_time(bus), std::max<std::int64_t>(other.period, 1));
@@ -208,35 +262,54 @@ Analysis analyse(std::span<const Message> messages, const Bus& bus) {
     a.responses.resize(messages.size());
     a.fits = bus.bit_rate > 0;
     if (bus.bit_rate == 0) return a;
-    const std::vector<Item>  items = items_of(messages, bus);
+    const std::vector<Item> items = items_of(messages, bus);
     std::vector<std::size_t> order(messages.size());
     std::iota(order.begin(), order.end(), std::size_t{0});
-    std::stable_sort(order.begin(), order.end(), [&](std::size_t x, std::size_t y) { return before(messages[x], messages[y]); });
+    std::stable_sort(order.begin(), order.end(), [&](std::size_t x, std::size_t y) {
+        return before(messages[x], messages[y]);
+    });
     std::vector<Item> sorted;
-    for (const std::size_t i : order) sorted.push_back(items[i]);
+    for (const std::size_t i : order) {
+        sorted.push_back(items[i]);
+    }
     // From the lowest priority upwards, so that the longest frame below is known.
-    std::vector<std::int64_t>  blocking(messages.size());
+    std::vector<std::int64_t> blocking(messages.size());
     std::optional<std::size_t> blocker;
     for (std::size_t rank = order.size(); rank-- > 0;) {
         const std::size_t i = order[rank];
-        const Message&    m = messages[i];
-        Response&         r = a.responses[i];
-        r.bits = m.bits != 0 ? m.bits : can::worst_case_bits(m.bytes, m.extended, m.fd, m.bit_rate_switch, m.remote).total();
+        const Message& m = messages[i];
+        Response& r = a.responses[i];
+        r.bits = m.bits != 0
+                     ? m.bits
+                     : can::worst_case_bits(m.bytes, m.extended, m.fd, m.bit_rate_switch, m.remote)
+                           .total();
         r.frame = items[i].c;
         r.blocker = blocker;
         r.blocking = blocking[rank] = blocker ? items[*blocker].c : 0;
         a.load += static_cast<double>(items[i].c) / static_cast<double>(items[i].t);
-        if (!blocker || items[i].c > items[*blocker].c) blocker = i;
+        if (!blocker || items[i].c > items[*blocker].c) {
+            blocker = i;
+        }
     }
-    const bool               queues = std::any_of(messages.begin(), messages.end(), [](const Message& m) { return m.fifo != 0; });
-    WithQueues               with_queues(sorted, blocking, bus);
+    const bool queues =
+        std::any_of(messages.begin(), messages.end(), [](const Message& m) { return m.fifo != 0; });
+    WithQueues with_queues(sorted, blocking, bus);
     const std::vector<Worst> bounds = queues ? with_queues.compute() : std::vector<Worst>{};
     for (std::size_t rank = 0; rank < order.size(); ++rank) {
         const std::size_t i = order[rank];
-        Response&         r = a.responses[i];
-        const Worst       worst = queues ? bounds[rank] : worst_of(items[i], r.blocking, std::span(sorted).first(rank + 1), bus);
-        if (queues) r.queue = with_queues.others(rank), r.blocking = std::max(r.blocking, items[i].c);
-        r.worst = worst.response, r.queued = worst.queued, r.instance = worst.instance, r.errors = worst.errors;
+        Response& r = a.responses[i];
+        const Worst worst =
+            queues ? bounds[rank]
+                   : worst_of(items[i], r.blocking, std::span(sorted).first(rank + 1), bus);
+        if (queues) {
+            r.queue = with_queues.others(rank);
+            r.blocking = std::max(r.blocking, items[i].c);
+        }
+        r.worst = worst.response;
+        r.queued = worst.queued;
+        r.instance = worst.instance;
+
+        r.errors = worst.errors;
         // with queues, the bound holds only when a message is sent before the next of its kind
         const std::int64_t limit = queues ? std::min(items[i].limit, items[i].t) : items[i].limit;
         r.in_time = r.worst >= 0 && r.worst <= limit;
@@ -245,28 +318,44 @@ Analysis analyse(std::span<const Message> messages, const Bus& bus) {
     return a;
 }
 
-std::optional<std::uint32_t> sufficient_bit_rate(std::span<const Message> messages, const Bus& bus) {
-    for (const std::uint32_t rate : {10'000U, 20'000U, 50'000U, 100'000U, 125'000U, 250'000U, 500'000U, 800'000U, 1'000'000U})
-        if (rate > bus.bit_rate && analyse(messages, {rate, bus.data_rate, bus.errors}).fits) return rate;
+std::optional<std::uint32_t> sufficient_bit_rate(std::span<const Message> messages,
+                                                 const Bus& bus) {
+    for (const std::uint32_t rate : {10'000U, 20'000U, 50'000U, 100'000U, 125'000U, 250'000U,
+                                     500'000U, 800'000U, 1'000'000U}) {
+        if (rate > bus.bit_rate && analyse(messages, {rate, bus.data_rate, bus.errors}).fits) {
+            return rate;
+        }
+    }
     return std::nullopt;
 }
 
 std::vector<std::size_t> sufficient_order(std::span<const Message> messages, const Bus& bus) {
-    if (messages.size() > 256 || bus.bit_rate == 0) return {};
-    if (std::any_of(messages.begin(), messages.end(), [](const Message& m) { return m.fifo != 0; })) return {};
-    const std::vector<Item>  items = items_of(messages, bus);
+    if (messages.size() > 256 || bus.bit_rate == 0) {
+        return {};
+    }
+    if (std::any_of(messages.begin(), messages.end(),
+                    [](const Message& m) { return m.fifo != 0; })) {
+        return {};
+    }
+    const std::vector<Item> items = items_of(messages, bus);
     std::vector<std::size_t> open(messages.size()), order;
     std::iota(open.begin(), open.end(), std::size_t{0});
-    std::stable_sort(open.begin(), open.end(),
-                     [&](std::size_t x, std::size_t y) { return items[x].limit - items[x].j < items[y].limit - items[y].j; });
+    std::stable_sort(open.begin(), open.end(), [&](std::size_t x, std::size_t y) {
+        return items[x].limit - items[x].j < items[y].limit - items[y].j;
+    });
     std::int64_t blocking = 0;
-    while (!open.empty()) {  // a message that meets its deadline below all others gets the lowest free priority; late deadlines first
+    // a message that meets its deadline below all others gets the lowest free priority; late
+    // deadlines first
+    while (!open.empty()) {
         bool found = false;
         for (std::size_t place = open.size(); place-- > 0 && !found;) {
             const std::size_t i = open[place];
             std::vector<Item> busy;
-            for (const std::size_t other : open)
-                if (other != i) busy.push_back(items[other]);
+            for (const std::size_t other : open) {
+                if (other != i) {
+                    busy.push_back(items[other]);
+                }
+            }
             busy.push_back(items[i]);
             const Worst worst = worst_of(items[i], blocking, busy, bus);
             if (worst.response < 0 || worst.response > items[i].limit) continue;
@@ -275,7 +364,9 @@ std::vector<std::size_t> sufficient_order(std::span<const Message> messages, con
             blocking = std::max(blocking, items[i].c);
             open.erase(open.begin() + static_cast<std::ptrdiff_t>(place));
         }
-        if (!found) return {};
+        if (!found) {
+            return {};
+        }
     }
     std::reverse(order.begin(), order.end());
     return order;

@@ -14,25 +14,42 @@ using namespace hal::messages;
 struct CanSend : hal::Component {
     using Component::Component;
 
-    hal::TextArgument address{*this, "link", "sim:can0", "address of the bus, as in sim:can0 or can:can0", {.per_instance = true}};
-    hal::Argument     id{*this, "id", 0x100, "identifier; above 0x7ff: 29 bits", {.per_instance = true, .min = 0, .max = 0x1fffffff}};
-    hal::Argument     ids{
-        *this, "ids", 1, "consecutive identifiers, chosen by the pin id-offset", {.per_instance = true, .min = 1, .max = 256}};
-    hal::TextArgument fields{*this, "fields", "",
-                             "data, little endian: NAME:TYPE,... with types bit, u8, s8, u16, s16, u32, s32, f32, f64"};
+    hal::TextArgument address{*this,
+                              "link",
+                              "sim:can0",
+                              "address of the bus, as in sim:can0 or can:can0",
+                              {.per_instance = true}};
+    hal::Argument id{*this,
+                     "id",
+                     0x100,
+                     "identifier; above 0x7ff: 29 bits",
+                     {.per_instance = true, .min = 0, .max = 0x1fffffff}};
+    hal::Argument ids{*this,
+                      "ids",
+                      1,
+                      "consecutive identifiers, chosen by the pin id-offset",
+                      {.per_instance = true, .min = 1, .max = 256}};
+    hal::TextArgument fields{
+        *this, "fields", "",
+        "data, little endian: NAME:TYPE,... with types bit, u8, s8, u16, s16, u32, s32, f32, f64"};
 
-    hal::In<bool>           trigger{*this, "trigger", "TRUE: sends one message in each cycle"};
-    hal::In<std::uint32_t>  id_offset{*this, "id-offset", "added to the identifier, at most ids - 1"};
-    hal::Param<bool>        on_change{*this, "on-change", "TRUE: also sends when the data differ from those sent last"};
-    hal::Param<double>      period{*this, "period", "also sends at multiples of this time; 0: only by trigger", {.unit = "s"}};
-    hal::Param<double>      phase{*this, "phase", "delay of these instants", {.unit = "s"}};
+    hal::In<bool> trigger{*this, "trigger", "TRUE: sends one message in each cycle"};
+    hal::In<std::uint32_t> id_offset{*this, "id-offset",
+                                     "added to the identifier, at most ids - 1"};
+    hal::Param<bool> on_change{*this, "on-change",
+                               "TRUE: also sends when the data differ from those sent last"};
+    hal::Param<double> period{
+        *this, "period", "also sends at multiples of this time; 0: only by trigger", {.unit = "s"}};
+    hal::Param<double> phase{*this, "phase", "delay of these instants", {.unit = "s"}};
     hal::Out<std::uint64_t> sent{*this, "sent", "messages queued"};
-    hal::Out<std::uint64_t> dropped{*this, "dropped", "messages not queued: queue full, bus down or off"};
-    hal::Out<std::uint32_t> waiting{*this, "waiting", "messages of this instance waiting for the bus"};
+    hal::Out<std::uint64_t> dropped{*this, "dropped",
+                                    "messages not queued: queue full, bus down or off"};
+    hal::Out<std::uint32_t> waiting{*this, "waiting",
+                                    "messages of this instance waiting for the bus"};
 
-    Layout             layout{fields.get()};
+    Layout layout{fields.get()};
     FieldPins<hal::In> pins{*this, layout, "field of the message"};
-    hal::Function      run{*this, "update", &CanSend::update, "sends the message when it is due"};
+    hal::Function run{*this, "update", &CanSend::update, "sends the message when it is due"};
 
     void start() {
         first_ = identifier(id, ids - 1);
@@ -44,49 +61,63 @@ struct CanSend : hal::Component {
         link_->set_filters(std::span(&nothing, 1));
     }
     void stop() noexcept {
-        if (link_) setup_time_.expect(link_->closing_ns(), hal::can::closing_text);
+        if (link_) {
+            setup_time_.expect(link_->closing_ns(), hal::can::closing_text);
+        }
         link_.reset();
     }
 
     void update(hal::Cycle cycle) noexcept {
         const std::int64_t now = cycle.start_ns();
-        hal::can::Frame    frame;
+        hal::can::Frame frame;
         frame.length = layout.bytes();
         pins.store(frame.data.data());
         const bool is_new = on_change && frame.data != last_data_;
         if (due(cycle) || trigger || is_new) {
-            frame.id = first_ + std::min<std::uint32_t>(id_offset, static_cast<std::uint32_t>(ids - 1));
+            frame.id =
+                first_ + std::min<std::uint32_t>(id_offset, static_cast<std::uint32_t>(ids - 1));
             frame.extended = first_ > 0x7ff;
             last_data_ = frame.data;
-            if (link_->send(frame, now) == hal::can::Sent::queued) sent = sent + 1;
-            else dropped = dropped + 1;
+            if (link_->send(frame, now) == hal::can::Sent::queued) {
+                sent = sent + 1;
+            } else {
+                dropped = dropped + 1;
+            }
         }
         link_->flush(now);
-        while (link_->receive(buffer_, now) == buffer_.size()) {}
+        while (link_->receive(buffer_, now) == buffer_.size()) {
+        }
         waiting = link_->statistics().queued;
     }
 
 private:
     /// True once per instant phase + k * period; an instant within the cycle belongs to its start.
     bool due(hal::Cycle cycle) noexcept {
-        const double wanted = period * 1e9, late = phase * 1e9;
+        const double wanted = period * 1e9;
+        const double late = phase * 1e9;
         if (!(wanted >= 1.0 && wanted < 1e18 && std::fabs(late) < 1e18)) return false;
-        const auto every = static_cast<std::int64_t>(std::llround(wanted)), shift = static_cast<std::int64_t>(std::llround(late));
-        if (!started_) begin_ = cycle.start_ns(), started_ = true;
+        const auto every = static_cast<std::int64_t>(std::llround(wanted));
+
+        const auto shift = static_cast<std::int64_t>(std::llround(late));
+        if (!started_) {
+            begin_ = cycle.start_ns();
+            started_ = true;
+        }
         const std::int64_t since = cycle.start_ns() - begin_ - shift;
         const std::int64_t instant = since >= 0 ? since / every : -1;
-        const bool         is_due = instant >= 0 && (instant != last_);
+        const bool is_due = instant >= 0 && (instant != last_);
         last_ = instant;
         return is_due;
     }
 
     std::unique_ptr<hal::can::Link> link_;
-    hal::SetupTime                  setup_time_;
+    hal::SetupTime setup_time_;
     std::array<hal::can::Frame, 16> buffer_;
-    std::array<std::uint8_t, 64>    last_data_{};
-    std::uint32_t                   first_ = 0;
-    std::int64_t                    begin_ = 0, last_ = -1;
-    bool                            started_ = false;
+    std::array<std::uint8_t, 64> last_data_{};
+    std::uint32_t first_ = 0;
+    std::int64_t begin_ = 0;
+    std::int64_t last_ = -1;
+    bool started_ = false;
 };
 
 }  // namespace

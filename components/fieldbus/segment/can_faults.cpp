@@ -13,17 +13,22 @@ namespace {
 
 using namespace hal::can;
 
-constexpr hal::faults::Named<Fault> can_fault_names[] = {
-    {"error", Fault::error}, {"loss", Fault::loss}, {"duplicate", Fault::duplicate}, {"delay", Fault::delay}};
+constexpr hal::faults::Named<Fault> can_fault_names[] = {{"error", Fault::error},
+                                                         {"loss", Fault::loss},
+                                                         {"duplicate", Fault::duplicate},
+                                                         {"delay", Fault::delay}};
 
 /// "error:id=0x10A:from=1s:until=2s".
 Disturbance parse_can_fault(std::string_view part) {
     return hal::faults::parse(
         part, can_fault_names, Disturbance{.delay_ns = 20'000},
-        "write error, loss, duplicate or delay, with options :id=0x10A:every=50:probability=0.02:count=3:from=1s:until=2s:time=20us",
+        "write error, loss, duplicate or delay, with options "
+        ":id=0x10A:every=50:probability=0.02:count=3:from=1s:until=2s:time=20us",
         [&](Disturbance& d, std::string_view key, std::string_view value) {
         if (key != "id") return false;
-        d.id = static_cast<std::uint32_t>(hal::faults::count(part, value, 0x1fffffff)), d.mask = 0x1fffffff;
+        d.id = static_cast<std::uint32_t>(hal::faults::count(part, value, 0x1fffffff));
+
+        d.mask = 0x1fffffff;
         return true;
     });
 }
@@ -31,36 +36,50 @@ Disturbance parse_can_fault(std::string_view part) {
 struct CanFaults final : hal::Component {
     using Component::Component;
 
-    hal::TextArgument              link{*this, "link", "sim:can0", "bus in memory, sim:NAME"};
-    hal::TextArgument              faults{*this, "faults", "", "faults, comma-separated: error:id=0x10A:from=1s:until=2s,loss:every=50"};
+    hal::TextArgument link{*this, "link", "sim:can0", "bus in memory, sim:NAME"};
+    hal::TextArgument faults{
+        *this, "faults", "",
+        "faults, comma-separated: error:id=0x10A:from=1s:until=2s,loss:every=50"};
     const std::vector<Disturbance> list = hal::faults::parse_list(faults.get(), parse_can_fault);
-    hal::Argument                  seed{*this, "seed", 1, "seed of random faults", {.min = 0, .max = 1'000'000'000}};
-    hal::Argument                  victim{*this,
+    hal::Argument seed{*this, "seed", 1, "seed of random faults", {.min = 0, .max = 1'000'000'000}};
+    hal::Argument victim{*this,
                          "victim",
                          0,
-                         "node whose wire `cut` cuts: its number on the bus, in the order in which links were opened",
-                                          {.min = 0, .max = 63}};
+                         "node whose wire `cut` cuts: its number on the bus, in the order in which "
+                         "links were opened",
+                         {.min = 0, .max = 63}};
 
-    hal::Function run{*this, "update", &CanFaults::update, "cuts and reconnects a wire, babbles, counts faults"};
+    hal::Function run{*this, "update", &CanFaults::update,
+                      "cuts and reconnects a wire, babbles, counts faults"};
 
-    hal::In<bool>             cut{*this, "cut", "TRUE: the wire of node `victim` is cut"};
-    hal::In<bool>             bus_off{*this, "bus-off", "rising edge: the next error of node `victim` takes it off the bus"};
-    hal::In<bool>             babble{*this, "babble", "TRUE: a node of its own sends `babble-id` at any time"};
-    hal::Param<std::uint32_t> babble_id{*this, "babble-id", "identifier of babbled frames", {.initial = 0x150}};
-    hal::Param<std::uint32_t> babble_period{*this, "babble-period", "interval between babbled frames", {.initial = 300, .unit = "us"}};
-    hal::Outs<std::uint64_t>  hits{*this, "hits-#", static_cast<std::int64_t>(list.size()), "frames affected by this fault of the list"};
+    hal::In<bool> cut{*this, "cut", "TRUE: the wire of node `victim` is cut"};
+    hal::In<bool> bus_off{*this, "bus-off",
+                          "rising edge: the next error of node `victim` takes it off the bus"};
+    hal::In<bool> babble{*this, "babble", "TRUE: a node of its own sends `babble-id` at any time"};
+    hal::Param<std::uint32_t> babble_id{
+        *this, "babble-id", "identifier of babbled frames", {.initial = 0x150}};
+    hal::Param<std::uint32_t> babble_period{
+        *this, "babble-period", "interval between babbled frames", {.initial = 300, .unit = "us"}};
+    hal::Outs<std::uint64_t> hits{*this, "hits-#", static_cast<std::int64_t>(list.size()),
+                                  "frames affected by this fault of the list"};
 
     void start() {
         auto opened = open(link.get());
         if (!opened) throw std::runtime_error(opened.problem);
-        if (opened.link->simulation() == nullptr) throw std::runtime_error(link.get() + " is not a bus in memory; write sim:NAME");
+        if (opened.link->simulation() == nullptr) {
+            throw std::runtime_error(link.get() + " is not a bus in memory; write sim:NAME");
+        }
         link_ = std::move(opened.link);
         auto& bus = *link_->simulation();
         bus.seed(static_cast<std::uint64_t>(seed));
-        for (const auto& d : list) numbers_.push_back(bus.disturb(d));
+        for (const auto& d : list) {
+            numbers_.push_back(bus.disturb(d));
+        }
     }
     void stop() noexcept {
-        if (link_) link_->simulation()->calm();
+        if (link_) {
+            link_->simulation()->calm();
+        }
         link_.reset();
         numbers_.clear();
         was_cut_ = was_babbling_ = was_off_ = false;
@@ -68,22 +87,32 @@ struct CanFaults final : hal::Component {
 
     void update(hal::Cycle cycle) noexcept {
         if (!link_) return;
-        for (Frame f; link_->receive(f, cycle.start_ns());) {}
+        for (Frame f; link_->receive(f, cycle.start_ns());) {
+        }
         auto& bus = *link_->simulation();
-        if (cut != was_cut_) bus.cut(static_cast<int>(victim), was_cut_ = cut);
-        if (bus_off && !was_off_) bus.set_counters(static_cast<int>(victim), 255, 0);
+        if (cut != was_cut_) {
+            bus.cut(static_cast<int>(victim), was_cut_ = cut);
+        }
+        if (bus_off && !was_off_) {
+            bus.set_counters(static_cast<int>(victim), 255, 0);
+        }
         was_off_ = bus_off;
         if (babble != was_babbling_) {
             was_babbling_ = babble;
-            bus.babble({babble_id & 0x7ffU, {0x55}}, was_babbling_ ? std::int64_t{babble_period} * 1000 : 0);
+            bus.babble({babble_id & 0x7ffU, {0x55}},
+                       was_babbling_ ? std::int64_t{babble_period} * 1000 : 0);
         }
-        for (std::size_t n = 0; n < numbers_.size(); ++n) hits[n] = bus.hits(numbers_[n]);
+        for (std::size_t n = 0; n < numbers_.size(); ++n) {
+            hits[n] = bus.hits(numbers_[n]);
+        }
     }
 
 private:
     std::unique_ptr<Link> link_;
-    std::vector<int>      numbers_;
-    bool                  was_cut_ = false, was_babbling_ = false, was_off_ = false;
+    std::vector<int> numbers_;
+    bool was_cut_ = false;
+    bool was_babbling_ = false;
+    bool was_off_ = false;
 };
 
 }  // namespace

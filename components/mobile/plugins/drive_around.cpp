@@ -11,34 +11,61 @@
 namespace {
 
 constexpr std::size_t sensors = 16;
-constexpr double      pi = std::numbers::pi;
+constexpr double pi = std::numbers::pi;
 
 struct DriveAround : hal::Component {
     using Component::Component;
 
     hal::mobile::ToTarget go{*this, {0.05, "distance within which the target is reached"}};
 
-    hal::Ins<std::uint32_t> reading{*this, "reading-##", sensors, "reading of sensor ## of the infrared ring, 0..4095"};
-    hal::In<double>         echo_range{
-        *this, "echo-range", "distance from the centre of what the ultrasonic head has found", {.initial = 1000.0, .unit = "m"}};
-    hal::In<double>        echo_bearing{*this, "echo-bearing", "its direction, to the left of the heading", {.unit = "rad"}};
-    hal::In<std::uint32_t> echo_count{*this, "echo-count", "a new value: echo-range and echo-bearing are new"};
-    hal::Param<double>     constant{*this, "constant", "reading times the square of distance + offset", {.initial = 40.0}};
-    hal::Param<double>     offset{*this, "offset", "offset of the distance", {.initial = 0.05, .unit = "m"}};
-    hal::Param<double>     apothem{*this, "apothem", "distance of the sensors from the centre", {.initial = 0.22, .unit = "m"}};
-    hal::Param<double> spread{*this, "spread", "distance of the two sensors of a side from its middle", {.initial = 0.045, .unit = "m"}};
-    hal::Param<double> body{*this, "body-radius", "radius of the robot with a margin", {.initial = 0.32, .unit = "m"}};
-    hal::Param<double> horizon{*this, "horizon", "obstacles farther from the centre do not matter", {.initial = 0.85, .unit = "m"}};
-    hal::Param<double> memory{*this, "memory", "time for which an obstacle is remembered", {.initial = 3.0, .unit = "s"}};
-    hal::Param<double> heading_gain{
-        *this, "heading-gain", "turning speed per angle to the chosen direction", {.initial = 3.0, .unit = "1/s"}};
-    hal::LimitParam    max_turn{*this, "max-turn", "maximum turning speed", {.initial = 1.5, .unit = "rad/s"}};
+    hal::Ins<std::uint32_t> reading{*this, "reading-##", sensors,
+                                    "reading of sensor ## of the infrared ring, 0..4095"};
+    hal::In<double> echo_range{*this,
+                               "echo-range",
+                               "distance from the centre of what the ultrasonic head has found",
+                               {.initial = 1000.0, .unit = "m"}};
+    hal::In<double> echo_bearing{
+        *this, "echo-bearing", "its direction, to the left of the heading", {.unit = "rad"}};
+    hal::In<std::uint32_t> echo_count{*this, "echo-count",
+                                      "a new value: echo-range and echo-bearing are new"};
+    hal::Param<double> constant{
+        *this, "constant", "reading times the square of distance + offset", {.initial = 40.0}};
+    hal::Param<double> offset{
+        *this, "offset", "offset of the distance", {.initial = 0.05, .unit = "m"}};
+    hal::Param<double> apothem{*this,
+                               "apothem",
+                               "distance of the sensors from the centre",
+                               {.initial = 0.22, .unit = "m"}};
+    hal::Param<double> spread{*this,
+                              "spread",
+                              "distance of the two sensors of a side from its middle",
+                              {.initial = 0.045, .unit = "m"}};
+    hal::Param<double> body{
+        *this, "body-radius", "radius of the robot with a margin", {.initial = 0.32, .unit = "m"}};
+    hal::Param<double> horizon{*this,
+                               "horizon",
+                               "obstacles farther from the centre do not matter",
+                               {.initial = 0.85, .unit = "m"}};
+    hal::Param<double> memory{
+        *this, "memory", "time for which an obstacle is remembered", {.initial = 3.0, .unit = "s"}};
+    hal::Param<double> heading_gain{*this,
+                                    "heading-gain",
+                                    "turning speed per angle to the chosen direction",
+                                    {.initial = 3.0, .unit = "1/s"}};
+    hal::LimitParam max_turn{
+        *this, "max-turn", "maximum turning speed", {.initial = 1.5, .unit = "rad/s"}};
 
-    hal::Out<double> nearest{
-        *this, "nearest", "distance of the nearest obstacle from the centre; 1000: none", {.unit = "m", .finite = true}};
-    hal::Out<double> direction{*this, "direction", "chosen direction, relative to the heading", {.unit = "rad", .finite = true}};
-    hal::Out<bool>   avoiding{*this, "avoiding", "TRUE: the direct way is not free"};
-    hal::Out<bool>   blocked{*this, "blocked", "TRUE: no direction is free; the robot turns on the spot"};
+    hal::Out<double> nearest{*this,
+                             "nearest",
+                             "distance of the nearest obstacle from the centre; 1000: none",
+                             {.unit = "m", .finite = true}};
+    hal::Out<double> direction{*this,
+                               "direction",
+                               "chosen direction, relative to the heading",
+                               {.unit = "rad", .finite = true}};
+    hal::Out<bool> avoiding{*this, "avoiding", "TRUE: the direct way is not free"};
+    hal::Out<bool> blocked{*this, "blocked",
+                           "TRUE: no direction is free; the robot turns on the spot"};
 
     hal::Function run{*this, "update", &DriveAround::update, "chooses a direction and the speeds"};
 
@@ -49,16 +76,19 @@ struct DriveAround : hal::Component {
         const double chosen = choose(go.wanted(), go.left());
         // Space in front: no faster than the robot can stop within it.
         const double room = std::clamp((free_ahead() - body) * 2.0, 0.0, 1.0);
-        const double slowed = go.speed(direction) * (avoiding ? std::fmax(room, 0.15) : std::fmax(room, 0.3));
+        const double slowed =
+            go.speed(direction) * (avoiding ? std::fmax(room, 0.15) : std::fmax(room, 0.3));
         go.linear = blocked ? 0.0 : go.finite(std::fmax(slowed, 0.0));
-        go.angular = go.finite(std::clamp(heading_gain * chosen, -std::fabs(max_turn), std::fabs(max_turn)));
+        go.angular =
+            go.finite(std::clamp(heading_gain * chosen, -std::fabs(max_turn), std::fabs(max_turn)));
     }
 
 private:
-    static constexpr int          sectors = 72;  // 5 degrees each
+    static constexpr int sectors = 72;  // 5 degrees each
     static constexpr std::int64_t never = INT64_MIN;
     struct Point {
-        double       x = 0.0, y = 0.0;
+        double x = 0.0;
+        double y = 0.0;
         std::int64_t at_ns = never;
     };
     struct Obstacle {
@@ -67,101 +97,132 @@ private:
 
     void rest() noexcept {
         direction = 0.0;
-        avoiding = false, blocked = false;
+        avoiding = false;
+        blocked = false;
         last_ = 0.0;
     }
-    /// Where the sensors report something, and reported something a short time ago: an obstacle beside the robot may be between two of them.
+    /// Where the sensors report something, and reported something a short time ago: an obstacle
+    /// beside the robot may be between two of them.
     void look(std::int64_t now) noexcept {
         double least = 1000.0;
         for (std::size_t i = 0; i < sensors; ++i) {
             if (reading[i] == 0) continue;
             const double range = std::sqrt(std::fmax(constant, 0.0) / reading[i]) - offset;
             if (!(range < 10.0)) continue;
-            const double facing = static_cast<double>(i / 2) * pi / 4, aside = i % 2 == 0 ? -spread : spread.get();
-            const double out = apothem + std::fmax(range, 0.0), at = std::hypot(out, aside);
+            const double facing = static_cast<double>(i / 2) * pi / 4;
+
+            const double aside = i % 2 == 0 ? -spread : spread.get();
+            const double out = apothem + std::fmax(range, 0.0);
+            const double at = std::hypot(out, aside);
             least = std::fmin(least, at);
             if (!(at < horizon)) continue;
             remember(at, facing + std::atan2(aside, out), now);
         }
         if (echo_count != echoes_) {
             echoes_ = echo_count;
-            if (echo_range > 0.0 && echo_range < horizon && std::isfinite(echo_bearing)) remember(echo_range, echo_bearing, now);
+            if (echo_range > 0.0 && echo_range < horizon && std::isfinite(echo_bearing)) {
+                remember(echo_range, echo_bearing, now);
+            }
         }
         nearest = go.finite(least);
         count_ = 0;
         for (const Point& p : points_) {
             const double at = std::hypot(p.x - go.x, p.y - go.y);
-            if (p.at_ns != never && 1e-9 * static_cast<double>(now - p.at_ns) <= memory && at < horizon)
+            if (p.at_ns != never && 1e-9 * static_cast<double>(now - p.at_ns) <= memory &&
+                at < horizon) {
                 seen_[count_++] = {std::atan2(p.y - go.y, p.x - go.x) - go.heading, at};
+            }
         }
     }
     /// A point that is nearly known is renewed; another one replaces the oldest.
     void remember(double at, double bearing, std::int64_t now) noexcept {
         constexpr double same_m = 0.05;
-        const Point      seen{go.x + at * std::cos(go.heading + bearing), go.y + at * std::sin(go.heading + bearing), now};
-        Point*           oldest = points_.data();
+        const Point seen{go.x + at * std::cos(go.heading + bearing),
+                         go.y + at * std::sin(go.heading + bearing), now};
+        Point* oldest = points_.data();
         for (Point& p : points_) {
             if (p.at_ns != never && std::hypot(p.x - seen.x, p.y - seen.y) < same_m) {
                 p.at_ns = seen.at_ns;
                 return;
             }
-            if (p.at_ns < oldest->at_ns) oldest = &p;
+            if (p.at_ns < oldest->at_ns) {
+                oldest = &p;
+            }
         }
         *oldest = seen;
     }
     double free_ahead() const noexcept {
         double least = horizon;
         for (std::size_t i = 0; i < count_; ++i) {  // what is in the lane of the body
-            const double ahead = seen_[i].distance * std::cos(seen_[i].angle), aside = seen_[i].distance * std::sin(seen_[i].angle);
-            if (ahead > 0.0 && std::fabs(aside) < 0.85 * body) least = std::fmin(least, ahead);
+            const double ahead = seen_[i].distance * std::cos(seen_[i].angle);
+
+            const double aside = seen_[i].distance * std::sin(seen_[i].angle);
+            if (ahead > 0.0 && std::fabs(aside) < 0.85 * body) {
+                least = std::fmin(least, ahead);
+            }
         }
         return least;
     }
     bool is_free(double angle, double left) const noexcept {
         for (std::size_t i = 0; i < count_; ++i) {
             const Obstacle& o = seen_[i];
-            if (o.distance - body > left) continue;  // behind the target
+            if (o.distance - body > left) {
+                continue;  // behind the target
+            }
             const double half = o.distance > body ? std::asin(body / o.distance) : pi / 2;
             if (std::fabs(std::remainder(o.angle - angle, 2 * pi)) < half) return false;
         }
         return true;
     }
-    /// The free direction with the least cost: away from the target, and away from the direction chosen before, in the room (J. Borenstein,
-    /// Y. Koren, *The vector field histogram*, IEEE Transactions on Robotics and Automation 7, 1991; the cost is that of I. Ulrich's VFH+, 1998).
+    /// The free direction with the least cost: away from the target, and away from the direction
+    /// chosen before, in the room (J. Borenstein, Y. Koren, *The vector field histogram*, IEEE
+    /// Transactions on Robotics and Automation 7, 1991; the cost is that of I. Ulrich's VFH+,
+    /// 1998).
     double choose(double wanted, double left) noexcept {
         const double before = std::remainder(last_ - go.heading, 2 * pi);
         if (is_free(wanted, left)) {
-            // Around a convex obstacle: the direct way counts as free when the old direction agrees with it.
-            avoiding = false, blocked = false;
+            // Around a convex obstacle: the direct way counts as free when the old direction agrees
+            // with it.
+            avoiding = false;
+            blocked = false;
             direction = wanted;
             last_ = go.heading + wanted;
             return wanted;
         }
-        double best = 0.0, least = 1e9;
+        double best = 0.0;
+        double least = 1e9;
         for (int i = 0; i < sectors; ++i) {
             const double angle = std::remainder(i * 2 * pi / sectors, 2 * pi);
             if (!is_free(angle, left)) continue;
-            const double cost = 2.0 * std::fabs(std::remainder(angle - wanted, 2 * pi)) +
-                                1.5 * (avoiding ? std::fabs(std::remainder(angle - before, 2 * pi)) : 0.0) + 0.3 * std::fabs(angle);
-            if (cost < least) least = cost, best = angle;
+            const double cost =
+                2.0 * std::fabs(std::remainder(angle - wanted, 2 * pi)) +
+                1.5 * (avoiding ? std::fabs(std::remainder(angle - before, 2 * pi)) : 0.0) +
+                0.3 * std::fabs(angle);
+            if (cost < least) {
+                least = cost;
+                best = angle;
+            }
         }
         blocked = least > 1e8;
         avoiding = true;
         direction = blocked ? 0.0 : best;
-        if (!blocked) last_ = go.heading + best;
+        if (!blocked) {
+            last_ = go.heading + best;
+        }
         return blocked ? pi / 4 : best;
     }
 
-    std::array<Point, 192>    points_{};
+    std::array<Point, 192> points_{};
     std::array<Obstacle, 192> seen_{};
-    std::size_t               count_ = 0;
-    double                    last_ = 0.0;
-    std::uint32_t             echoes_ = 0;
+    std::size_t count_ = 0;
+    double last_ = 0.0;
+    std::uint32_t echoes_ = 0;
 };
 
 }  // namespace
 
-HAL_COMPONENT(DriveAround, "drive_around", "Drives a two-wheeled robot to a point, around obstacles", R"(
+HAL_COMPONENT(DriveAround, "drive_around",
+              "Drives a two-wheeled robot to a point, around obstacles", R"(
 Computes the speeds for `diff_drive` from pose, target and the readings of a ring of 16 infrared sensors: an octagon with two sensors per side, side 1
 forwards, counted to the left.
 

@@ -7,10 +7,16 @@ struct DriveTo : hal::Component {
     using Component::Component;
 
     hal::mobile::ToTarget go{*this,
-                             {0.01, "distance within which the target is reached; beyond twice this distance the robot starts again"}};
-    hal::Param<double>    heading_gain{*this, "heading-gain", "turning speed per remaining angle", {.initial = 4.0, .unit = "1/s"}};
+                             {0.01,
+                              "distance within which the target is reached; beyond twice this "
+                              "distance the robot starts again"}};
+    hal::Param<double> heading_gain{*this,
+                                    "heading-gain",
+                                    "turning speed per remaining angle",
+                                    {.initial = 4.0, .unit = "1/s"}};
 
-    hal::Function run{*this, "", &DriveTo::update, "computes the requested speeds from target and pose"};
+    hal::Function run{*this, "", &DriveTo::update,
+                      "computes the requested speeds from target and pose"};
 
     void update(hal::Cycle) noexcept {
         if (!go.valid() || !go.under_way(2.0)) return;

@@ -10,18 +10,22 @@ namespace {
 struct Goals : hal::Component {
     using Component::Component;
 
-    hal::Texts        texts{*this};
+    hal::Texts texts{*this};
     hal::TextArgument file{
-        *this, "file", "", "file beside the netlist with a line goal X Y for each; without it one goal, 0 0", {.per_instance = true}};
+        *this,
+        "file",
+        "",
+        "file beside the netlist with a line goal X Y for each; without it one goal, 0 0",
+        {.per_instance = true}};
 
-    hal::In<bool>           next{*this, "next", "a rising edge proceeds to the next goal"};
-    hal::In<bool>           restart{*this, "restart", "TRUE returns to the first goal"};
-    hal::Param<bool>        loop{*this, "loop", "TRUE: the first goal follows the last"};
-    hal::Out<double>        x{*this, "x", "x of the goal", {.unit = "m"}};
-    hal::Out<double>        y{*this, "y", "y of the goal", {.unit = "m"}};
+    hal::In<bool> next{*this, "next", "a rising edge proceeds to the next goal"};
+    hal::In<bool> restart{*this, "restart", "TRUE returns to the first goal"};
+    hal::Param<bool> loop{*this, "loop", "TRUE: the first goal follows the last"};
+    hal::Out<double> x{*this, "x", "x of the goal", {.unit = "m"}};
+    hal::Out<double> y{*this, "y", "y of the goal", {.unit = "m"}};
     hal::Out<std::uint32_t> index{*this, "index", "number of the goal, from 0"};
     hal::Out<std::uint32_t> left{*this, "left", "goals behind this one"};
-    hal::Out<bool>          done{*this, "done", "TRUE: next came at the last goal, and loop is FALSE"};
+    hal::Out<bool> done{*this, "done", "TRUE: next came at the last goal, and loop is FALSE"};
 
     hal::Function run{*this, "update", &Goals::update, "selects the goal"};
 
@@ -33,9 +37,13 @@ struct Goals : hal::Component {
             at_ = 0;
             done = false;
         } else if (next && !was_) {
-            if (at_ + 1 < count) ++at_;
-            else if (loop) at_ = 0;
-            else done = true;
+            if (at_ + 1 < count) {
+                ++at_;
+            } else if (loop) {
+                at_ = 0;
+            } else {
+                done = true;
+            }
         }
         was_ = next;
         x = list.goals[at_].x;
@@ -57,7 +65,7 @@ private:
         return goals;
     }
     std::uint32_t at_ = 0;
-    bool          was_ = false;
+    bool was_ = false;
 };
 
 }  // namespace

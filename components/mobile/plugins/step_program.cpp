@@ -21,12 +21,20 @@ public:
     explicit StepProgram(const hal_host* host)
         : Component(host),
           texts_(*this),
-          file_(*this, "file", "", "file beside the netlist with the program; default: an example of two steps"),
+          file_(*this, "file", "",
+                "file beside the netlist with the program; default: an example of two steps"),
           program_(read()) {
-        for (const auto& name : program_.inputs) inputs_.emplace_back(*this, name.c_str(), "input of the program");
-        for (const auto& name : program_.outputs)
-            outputs_.emplace_back(*this, name.c_str(), "output of the program", hal::PinOptions<bool>{.safe = false});
-        for (const auto& s : program_.steps) active_.emplace_back(*this, ("in-" + s.name).c_str(), ("TRUE in step " + s.name).c_str());
+        for (const auto& name : program_.inputs) {
+            inputs_.emplace_back(*this, name.c_str(), "input of the program");
+        }
+        for (const auto& name : program_.outputs) {
+            outputs_.emplace_back(*this, name.c_str(), "output of the program",
+                                  hal::PinOptions<bool>{.safe = false});
+        }
+        for (const auto& s : program_.steps) {
+            active_.emplace_back(*this, ("in-" + s.name).c_str(),
+                                 ("TRUE in step " + s.name).c_str());
+        }
     }
 
     void update(hal::Cycle cycle) noexcept {
@@ -43,8 +51,12 @@ public:
         step_time = seconds(cycle.start_ns() - entered_ns_);
         time = started_ ? seconds(cycle.start_ns() - left_ns_) : 0.0;
         step = at_;
-        for (std::size_t i = 0; i < outputs_.size(); ++i) outputs_[i] = enable && (program_.steps[at_].outputs >> i & 1) != 0;
-        for (std::size_t i = 0; i < active_.size(); ++i) active_[i] = i == at_;
+        for (std::size_t i = 0; i < outputs_.size(); ++i) {
+            outputs_[i] = enable && (program_.steps[at_].outputs >> i & 1) != 0;
+        }
+        for (std::size_t i = 0; i < active_.size(); ++i) {
+            active_[i] = i == at_;
+        }
     }
 
 private:
@@ -53,45 +65,61 @@ private:
     /// At most one transition per cycle, so that each step sets its outputs for at least one.
     void advance(hal::Cycle cycle) noexcept {
         std::uint64_t bits = 0;
-        for (std::size_t i = 0; i < inputs_.size(); ++i) bits |= std::uint64_t{inputs_[i].get()} << i;
-        if (started_ && fired_ < program_.alarms.size() && cycle.start_ns() - left_ns_ >= program_.alarms[fired_].after_ns)
+        for (std::size_t i = 0; i < inputs_.size(); ++i) {
+            bits |= std::uint64_t{inputs_[i].get()} << i;
+        }
+        if (started_ && fired_ < program_.alarms.size() &&
+            cycle.start_ns() - left_ns_ >= program_.alarms[fired_].after_ns) {
             return enter(program_.alarms[fired_++].to, cycle);
+        }
         for (const auto& t : program_.steps[at_].transitions) {
-            const bool taken =
-                t.after_ns >= 0 ? cycle.start_ns() - entered_ns_ >= t.after_ns : (bits & t.must) == t.must && (bits & t.must_not) == 0;
+            const bool taken = t.after_ns >= 0
+                                   ? cycle.start_ns() - entered_ns_ >= t.after_ns
+                                   : (bits & t.must) == t.must && (bits & t.must_not) == 0;
             if (taken) return enter(t.to, cycle);
         }
     }
     void enter(std::uint32_t to, hal::Cycle cycle) noexcept {
-        if (!started_ && begun_ && to != 0) started_ = true, left_ns_ = cycle.start_ns();
+        if (!started_ && begun_ && to != 0) {
+            started_ = true;
+            left_ns_ = cycle.start_ns();
+        }
         at_ = to;
         entered_ns_ = cycle.start_ns();
     }
     hal::mobile::StepText read() const {
-        const std::string     text = file_.get().empty() ? example : texts_.read("file", file_.get());
+        const std::string text = file_.get().empty() ? example : texts_.read("file", file_.get());
         hal::mobile::StepText program;
         program.read(text);
         texts_.reject(file_.get(), text, "mobile-text", program.problems);
         return program;
     }
 
-    hal::Texts                 texts_;
-    hal::TextArgument          file_;
-    hal::mobile::StepText      program_;
-    std::deque<hal::In<bool>>  inputs_;
+    hal::Texts texts_;
+    hal::TextArgument file_;
+    hal::mobile::StepText program_;
+    std::deque<hal::In<bool>> inputs_;
     std::deque<hal::Out<bool>> outputs_, active_;
-    std::int64_t               entered_ns_ = 0, left_ns_ = 0;
-    std::size_t                fired_ = 0;
-    std::uint32_t              at_ = 0;
-    bool                       begun_ = false, started_ = false;
+    std::int64_t entered_ns_ = 0;
+    std::int64_t left_ns_ = 0;
+    std::size_t fired_ = 0;
+    std::uint32_t at_ = 0;
+    bool begun_ = false;
+    bool started_ = false;
 
 public:
-    hal::In<bool>           enable{*this, "enable", "FALSE: the program is in its first step and all outputs are FALSE", {.initial = true}};
-    hal::In<bool>           reset{*this, "reset", "TRUE returns to the first step"};
-    hal::Out<std::uint32_t> step{*this, "step", "number of the step, from 0, in the order of the file"};
-    hal::Out<double>        time{*this, "time", "time since the program left its first step", {.unit = "s"}};
-    hal::Out<double>        step_time{*this, "step-time", "time since the step began", {.unit = "s"}};
-    hal::Function           run{*this, "update", &StepProgram::update, "takes at most one transition and sets the outputs"};
+    hal::In<bool> enable{*this,
+                         "enable",
+                         "FALSE: the program is in its first step and all outputs are FALSE",
+                         {.initial = true}};
+    hal::In<bool> reset{*this, "reset", "TRUE returns to the first step"};
+    hal::Out<std::uint32_t> step{*this, "step",
+                                 "number of the step, from 0, in the order of the file"};
+    hal::Out<double> time{
+        *this, "time", "time since the program left its first step", {.unit = "s"}};
+    hal::Out<double> step_time{*this, "step-time", "time since the step began", {.unit = "s"}};
+    hal::Function run{*this, "update", &StepProgram::update,
+                      "takes at most one transition and sets the outputs"};
 };
 
 }  // namespace

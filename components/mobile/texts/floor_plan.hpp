@@ -23,7 +23,7 @@ struct Disc {
 
 /// Where a ray meets something first.
 struct Hit {
-    double distance;   ///< m; infinite: nothing within reach
+    double distance;  ///< m; infinite: nothing within reach
     double incidence;  ///< cosine of the angle between ray and normal of the surface, 0..1
 };
 
@@ -31,15 +31,16 @@ class FloorPlan {
 public:
     static constexpr std::size_t most_shapes = 256;
 
-    std::vector<Wall>          walls;
-    std::vector<Disc>          discs, beacons;
+    std::vector<Wall> walls;
+    std::vector<Disc> discs, beacons;
     std::vector<text::Problem> problems;  ///< of the file; empty: it was valid
 
     /// Reads the text of a file. [setup]
     void read(std::string_view text);
     /// Returns what a ray from (x, y) in direction `angle` meets within `reach` m. [realtime]
     Hit cast(double x, double y, double angle, double reach) const noexcept;
-    /// Returns the distance from (x, y) to the nearest wall or obstacle, m; negative inside of a circle, infinite without any. [realtime]
+    /// Returns the distance from (x, y) to the nearest wall or obstacle, m; negative inside of a
+    /// circle, infinite without any. [realtime]
     double clearance(double x, double y) const noexcept;
 };
 

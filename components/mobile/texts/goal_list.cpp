@@ -9,11 +9,12 @@ namespace hal::mobile {
 
 void GoalList::read(std::string_view text) {
     for (text::Lines lines(text); const auto line = lines.next();) {
-        const auto            words = text::words_of(*line);
+        const auto words = text::words_of(*line);
         std::array<double, 2> place{};
         if (words[0].text != "goal") {
             text::add(problems, words[0].at.offset, words[0].at.offset + words[0].at.length,
-                      "unknown key '" + words[0].text.substr(0, 60) + "'", "write goal X Y, in metres");
+                      "unknown key '" + words[0].text.substr(0, 60) + "'",
+                      "write goal X Y, in metres");
             continue;
         }
         if (!read_numbers(words, 1, place, "goal X Y, in metres", problems)) continue;
@@ -24,8 +25,10 @@ void GoalList::read(std::string_view text) {
         }
         goals.push_back({place[0], place[1]});
     }
-    if (goals.empty() && problems.empty())
-        text::add(problems, 0, text.empty() ? 0 : 1, "the file has no goals", "write goal X Y for each, in metres");
+    if (goals.empty() && problems.empty()) {
+        text::add(problems, 0, text.empty() ? 0 : 1, "the file has no goals",
+                  "write goal X Y for each, in metres");
+    }
 }
 
 }  // namespace hal::mobile

@@ -15,8 +15,8 @@ struct Goal {
 
 struct GoalList {
     static constexpr std::size_t most_goals = 256;
-    std::vector<Goal>            goals;
-    std::vector<text::Problem>   problems;  ///< of the file; empty: it was valid
+    std::vector<Goal> goals;
+    std::vector<text::Problem> problems;  ///< of the file; empty: it was valid
 
     /// Reads the text of a file. [setup]
     void read(std::string_view text);

@@ -12,15 +12,19 @@
 
 namespace hal::mobile {
 
-/// Reads `words` from `first` on as numbers below 1e6, exactly `to.size()` of them; otherwise adds a problem and returns false. [setup]
-inline bool read_numbers(const std::vector<text::Word>& words, std::size_t first, std::span<double> to, const std::string& form,
+/// Reads `words` from `first` on as numbers below 1e6, exactly `to.size()` of them; otherwise adds
+/// a problem and returns false. [setup]
+inline bool read_numbers(const std::vector<text::Word>& words, std::size_t first,
+                         std::span<double> to, const std::string& form,
                          std::vector<text::Problem>& problems) {
     for (std::size_t i = 0; i < to.size() && first + i < words.size(); ++i) {
         const auto& word = words[first + i];
-        const auto  value = parse_real(word.text);
+        const auto value = parse_real(word.text);
         if (!value || std::fabs(*value) >= 1e6) {
-            text::add(problems, word.at.offset, word.at.offset + word.at.length,
-                      "'" + word.text.substr(0, 60) + "' is not a number" + (value ? " below 1e6" : ""), "write " + form);
+            text::add(
+                problems, word.at.offset, word.at.offset + word.at.length,
+                "'" + word.text.substr(0, 60) + "' is not a number" + (value ? " below 1e6" : ""),
+                "write " + form);
             return false;
         }
         to[i] = *value;
@@ -29,8 +33,9 @@ inline bool read_numbers(const std::vector<text::Word>& words, std::size_t first
     if (words.size() != first + to.size()) {
         const std::size_t count = words.size() - first;
         text::add(problems, words[0].at.offset, last.offset + last.length,
-                  "'" + words[0].text.substr(0, 60) + "' has " + std::to_string(count) + (count == 1 ? " number" : " numbers") +
-                      ", expected " + std::to_string(to.size()),
+                  "'" + words[0].text.substr(0, 60) + "' has " + std::to_string(count) +
+                      (count == 1 ? " number" : " numbers") + ", expected " +
+                      std::to_string(to.size()),
                   "write " + form);
         return false;
     }

@@ -22,23 +22,26 @@
 namespace hal::mobile {
 
 struct Transition {
-    std::uint64_t must = 0, must_not = 0;  ///< inputs, a bit each
-    std::int64_t  after_ns = -1;           ///< -1: a condition
+    std::uint64_t must = 0;
+    std::uint64_t must_not = 0;  ///< inputs, a bit each
+    std::int64_t after_ns = -1;  ///< -1: a condition
     std::uint32_t to = 0;
 };
 struct Step {
-    std::string             name;
-    text::Span              at;
-    std::uint64_t           outputs = 0;
+    std::string name;
+    text::Span at;
+    std::uint64_t outputs = 0;
     std::vector<Transition> transitions;
 };
 
 struct StepText {
-    static constexpr std::size_t most_bits = 64, most_steps = 128, most_transitions = 32;
+    static constexpr std::size_t most_bits = 64;
+    static constexpr std::size_t most_steps = 128;
+    static constexpr std::size_t most_transitions = 32;
 
-    std::vector<std::string>   inputs, outputs;
-    std::vector<Step>          steps;
-    std::vector<Transition>    alarms;  ///< `at`, in order of time
+    std::vector<std::string> inputs, outputs;
+    std::vector<Step> steps;
+    std::vector<Transition> alarms;  ///< `at`, in order of time
     std::vector<text::Problem> problems;
 
     /// Reads the text of a file. [setup]

@@ -12,7 +12,9 @@ namespace hal::mcap {
 template <class T>
 void put(std::string& to, T value) {
     static_assert(std::is_unsigned_v<T>);
-    for (std::size_t i = 0; i < sizeof(T); ++i) to += static_cast<char>(static_cast<std::uint64_t>(value) >> (8 * i));
+    for (std::size_t i = 0; i < sizeof(T); ++i) {
+        to += static_cast<char>(static_cast<std::uint64_t>(value) >> (8 * i));
+    }
 }
 
 inline void put_text(std::string& to, std::string_view text) {
@@ -36,8 +38,10 @@ public:
     T get() {
         static_assert(std::is_unsigned_v<T>);
         const std::string_view part = take(sizeof(T));
-        std::uint64_t          value = 0;
-        for (std::size_t i = 0; i < part.size(); ++i) value |= std::uint64_t{static_cast<unsigned char>(part[i])} << (8 * i);
+        std::uint64_t value = 0;
+        for (std::size_t i = 0; i < part.size(); ++i) {
+            value |= std::uint64_t{static_cast<unsigned char>(part[i])} << (8 * i);
+        }
         return static_cast<T>(value);
     }
     std::string_view text() { return take(get<std::uint32_t>()); }
@@ -54,13 +58,13 @@ public:
         bytes_.remove_prefix(part.size());
         return part;
     }
-    bool        good() const { return good_; }
-    bool        more() const { return good_ && !bytes_.empty(); }
+    bool good() const { return good_; }
+    bool more() const { return good_ && !bytes_.empty(); }
     std::size_t left() const { return bytes_.size(); }
 
 private:
     std::string_view bytes_;
-    bool             good_ = true;
+    bool good_ = true;
 };
 
 }  // namespace hal::mcap

@@ -28,12 +28,13 @@ const char* Compressor::name() { return "zstd"; }
 void Compressor::compress(std::string_view bytes, std::string& to) {
     constexpr int level = 1;  // 250 MB/s; level 3 is a tenth smaller at half the speed
     to.resize(ZSTD_compressBound(bytes.size()));
-    const std::size_t size = ZSTD_compressCCtx(state_->context, to.data(), to.size(), bytes.data(), bytes.size(), level);
+    const std::size_t size =
+        ZSTD_compressCCtx(state_->context, to.data(), to.size(), bytes.data(), bytes.size(), level);
     to.resize(ZSTD_isError(size) ? 0 : size);
 }
 #else
 const char* Compressor::name() { return ""; }
-void        Compressor::compress(std::string_view bytes, std::string& to) { to = bytes; }
+void Compressor::compress(std::string_view bytes, std::string& to) { to = bytes; }
 #endif
 
 namespace {
@@ -52,20 +53,24 @@ bool expand_zstd(std::string_view bytes, std::uint64_t size, std::string& to) {
 #ifdef HALCYON_LZ4
 // Frames of the LZ4 frame format, one or several.
 bool expand_lz4(std::string_view bytes, std::uint64_t size, std::string& to) {
-    constexpr std::uint64_t max_ratio = 255;  // of the format: a larger claim is not worth its memory
+    // of the format: a larger claim is not worth its memory
+    constexpr std::uint64_t max_ratio = 255;
     if (size > max_ratio * (bytes.size() + 1)) return false;
     LZ4F_dctx* made = nullptr;
     if (LZ4F_isError(LZ4F_createDecompressionContext(&made, LZ4F_VERSION))) return false;
-    const std::unique_ptr<LZ4F_dctx, decltype(&LZ4F_freeDecompressionContext)> context(made, LZ4F_freeDecompressionContext);
+    const std::unique_ptr<LZ4F_dctx, decltype(&LZ4F_freeDecompressionContext)> context(
+        made, LZ4F_freeDecompressionContext);
     to.resize(static_cast<std::size_t>(size));
     std::size_t done = 0;
     std::size_t expected = 1;  // bytes that the frame still needs; 0 at its end
     while (!bytes.empty()) {
         std::size_t produced = to.size() - done;
         std::size_t consumed = bytes.size();
-        expected = LZ4F_decompress(context.get(), to.data() + done, &produced, bytes.data(), &consumed, nullptr);
+        expected = LZ4F_decompress(context.get(), to.data() + done, &produced, bytes.data(),
+                                   &consumed, nullptr);
         if (LZ4F_isError(expected)) return false;
-        if (consumed == 0 && produced == 0) return false;  // more output than the header of the chunk has announced
+        // more output than the header of the chunk has announced
+        if (consumed == 0 && produced == 0) return false;
         done += produced;
         bytes.remove_prefix(consumed);
     }
@@ -75,14 +80,17 @@ bool expand_lz4(std::string_view bytes, std::uint64_t size, std::string& to) {
 
 std::string unsupported(std::string_view compression) {
     std::string name(compression.substr(0, 20));
-    if (compression == "zstd" || compression == "lz4")
-        return "unsupported compression '" + name + "': this program was built without lib" + name + "-dev";
+    if (compression == "zstd" || compression == "lz4") {
+        return "unsupported compression '" + name + "': this program was built without lib" + name +
+               "-dev";
+    }
     return "unsupported compression '" + name + "'; supported: zstd, lz4 and none";
 }
 
 }  // namespace
 
-bool expand(std::string_view compression, std::string_view bytes, std::uint64_t size, std::string& to, std::string& problem) {
+bool expand(std::string_view compression, std::string_view bytes, std::uint64_t size,
+            std::string& to, std::string& problem) {
     if (compression.empty()) {
         to = bytes;
         problem = "a chunk and its header disagree on the size";

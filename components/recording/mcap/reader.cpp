@@ -17,18 +17,22 @@
 namespace hal::mcap {
 namespace {
 
-constexpr std::size_t record_head = 9, footer_bytes = record_head + 20, message_head = 2 + 4 + 8 + 8;
+constexpr std::size_t record_head = 9;
+constexpr std::size_t footer_bytes = record_head + 20;
+
+constexpr std::size_t message_head = 2 + 4 + 8 + 8;
 
 class FileSource final : public Source {
 public:
     explicit FileSource(int file, std::uint64_t size) : file_(file), size_(size) {}
     ~FileSource() override { ::close(file_); }
     std::uint64_t size() const override { return size_; }
-    bool          read(std::uint64_t offset, std::size_t count, std::string& to) override {
+    bool read(std::uint64_t offset, std::size_t count, std::string& to) override {
         if (offset > size_ || count > size_ - offset) return false;
         to.resize(count);
         for (std::size_t done = 0; done < count;) {
-            const ssize_t n = ::pread(file_, to.data() + done, count - done, static_cast<off_t>(offset + done));
+            const ssize_t n =
+                ::pread(file_, to.data() + done, count - done, static_cast<off_t>(offset + done));
             if (n < 0 && errno == EINTR) continue;
             if (n <= 0) return false;
             done += static_cast<std::size_t>(n);
@@ -37,7 +41,7 @@ public:
     }
 
 private:
-    int           file_;
+    int file_;
     std::uint64_t size_;
 };
 
@@ -45,7 +49,7 @@ class BytesSource final : public Source {
 public:
     explicit BytesSource(std::string_view bytes) : bytes_(bytes) {}
     std::uint64_t size() const override { return bytes_.size(); }
-    bool          read(std::uint64_t offset, std::size_t count, std::string& to) override {
+    bool read(std::uint64_t offset, std::size_t count, std::string& to) override {
         if (offset > bytes_.size() || count > bytes_.size() - offset) return false;
         to = bytes_.substr(static_cast<std::size_t>(offset), count);
         return true;
@@ -58,8 +62,11 @@ private:
 std::map<std::string, std::string> read_pairs(std::string_view text) {
     std::map<std::string, std::string> entries;
     for (Fields fields(text); fields.more();) {
-        const std::string_view key = fields.text(), value = fields.text();
-        if (fields.good()) entries.emplace(key, value);
+        const std::string_view key = fields.text();
+        const std::string_view value = fields.text();
+        if (fields.good()) {
+            entries.emplace(key, value);
+        }
     }
     return entries;
 }
@@ -68,24 +75,31 @@ std::map<std::string, std::string> read_pairs(std::string_view text) {
 std::string not_mcap(Source& source) {
     struct Format {
         std::string_view magic;
-        const char*      sentence;
+        const char* sentence;
     };
     constexpr Format formats[] = {
-        {std::string_view("\x28\xb5\x2f\xfd", 4), "it is compressed as a whole, with zstd; type: zstd -d FILE"},
-        {std::string_view("\x04\x22\x4d\x18", 4), "it is compressed as a whole, with lz4; type: lz4 -d FILE"},
-        {std::string_view("\x1f\x8b", 2), "it is compressed as a whole, with gzip; type: gunzip FILE"},
-        {"SQLite format 3", "it is an SQLite database, a .db3 of ROS 2; convert it with rosbags-convert"},
+        {std::string_view("\x28\xb5\x2f\xfd", 4),
+         "it is compressed as a whole, with zstd; type: zstd -d FILE"},
+        {std::string_view("\x04\x22\x4d\x18", 4),
+         "it is compressed as a whole, with lz4; type: lz4 -d FILE"},
+        {std::string_view("\x1f\x8b", 2),
+         "it is compressed as a whole, with gzip; type: gunzip FILE"},
+        {"SQLite format 3",
+         "it is an SQLite database, a .db3 of ROS 2; convert it with rosbags-convert"},
         {"#ROSBAG V", "it is a bag of ROS 1; convert it with rosbags-convert"},
     };
     std::string begin;
     source.read(0, static_cast<std::size_t>(std::min<std::uint64_t>(source.size(), 16)), begin);
-    for (const Format& format : formats)
-        if (std::string_view(begin).starts_with(format.magic)) return std::string("not an MCAP file: ") + format.sentence;
+    for (const Format& format : formats) {
+        if (std::string_view(begin).starts_with(format.magic)) {
+            return std::string("not an MCAP file: ") + format.sentence;
+        }
+    }
     return "not an MCAP file: it does not begin with the bytes that such a file has";
 }
 
 Message read_message(std::string_view content) {
-    Fields  fields(content);
+    Fields fields(content);
     Message message;
     message.channel = fields.get<std::uint16_t>();
     message.sequence = fields.get<std::uint32_t>();
@@ -98,17 +112,23 @@ Message read_message(std::string_view content) {
 }  // namespace
 
 std::unique_ptr<Source> open_file(const std::string& path, std::string& problem) {
-    const int   file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOCTTY | O_NONBLOCK);
+    const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOCTTY | O_NONBLOCK);
     struct stat about{};
-    if (file >= 0 && ::fstat(file, &about) == 0 && S_ISREG(about.st_mode))
+    if (file >= 0 && ::fstat(file, &about) == 0 && S_ISREG(about.st_mode)) {
         return std::make_unique<FileSource>(file, static_cast<std::uint64_t>(about.st_size));
-    const char* const other = S_ISDIR(about.st_mode) ? "it is a folder; name the .mcap file in it" : "it is not a regular file";
+    }
+    const char* const other = S_ISDIR(about.st_mode) ? "it is a folder; name the .mcap file in it"
+                                                     : "it is not a regular file";
     problem = "cannot read '" + path + "': " + (file < 0 ? std::strerror(errno) : other);
-    if (file >= 0) ::close(file);
+    if (file >= 0) {
+        ::close(file);
+    }
     return nullptr;
 }
 
-std::unique_ptr<Source> open_bytes(std::string_view bytes) { return std::make_unique<BytesSource>(bytes); }
+std::unique_ptr<Source> open_bytes(std::string_view bytes) {
+    return std::make_unique<BytesSource>(bytes);
+}
 
 bool Reader::open(std::unique_ptr<Source> source) {
     source_ = std::move(source);
@@ -131,29 +151,40 @@ bool Reader::open(std::unique_ptr<Source> source) {
 
 // A summary may omit schemas and channels, and then lists chunks only.
 bool Reader::summary_has_channels() const {
-    for (const auto& [id, channel] : channels_)
+    for (const auto& [id, channel] : channels_) {
         if (channel.schema != 0 && !schemas_.contains(channel.schema)) return false;
+    }
     bool listed = true;
     for (const ChunkIndex& chunk : chunks_) {
         listed = listed && !chunk.message_indexes.empty();
-        for (const auto& [channel, offset] : chunk.message_indexes)
+        for (const auto& [channel, offset] : chunk.message_indexes) {
             if (!channels_.contains(channel)) return false;
+        }
     }
     return channel_count_ ? channels_.size() >= *channel_count_ : listed;
 }
 
 // A schema, a channel or an index: from the summary, or found by a scan.
 bool Reader::take(std::uint8_t opcode, std::string_view content) {
-    if (schemas_.size() + channels_.size() + chunks_.size() + metadata_.size() > most_entries) return fail("the file has too many parts");
+    if (schemas_.size() + channels_.size() + chunks_.size() + metadata_.size() > most_entries) {
+        return fail("the file has too many parts");
+    }
     Fields fields(content);
     if (opcode == op_schema) {
         const auto id = fields.get<std::uint16_t>();
-        Schema     schema{id, std::string(fields.text()), std::string(fields.text()), std::string(fields.text())};
-        if (fields.good() && id != 0) schemas_.try_emplace(id, std::move(schema));
+        Schema schema{id, std::string(fields.text()), std::string(fields.text()),
+                      std::string(fields.text())};
+        if (fields.good() && id != 0) {
+            schemas_.try_emplace(id, std::move(schema));
+        }
     } else if (opcode == op_channel) {
-        const auto id = fields.get<std::uint16_t>(), schema = fields.get<std::uint16_t>();
-        Channel    channel{id, schema, std::string(fields.text()), std::string(fields.text()), read_pairs(fields.text())};
-        if (fields.good()) channels_.try_emplace(id, std::move(channel));
+        const auto id = fields.get<std::uint16_t>();
+        const auto schema = fields.get<std::uint16_t>();
+        Channel channel{id, schema, std::string(fields.text()), std::string(fields.text()),
+                        read_pairs(fields.text())};
+        if (fields.good()) {
+            channels_.try_emplace(id, std::move(channel));
+        }
     } else if (opcode == op_chunk_index) {
         ChunkIndex index;
         index.begin_time = fields.get<std::uint64_t>();
@@ -171,7 +202,8 @@ bool Reader::take(std::uint8_t opcode, std::string_view content) {
         if (!fields.good()) return fail("a chunk index is incomplete");
         chunks_.push_back(std::move(index));
     } else if (opcode == op_metadata_index) {
-        const auto offset = fields.get<std::uint64_t>(), length = fields.get<std::uint64_t>();
+        const auto offset = fields.get<std::uint64_t>();
+        const auto length = fields.get<std::uint64_t>();
         metadata_.push_back({offset, length, std::string(fields.text())});
     } else if (opcode == op_statistics) {
         fields.get<std::uint64_t>();
@@ -183,47 +215,64 @@ bool Reader::take(std::uint8_t opcode, std::string_view content) {
 
 bool Reader::read_summary() {
     const std::uint64_t size = source_->size();
-    std::string         end;
-    if (size < 2 * magic.size() + footer_bytes || !source_->read(size - magic.size() - footer_bytes, magic.size() + footer_bytes, end))
+    std::string end;
+    if (size < 2 * magic.size() + footer_bytes ||
+        !source_->read(size - magic.size() - footer_bytes, magic.size() + footer_bytes, end)) {
         return false;
+    }
     Fields fields(end);
     if (fields.get<std::uint8_t>() != op_footer || fields.get<std::uint64_t>() != 20) return false;
     const auto begin = fields.get<std::uint64_t>();
     fields.get<std::uint64_t>();
-    const auto          crc = fields.get<std::uint32_t>();
+    const auto crc = fields.get<std::uint32_t>();
     const std::uint64_t footer = size - magic.size() - footer_bytes;
     if (fields.rest() != magic) return false;
     ends_ = begin == 0;  // a file without a summary may be whole
     if (begin == 0 || begin > footer || footer - begin > most_chunk) return false;
     std::string summary;
     if (!source_->read(begin, static_cast<std::size_t>(footer - begin), summary)) return false;
-    if (crc != 0 && crc32(std::string_view(end).substr(0, footer_bytes - 4), crc32(summary)) != crc) return false;
+    if (crc != 0 &&
+        crc32(std::string_view(end).substr(0, footer_bytes - 4), crc32(summary)) != crc) {
+        return false;
+    }
     for (Fields records(summary); records.more();) {
-        const auto             opcode = records.get<std::uint8_t>();
+        const auto opcode = records.get<std::uint8_t>();
         const std::string_view content = records.blob();
         if (!records.good() || !take(opcode, content)) return false;
     }
     return true;
 }
 
-// Reads the records after each other up to the first that is incomplete. Chunks of the summary are read with `load_known` only, for the schemas and
-// channels in them; metadata of the summary is known.
+// Reads the records after each other up to the first that is incomplete. Chunks of the summary are
+// read with `load_known` only, for the schemas and channels in them; metadata of the summary is
+// known.
 bool Reader::scan(bool load_known) {
     const std::uint64_t size = source_->size();
     std::set<std::uint64_t> known, described;
-    for (const ChunkIndex& chunk : chunks_) known.insert(chunk.offset);
-    for (const Metadata& one : metadata_) described.insert(one.offset);
+    for (const ChunkIndex& chunk : chunks_) {
+        known.insert(chunk.offset);
+    }
+    for (const Metadata& one : metadata_) {
+        described.insert(one.offset);
+    }
     std::string head, content;
     ends_ = false;
     for (std::uint64_t at = magic.size(); at + record_head <= size;) {
-        if (!source_->read(at, static_cast<std::size_t>(std::min<std::uint64_t>(record_head + message_head, size - at)), head)) break;
-        Fields     fields(head);
+        if (!source_->read(at,
+                           static_cast<std::size_t>(
+                               std::min<std::uint64_t>(record_head + message_head, size - at)),
+                           head)) {
+            break;
+        }
+        Fields fields(head);
         const auto opcode = fields.get<std::uint8_t>();
         const auto length = fields.get<std::uint64_t>();
         ends_ = opcode == op_data_end;
         if (length > size - at - record_head || ends_) break;
         if (opcode == op_message) {
-            if (length < message_head || length > most_chunk || chunks_.size() >= most_entries) break;
+            if (length < message_head || length > most_chunk || chunks_.size() >= most_entries) {
+                break;
+            }
             fields.get<std::uint16_t>();
             fields.get<std::uint32_t>();
             add_loose(at, record_head + length, fields.get<std::uint64_t>());
@@ -232,28 +281,41 @@ bool Reader::scan(bool load_known) {
             index.offset = at;
             index.length = record_head + length;
             if (chunks_.size() >= most_entries || !scan_chunk(index)) break;
-            if (!known.contains(at)) chunks_.push_back(std::move(index));
+            if (!known.contains(at)) {
+                chunks_.push_back(std::move(index));
+            }
         } else if ((opcode == op_schema || opcode == op_channel) && length <= most_chunk) {
-            if (!source_->read(at + record_head, static_cast<std::size_t>(length), content) || !take(opcode, content)) break;
-        } else if (opcode == op_metadata && !described.contains(at) && metadata_.size() < 1000 && length <= (1 << 20) &&
+            if (!source_->read(at + record_head, static_cast<std::size_t>(length), content) ||
+                !take(opcode, content)) {
+                break;
+            }
+        } else if (opcode == op_metadata && !described.contains(at) && metadata_.size() < 1000 &&
+                   length <= (1 << 20) &&
                    source_->read(at + record_head, static_cast<std::size_t>(length), content)) {
             metadata_.push_back({at, record_head + length, std::string(Fields(content).text())});
         }
         at += record_head + length;
     }
     problem_.clear();
-    std::stable_sort(chunks_.begin(), chunks_.end(), [](const ChunkIndex& a, const ChunkIndex& b) { return a.offset < b.offset; });
+    std::stable_sort(chunks_.begin(), chunks_.end(),
+                     [](const ChunkIndex& a, const ChunkIndex& b) { return a.offset < b.offset; });
     return true;
 }
 
-// Completes the index of a chunk from its head, and reads the schemas and channels in it. A chunk that cannot be expanded stays in the list: each()
-// reports why. Returns false when its head is incomplete.
+// Completes the index of a chunk from its head, and reads the schemas and channels in it. A chunk
+// that cannot be expanded stays in the list: each() reports why. Returns false when its head is
+// incomplete.
 bool Reader::scan_chunk(ChunkIndex& index) {
-    constexpr std::size_t fixed = 8 + 8 + 8 + 4 + 4, most_head = 256;
-    const std::uint64_t   length = index.length - record_head;
-    std::string           head;
+    constexpr std::size_t fixed = 8 + 8 + 8 + 4 + 4;
+    constexpr std::size_t most_head = 256;
+    const std::uint64_t length = index.length - record_head;
+    std::string head;
     if (length < fixed) return false;
-    if (!source_->read(index.offset + record_head, static_cast<std::size_t>(std::min<std::uint64_t>(length, most_head)), head)) return false;
+    if (!source_->read(index.offset + record_head,
+                       static_cast<std::size_t>(std::min<std::uint64_t>(length, most_head)),
+                       head)) {
+        return false;
+    }
     Fields chunk(head);
     index.begin_time = chunk.get<std::uint64_t>();
     index.end_time = chunk.get<std::uint64_t>();
@@ -265,9 +327,11 @@ bool Reader::scan_chunk(ChunkIndex& index) {
     std::string records;
     if (!load_chunk(index, records)) return true;
     for (Fields inner(records); inner.more();) {
-        const auto             kind = inner.get<std::uint8_t>();
+        const auto kind = inner.get<std::uint8_t>();
         const std::string_view what = inner.blob();
-        if (inner.good() && (kind == op_schema || kind == op_channel) && !take(kind, what)) return false;
+        if (inner.good() && (kind == op_schema || kind == op_channel) && !take(kind, what)) {
+            return false;
+        }
     }
     return true;
 }
@@ -275,7 +339,8 @@ bool Reader::scan_chunk(ChunkIndex& index) {
 // A message, to the run of messages before it when that ends here.
 void Reader::add_loose(std::uint64_t at, std::uint64_t length, std::uint64_t time) {
     constexpr std::uint64_t run = std::uint64_t{1} << 20;
-    if (chunks_.empty() || !chunks_.back().loose || chunks_.back().offset + chunks_.back().length != at || chunks_.back().length >= run) {
+    if (chunks_.empty() || !chunks_.back().loose ||
+        chunks_.back().offset + chunks_.back().length != at || chunks_.back().length >= run) {
         ChunkIndex& index = chunks_.emplace_back();
         index.begin_time = index.end_time = time;
         index.offset = at;
@@ -289,19 +354,30 @@ void Reader::add_loose(std::uint64_t at, std::uint64_t length, std::uint64_t tim
 
 bool Reader::load_chunk(const ChunkIndex& chunk, std::string& records) {
     std::string bytes;
-    if (chunk.loose) return source_->read(chunk.offset, static_cast<std::size_t>(chunk.length), records) || fail("a message is missing");
-    if (chunk.length < record_head || chunk.length > most_chunk || chunk.size > most_chunk) return fail("a chunk is larger than 256 MiB");
-    if (!source_->read(chunk.offset, static_cast<std::size_t>(chunk.length), bytes))
+    if (chunk.loose) {
+        return source_->read(chunk.offset, static_cast<std::size_t>(chunk.length), records) ||
+               fail("a message is missing");
+    }
+    if (chunk.length < record_head || chunk.length > most_chunk || chunk.size > most_chunk) {
+        return fail("a chunk is larger than 256 MiB");
+    }
+    if (!source_->read(chunk.offset, static_cast<std::size_t>(chunk.length), bytes)) {
         return fail("missing chunk at the position in the index: the file is damaged or truncated");
+    }
     Fields fields(bytes);
-    if (fields.get<std::uint8_t>() != op_chunk) return fail("missing chunk at the position in the index");
+    if (fields.get<std::uint8_t>() != op_chunk) {
+        return fail("missing chunk at the position in the index");
+    }
     Fields content(fields.blob());
     content.get<std::uint64_t>();
     content.get<std::uint64_t>();
-    const auto             size = content.get<std::uint64_t>();
-    const auto             crc = content.get<std::uint32_t>();
-    const std::string_view compression = content.text(), compressed = content.blob();
-    if (!fields.good() || !content.good() || size > most_chunk) return fail("a chunk is incomplete");
+    const auto size = content.get<std::uint64_t>();
+    const auto crc = content.get<std::uint32_t>();
+    const std::string_view compression = content.text();
+    const std::string_view compressed = content.blob();
+    if (!fields.good() || !content.good() || size > most_chunk) {
+        return fail("a chunk is incomplete");
+    }
     std::string problem;
     if (!expand(compression, compressed, size, records, problem)) return fail(problem);
     ++chunks_read_;
@@ -310,13 +386,17 @@ bool Reader::load_chunk(const ChunkIndex& chunk, std::string& records) {
 
 std::uint64_t Reader::begin_time() const {
     std::uint64_t time = chunks_.empty() ? 0 : std::numeric_limits<std::uint64_t>::max();
-    for (const ChunkIndex& chunk : chunks_) time = std::min(time, chunk.begin_time);
+    for (const ChunkIndex& chunk : chunks_) {
+        time = std::min(time, chunk.begin_time);
+    }
     return time;
 }
 
 std::uint64_t Reader::end_time() const {
     std::uint64_t time = 0;
-    for (const ChunkIndex& chunk : chunks_) time = std::max(time, chunk.end_time);
+    for (const ChunkIndex& chunk : chunks_) {
+        time = std::max(time, chunk.end_time);
+    }
     return time;
 }
 
@@ -324,7 +404,10 @@ std::map<std::string, std::string> Reader::metadata(std::string_view name) {
     std::map<std::string, std::string> all;
     for (const Metadata& one : metadata_) {
         std::string bytes;
-        if (one.name != name || one.length > (1 << 20) || !source_->read(one.offset, static_cast<std::size_t>(one.length), bytes)) continue;
+        if (one.name != name || one.length > (1 << 20) ||
+            !source_->read(one.offset, static_cast<std::size_t>(one.length), bytes)) {
+            continue;
+        }
         Fields fields(bytes);
         if (fields.get<std::uint8_t>() != op_metadata) continue;
         Fields content(fields.blob());
@@ -340,7 +423,7 @@ bool Reader::each(const Visit& visit, std::uint64_t begin, std::uint64_t end) {
         if (chunk.end_time < begin || chunk.begin_time >= end) continue;
         if (!load_chunk(chunk, records)) return false;
         for (Fields fields(records); fields.more();) {
-            const auto             opcode = fields.get<std::uint8_t>();
+            const auto opcode = fields.get<std::uint8_t>();
             const std::string_view content = fields.blob();
             if (!fields.good() || opcode != op_message || content.size() < 22) continue;
             const Message message = read_message(content);

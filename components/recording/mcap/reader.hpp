@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Reads MCAP files of any writer. Nothing in the file is trusted: sizes are bounded, CRCs are checked. One thread at a time.
+// Reads MCAP files of any writer. Nothing in the file is trusted: sizes are bounded, CRCs are
+// checked. One thread at a time.
 #pragma once
 
 #include <cstdint>
@@ -32,29 +33,35 @@ std::unique_ptr<Source> open_bytes(std::string_view bytes);
 
 class Reader {
 public:
-    static constexpr std::uint64_t most_chunk = std::uint64_t{256} << 20;   ///< bytes of a chunk, expanded
-    static constexpr std::size_t   most_entries = 1'000'000;                   ///< chunks, or other records of the summary
+    /// bytes of a chunk, expanded
+    static constexpr std::uint64_t most_chunk = std::uint64_t{256} << 20;
+    /// chunks, or other records of the summary
+    static constexpr std::size_t most_entries = 1'000'000;
 
-    /// Reads what the file contains: its summary, and the heads of its records. Where the summary is missing, or omits chunks, schemas or channels,
-    /// it reads these chunks too. Messages that are in no chunk count as chunks of 1 MiB. Returns false and sets problem() when it is not an MCAP
-    /// file.
-    bool               open(std::unique_ptr<Source> source);
+    /// Reads what the file contains: its summary, and the heads of its records. Where the summary
+    /// is missing, or omits chunks, schemas or channels, it reads these chunks too. Messages that
+    /// are in no chunk count as chunks of 1 MiB. Returns false and sets problem() when it is not an
+    /// MCAP file.
+    bool open(std::unique_ptr<Source> source);
     const std::string& problem() const { return problem_; }
-    /// True: the file has no end, as after a power failure; it was read up to its last complete chunk or message.
+    /// True: the file has no end, as after a power failure; it was read up to its last complete
+    /// chunk or message.
     bool unfinished() const { return unfinished_; }
 
-    const std::map<std::uint16_t, Schema>&  schemas() const { return schemas_; }
+    const std::map<std::uint16_t, Schema>& schemas() const { return schemas_; }
     const std::map<std::uint16_t, Channel>& channels() const { return channels_; }
-    const std::vector<ChunkIndex>&          chunks() const { return chunks_; }
-    std::uint64_t                           begin_time() const;
-    std::uint64_t                           end_time() const;  ///< of the last message
+    const std::vector<ChunkIndex>& chunks() const { return chunks_; }
+    std::uint64_t begin_time() const;
+    std::uint64_t end_time() const;  ///< of the last message
     /// Returns the named entries of all metadata records of that name that the summary lists.
     std::map<std::string, std::string> metadata(std::string_view name);
 
     using Visit = std::function<bool(const Message&)>;
-    /// Calls `visit` for the messages with begin <= log time < end, in the order of the file, until it returns false. Only chunks that may have
-    /// some are read. Returns false and sets problem() when one is damaged.
-    bool          each(const Visit& visit, std::uint64_t begin = 0, std::uint64_t end = std::numeric_limits<std::uint64_t>::max());
+    /// Calls `visit` for the messages with begin <= log time < end, in the order of the file, until
+    /// it returns false. Only chunks that may have some are read. Returns false and sets problem()
+    /// when one is damaged.
+    bool each(const Visit& visit, std::uint64_t begin = 0,
+              std::uint64_t end = std::numeric_limits<std::uint64_t>::max());
     std::uint64_t chunks_read() const { return chunks_read_; }
 
 private:
@@ -70,18 +77,20 @@ private:
     bool take(std::uint8_t opcode, std::string_view content);
     bool load_chunk(const ChunkIndex& chunk, std::string& records);
 
-    std::unique_ptr<Source>          source_;
-    std::string                      problem_;
-    bool                             unfinished_ = false, ends_ = false;  // ends_: with a footer and the end of the data
-    std::map<std::uint16_t, Schema>  schemas_;
+    std::unique_ptr<Source> source_;
+    std::string problem_;
+    // ends_: with a footer and the end of the data
+    bool unfinished_ = false;
+    bool ends_ = false;
+    std::map<std::uint16_t, Schema> schemas_;
     std::map<std::uint16_t, Channel> channels_;
-    std::vector<ChunkIndex>          chunks_;
+    std::vector<ChunkIndex> chunks_;
     struct Metadata {
         std::uint64_t offset, length;
-        std::string   name;
+        std::string name;
     };
     std::vector<Metadata> metadata_;
-    std::uint64_t         chunks_read_ = 0;
+    std::uint64_t chunks_read_ = 0;
     std::optional<std::uint32_t> channel_count_;  // of the statistics
 };
 

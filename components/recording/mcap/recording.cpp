@@ -38,16 +38,21 @@ std::string json_text(std::string_view object, std::string_view key) {
     return text;
 }
 
-// Rows of several threads may come in batches: a channel's own are in order but for those of a thread that hung.
+// Rows of several threads may come in batches: a channel's own are in order but for those of a
+// thread that hung.
 void sort(Table& table) {
     if (std::is_sorted(table.times_ns.begin(), table.times_ns.end())) return;
     std::vector<std::size_t> order(table.rows());
     std::iota(order.begin(), order.end(), std::size_t{0});
-    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return table.times_ns[a] < table.times_ns[b]; });
+    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+        return table.times_ns[a] < table.times_ns[b];
+    });
     Table sorted{table.topic, table.columns, {}, {}, table.thread};
     for (const std::size_t row : order) {
         sorted.times_ns.push_back(table.times_ns[row]);
-        for (std::size_t c = 0; c < table.columns.size(); ++c) sorted.words.push_back(table.word(row, c));
+        for (std::size_t c = 0; c < table.columns.size(); ++c) {
+            sorted.words.push_back(table.word(row, c));
+        }
     }
     table = std::move(sorted);
 }
@@ -55,7 +60,8 @@ void sort(Table& table) {
 /// Our own files have these values in their rows too.
 bool is_joint_state(const Reader& reader, const Channel& channel) {
     const auto schema = reader.schemas().find(channel.schema);
-    return channel.topic.starts_with("/hal/") && schema != reader.schemas().end() && schema->second.name == "sensor_msgs/msg/JointState";
+    return channel.topic.starts_with("/hal/") && schema != reader.schemas().end() &&
+           schema->second.name == "sensor_msgs/msg/JointState";
 }
 
 constexpr const char* supported = "; CDR messages with a 'ros2msg' schema are";
@@ -66,56 +72,79 @@ public:
     explicit Skipped(std::vector<std::string>& sentences) : sentences_(sentences) {}
     void add(std::string sentence) {
         constexpr std::size_t max_sentences = 8;
-        if (sentences_.size() < max_sentences) sentences_.push_back(std::move(sentence));
-        else
+        if (sentences_.size() < max_sentences) {
+            sentences_.push_back(std::move(sentence));
+        } else {
             ++more_;
+        }
     }
     void finish() {
-        if (more_ == 1) sentences_.push_back("of 1 more topic not everything is read");
-        if (more_ > 1) sentences_.push_back("of " + std::to_string(more_) + " more topics not everything is read");
+        if (more_ == 1) {
+            sentences_.push_back("of 1 more topic not everything is read");
+        }
+        if (more_ > 1) {
+            sentences_.push_back("of " + std::to_string(more_) +
+                                 " more topics not everything is read");
+        }
     }
 
 private:
     std::vector<std::string>& sentences_;
-    std::size_t               more_ = 0;
+    std::size_t more_ = 0;
 };
 
-std::string topic_text(const Channel& channel) { return "topic '" + channel.topic.substr(0, 60) + "'"; }
+std::string topic_text(const Channel& channel) {
+    return "topic '" + channel.topic.substr(0, 60) + "'";
+}
 
 /// Returns "header.frame_id (string), name (string[]) and 2 more".
 std::string listed(const std::vector<std::string>& fields) {
     constexpr std::size_t max_fields = 4;
-    std::string           text;
-    for (std::size_t i = 0; i < fields.size() && i < max_fields; ++i) text += (i == 0 ? "" : ", ") + fields[i];
-    if (fields.size() > max_fields) text += " and " + std::to_string(fields.size() - max_fields) + " more";
+    std::string text;
+    for (std::size_t i = 0; i < fields.size() && i < max_fields; ++i) {
+        text += (i == 0 ? "" : ", ") + fields[i];
+    }
+    if (fields.size() > max_fields) {
+        text += " and " + std::to_string(fields.size() - max_fields) + " more";
+    }
     return text;
 }
 
-/// The event in a message of rcl_interfaces/msg/Log: stamp, level, name, msg. Returns false when it is too short.
+/// The event in a message of rcl_interfaces/msg/Log: stamp, level, name, msg. Returns false when it
+/// is too short.
 bool read_log(std::string_view payload, std::string& kind, std::string& text) {
-    constexpr std::size_t name_at = 4 + 12;  // after the CDR header, the time, the level and its padding
+    // after the CDR header, the time, the level and its padding
+    constexpr std::size_t name_at = 4 + 12;
     if (payload.size() < name_at || payload[1] != 1) return false;
     Fields fields(payload.substr(name_at));
     kind = fields.text();
     fields.take((4 - kind.size() % 4) % 4);
     text = fields.text();
-    for (std::string* one : {&kind, &text})
-        if (!one->empty()) one->pop_back();  // the zero at its end
+    for (std::string* one : {&kind, &text}) {
+        if (!one->empty()) {
+            one->pop_back();  // the zero at its end
+        }
+    }
     return fields.good();
 }
 
-bool load_mcap(const std::string& path, Recording& to, std::string& problem, const LoadOptions& options) {
+bool load_mcap(const std::string& path, Recording& to, std::string& problem,
+               const LoadOptions& options) {
     Reader reader;
-    auto   source = open_file(path, problem);
+    auto source = open_file(path, problem);
     if (!source) return false;
     if (!reader.open(std::move(source))) {
         problem = "'" + path + "': " + reader.problem();
         return false;
     }
-    if (reader.unfinished()) to.note = "'" + path + "' ends without a summary: it was read up to its last complete chunk or message";
+    if (reader.unfinished()) {
+        to.note = "'" + path +
+                  "' ends without a summary: it was read up to its last complete chunk or message";
+    }
     std::map<std::uint16_t, std::pair<RowReader, std::size_t>> rows;
-    std::map<std::uint16_t, std::string>                       events;  // the encoding of their messages
-    Skipped                                                    skipped(to.skipped);
+    // the encoding of their messages
+    std::map<std::uint16_t, std::string> events;
+    Skipped skipped(to.skipped);
     for (const auto& [id, channel] : reader.channels()) {
         if (channel.topic == "/hal/events") {
             events[id] = channel.encoding;
@@ -123,30 +152,41 @@ bool load_mcap(const std::string& path, Recording& to, std::string& problem, con
         }
         if (is_joint_state(reader, channel)) continue;
         const auto schema = reader.schemas().find(channel.schema);
-        RowReader  row;
+        RowReader row;
         if (schema != reader.schemas().end() && row.open(schema->second, channel)) {
-            if (!row.skipped().empty()) skipped.add(topic_text(channel) + ": not read: " + listed(row.skipped()));
+            if (!row.skipped().empty()) {
+                skipped.add(topic_text(channel) + ": not read: " + listed(row.skipped()));
+            }
             const auto thread = channel.metadata.find("thread");
-            to.tables.push_back({channel.topic, row.columns(), {}, {}, thread == channel.metadata.end() ? "" : thread->second});
+            to.tables.push_back({channel.topic,
+                                 row.columns(),
+                                 {},
+                                 {},
+                                 thread == channel.metadata.end() ? "" : thread->second});
             rows.emplace(id, std::pair{std::move(row), to.tables.size() - 1});
             continue;
         }
-        const std::string why = schema == reader.schemas().end() ? "it has no schema" : row.problem();
+        const std::string why =
+            schema == reader.schemas().end() ? "it has no schema" : row.problem();
         const std::string sentence = topic_text(channel) + " is not read: " + why;
-        if (to.unread.empty()) to.unread = sentence + supported;
+        if (to.unread.empty()) {
+            to.unread = sentence + supported;
+        }
         skipped.add(sentence);
     }
     std::vector<std::uint64_t> values;
-    std::size_t                bytes = 0;
-    std::set<std::uint16_t>    unreadable;
-    const auto                 visit = [&](const Message& message) {
+    std::size_t bytes = 0;
+    std::set<std::uint16_t> unreadable;
+    const auto visit = [&](const Message& message) {
         const auto time_ns = static_cast<std::int64_t>(message.log_time);
         bytes += 8;
         if (const auto at = rows.find(message.channel); at != rows.end()) {
             Table& table = to.tables[at->second.second];
             if (!at->second.first.read(message.payload, values)) {
-                if (unreadable.insert(message.channel).second)
-                    skipped.add("a message of topic '" + table.topic.substr(0, 60) + "' is shorter than its schema, or not plain CDR");
+                if (unreadable.insert(message.channel).second) {
+                    skipped.add("a message of topic '" + table.topic.substr(0, 60) +
+                                "' is shorter than its schema, or not plain CDR");
+                }
                 return true;
             }
             table.times_ns.push_back(time_ns);
@@ -165,15 +205,23 @@ bool load_mcap(const std::string& path, Recording& to, std::string& problem, con
         }
         return bytes <= options.most_bytes;
     };
-    const auto end = options.end_ns == INT64_MAX ? UINT64_MAX : static_cast<std::uint64_t>(options.end_ns);
-    if (!reader.each(visit, static_cast<std::uint64_t>(std::max<std::int64_t>(options.begin_ns, 0)), end))
+    const auto end =
+        options.end_ns == INT64_MAX ? UINT64_MAX : static_cast<std::uint64_t>(options.end_ns);
+    if (!reader.each(visit, static_cast<std::uint64_t>(std::max<std::int64_t>(options.begin_ns, 0)),
+                     end)) {
         to.note = "'" + path + "': " + reader.problem() + "; it was read up to there";
+    }
     skipped.finish();
-    if (!reader.problem().empty()) to.unread = reader.problem();
-    else if (to.unread.empty() && !unreadable.empty()) to.unread = to.skipped.back();
-    else if (to.unread.empty()) to.unread = rows.empty() ? "it has no topics" : "none of its topics has a message";
+    if (!reader.problem().empty()) {
+        to.unread = reader.problem();
+    } else if (to.unread.empty() && !unreadable.empty()) {
+        to.unread = to.skipped.back();
+    } else if (to.unread.empty()) {
+        to.unread = rows.empty() ? "it has no topics" : "none of its topics has a message";
+    }
     if (bytes > options.most_bytes) {
-        problem = "'" + path + "' has more than " + std::to_string(options.most_bytes >> 20) + " MiB of values; choose a part of it";
+        problem = "'" + path + "' has more than " + std::to_string(options.most_bytes >> 20) +
+                  " MiB of values; choose a part of it";
         return false;
     }
     return true;
@@ -181,11 +229,14 @@ bool load_mcap(const std::string& path, Recording& to, std::string& problem, con
 
 std::vector<std::string> csv_words(const std::string& line) {
     std::vector<std::string> words(1);
-    bool                     quoted = false;
+    bool quoted = false;
     for (std::size_t i = 0; i < line.size(); ++i) {
         if (line[i] == '"') {
-            if (quoted && i + 1 < line.size() && line[i + 1] == '"') words.back() += line[i++];
-            else quoted = !quoted;
+            if (quoted && i + 1 < line.size() && line[i + 1] == '"') {
+                words.back() += line[i++];
+            } else {
+                quoted = !quoted;
+            }
         } else if (line[i] == ',' && !quoted) {
             words.emplace_back();
         } else if (line[i] != '\r') {
@@ -205,20 +256,25 @@ bool whole_number(const std::string& text, std::uint64_t& word) {
     Int value = 0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
     if (error == std::errc() && end == text.data() + text.size()) {
-        word = static_cast<std::uint64_t>(static_cast<std::conditional_t<std::is_signed_v<Int>, std::int64_t, std::uint64_t>>(value));
+        word = static_cast<std::uint64_t>(
+            static_cast<std::conditional_t<std::is_signed_v<Int>, std::int64_t, std::uint64_t>>(
+                value));
         return true;
     }
     double real = 0;  // "1.0", "1e3": of another program
     if (!number_of(text, real) || real != std::floor(real) || std::abs(real) > 0x1p53) return false;
-    if (real < static_cast<double>(std::numeric_limits<Int>::min()) || real > static_cast<double>(std::numeric_limits<Int>::max()))
+    if (real < static_cast<double>(std::numeric_limits<Int>::min()) ||
+        real > static_cast<double>(std::numeric_limits<Int>::max())) {
         return false;
+    }
     word = static_cast<std::uint64_t>(static_cast<std::int64_t>(real));
     return true;
 }
 
-/// Reads a value of that type into `word`. Returns false, and keeps `word`, when the text is invalid.
+/// Reads a value of that type into `word`. Returns false, and keeps `word`, when the text is
+/// invalid.
 bool word_of(const std::string& text, hal_type type, std::uint64_t& word) {
-    double        real = 0;
+    double real = 0;
     std::uint64_t bit = 0;
     switch (type) {
     case HAL_TYPE_BIT:
@@ -236,15 +292,19 @@ bool word_of(const std::string& text, hal_type type, std::uint64_t& word) {
     }
 }
 
-constexpr std::pair<std::string_view, hal_type> type_words[] = {{"bit", HAL_TYPE_BIT}, {"float", HAL_TYPE_FLOAT}, {"s32", HAL_TYPE_S32},
-                                                                {"u32", HAL_TYPE_U32}, {"s64", HAL_TYPE_S64},     {"u64", HAL_TYPE_U64}};
+constexpr std::pair<std::string_view, hal_type> type_words[] = {
+    {"bit", HAL_TYPE_BIT}, {"float", HAL_TYPE_FLOAT}, {"s32", HAL_TYPE_S32},
+    {"u32", HAL_TYPE_U32}, {"s64", HAL_TYPE_S64},     {"u64", HAL_TYPE_U64}};
 
-bool load_csv(const std::string& path, Recording& to, std::string& problem, const LoadOptions& options) {
-    const auto  source = open_file(path, problem);
+bool load_csv(const std::string& path, Recording& to, std::string& problem,
+              const LoadOptions& options) {
+    const auto source = open_file(path, problem);
     std::string text, line;
     if (!source) return false;
-    constexpr std::uint64_t addressable = std::numeric_limits<std::size_t>::max() / 2;  // on 32 bit less than the limit
-    if (source->size() > std::min(4 * options.most_bytes, addressable) || !source->read(0, static_cast<std::size_t>(source->size()), text)) {
+    constexpr std::uint64_t addressable =
+        std::numeric_limits<std::size_t>::max() / 2;  // on 32 bit less than the limit
+    if (source->size() > std::min(4 * options.most_bytes, addressable) ||
+        !source->read(0, static_cast<std::size_t>(source->size()), text)) {
         problem = "'" + path + "' is too large, or cannot be read";
         return false;
     }
@@ -258,26 +318,32 @@ bool load_csv(const std::string& path, Recording& to, std::string& problem, cons
     Table table{"", {}, {}, {}};
     for (std::size_t i = 1; i < names.size(); ++i) {
         const auto type = options.types.find(names[i]);
-        table.columns.push_back({names[i], type == options.types.end() ? HAL_TYPE_FLOAT : type->second, ""});
+        table.columns.push_back(
+            {names[i], type == options.types.end() ? HAL_TYPE_FLOAT : type->second, ""});
     }
     std::vector<std::uint64_t> held(table.columns.size());
     for (std::size_t number = 2; std::getline(file, line); ++number) {
         const std::vector<std::string> words = csv_words(line);
-        const std::string              place = "'" + path + "', line " + std::to_string(number) + ": ";
-        double                         time_s = 0;
-        if (words.size() != names.size() || !number_of(words[0], time_s) || !(std::abs(time_s) < 9e9)) {
+        const std::string place = "'" + path + "', line " + std::to_string(number) + ": ";
+        double time_s = 0;
+        if (words.size() != names.size() || !number_of(words[0], time_s) ||
+            !(std::abs(time_s) < 9e9)) {
             problem = place + "not a row of " + std::to_string(names.size()) + " numbers";
             return false;
         }
         for (std::size_t i = 1; i < words.size(); ++i) {
             const hal_type type = table.columns[i - 1].type;
-            if (words[i].empty() || word_of(words[i], type, held[i - 1])) continue;  // empty: as before
-            const auto word =
-                std::find_if(std::begin(type_words), std::end(type_words), [type](const auto& one) { return one.second == type; });
-            if (type == HAL_TYPE_FLOAT) problem = place + "not a row of " + std::to_string(names.size()) + " numbers";
-            else
-                problem =
-                    place + "'" + words[i].substr(0, 40) + "' of '" + names[i] + "' is not a value of type " + std::string(word->first);
+            if (words[i].empty() || word_of(words[i], type, held[i - 1])) {
+                continue;  // empty: as before
+            }
+            const auto word = std::find_if(std::begin(type_words), std::end(type_words),
+                                           [type](const auto& one) { return one.second == type; });
+            if (type == HAL_TYPE_FLOAT) {
+                problem = place + "not a row of " + std::to_string(names.size()) + " numbers";
+            } else {
+                problem = place + "'" + words[i].substr(0, 40) + "' of '" + names[i] +
+                          "' is not a value of type " + std::string(word->first);
+            }
             return false;
         }
         const auto time_ns = static_cast<std::int64_t>(std::llround(time_s * 1e9));
@@ -285,7 +351,8 @@ bool load_csv(const std::string& path, Recording& to, std::string& problem, cons
         table.times_ns.push_back(time_ns);
         table.words.insert(table.words.end(), held.begin(), held.end());
         if (table.words.size() * 8 <= options.most_bytes) continue;
-        problem = "'" + path + "' has more than " + std::to_string(options.most_bytes >> 20) + " MiB of values; choose a part of it";
+        problem = "'" + path + "' has more than " + std::to_string(options.most_bytes >> 20) +
+                  " MiB of values; choose a part of it";
         return false;
     }
     to.tables.push_back(std::move(table));
@@ -295,8 +362,9 @@ bool load_csv(const std::string& path, Recording& to, std::string& problem, cons
 }  // namespace
 
 std::optional<hal_type> type_of_word(std::string_view word) {
-    for (const auto& [own, type] : type_words)
+    for (const auto& [own, type] : type_words) {
         if (own == word) return type;
+    }
     return std::nullopt;
 }
 
@@ -312,32 +380,45 @@ double Table::real(std::size_t row, std::size_t column) const {
 
 std::int64_t Recording::begin_ns() const {
     std::int64_t time = INT64_MAX;
-    for (const Table& table : tables)
-        if (table.rows() != 0) time = std::min(time, table.times_ns.front());
+    for (const Table& table : tables) {
+        if (table.rows() != 0) {
+            time = std::min(time, table.times_ns.front());
+        }
+    }
     return time == INT64_MAX ? 0 : time;
 }
 
 std::int64_t Recording::end_ns() const {
     std::int64_t time = INT64_MIN;
-    for (const Table& table : tables)
-        if (table.rows() != 0) time = std::max(time, table.times_ns.back());
+    for (const Table& table : tables) {
+        if (table.rows() != 0) {
+            time = std::max(time, table.times_ns.back());
+        }
+    }
     return time == INT64_MIN ? 0 : time;
 }
 
 std::vector<std::string> Recording::notes() const {
     std::vector<std::string> all;
-    if (!note.empty()) all.push_back(note);
+    if (!note.empty()) {
+        all.push_back(note);
+    }
     all.insert(all.end(), skipped.begin(), skipped.end());
     return all;
 }
 
-bool load(const std::string& path, Recording& to, std::string& problem, const LoadOptions& options) {
+bool load(const std::string& path, Recording& to, std::string& problem,
+          const LoadOptions& options) {
     if (!(path.ends_with(".csv") ? load_csv : load_mcap)(path, to, problem, options)) return false;
-    for (Table& table : to.tables) sort(table);
+    for (Table& table : to.tables) {
+        sort(table);
+    }
     std::erase_if(to.tables, [](const Table& table) { return table.rows() == 0; });
-    if (!to.tables.empty()) to.unread.clear();
-    else
+    if (!to.tables.empty()) {
+        to.unread.clear();
+    } else {
         to.skipped.clear();
+    }
     return true;
 }
 

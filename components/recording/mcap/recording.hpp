@@ -18,28 +18,34 @@ std::optional<hal_type> type_of_word(std::string_view word);
 
 /// Rows of one channel: those of one thread.
 struct Table {
-    std::string                topic;
-    std::vector<Column>        columns;
-    std::vector<std::int64_t>  times_ns;    ///< Unix time, ascending
+    std::string topic;
+    std::vector<Column> columns;
+    std::vector<std::int64_t> times_ns;    ///< Unix time, ascending
     std::vector<std::uint64_t> words;      ///< row after row
-    std::string                thread = {};  ///< of a machine; "" of another writer
+    std::string thread = {};  ///< of a machine; "" of another writer
 
-    std::size_t   rows() const { return times_ns.size(); }
-    std::uint64_t word(std::size_t row, std::size_t column) const { return words[row * columns.size() + column]; }
-    double        real(std::size_t row, std::size_t column) const;
+    std::size_t rows() const { return times_ns.size(); }
+    std::uint64_t word(std::size_t row, std::size_t column) const {
+        return words[row * columns.size() + column];
+    }
+    double real(std::size_t row, std::size_t column) const;
 };
 
 struct Event {
     std::int64_t time_ns;
-    std::string  kind, text;
+    std::string kind, text;
 };
 
 struct Recording {
     std::vector<Table> tables;
     std::vector<Event> events;
-    std::string        note;                      ///< what is wrong with the file though it was read; "" when nothing is
-    std::string        unread;  ///< of a file without rows: the reason, such as which of its topics is not read, and why; else ""
-    std::vector<std::string> skipped = {};  ///< of a file with rows: what of it is not read, a sentence per topic
+    /// what is wrong with the file though it was read; "" when nothing is
+    std::string note;
+    /// of a file without rows: the reason, such as which of its topics is not read, and why; else
+    /// ""
+    std::string unread;
+    /// of a file with rows: what of it is not read, a sentence per topic
+    std::vector<std::string> skipped = {};
 
     std::int64_t begin_ns() const;
     std::int64_t end_ns() const;
@@ -49,12 +55,16 @@ struct Recording {
 
 /// Options of load().
 struct LoadOptions {
-    std::uint64_t                   most_bytes = std::uint64_t{1} << 30;
-    std::int64_t                    begin_ns = INT64_MIN, end_ns = INT64_MAX;  ///< of Unix time; of the table's time for .csv
-    std::map<std::string, hal_type> types = {};  ///< of columns of a .csv, which does not have them; others are FLOAT
+    std::uint64_t most_bytes = std::uint64_t{1} << 30;
+    /// of Unix time; of the table's time for .csv
+    std::int64_t begin_ns = INT64_MIN;
+    std::int64_t end_ns = INT64_MAX;
+    /// of columns of a .csv, which does not have them; others are FLOAT
+    std::map<std::string, hal_type> types = {};
 };
 
 /// Loads a recording (.mcap, or .csv as `hal record` writes it). Returns false and sets `problem`.
-bool load(const std::string& path, Recording& to, std::string& problem, const LoadOptions& options = {});
+bool load(const std::string& path, Recording& to, std::string& problem,
+          const LoadOptions& options = {});
 
 }  // namespace hal::mcap

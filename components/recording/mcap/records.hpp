@@ -31,29 +31,36 @@ enum Opcode : std::uint8_t {
 
 struct Schema {
     std::uint16_t id = 0;  ///< never 0
-    std::string   name, encoding, data;
+    std::string name, encoding, data;
 };
 
 struct Channel {
-    std::uint16_t                      id = 0, schema = 0;
-    std::string                        topic, encoding;  ///< encoding: of the messages
+    std::uint16_t id = 0;
+    std::uint16_t schema = 0;
+    std::string topic, encoding;  ///< encoding: of the messages
     std::map<std::string, std::string> metadata;
 };
 
 struct Message {
-    std::uint16_t    channel = 0;
-    std::uint32_t    sequence = 0;
-    std::uint64_t    log_time = 0, publish_time = 0;
+    std::uint16_t channel = 0;
+    std::uint32_t sequence = 0;
+    std::uint64_t log_time = 0;
+    std::uint64_t publish_time = 0;
     std::string_view payload;     ///< valid while the visitor runs
 };
 
 struct ChunkIndex {
-    std::uint64_t                          begin_time = 0, end_time = 0, offset = 0, length = 0;
+    std::uint64_t begin_time = 0;
+    std::uint64_t end_time = 0;
+    std::uint64_t offset = 0;
+    std::uint64_t length = 0;
     std::map<std::uint16_t, std::uint64_t> message_indexes;  ///< channel to place in the file
-    std::uint64_t                          message_index_length = 0;
-    std::string                            compression;
-    std::uint64_t                          compressed_size = 0, size = 0;
-    bool                                   loose = false;  ///< messages that are in the file without a chunk
+    std::uint64_t message_index_length = 0;
+    std::string compression;
+    std::uint64_t compressed_size = 0;
+    std::uint64_t size = 0;
+    /// messages that are in the file without a chunk
+    bool loose = false;
 };
 
 }  // namespace hal::mcap

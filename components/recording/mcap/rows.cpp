@@ -13,8 +13,8 @@ namespace {
 
 struct Kind {
     std::string_view word;
-    std::size_t      bytes;
-    hal_type         type;
+    std::size_t bytes;
+    hal_type type;
 };
 
 constexpr Kind kinds[] = {
@@ -23,8 +23,9 @@ constexpr Kind kinds[] = {
 };
 
 const Kind& kind_of(hal_type type) {
-    return *std::find_if(std::begin(kinds), std::end(kinds),
-                         [type](const Kind& kind) { return kind.type == type || kind.type == HAL_TYPE_BIT; });
+    return *std::find_if(std::begin(kinds), std::end(kinds), [type](const Kind& kind) {
+        return kind.type == type || kind.type == HAL_TYPE_BIT;
+    });
 }
 
 }  // namespace
@@ -34,31 +35,45 @@ std::string ros_name(const std::string& name) {
     std::string field;
     for (const char c : name) {
         const bool plain = (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9');
-        const char lower = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : plain ? c : '_';
-        if (lower != '_' || (!field.empty() && field.back() != '_')) field += lower;
+        const char lower = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a')
+                           : plain              ? c
+                                                : '_';
+        if (lower != '_' || (!field.empty() && field.back() != '_')) {
+            field += lower;
+        }
     }
-    while (!field.empty() && field.back() == '_') field.pop_back();
+    while (!field.empty() && field.back() == '_') {
+        field.pop_back();
+    }
     if (field.empty()) return "v";
-    if (field.front() >= '0' && field.front() <= '9') field.insert(0, "v_");
+    if (field.front() >= '0' && field.front() <= '9') {
+        field.insert(0, "v_");
+    }
     return field;
 }
 
-RowWriter::RowWriter(std::vector<Column> columns) : columns_(std::move(columns)), order_(columns_.size()) {
+RowWriter::RowWriter(std::vector<Column> columns)
+    : columns_(std::move(columns)), order_(columns_.size()) {
     std::set<std::string> taken;
     for (const Column& column : columns_) {
         const std::string base = ros_name(column.name);
-        std::string       field = base;
-        for (int n = 2; !taken.insert(field).second; ++n) field = base + "_" + std::to_string(n);
+        std::string field = base;
+        for (int n = 2; !taken.insert(field).second; ++n) {
+            field = base + "_" + std::to_string(n);
+        }
         fields_.push_back(std::move(field));
     }
     std::iota(order_.begin(), order_.end(), std::size_t{0});
-    std::stable_sort(order_.begin(), order_.end(),
-                     [this](std::size_t a, std::size_t b) { return kind_of(columns_[a].type).bytes > kind_of(columns_[b].type).bytes; });
+    std::stable_sort(order_.begin(), order_.end(), [this](std::size_t a, std::size_t b) {
+        return kind_of(columns_[a].type).bytes > kind_of(columns_[b].type).bytes;
+    });
 }
 
 std::string RowWriter::schema() const {
     std::string text;
-    for (const std::size_t i : order_) text += std::string(kind_of(columns_[i].type).word) + " " + fields_[i] + "\n";
+    for (const std::size_t i : order_) {
+        text += std::string(kind_of(columns_[i].type).word) + " " + fields_[i] + "\n";
+    }
     return text;
 }
 
@@ -66,7 +81,9 @@ std::map<std::string, std::string> RowWriter::metadata() const {
     std::map<std::string, std::string> entries;
     for (std::size_t i = 0; i < columns_.size(); ++i) {
         entries["pin." + fields_[i]] = columns_[i].name;
-        if (!columns_[i].unit.empty()) entries["unit." + fields_[i]] = columns_[i].unit;
+        if (!columns_[i].unit.empty()) {
+            entries["unit." + fields_[i]] = columns_[i].unit;
+        }
     }
     return entries;
 }
@@ -75,25 +92,31 @@ void RowWriter::write(const std::uint64_t* values, std::string& to) const {
     to.assign("\x00\x01\x00\x00", 4);  // CDR, little-endian
     for (const std::size_t i : order_) {
         const std::size_t bytes = kind_of(columns_[i].type).bytes;
-        for (std::size_t k = 0; k < bytes; ++k) to += static_cast<char>(values[i] >> (8 * k));
+        for (std::size_t k = 0; k < bytes; ++k) {
+            to += static_cast<char>(values[i] >> (8 * k));
+        }
     }
 }
 
 bool RowReader::open(const Schema& schema, const Channel& channel) {
     columns_.clear();
     problem_.clear();
-    if (channel.encoding != "cdr") problem_ = "its messages are '" + channel.encoding.substr(0, 40) + "'";
-    else if (schema.encoding != "ros2msg")
+    if (channel.encoding != "cdr") {
+        problem_ = "its messages are '" + channel.encoding.substr(0, 40) + "'";
+    } else if (schema.encoding != "ros2msg") {
         problem_ = "its schema is '" + schema.encoding.substr(0, 40) + "'";
-    else if (!message_.open(schema.name, schema.data))
+    } else if (!message_.open(schema.name, schema.data)) {
         problem_ = message_.problem();
+    }
     if (!problem_.empty()) return false;
     const auto metadata = [&](const std::string& key, const std::string& otherwise) {
         const auto at = channel.metadata.find(key);
         return at == channel.metadata.end() ? otherwise : at->second;
     };
-    for (const RosMessage::Number& number : message_.numbers())
-        columns_.push_back({metadata("pin." + number.name, number.name), number.type, metadata("unit." + number.name, "")});
+    for (const RosMessage::Number& number : message_.numbers()) {
+        columns_.push_back({metadata("pin." + number.name, number.name), number.type,
+                            metadata("unit." + number.name, "")});
+    }
     return true;
 }
 

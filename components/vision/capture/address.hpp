@@ -9,7 +9,8 @@
 
 namespace hal::vision {
 
-/// Parsed address such as "v4l2:/dev/video0?width=640&fps=30". Reading an option marks it as known; finish() rejects unknown ones.
+/// Parsed address such as "v4l2:/dev/video0?width=640&fps=30". Reading an option marks it as known;
+/// finish() rejects unknown ones.
 class Address {
 public:
     /// Throws std::invalid_argument with the reason and a correction. [setup]
@@ -20,7 +21,8 @@ public:
     const std::string& place() const { return place_; }
 
     bool has(const char* name) const;  ///< the option is present
-    /// Returns the option's number, or `fallback` without it. Throws if it is not a number or out of range. [setup]
+    /// Returns the option's number, or `fallback` without it. Throws if it is not a number or out
+    /// of range. [setup]
     double number(const char* name, double fallback, double least, double most);
     /// Returns an integer option, like number().
     int whole(const char* name, int fallback, int least, int most);
@@ -28,17 +30,19 @@ public:
     bool flag(const char* name);
     /// Returns the option's text, or `fallback` without it.
     std::string word(const char* name, const char* fallback);
-    /// Call after reading all options: throws if an unknown one is present, and lists the known ones. [setup]
+    /// Call after reading all options: throws if an unknown one is present, and lists the known
+    /// ones. [setup]
     void finish() const;
 
 private:
     struct Option {
         std::string name, value;
-        bool        has_value = false, asked = false;
+        bool has_value = false;
+        bool asked = false;
     };
-    Option*                  find(const char* name);
-    std::string              text_, driver_, place_;
-    std::vector<Option>      options_;
+    Option* find(const char* name);
+    std::string text_, driver_, place_;
+    std::vector<Option> options_;
     std::vector<std::string> known_;
 };
 

@@ -11,8 +11,9 @@
 
 namespace hal::vision {
 
-/// Reads the first picture of `bytes` into `frame`, 16-bit samples shortened to 8. Nothing when it is well; the problem otherwise, and
-/// the frame is undefined. Bounded: whatever the bytes, it takes no more memory than a frame may have. [any]
+/// Reads the first picture of `bytes` into `frame`, 16-bit samples shortened to 8. Nothing when it
+/// is well; the problem otherwise, and the frame is undefined. Bounded: whatever the bytes, it
+/// takes no more memory than a frame may have. [any]
 std::optional<Problem> read_pnm(const std::uint8_t* bytes, std::size_t count, Frame& frame);
 
 /// The frame as P5 or P6. [any]

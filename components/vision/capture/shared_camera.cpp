@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Shares one camera between all components of the process that name it: the kernel delivers its frames to one reader only.
+// Shares one camera between all components of the process that name it: the kernel delivers its
+// frames to one reader only.
 #include <map>
 #include <mutex>
 
@@ -8,21 +9,22 @@
 namespace hal::vision {
 namespace {
 
-/// An open camera. The first component that finds no newer frame reads one for all; meanwhile the others wait for the same frame.
+/// An open camera. The first component that finds no newer frame reads one for all; meanwhile the
+/// others wait for the same frame.
 struct Hub {
-    std::string             address;
+    std::string address;
     std::unique_ptr<Source> camera;
     ~Hub() { camera->close(); }
 
-    std::mutex    mutex;  // of what follows
-    Frame         frame;
+    std::mutex mutex;  // of what follows
+    Frame frame;
     std::uint64_t count = 0;  // frames so far
-    bool          lost = false;
+    bool lost = false;
 };
 
 using Name = std::pair<VideoSystem*, std::string>;
 struct Hubs {
-    std::mutex                         mutex;
+    std::mutex mutex;
     std::map<Name, std::weak_ptr<Hub>> open;
 };
 Hubs& hubs() {
@@ -32,19 +34,21 @@ Hubs& hubs() {
 
 class Shared final : public Source {
 public:
-    Shared(Address address, VideoSystem& system) : address_(address), system_(system), model_(v4l2_source(std::move(address), system)) {}
+    Shared(Address address, VideoSystem& system)
+        : address_(address), system_(system), model_(v4l2_source(std::move(address), system)) {}
 
     bool open(std::int64_t now) override {
-        Hubs&                 all = hubs();
+        Hubs& all = hubs();
         const std::lock_guard lock(all.mutex);
-        std::weak_ptr<Hub>&   known = all.open[{&system_, address_.place()}];
+        std::weak_ptr<Hub>& known = all.open[{&system_, address_.place()}];
         hub_ = known.lock();
         if (hub_ && !lost()) {
             if (hub_->address != address_.text()) {
                 const std::string other = hub_->address;
                 hub_.reset();
                 return fail(FrameError::unusable,
-                            "another component has opened " + other + "; a camera has one set of options: use the same source= for both");
+                            "another component has opened " + other +
+                                "; a camera has one set of options: use the same source= for both");
             }
         } else {
             auto made = std::make_shared<Hub>();
@@ -67,8 +71,11 @@ public:
         if (!hub_->lost && hub_->count == seen_) {
             const Got got = hub_->camera->next(now, timeout, hub_->frame);
             if (got == Got::nothing) return got;
-            if (got == Got::frame) ++hub_->count;
-            else fail(hub_->camera->problem().kind, hub_->camera->problem().text);
+            if (got == Got::frame) {
+                ++hub_->count;
+            } else {
+                fail(hub_->camera->problem().kind, hub_->camera->problem().text);
+            }
             if (got == Got::bad) return got;
             hub_->lost = got == Got::lost;
         }
@@ -78,14 +85,18 @@ public:
         }
         seen_ = hub_->count;
         frame = hub_->frame;
-        if (any_) skipped_ += frame.number - last_ - 1;
+        if (any_) {
+            skipped_ += frame.number - last_ - 1;
+        }
         last_ = frame.number;
         any_ = true;
         return Got::frame;
     }
-    void          close() noexcept override { hub_.reset(); }
-    std::string   remark() const override { return hub_ ? hub_->camera->remark() : std::string(); }
-    double        timeout_s() const override { return hub_ ? hub_->camera->timeout_s() : model_->timeout_s(); }
+    void close() noexcept override { hub_.reset(); }
+    std::string remark() const override { return hub_ ? hub_->camera->remark() : std::string(); }
+    double timeout_s() const override {
+        return hub_ ? hub_->camera->timeout_s() : model_->timeout_s();
+    }
     std::uint32_t frozen_after() const override { return model_->frozen_after(); }
 
 private:
@@ -94,17 +105,22 @@ private:
         return hub_->lost;
     }
     const Address address_;
-    VideoSystem&  system_;
+    VideoSystem& system_;
     const std::unique_ptr<Source>
-                         model_;  // never opened: rejects invalid options when the netlist is checked, and has the camera's constants
+        model_;  // never opened: rejects invalid options when the netlist is checked, and has the camera's constants
     std::shared_ptr<Hub> hub_;
-    std::uint64_t        seen_ = 0, last_ = 0;
-    bool                 any_ = false;
+    std::uint64_t seen_ = 0;
+    std::uint64_t last_ = 0;
+    bool any_ = false;
 };
 
 }  // namespace
 
-std::unique_ptr<Source> shared_camera(Address address, VideoSystem& system) { return std::make_unique<Shared>(std::move(address), system); }
-std::unique_ptr<Source> v4l2_source(Address address) { return shared_camera(std::move(address), kernel()); }
+std::unique_ptr<Source> shared_camera(Address address, VideoSystem& system) {
+    return std::make_unique<Shared>(std::move(address), system);
+}
+std::unique_ptr<Source> v4l2_source(Address address) {
+    return shared_camera(std::move(address), kernel());
+}
 
 }  // namespace hal::vision

@@ -31,7 +31,7 @@ constexpr int frame_error_count = 11;
 const char* to_string(FrameError);
 
 struct Problem {
-    FrameError     kind = FrameError::none;
+    FrameError kind = FrameError::none;
     std::string text;  ///< message without a full stop: "/dev/video0 was unplugged"
 };
 
@@ -42,24 +42,29 @@ enum class Got : std::uint8_t {
     lost,     ///< the source failed: problem(); close and reopen it
 };
 
-/// A camera or a substitute. Used by one thread at a time. The constructor parses the address and opens nothing.
+/// A camera or a substitute. Used by one thread at a time. The constructor parses the address and
+/// opens nothing.
 class Source {
 public:
     virtual ~Source() = default;
-    /// Opens the source. Returns false with the reason in problem(); may be retried. [setup, or the helper thread]
+    /// Opens the source. Returns false with the reason in problem(); may be retried. [setup, or the
+    /// helper thread]
     virtual bool open(std::int64_t now_ns) = 0;
-    /// Reads the newest unread frame at `now_ns`; older ones are skipped and counted. Waits at most `timeout_ns`; with 0 it does not
-    /// wait, so that the result depends on `now_ns` alone where the source supports it.
-    virtual Got    next(std::int64_t now_ns, std::int64_t timeout_ns, Frame& frame) = 0;
-    virtual void   close() noexcept = 0;
+    /// Reads the newest unread frame at `now_ns`; older ones are skipped and counted. Waits at most
+    /// `timeout_ns`; with 0 it does not wait, so that the result depends on `now_ns` alone where
+    /// the source supports it.
+    virtual Got next(std::int64_t now_ns, std::int64_t timeout_ns, Frame& frame) = 0;
+    virtual void close() noexcept = 0;
     const Problem& problem() const { return problem_; }
-    /// Returns how the open source deviates from its address, without a full stop; empty: it does not.
+    /// Returns how the open source deviates from its address, without a full stop; empty: it does
+    /// not.
     virtual std::string remark() const { return {}; }
     /// Returns the number of frames skipped since open(), including those lost by the camera.
     std::uint64_t skipped() const { return skipped_; }
     /// Returns the time without a frame after which it is logged, s.
     virtual double timeout_s() const { return 1.0; }
-    /// Returns the number of identical frames that count as a frozen camera; 0: never, for pictures without noise.
+    /// Returns the number of identical frames that count as a frozen camera; 0: never, for pictures
+    /// without noise.
     virtual std::uint32_t frozen_after() const { return 0; }
 
 protected:
@@ -73,12 +78,14 @@ private:
     Problem problem_;
 };
 
-/// Creates the source of an address. Throws std::invalid_argument if it is invalid. `find` returns the path of a file or folder named
-/// relative to the netlist (hal::Texts::find). [setup]
-std::unique_ptr<Source> make_source(const std::string& address, const std::function<std::string(const std::string&)>& find);
+/// Creates the source of an address. Throws std::invalid_argument if it is invalid. `find` returns
+/// the path of a file or folder named relative to the netlist (hal::Texts::find). [setup]
+std::unique_ptr<Source> make_source(const std::string& address,
+                                    const std::function<std::string(const std::string&)>& find);
 
 std::unique_ptr<Source> v4l2_source(Address);  ///< shared by all components that name the camera
-std::unique_ptr<Source> frames_source(Address, const std::function<std::string(const std::string&)>& find);
+std::unique_ptr<Source> frames_source(Address,
+                                      const std::function<std::string(const std::string&)>& find);
 std::unique_ptr<Source> sim_source(Address);  ///< scene/source_sim.cpp
 
 }  // namespace hal::vision

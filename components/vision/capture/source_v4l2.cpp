@@ -19,9 +19,12 @@
 namespace hal::vision {
 
 void yuyv_to_bgr(const std::uint8_t* yuyv, std::uint8_t* bgr, std::size_t pixels) {
-    const auto clipped = [](int v) { return static_cast<std::uint8_t>(std::clamp(v >> 8, 0, 255)); };
+    const auto clipped = [](int v) {
+        return static_cast<std::uint8_t>(std::clamp(v >> 8, 0, 255));
+    };
     for (std::size_t i = 0; i + 1 < pixels; i += 2, yuyv += 4) {
-        const int u = yuyv[1] - 128, v = yuyv[3] - 128;
+        const int u = yuyv[1] - 128;
+        const int v = yuyv[3] - 128;
         for (const int y : {yuyv[0], yuyv[2]}) {
             const int c = 298 * (y - 16) + 128;  // BT.601: 255/219, 255/224 ... in 1/256
             *bgr++ = clipped(c + 516 * u);
@@ -39,17 +42,19 @@ class Kernel final : public VideoSystem {
     int open(const char* path) override { return ::open(path, O_RDWR | O_NONBLOCK | O_CLOEXEC); }
     int control(int fd, unsigned long request, void* argument) override {
         int result;
-        do result = ::ioctl(fd, request, argument);
-        while (result == -1 && errno == EINTR);
+        do {
+            result = ::ioctl(fd, request, argument);
+        } while (result == -1 && errno == EINTR);
         return result;
     }
     void* map(int fd, std::size_t bytes, std::int64_t offset) override {
-        void* const at = ::mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_SHARED, fd, static_cast<off_t>(offset));
+        void* const at = ::mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_SHARED, fd,
+                                static_cast<off_t>(offset));
         return at == MAP_FAILED ? nullptr : at;
     }
     void unmap(void* at, std::size_t bytes) override { ::munmap(at, bytes); }
-    int  wait(int fd, int timeout_ms) override {
-        pollfd    one{fd, POLLIN, 0};
+    int wait(int fd, int timeout_ms) override {
+        pollfd one{fd, POLLIN, 0};
         const int found = ::poll(&one, 1, timeout_ms);
         if (found < 0) return errno == EINTR ? 0 : -1;
         return found == 0 ? 0 : (one.revents & (POLLERR | POLLHUP | POLLNVAL)) != 0 ? -1 : 1;
@@ -75,7 +80,10 @@ public:
         fps_ = given_fps_ = address.number("fps", 30.0, 0.1, 1000.0);
         grey_ = address.flag("grey");
         address.finish();
-        if (device_.empty()) throw hal::ArgumentError("source", "source=" + address.text() + " has no device; write v4l2:/dev/video0");
+        if (device_.empty()) {
+            throw hal::ArgumentError(
+                "source", "source=" + address.text() + " has no device; write v4l2:/dev/video0");
+        }
     }
     ~V4l2() override { close(); }
 
@@ -95,17 +103,23 @@ public:
         const int ready = system_.wait(fd_, static_cast<int>(timeout / 1'000'000));
         if (ready < 0) return unplugged();
         if (ready == 0) return Got::nothing;
-        bool        there = false;
+        bool there = false;
         v4l2_buffer newest{};
         for (;;) {
             v4l2_buffer buffer = blank();
             if (system_.control(fd_, VIDIOC_DQBUF, &buffer) == -1) {
                 if (errno == EAGAIN) break;
-                if (there) give_back(newest);
+                if (there) {
+                    give_back(newest);
+                }
                 return unplugged();
             }
-            if (buffer.index >= maps_.size()) continue;  // no driver does
-            if (there) give_back(newest);
+            if (buffer.index >= maps_.size()) {
+                continue;  // no driver does
+            }
+            if (there) {
+                give_back(newest);
+            }
             newest = buffer;
             there = true;
         }
@@ -118,18 +132,20 @@ public:
         if (fd_ < 0) return;
         int type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
         system_.control(fd_, VIDIOC_STREAMOFF, &type);
-        for (const Map& map : maps_) system_.unmap(map.at, map.bytes);
+        for (const Map& map : maps_) {
+            system_.unmap(map.at, map.bytes);
+        }
         maps_.clear();
         system_.close(fd_);
         fd_ = -1;
     }
-    std::string   remark() const override { return remark_; }
-    double        timeout_s() const override { return 1.0 + 3.0 / given_fps_; }
+    std::string remark() const override { return remark_; }
+    double timeout_s() const override { return 1.0 + 3.0 / given_fps_; }
     std::uint32_t frozen_after() const override { return 10; }
 
 private:
     struct Map {
-        void*       at;
+        void* at;
         std::size_t bytes;
     };
     static v4l2_buffer blank(std::uint32_t index = 0) {
@@ -148,14 +164,23 @@ private:
         return Got::lost;
     }
     bool not_opened(int error) {
-        if (error == ENOENT || error == ENODEV || error == ENXIO)
-            return fail(FrameError::missing, "missing camera " + device_ + "; to list cameras: ls -l /dev/v4l/by-id");
-        if (error == EACCES || error == EPERM)
-            return fail(FrameError::unusable, device_ + ": permission denied; type: sudo usermod -aG video $USER, and log in again");
+        if (error == ENOENT || error == ENODEV || error == ENXIO) {
+            return fail(FrameError::missing,
+                        "missing camera " + device_ + "; to list cameras: ls -l /dev/v4l/by-id");
+        }
+        if (error == EACCES || error == EPERM) {
+            return fail(
+                FrameError::unusable,
+                device_ +
+                    ": permission denied; type: sudo usermod -aG video $USER, and log in again");
+        }
         if (error == EBUSY) return busy();
         return fail(FrameError::unusable, device_ + " cannot be opened: " + std::strerror(error));
     }
-    bool busy() { return fail(FrameError::unusable, device_ + " is used by another program; type: fuser -v " + device_); }
+    bool busy() {
+        return fail(FrameError::unusable,
+                    device_ + " is used by another program; type: fuser -v " + device_);
+    }
     bool failed(const char* what) {
         const int error = errno;
         if (error == EBUSY) return busy();
@@ -165,16 +190,24 @@ private:
 
     bool start() {
         v4l2_capability able{};
-        if (system_.control(fd_, VIDIOC_QUERYCAP, &able) == -1)
-            return fail(FrameError::unusable, device_ + " is not a camera; to list cameras: ls -l /dev/v4l/by-id");
-        const std::uint32_t can = (able.capabilities & V4L2_CAP_DEVICE_CAPS) != 0 ? able.device_caps : able.capabilities;
-        if ((can & V4L2_CAP_VIDEO_CAPTURE) == 0 || (can & V4L2_CAP_STREAMING) == 0)
-            return fail(FrameError::unusable, device_ + " gives no frames; a camera has several devices, and often the even ones do");
+        if (system_.control(fd_, VIDIOC_QUERYCAP, &able) == -1) {
+            return fail(FrameError::unusable,
+                        device_ + " is not a camera; to list cameras: ls -l /dev/v4l/by-id");
+        }
+        const std::uint32_t can =
+            (able.capabilities & V4L2_CAP_DEVICE_CAPS) != 0 ? able.device_caps : able.capabilities;
+        if ((can & V4L2_CAP_VIDEO_CAPTURE) == 0 || (can & V4L2_CAP_STREAMING) == 0) {
+            return fail(
+                FrameError::unusable,
+                device_ +
+                    " gives no frames; a camera has several devices, and often the even ones do");
+        }
         return choose_format() && choose_rate() && map() && stream();
     }
     bool choose_format() {
         std::string offered;
-        bool        yuyv = false, grey = false;
+        bool yuyv = false;
+        bool grey = false;
         for (std::uint32_t i = 0; i < 64; ++i) {
             v4l2_fmtdesc one{};
             one.index = i;
@@ -184,47 +217,69 @@ private:
             grey = grey || one.pixelformat == V4L2_PIX_FMT_GREY;
             offered += (offered.empty() ? "" : ", ") + four_letters(one.pixelformat);
         }
-        if (!yuyv && !grey)
-            return fail(FrameError::unusable, device_ + " offers " + (offered.empty() ? "no format" : offered) +
-                                              "; only YUYV and GREY are read; ffmpeg -i " + device_ +
-                                              " -pix_fmt yuyv422 -f v4l2 /dev/videoN makes YUYV of it for a v4l2loopback device");
+        if (!yuyv && !grey) {
+            return fail(FrameError::unusable,
+                        device_ + " offers " + (offered.empty() ? "no format" : offered) +
+                            "; only YUYV and GREY are read; ffmpeg -i " + device_ +
+                            " -pix_fmt yuyv422 -f v4l2 /dev/videoN makes YUYV of it for a "
+                            "v4l2loopback device");
+        }
         v4l2_format format{};
         format.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
         format.fmt.pix.width = static_cast<std::uint32_t>(width_);
         format.fmt.pix.height = static_cast<std::uint32_t>(height_);
-        format.fmt.pix.pixelformat = yuyv && !(grey && grey_) ? V4L2_PIX_FMT_YUYV : V4L2_PIX_FMT_GREY;
+        format.fmt.pix.pixelformat =
+            yuyv && !(grey && grey_) ? V4L2_PIX_FMT_YUYV : V4L2_PIX_FMT_GREY;
         format.fmt.pix.field = V4L2_FIELD_NONE;
         const std::uint32_t wanted = format.fmt.pix.pixelformat;
         if (system_.control(fd_, VIDIOC_S_FMT, &format) == -1) return failed("format rejected");
         const v4l2_pix_format& is = format.fmt.pix;
-        if (is.pixelformat != wanted)
-            return fail(FrameError::unusable, device_ + " gives " + four_letters(is.pixelformat) + " and not " + four_letters(wanted) +
-                                              " at this size; take a smaller one: v4l2-ctl -d " + device_ + " --list-formats-ext");
-        if (is.width != static_cast<std::uint32_t>(width_) || is.height != static_cast<std::uint32_t>(height_))
-            return fail(FrameError::unusable, device_ + " has no frames of " + std::to_string(width_) + " x " + std::to_string(height_) +
-                                              "; write v4l2:" + device_ + "?width=" + std::to_string(is.width) +
-                                              "&height=" + std::to_string(is.height));
+        if (is.pixelformat != wanted) {
+            return fail(FrameError::unusable,
+                        device_ + " gives " + four_letters(is.pixelformat) + " and not " +
+                            four_letters(wanted) +
+                            " at this size; take a smaller one: v4l2-ctl -d " + device_ +
+                            " --list-formats-ext");
+        }
+        if (is.width != static_cast<std::uint32_t>(width_) ||
+            is.height != static_cast<std::uint32_t>(height_)) {
+            return fail(FrameError::unusable,
+                        device_ + " has no frames of " + std::to_string(width_) + " x " +
+                            std::to_string(height_) + "; write v4l2:" + device_ + "?width=" +
+                            std::to_string(is.width) + "&height=" + std::to_string(is.height));
+        }
         is_yuyv_ = wanted == V4L2_PIX_FMT_YUYV;
         const std::size_t row = static_cast<std::size_t>(width_) * (is_yuyv_ ? 2 : 1);
         line_ = std::max<std::size_t>(is.bytesperline, row);
-        if (!Frame::fits(width_, height_) || line_ > std::size_t{16} * most_wide || (is_yuyv_ && width_ % 2 != 0))
-            return fail(FrameError::too_large,
-                        "frames of " + std::to_string(width_) + " x " + std::to_string(height_) + " are larger than a frame may be");
+        if (!Frame::fits(width_, height_) || line_ > std::size_t{16} * most_wide ||
+            (is_yuyv_ && width_ % 2 != 0)) {
+            return fail(FrameError::too_large, "frames of " + std::to_string(width_) + " x " +
+                                                   std::to_string(height_) +
+                                                   " are larger than a frame may be");
+        }
         return true;
     }
-    /// The camera may have other rates, or a fixed one: this is logged, and frames are used at its rate.
+    /// The camera may have other rates, or a fixed one: this is logged, and frames are used at its
+    /// rate.
     bool choose_rate() {
         v4l2_streamparm parameters{};
         parameters.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
         v4l2_fract& period = parameters.parm.capture.timeperframe;
         period = {1000, static_cast<std::uint32_t>(std::lround(fps_ * 1000.0))};
-        const bool chosen = system_.control(fd_, VIDIOC_S_PARM, &parameters) != -1 && period.numerator != 0 && period.denominator != 0;
-        given_fps_ = chosen ? std::clamp(static_cast<double>(period.denominator) / period.numerator, 0.1, 1000.0) : fps_;
-        if (chosen && std::fabs(given_fps_ - fps_) > 0.01 * fps_)
-            remark_ = device_ + " gives " + rate(given_fps_) + " frames per second, not " + rate(fps_) +
-                      "; to list the rates of each size: v4l2-ctl -d " + device_ + " --list-formats-ext";
-        else if (!chosen && asked_) remark_ = device_ + " has a fixed frame rate; fps=" + rate(fps_) + " has no effect";
-        else remark_.clear();
+        const bool chosen = system_.control(fd_, VIDIOC_S_PARM, &parameters) != -1 &&
+                            period.numerator != 0 && period.denominator != 0;
+        given_fps_ = chosen ? std::clamp(static_cast<double>(period.denominator) / period.numerator,
+                                         0.1, 1000.0)
+                            : fps_;
+        if (chosen && std::fabs(given_fps_ - fps_) > 0.01 * fps_) {
+            remark_ = device_ + " gives " + rate(given_fps_) + " frames per second, not " +
+                      rate(fps_) + "; to list the rates of each size: v4l2-ctl -d " + device_ +
+                      " --list-formats-ext";
+        } else if (!chosen && asked_) {
+            remark_ = device_ + " has a fixed frame rate; fps=" + rate(fps_) + " has no effect";
+        } else {
+            remark_.clear();
+        }
         return true;
     }
     static std::string rate(double fps) {
@@ -237,16 +292,21 @@ private:
         request.count = buffers_wanted;
         request.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
         request.memory = V4L2_MEMORY_MMAP;
-        if (system_.control(fd_, VIDIOC_REQBUFS, &request) == -1) return failed("it gives no buffers");
+        if (system_.control(fd_, VIDIOC_REQBUFS, &request) == -1) {
+            return failed("it gives no buffers");
+        }
         for (std::uint32_t i = 0; i < std::min(request.count, 32u); ++i) {
             v4l2_buffer buffer = blank(i);
-            if (system_.control(fd_, VIDIOC_QUERYBUF, &buffer) == -1) return failed("it gives no buffers");
+            if (system_.control(fd_, VIDIOC_QUERYBUF, &buffer) == -1) {
+                return failed("it gives no buffers");
+            }
             void* const at = system_.map(fd_, buffer.length, buffer.m.offset);
             if (at == nullptr) return failed("its buffers cannot be mapped");
             maps_.push_back({at, buffer.length});
             if (!give_back(buffer)) return failed("it takes no buffers");
         }
-        return maps_.size() >= 2 || fail(FrameError::unusable, device_ + " gives fewer than two buffers");
+        return maps_.size() >= 2 ||
+               fail(FrameError::unusable, device_ + " gives fewer than two buffers");
     }
     bool stream() {
         int type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
@@ -254,43 +314,63 @@ private:
     }
 
     bool take(const v4l2_buffer& buffer, std::int64_t now, Frame& frame) {
-        // The driver also counts frames that it lost; frames skipped here leave the same gap in the sequence.
-        if (any_) skipped_ += buffer.sequence - last_ - 1u;
+        // The driver also counts frames that it lost; frames skipped here leave the same gap in the
+        // sequence.
+        if (any_) {
+            skipped_ += buffer.sequence - last_ - 1u;
+        }
         last_ = buffer.sequence;
         any_ = true;
         const std::size_t row = static_cast<std::size_t>(width_) * (is_yuyv_ ? 2 : 1);
         const std::size_t needed = line_ * static_cast<std::size_t>(height_ - 1) + row;
-        const Map&        map = maps_[buffer.index];
-        if ((buffer.flags & V4L2_BUF_FLAG_ERROR) != 0) return fail(FrameError::damaged, device_ + " marks a frame as damaged");
-        if (std::min<std::size_t>(buffer.bytesused, map.bytes) < needed)
-            return fail(FrameError::damaged,
-                        device_ + " gives " + std::to_string(buffer.bytesused) + " bytes of a frame of " + std::to_string(needed));
+        const Map& map = maps_[buffer.index];
+        if ((buffer.flags & V4L2_BUF_FLAG_ERROR) != 0) {
+            return fail(FrameError::damaged, device_ + " marks a frame as damaged");
+        }
+        if (std::min<std::size_t>(buffer.bytesused, map.bytes) < needed) {
+            return fail(FrameError::damaged, device_ + " gives " +
+                                                 std::to_string(buffer.bytesused) +
+                                                 " bytes of a frame of " + std::to_string(needed));
+        }
         frame.resize(width_, height_, is_yuyv_ && !grey_ ? Format::bgr : Format::grey);
         const auto* const bytes = static_cast<const std::uint8_t*>(map.at);
         for (int y = 0; y < height_; ++y) {
             const std::uint8_t* const from = bytes + line_ * static_cast<std::size_t>(y);
-            std::uint8_t* const       to = frame.row(y);
-            if (!is_yuyv_) std::memcpy(to, from, row);
-            else if (grey_)
-                for (std::size_t x = 0; x < row / 2; ++x) to[x] = from[2 * x];
-            else yuyv_to_bgr(from, to, static_cast<std::size_t>(width_));
+            std::uint8_t* const to = frame.row(y);
+            if (!is_yuyv_) {
+                std::memcpy(to, from, row);
+            } else if (grey_) {
+                for (std::size_t x = 0; x < row / 2; ++x) {
+                    to[x] = from[2 * x];
+                }
+            } else {
+                yuyv_to_bgr(from, to, static_cast<std::size_t>(width_));
+            }
         }
         frame.number = buffer.sequence;
-        const bool monotonic = (buffer.flags & V4L2_BUF_FLAG_TIMESTAMP_MASK) == V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC;
-        frame.stamp_ns =
-            monotonic ? std::int64_t{buffer.timestamp.tv_sec} * 1'000'000'000 + std::int64_t{buffer.timestamp.tv_usec} * 1000 : now;
+        const bool monotonic =
+            (buffer.flags & V4L2_BUF_FLAG_TIMESTAMP_MASK) == V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC;
+        frame.stamp_ns = monotonic ? std::int64_t{buffer.timestamp.tv_sec} * 1'000'000'000 +
+                                         std::int64_t{buffer.timestamp.tv_usec} * 1000
+                                   : now;
         return true;
     }
 
-    VideoSystem&      system_;
+    VideoSystem& system_;
     const std::string device_;
-    int               width_ = 0, height_ = 0, fd_ = -1;
-    double            fps_ = 30.0, given_fps_ = 30.0;  // asked for; what the camera makes of it
-    std::string       remark_;
-    bool              asked_ = false, grey_ = false, is_yuyv_ = false, any_ = false;
-    std::size_t       line_ = 0;  // bytes from row to row
-    std::uint32_t     last_ = 0;  // sequence number of the frame before
-    std::vector<Map>  maps_;
+    int width_ = 0;
+    int height_ = 0;
+    int fd_ = -1;
+    double fps_ = 30.0;
+    double given_fps_ = 30.0;  // asked for; what the camera makes of it
+    std::string remark_;
+    bool asked_ = false;
+    bool grey_ = false;
+    bool is_yuyv_ = false;
+    bool any_ = false;
+    std::size_t line_ = 0;  // bytes from row to row
+    std::uint32_t last_ = 0;  // sequence number of the frame before
+    std::vector<Map> maps_;
 };
 
 }  // namespace
@@ -300,6 +380,8 @@ VideoSystem& kernel() {
     return real;
 }
 
-std::unique_ptr<Source> v4l2_source(Address address, VideoSystem& system) { return std::make_unique<V4l2>(std::move(address), system); }
+std::unique_ptr<Source> v4l2_source(Address address, VideoSystem& system) {
+    return std::make_unique<V4l2>(std::move(address), system);
+}
 
 }  // namespace hal::vision

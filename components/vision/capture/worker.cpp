@@ -9,9 +9,11 @@
 
 namespace hal::vision {
 namespace {
-constexpr std::int64_t second = 1'000'000'000, most_wait = second / 10;
+constexpr std::int64_t second = 1'000'000'000;
+constexpr std::int64_t most_wait = second / 10;
 constexpr std::int64_t again_after = second;           // retry interval of opening a source
-constexpr std::int64_t quiet_for = 10 * second;        // minimum interval of messages about the same problem
+// minimum interval of messages about the same problem
+constexpr std::int64_t quiet_for = 10 * second;
 constexpr std::int64_t long_ago = INT64_MIN / 2;
 
 std::string seconds(std::int64_t ns) {
@@ -28,20 +30,22 @@ Problem tried_again(Problem problem) {
 // FNV-1a over words: a camera's noise changes some bit of it in each frame.
 std::uint64_t hash(const std::vector<std::uint8_t>& bytes) {
     std::uint64_t h = 0xcbf29ce484222325u;
-    std::size_t   i = 0;
+    std::size_t i = 0;
     for (; i + 8 <= bytes.size(); i += 8) {
         std::uint64_t w;
         std::memcpy(&w, bytes.data() + i, 8);
         h = (h ^ w) * 0x100000001b3u;
         h ^= h >> 29;
     }
-    for (; i < bytes.size(); ++i) h = (h ^ bytes[i]) * 0x100000001b3u;
+    for (; i < bytes.size(); ++i) {
+        h = (h ^ bytes[i]) * 0x100000001b3u;
+    }
     return h;
 }
 }  // namespace
 
-Worker::Worker(std::string instance, std::unique_ptr<Source> source, std::function<void(const Frame&)> detect,
-               std::function<void(const Status&)> publish)
+Worker::Worker(std::string instance, std::unique_ptr<Source> source,
+               std::function<void(const Frame&)> detect, std::function<void(const Status&)> publish)
     : instance_(std::move(instance)),
       log_(std::make_unique<hal::MessageLog>(instance_)),
       source_(std::move(source)),
@@ -72,7 +76,9 @@ void Worker::turn(std::int64_t now, bool may_wait) noexcept {
         close();
         try_again_ns_ = now + again_after;
         try {
-            report(tried_again({FrameError::timeout, std::string("cannot read frames: ") + e.what()}), now);
+            report(
+                tried_again({FrameError::timeout, std::string("cannot read frames: ") + e.what()}),
+                now);
             publish();
         } catch (const std::exception&) {  // no memory for the message either
         }
@@ -80,14 +86,18 @@ void Worker::turn(std::int64_t now, bool may_wait) noexcept {
 }
 
 void Worker::step(std::int64_t now, bool may_wait) {
-    if (!open_ && now >= try_again_ns_) open(now);
+    if (!open_ && now >= try_again_ns_) {
+        open(now);
+    }
     if (!open_) {
-        if (may_wait) std::this_thread::sleep_for(std::chrono::nanoseconds(most_wait / 2));
+        if (may_wait) {
+            std::this_thread::sleep_for(std::chrono::nanoseconds(most_wait / 2));
+        }
         return;
     }
-    const Got           got = source_->next(now, may_wait ? most_wait : 0, frame_);
+    const Got got = source_->next(now, may_wait ? most_wait : 0, frame_);
     const std::uint32_t dropped = dropped_before_ + static_cast<std::uint32_t>(source_->skipped());
-    const bool          more = dropped != status_.dropped;
+    const bool more = dropped != status_.dropped;
     status_.dropped = dropped;
     switch (got) {
     case Got::frame:
@@ -105,11 +115,14 @@ void Worker::step(std::int64_t now, bool may_wait) {
         try_again_ns_ = now + again_after;
         return publish();
     case Got::nothing:
-        if (static_cast<double>(now - last_frame_ns_) * 1e-9 > source_->timeout_s() && status_.error == FrameError::none) {
+        if (static_cast<double>(now - last_frame_ns_) * 1e-9 > source_->timeout_s() &&
+            status_.error == FrameError::none) {
             report({FrameError::timeout, "no frame for " + seconds(now - last_frame_ns_)}, now);
             return publish();
         }
-        if (more) publish();
+        if (more) {
+            publish();
+        }
     }
 }
 
@@ -120,10 +133,16 @@ void Worker::open(std::int64_t now) {
         last_frame_ns_ = now;
         dropped_before_ = status_.dropped;
         equal_ = 0;
-        if (status_.error == FrameError::missing && !reported_) status_.error = FrameError::none;  // nothing was wrong so far
-        if (std::string remark = source_->remark(); remark != remark_) {  // once, not at each reconnection
+        // nothing was wrong so far
+        if (status_.error == FrameError::missing && !reported_) {
+            status_.error = FrameError::none;
+        }
+        // once, not at each reconnection
+        if (std::string remark = source_->remark(); remark != remark_) {
             remark_ = std::move(remark);
-            if (!remark_.empty()) print(remark_);
+            if (!remark_.empty()) {
+                print(remark_);
+            }
         }
         return;
     }
@@ -133,7 +152,9 @@ void Worker::open(std::int64_t now) {
 }
 
 void Worker::close() noexcept {
-    if (open_) source_->close();
+    if (open_) {
+        source_->close();
+    }
     open_ = false;
     status_.ok = false;
     try_again_ns_ = INT64_MIN;
@@ -141,13 +162,18 @@ void Worker::close() noexcept {
 
 void Worker::take(const Frame& frame, std::int64_t now) {
     const auto size = [](int w, int h) { return std::to_string(w) + " x " + std::to_string(h); };
-    Problem    problem;
-    if (width_ != 0 && (frame.width != width_ || frame.height != height_))
-        problem = {FrameError::wrong_size, "frames are " + size(frame.width, frame.height) + " and the calibration " + file_ + " is for " +
-                                            size(width_, height_) + "; take the file of this camera, or set the source's width and height"};
-    else if (frozen(frame))
-        problem = {FrameError::frozen, std::to_string(frozen_after_) + " frames in a row are identical; the camera is frozen"};
-    else if (black(frame)) problem = {FrameError::black, "frames are black; check the light and the lens cap"};
+    Problem problem;
+    if (width_ != 0 && (frame.width != width_ || frame.height != height_)) {
+        problem = {FrameError::wrong_size,
+                   "frames are " + size(frame.width, frame.height) + " and the calibration " +
+                       file_ + " is for " + size(width_, height_) +
+                       "; take the file of this camera, or set the source's width and height"};
+    } else if (frozen(frame)) {
+        problem = {FrameError::frozen, std::to_string(frozen_after_) +
+                                           " frames in a row are identical; the camera is frozen"};
+    } else if (black(frame)) {
+        problem = {FrameError::black, "frames are black; check the light and the lens cap"};
+    }
     if (problem.kind != FrameError::none) {
         ++status_.bad;
         report(std::move(problem), now);
@@ -172,9 +198,12 @@ bool Worker::frozen(const Frame& frame) {
     return equal_ + 1 >= std::max(frozen_after_, 2u);
 }
 
-// Nothing but noise around 0: the mean is below 8 of 255 and of a thousand pixels hardly one is above 40.
+// Nothing but noise around 0: the mean is below 8 of 255 and of a thousand pixels hardly one is
+// above 40.
 bool Worker::black(const Frame& frame) const {
-    std::size_t sum = 0, bright = 0, count = 0;
+    std::size_t sum = 0;
+    std::size_t bright = 0;
+    std::size_t count = 0;
     for (std::size_t i = 0; i < frame.pixels.size(); i += 7, ++count) {
         sum += frame.pixels[i];
         bright += frame.pixels[i] > 40;
@@ -184,7 +213,9 @@ bool Worker::black(const Frame& frame) const {
 
 void Worker::report(Problem problem, std::int64_t now) {
     const bool known = reported_ && problem.kind == status_.error;
-    if (status_.error == FrameError::none || !reported_) since_ns_ = now;
+    if (status_.error == FrameError::none || !reported_) {
+        since_ns_ = now;
+    }
     status_.error = problem.kind;
     status_.ok = false;
     reported_ = true;
@@ -197,8 +228,10 @@ void Worker::report(Problem problem, std::int64_t now) {
 void Worker::recovered(std::int64_t now) {
     const bool again = reported_ && status_.error != FrameError::none;
     // only after a problem that was logged: messages come in pairs
-    if (again && said_ns_[static_cast<std::size_t>(status_.error)] >= since_ns_)
-        print((ever_ ? "frames are valid again after " : "first valid frame after ") + seconds(now - since_ns_));
+    if (again && said_ns_[static_cast<std::size_t>(status_.error)] >= since_ns_) {
+        print((ever_ ? "frames are valid again after " : "first valid frame after ") +
+              seconds(now - since_ns_));
+    }
     status_.error = FrameError::none;
     status_.ok = ever_ = true;
     reported_ = false;

@@ -13,21 +13,28 @@ namespace {
 constexpr std::size_t most_in_band = 3;
 
 struct Parabola {
-    double a = 0.0, b = 0.0, c = 0.0;
+    double a = 0.0;
+    double b = 0.0;
+    double c = 0.0;
     double operator()(double x) const noexcept { return a + x * (b + x * c); }
 };
 
 /// The points of one row of the picture, a mean over the rows of its band.
-void look(const std::vector<float>& row, double v, int band, const Ground& ground, const LineRules& rules, std::vector<LinePoint>& to) {
-    const std::size_t  n = row.size();
+void look(const std::vector<float>& row, double v, int band, const Ground& ground,
+          const LineRules& rules, std::vector<LinePoint>& to) {
+    const std::size_t n = row.size();
     std::vector<float> sorted = row;
-    std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(n / 2), sorted.end());
-    const double        floor = sorted[n / 2], sign = rules.dark ? -1.0 : 1.0;
+    std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(n / 2),
+                     sorted.end());
+    const double floor = sorted[n / 2];
+    const double sign = rules.dark ? -1.0 : 1.0;
     std::vector<double> out(n);
-    double              most = 0.0;
-    for (std::size_t u = 0; u < n; ++u) most = std::max(most, out[u] = sign * (row[u] - floor));
+    double most = 0.0;
+    for (std::size_t u = 0; u < n; ++u) {
+        most = std::max(most, out[u] = sign * (row[u] - floor));
+    }
     if (most < rules.contrast) return;
-    const double           threshold = std::max(0.5 * most, rules.contrast);
+    const double threshold = std::max(0.5 * most, rules.contrast);
     std::vector<LinePoint> found;
     for (std::size_t u = 0; u < n;) {
         if (out[u] < threshold) {
@@ -35,29 +42,45 @@ void look(const std::vector<float>& row, double v, int band, const Ground& groun
             continue;
         }
         std::size_t end = u;
-        while (end < n && out[end] >= threshold) ++end;
+        while (end < n && out[end] >= threshold) {
+            ++end;
+        }
         const bool whole = u > 1 && end + 1 < n;  // one that the picture's edge cuts has no middle
         // its edges, between two pixels
-        const double left = whole ? static_cast<double>(u) - (out[u] - threshold) / (out[u] - out[u - 1]) : 0.0;
-        const double right = whole ? static_cast<double>(end - 1) + (out[end - 1] - threshold) / (out[end - 1] - out[end]) : 0.0;
-        LinePoint    point{0.5 * (left + right), v, 0.0, 0.0, band};
-        double       x = 0.0, y = 0.0, x2 = 0.0, y2 = 0.0;
-        if (whole && place(ground, left, v, x, y) && place(ground, right, v, x2, y2) && place(ground, point.u, v, point.x, point.y))
-            if (const double width = std::hypot(x2 - x, y2 - y); width > 0.5 * rules.width && width < 2.0 * rules.width)
+        const double left =
+            whole ? static_cast<double>(u) - (out[u] - threshold) / (out[u] - out[u - 1]) : 0.0;
+        const double right = whole ? static_cast<double>(end - 1) +
+                                         (out[end - 1] - threshold) / (out[end - 1] - out[end])
+                                   : 0.0;
+        LinePoint point{0.5 * (left + right), v, 0.0, 0.0, band};
+        double x = 0.0;
+        double y = 0.0;
+        double x2 = 0.0;
+        double y2 = 0.0;
+        if (whole && place(ground, left, v, x, y) && place(ground, right, v, x2, y2) &&
+            place(ground, point.u, v, point.x, point.y)) {
+            if (const double width = std::hypot(x2 - x, y2 - y);
+                width > 0.5 * rules.width && width < 2.0 * rules.width) {
                 found.push_back(point);
+            }
+        }
         u = end;
     }
-    std::sort(found.begin(), found.end(), [](const LinePoint& a, const LinePoint& b) { return std::fabs(a.y) < std::fabs(b.y); });
-    if (found.size() > most_in_band) found.resize(most_in_band);
+    std::sort(found.begin(), found.end(), [](const LinePoint& a, const LinePoint& b) {
+        return std::fabs(a.y) < std::fabs(b.y);
+    });
+    if (found.size() > most_in_band) {
+        found.resize(most_in_band);
+    }
     to.insert(to.end(), found.begin(), found.end());
 }
 
 /// Least squares; false: no three places ahead of one another.
 bool fit(const std::vector<LinePoint>& points, double ahead, Parabola& to) {
     cv::Matx33d m = cv::Matx33d::zeros();
-    cv::Vec3d   r(0, 0, 0);
+    cv::Vec3d r(0, 0, 0);
     for (const LinePoint& p : points) {
-        const double    x = p.x - ahead;
+        const double x = p.x - ahead;
         const cv::Vec3d powers(1.0, x, x * x);
         m += powers * powers.t();
         r += powers * p.y;
@@ -68,14 +91,19 @@ bool fit(const std::vector<LinePoint>& points, double ahead, Parabola& to) {
     return std::isfinite(to.a + to.b + to.c);
 }
 
-std::vector<LinePoint> agreeing(const std::vector<LinePoint>& points, const Parabola& with, double ahead, double tolerance) {
+std::vector<LinePoint> agreeing(const std::vector<LinePoint>& points, const Parabola& with,
+                                double ahead, double tolerance) {
     std::vector<LinePoint> those;
     for (const LinePoint& p : points) {
         const double off = std::fabs(p.y - with(p.x - ahead));
         if (off > tolerance) continue;
         if (!those.empty() && those.back().band == p.band) {  // one of a band: the nearest
-            if (off < std::fabs(those.back().y - with(those.back().x - ahead))) those.back() = p;
-        } else those.push_back(p);
+            if (off < std::fabs(those.back().y - with(those.back().x - ahead))) {
+                those.back() = p;
+            }
+        } else {
+            those.push_back(p);
+        }
     }
     return those;
 }
@@ -83,44 +111,66 @@ std::vector<LinePoint> agreeing(const std::vector<LinePoint>& points, const Para
 }  // namespace
 
 LineSeen find_line(const Frame& frame, const Ground& ground, const LineRules& rules) {
-    LineSeen      seen;
-    const cv::Mat picture(frame.height, frame.width, frame.format == Format::grey ? CV_8UC1 : CV_8UC3,
+    LineSeen seen;
+    const cv::Mat picture(frame.height, frame.width,
+                          frame.format == Format::grey ? CV_8UC1 : CV_8UC3,
                           const_cast<std::uint8_t*>(frame.pixels.data()));
-    cv::Mat       grey = picture;
-    if (frame.format == Format::bgr) cv::cvtColor(picture, grey, cv::COLOR_BGR2GRAY);
+    cv::Mat grey = picture;
+    if (frame.format == Format::bgr) {
+        cv::cvtColor(picture, grey, cv::COLOR_BGR2GRAY);
+    }
 
-    // from the lowest row to where the reach ends, or a line of the width has fewer than three pixels
+    // from the lowest row to where the reach ends, or a line of the width has fewer than three
+    // pixels
     const int bands = std::clamp(rules.bands, 3, 32);
-    int       top = frame.height - 1;
-    double    x = 0.0, y = 0.0, x2 = 0.0, y2 = 0.0;
-    while (top > 0 && place(ground, 0.5 * frame.width, top - 1, x, y) && place(ground, 0.5 * frame.width + 3.0, top - 1, x2, y2) &&
-           std::hypot(x2 - x, y2 - y) < rules.width && x < rules.reach)
+    int top = frame.height - 1;
+    double x = 0.0;
+    double y = 0.0;
+    double x2 = 0.0;
+    double y2 = 0.0;
+    while (top > 0 && place(ground, 0.5 * frame.width, top - 1, x, y) &&
+           place(ground, 0.5 * frame.width + 3.0, top - 1, x2, y2) &&
+           std::hypot(x2 - x, y2 - y) < rules.width && x < rules.reach) {
         --top;
+    }
     const int each = (frame.height - top) / bands;
     if (each < 1) return seen;
     std::vector<LinePoint> points;
     for (int band = 0; band < bands; ++band) {
-        const int          middle = frame.height - 1 - band * each - each / 2, half = std::min(each / 2, 2);
-        const int          first = std::max(middle - half, 0), last = std::min(middle + half, frame.height - 1);
+        const int middle = frame.height - 1 - band * each - each / 2;
+        const int half = std::min(each / 2, 2);
+        const int first = std::max(middle - half, 0);
+
+        const int last = std::min(middle + half, frame.height - 1);
         std::vector<float> row(static_cast<std::size_t>(frame.width), 0.0F);
-        for (int v = first; v <= last; ++v)
-            for (int u = 0; u < frame.width; ++u)
-                row[static_cast<std::size_t>(u)] += static_cast<float>(grey.at<std::uint8_t>(v, u)) / static_cast<float>(last - first + 1);
+        for (int v = first; v <= last; ++v) {
+            for (int u = 0; u < frame.width; ++u) {
+                row[static_cast<std::size_t>(u)] +=
+                    static_cast<float>(grey.at<std::uint8_t>(v, u)) /
+                    static_cast<float>(last - first + 1);
+            }
+        }
         look(row, 0.5 * (first + last), band, ground, rules, points);
     }
 
-    const double           tolerance = 0.5 * rules.width;
+    const double tolerance = 0.5 * rules.width;
     std::vector<LinePoint> best;
-    Parabola               through;
-    for (std::size_t i = 0; i < points.size(); ++i)
-        for (std::size_t j = i + 1; j < points.size(); ++j)
+    Parabola through;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        for (std::size_t j = i + 1; j < points.size(); ++j) {
             for (std::size_t k = j + 1; k < points.size(); ++k) {
                 if (points[i].band == points[j].band || points[j].band == points[k].band) continue;
-                if (!fit({points[i], points[j], points[k]}, rules.ahead, through) || std::fabs(through.c) > 5.0 ||
-                    std::fabs(through.b) > 3.0)
+                if (!fit({points[i], points[j], points[k]}, rules.ahead, through) ||
+                    std::fabs(through.c) > 5.0 || std::fabs(through.b) > 3.0) {
                     continue;
-                if (auto those = agreeing(points, through, rules.ahead, tolerance); those.size() > best.size()) best = std::move(those);
+                }
+                if (auto those = agreeing(points, through, rules.ahead, tolerance);
+                    those.size() > best.size()) {
+                    best = std::move(those);
+                }
             }
+        }
+    }
     seen.quality = static_cast<double>(best.size()) / bands;
     if (!fit(best, rules.ahead, through)) return seen;
     seen.offset = through.a;

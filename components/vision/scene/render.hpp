@@ -10,9 +10,11 @@
 
 namespace hal::vision::scene {
 
-/// Renders the picture (8 bit; blue, green, red) of an exposure from state `from` to state `to`; light, noise and
-/// occlusion are those of `to`. The same settings, states and `number` give the same bytes each time. [any] allocates memory
-std::vector<std::uint8_t> render(const Settings& settings, const State& from, const State& to, std::uint64_t number);
+/// Renders the picture (8 bit; blue, green, red) of an exposure from state `from` to state `to`;
+/// light, noise and occlusion are those of `to`. The same settings, states and `number` give the
+/// same bytes each time. [any] allocates memory
+std::vector<std::uint8_t> render(const Settings& settings, const State& from, const State& to,
+                                 std::uint64_t number);
 
 /// Draw one part of the scene each; the manual of vision_scene describes their layout.
 void draw_furuta(Canvas& canvas, const Settings& settings, const State& from, const State& to);

@@ -10,8 +10,8 @@
 #include "cane_stations.hpp"
 #include "command_guard.hpp"
 #include "discipline/discipline.hpp"
-#include "link/filtering.hpp"
 #include "hal/queue.hpp"
+#include "link/filtering.hpp"
 #include "link/segment.hpp"
 #include "link/system.hpp"
 #include "seal.hpp"
@@ -23,16 +23,20 @@ namespace {
 constexpr unsigned most_messages = 255;  // per packed frame: the count is one byte
 constexpr std::size_t most_payload = ethernet::largest_frame - ethernet::header_bytes;
 
-/// Share of the line used by the frames of this link in both directions. Both threads add to it; the receiving one closes the windows.
+/// Share of the line used by the frames of this link in both directions. Both threads add to it;
+/// the receiving one closes the windows.
 class Load {
 public:
-    void add(std::size_t frame_bytes) noexcept { bytes_.fetch_add(ethernet::wire_bytes(frame_bytes), std::memory_order_relaxed); }
+    void add(std::size_t frame_bytes) noexcept {
+        bytes_.fetch_add(ethernet::wire_bytes(frame_bytes), std::memory_order_relaxed);
+    }
     void tick(std::int64_t now_ns, std::uint32_t mbit_per_s) noexcept {
         constexpr std::int64_t window_ns = 100'000'000;
         if (now_ns >= since_ns_ && now_ns - since_ns_ < window_ns) return;
         const auto bits = 8.0 * static_cast<double>(bytes_.exchange(0, std::memory_order_relaxed));
         const auto ns = static_cast<double>(now_ns > since_ns_ ? now_ns - since_ns_ : window_ns);
-        share_.store(mbit_per_s == 0 ? 0.0 : std::min(1.0, bits * 1e3 / mbit_per_s / ns), std::memory_order_relaxed);
+        share_.store(mbit_per_s == 0 ? 0.0 : std::min(1.0, bits * 1e3 / mbit_per_s / ns),
+                     std::memory_order_relaxed);
         since_ns_ = now_ns;
     }
     double share() const noexcept { return share_.load(std::memory_order_relaxed); }
@@ -46,13 +50,18 @@ private:
 Description describe_settings(const Settings& s) {
     Description d;
     d.address = "cane:" + s.segment.substr(s.segment.starts_with("eth:") ? 4 : 0);
-    if (s.slot) d.address += "?slot=" + std::to_string(*s.slot);
-    d.transport = std::string("CAN in Ethernet frames, ") + (s.format == Format::packed ? "packed" : "one each");
+    if (s.slot) {
+        d.address += "?slot=" + std::to_string(*s.slot);
+    }
+    d.transport = std::string("CAN in Ethernet frames, ") +
+                  (s.format == Format::packed ? "packed" : "one each");
     d.segment = s.segment;
     d.in_slots = s.slot.has_value();
     const auto line = ethernet::describe(s.segment);
-    d.simulated = line.simulated, d.in_memory = line.in_memory;
-    d.has_bit_rate = false, d.has_stamps = true;
+    d.simulated = line.simulated;
+    d.in_memory = line.in_memory;
+    d.has_bit_rate = false;
+    d.has_stamps = true;
     return d;
 }
 
@@ -60,18 +69,33 @@ class CaneLink final : public FilteringLink {
 public:
     CaneLink(Settings settings, const Options& options, std::unique_ptr<ethernet::Port> port,
              std::shared_ptr<ethernet::DisciplineHandle> discipline, std::uint16_t session)
-        : settings_(std::move(settings)), options_(options), port_(std::move(port)), discipline_(std::move(discipline)), session_(session),
-          simulated_(port_->description().simulated), process_data_(options.send_capacity), service_data_(options.send_capacity) {
-        for (const auto& [id, address] : settings_.nodes) nodes_.fix(id, address);
+        : settings_(std::move(settings)),
+          options_(options),
+          port_(std::move(port)),
+          discipline_(std::move(discipline)),
+          session_(session),
+          simulated_(port_->description().simulated),
+          process_data_(options.send_capacity),
+          service_data_(options.send_capacity) {
+        for (const auto& [id, address] : settings_.nodes) {
+            nodes_.fix(id, address);
+        }
         guard_.learn(settings_.learns);
-        if (settings_.master) guard_.fix(*settings_.master);
-        for (const auto& other : settings_.also) guard_.allow(other);
+        if (settings_.master) {
+            guard_.fix(*settings_.master);
+        }
+        for (const auto& other : settings_.also) {
+            guard_.allow(other);
+        }
         seal_ = Seal::take(settings_.key, simulated_);
         description_ = describe_settings(settings_);
         auto own = port_->address();
-        if (discipline_) discipline_->with([&](const ethernet::Discipline& d) { own = d.address(); });
+        if (discipline_) {
+            discipline_->with([&](const ethernet::Discipline& d) { own = d.address(); });
+        }
         std::copy(own.begin(), own.end(), frame_.begin() + 6);
-        frame_[12] = ether_type >> 8, frame_[13] = ether_type & 0xff;
+        frame_[12] = ether_type >> 8;
+        frame_[13] = ether_type & 0xff;
         look_at_line();
     }
 
@@ -90,8 +114,11 @@ public:
     }
 
     void flush(std::int64_t now_ns) noexcept override {
-        if (settings_.format == Format::packed) flush_packed(now_ns);
-        else flush_single(now_ns);
+        if (settings_.format == Format::packed) {
+            flush_packed(now_ns);
+        } else {
+            flush_single(now_ns);
+        }
         held_ = process_data_.size();
     }
 
@@ -117,13 +144,15 @@ public:
     int descriptor() const noexcept override { return port_->descriptor(); }
     bool rejected(Rejected& what) noexcept override { return rejections_.take(what); }
     std::vector<DeliveryTime> delivery_times() const override {
-        return discipline_ ? discipline_->delivery_times(*settings_.slot) : std::vector<DeliveryTime>{};
+        return discipline_ ? discipline_->delivery_times(*settings_.slot)
+                           : std::vector<DeliveryTime>{};
     }
 
     bool wait(std::int64_t at_most_ns) override {
         if (next_ != filled_) return true;
         if (!simulated_) return port_->wait(link::monotonic_ns() + at_most_ns);
-        constexpr std::int64_t step_ns = 100'000;  // a segment in memory does not wake a waiting thread
+        // a segment in memory does not wake a waiting thread
+        constexpr std::int64_t step_ns = 100'000;
         for (; !refill(ethernet::unclocked); at_most_ns -= step_ns) {
             if (at_most_ns <= 0) return false;
             const timespec pause{0, static_cast<long>(std::min(step_ns, at_most_ns))};
@@ -133,11 +162,16 @@ public:
     }
 
 private:
-    /// Returns true for SDO, heartbeat, boot-up and LSS, which wait for messages with a deadline: process data, SYNC, NMT and EMCY.
+    /// Returns true for SDO, heartbeat, boot-up and LSS, which wait for messages with a deadline:
+    /// process data, SYNC, NMT and EMCY.
     static bool is_service(const Frame& f) noexcept { return f.id >= 0x580; }
-    /// Returns true for SYNC and the PDOs of the predefined connection set, of which only the newest is valid.
-    static bool is_state(const Frame& f) noexcept { return !f.extended && !f.remote && (f.id == 0x080 || (f.id >= 0x180 && f.id < 0x580)); }
-    /// Replaces an older message still waiting from the last cycle, so that one delay does not accumulate. Returns true when it did.
+    /// Returns true for SYNC and the PDOs of the predefined connection set, of which only the
+    /// newest is valid.
+    static bool is_state(const Frame& f) noexcept {
+        return !f.extended && !f.remote && (f.id == 0x080 || (f.id >= 0x180 && f.id < 0x580));
+    }
+    /// Replaces an older message still waiting from the last cycle, so that one delay does not
+    /// accumulate. Returns true when it did.
     bool is_replaced(const Frame& frame) noexcept {
         if (held_ == 0 || !is_state(frame)) return false;
         for (std::size_t n = 0; n < held_; ++n) {
@@ -154,83 +188,120 @@ private:
     std::size_t room() const noexcept {
         if (!discipline_) return most_payload;
         std::size_t room = 0;
-        discipline_->with([&](const ethernet::Discipline& d) { room = std::min(d.room(*settings_.slot), most_payload); });
+        discipline_->with([&](const ethernet::Discipline& d) {
+            room = std::min(d.room(*settings_.slot), most_payload);
+        });
         return room;
     }
     bool is_up() const noexcept {
         bool ready = !discipline_;
-        if (discipline_) discipline_->with([&](const ethernet::Discipline& d) { ready = d.ready(); });
+        if (discipline_) {
+            discipline_->with([&](const ethernet::Discipline& d) { ready = d.ready(); });
+        }
         return line_up_ && ready;
     }
     void look_at_line() noexcept {
         const auto line = port_->statistics();
-        line_up_ = line.up, speed_ = line.speed;
-        const auto is = is_up() ? State::active : State::down, was = counting_.state.exchange(is, std::memory_order_relaxed);
-        if (is == State::active && was == State::down && was_up_) Counting::add(counting_.restarts);
+        line_up_ = line.up;
+        speed_ = line.speed;
+        const auto is = is_up() ? State::active : State::down;
+
+        const auto was = counting_.state.exchange(is, std::memory_order_relaxed);
+        if (is == State::active && was == State::down && was_up_) {
+            Counting::add(counting_.restarts);
+        }
         was_up_ = was_up_ || is == State::active;
     }
 
-    void address_to(const ethernet::Address& to) noexcept { std::copy(to.begin(), to.end(), frame_.begin()); }
+    void address_to(const ethernet::Address& to) noexcept {
+        std::copy(to.begin(), to.end(), frame_.begin());
+    }
 
     /// Sends the frame in `frame_`. On `full` the caller keeps its messages for the next call.
     ethernet::Sent launch(std::size_t length, bool service, std::int64_t now_ns) noexcept {
-        ethernet::Finisher* const finisher = settings_.format == Format::packed ? seal_.get() : nullptr;
+        ethernet::Finisher* const finisher =
+            settings_.format == Format::packed ? seal_.get() : nullptr;
         if (!is_up()) return ethernet::Sent::down;
         const std::span whole(frame_.data(), length);
         auto sent = ethernet::Sent::down;
-        if (!discipline_) sent = port_->send(whole, {.finisher = finisher}, now_ns);
-        else
+        if (!discipline_) {
+            sent = port_->send(whole, {.finisher = finisher}, now_ns);
+        } else {
             discipline_->with([&](ethernet::Discipline& d) {
-                sent = d.send(whole, *settings_.slot, settings_.priority + (service ? 1 : 0), finisher);
+                sent = d.send(whole, *settings_.slot, settings_.priority + (service ? 1 : 0),
+                              finisher);
             });
-        if (sent == ethernet::Sent::queued) load_.add(length);
+        }
+        if (sent == ethernet::Sent::queued) {
+            load_.add(length);
+        }
         return sent;
     }
     /// Removes the first `count` messages of a queue and counts them as sent or lost.
     void done(hal::Queue<Frame>& queue, std::size_t count, ethernet::Sent sent) noexcept {
-        if (sent == ethernet::Sent::queued)
-            for (std::size_t n = 0; n < count; ++n) counting_.count_sent(*queue.at(n));
-        else Counting::add(counting_.dropped, count);
+        if (sent == ethernet::Sent::queued) {
+            for (std::size_t n = 0; n < count; ++n) {
+                counting_.count_sent(*queue.at(n));
+            }
+        } else {
+            Counting::add(counting_.dropped, count);
+        }
         queue.drop(count);
     }
 
     void flush_single(std::int64_t now_ns) noexcept {
-        for (auto* queue : {&process_data_, &service_data_})
+        for (auto* queue : {&process_data_, &service_data_}) {
             while (const Frame* f = queue->front()) {
-                const auto to = f->extended ? std::nullopt : nodes_.where(f->id, settings_.produced_to_master);
+                const auto to =
+                    f->extended ? std::nullopt : nodes_.where(f->id, settings_.produced_to_master);
                 address_to(to.value_or(ethernet::broadcast));
-                const auto bytes = put_single(*f, settings_.order, std::span(frame_).subspan(ethernet::header_bytes, room()));
+                const auto bytes = put_single(
+                    *f, settings_.order, std::span(frame_).subspan(ethernet::header_bytes, room()));
                 const auto sent = bytes == 0 ? ethernet::Sent::rejected
-                                             : launch(ethernet::header_bytes + bytes, queue == &service_data_, now_ns);
+                                             : launch(ethernet::header_bytes + bytes,
+                                                      queue == &service_data_, now_ns);
                 if (sent == ethernet::Sent::full) return;
                 done(*queue, 1, sent);
             }
+        }
     }
 
-    /// Packs as many messages as fit, process data first. The frame goes to one station if all of them do.
+    /// Packs as many messages as fit, process data first. The frame goes to one station if all of
+    /// them do.
     void flush_packed(std::int64_t now_ns) noexcept {
         while (process_data_.front() != nullptr || service_data_.front() != nullptr) {
             const auto payload = room();
-            const std::size_t header = packed_header + (settings_.key ? counter_bytes : 0), tail = settings_.key ? tag_bytes : 0;
-            const auto space = payload < header + tail ? std::span<std::uint8_t>{}
-                                                       : std::span(frame_).subspan(ethernet::header_bytes + header, payload - header - tail);
+            const std::size_t header = packed_header + (settings_.key ? counter_bytes : 0);
+
+            const std::size_t tail = settings_.key ? tag_bytes : 0;
+            const auto space = payload < header + tail
+                                   ? std::span<std::uint8_t>{}
+                                   : std::span(frame_).subspan(ethernet::header_bytes + header,
+                                                               payload - header - tail);
             std::size_t bytes = 0, counts[2] = {0, 0};
             std::optional<ethernet::Address> to;
-            bool to_all = false, first = true, is_full = false;
-            for (std::size_t q = 0; q < 2 && !is_full; ++q)
+            bool to_all = false;
+            bool first = true;
+            bool is_full = false;
+            for (std::size_t q = 0; q < 2 && !is_full; ++q) {
                 while (const Frame* f = (q == 0 ? process_data_ : service_data_).at(counts[q])) {
-                    const auto more = counts[0] + counts[1] < most_messages ? put_packed(*f, space.subspan(bytes)) : 0;
+                    const auto more = counts[0] + counts[1] < most_messages
+                                          ? put_packed(*f, space.subspan(bytes))
+                                          : 0;
                     if (more == 0) {
                         is_full = true;
                         break;
                     }
-                    const auto wants = f->extended ? std::nullopt : nodes_.where(f->id, settings_.produced_to_master);
+                    const auto wants = f->extended
+                                           ? std::nullopt
+                                           : nodes_.where(f->id, settings_.produced_to_master);
                     to_all = to_all || !wants || (!first && wants != to);
                     to = wants;
                     first = false;
                     bytes += more;
                     ++counts[q];
                 }
+            }
             auto sent = ethernet::Sent::rejected;  // not even one fits
             if (first) {
                 counts[process_data_.front() != nullptr ? 0 : 1] = 1;
@@ -239,8 +310,10 @@ private:
                 address_to(destination);
                 const auto length = ethernet::header_bytes + header + bytes + tail;
                 const bool service = counts[0] == 0;
-                begin_packed(std::span(frame_.data(), length), static_cast<std::uint8_t>(counts[0] + counts[1]),
-                             service ? session_ | services_alone : session_, settings_.key.has_value());
+                begin_packed(std::span(frame_.data(), length),
+                             static_cast<std::uint8_t>(counts[0] + counts[1]),
+                             service ? session_ | services_alone : session_,
+                             settings_.key.has_value());
                 sent = launch(length, service, now_ns);
                 if (sent == ethernet::Sent::full) return;
             }
@@ -252,69 +325,107 @@ private:
     /// Opens the next frame with messages for this link. Returns false when there is none.
     bool refill(std::int64_t now_ns) noexcept {
         next_ = filled_ = 0;
-        constexpr unsigned most_frames = 256;  // per call: a babbling station must not delay the cycle without limit
+        // per call: a babbling station must not delay the cycle without limit
+        constexpr unsigned most_frames = 256;
         for (unsigned n = 0; n < most_frames; ++n) {
             const auto arrival = port_->receive(now_ns);
             if (!arrival) break;
             take(*arrival);
             if (filled_ != 0) return true;
         }
-        const auto now = now_ns != ethernet::unclocked || simulated_ ? now_ns : link::monotonic_ns();
-        if (now != looked_at_) look_at_line(), looked_at_ = now;
-        if (now != ethernet::unclocked) load_.tick(now, speed_);
+        const auto now =
+            now_ns != ethernet::unclocked || simulated_ ? now_ns : link::monotonic_ns();
+        if (now != looked_at_) {
+            look_at_line();
+            looked_at_ = now;
+        }
+        if (now != ethernet::unclocked) {
+            load_.tick(now, speed_);
+        }
         return false;
     }
 
     void take(const ethernet::Arrival& arrival) noexcept {
         const auto whole = arrival.bytes;
-        if (whole.size() < ethernet::header_bytes || whole[12] != ether_type >> 8 || whole[13] != (ether_type & 0xff))
+        if (whole.size() < ethernet::header_bytes || whole[12] != ether_type >> 8 ||
+            whole[13] != (ether_type & 0xff)) {
             return Counting::add(counting_.errors);
+        }
         ethernet::Address to, from;
         std::copy_n(whole.begin(), 6, to.begin());
         std::copy_n(whole.begin() + 6, 6, from.begin());
-        if ((from[0] & 1) != 0) return Counting::add(counting_.errors);  // a multicast source address is invalid
+        // a multicast source address is invalid
+        if ((from[0] & 1) != 0) return Counting::add(counting_.errors);
         load_.add(whole.size());
         using Origin = ethernet::Discipline::Origin;
         Origin origin = Origin::plausible;
-        if (discipline_) discipline_->with([&](const ethernet::Discipline& d) { origin = d.origin(from, arrival.time_ns, whole.size()); });
-        if (origin == Origin::unknown_station) return reject(Rejected::Why::unknown_station, 0, from, arrival.time_ns);
+        if (discipline_) {
+            discipline_->with([&](const ethernet::Discipline& d) {
+                origin = d.origin(from, arrival.time_ns, whole.size());
+            });
+        }
+        if (origin == Origin::unknown_station) {
+            return reject(Rejected::Why::unknown_station, 0, from, arrival.time_ns);
+        }
         /// Returns false for a command that is not from the master, or not in its slot.
         const auto is_allowed = [&](const Frame& f) {
-            if (Guard::negotiates(f)) guard_.release();
+            if (Guard::negotiates(f)) {
+                guard_.release();
+            }
             if (!Guard::commands(f)) return true;
-            if (origin == Origin::out_of_slot) return reject(Rejected::Why::out_of_slot, f.id, from, arrival.time_ns), false;
-            return guard_.may_command(from, arrival.time_ns) || (reject(Rejected::Why::not_the_master, f.id, from, arrival.time_ns), false);
+            if (origin == Origin::out_of_slot) {
+                reject(Rejected::Why::out_of_slot, f.id, from, arrival.time_ns);
+                return false;
+            }
+            return guard_.may_command(from, arrival.time_ns) ||
+                   (reject(Rejected::Why::not_the_master, f.id, from, arrival.time_ns), false);
         };
         Frame f;
         if (settings_.format == Format::single) {
-            if (get_single(whole.subspan(ethernet::header_bytes), settings_.order, f) != Wrong::none) return Counting::add(counting_.errors);
-            if (is_allowed(f)) keep(f, from, arrival.time_ns);
+            if (get_single(whole.subspan(ethernet::header_bytes), settings_.order, f) !=
+                Wrong::none) {
+                return Counting::add(counting_.errors);
+            }
+            if (is_allowed(f)) {
+                keep(f, from, arrival.time_ns);
+            }
             return;
         }
         Unpacker packed;
         switch (packed.open(whole, settings_.key ? &*settings_.key : nullptr)) {
         case Wrong::none: break;
-        case Wrong::not_signed: return reject(Rejected::Why::unsigned_frame, 0, from, arrival.time_ns);
+        case Wrong::not_signed:
+            return reject(Rejected::Why::unsigned_frame, 0, from, arrival.time_ns);
         case Wrong::tag: return reject(Rejected::Why::wrong_tag, 0, from, arrival.time_ns);
         default: return Counting::add(counting_.errors);
         }
-        if (settings_.key && !replays_.fresh(from, packed.counter())) return reject(Rejected::Why::replayed, 0, from, arrival.time_ns);
-        for (Unpacker look = packed; look.next(f);)
+        if (settings_.key && !replays_.fresh(from, packed.counter())) {
+            return reject(Rejected::Why::replayed, 0, from, arrival.time_ns);
+        }
+        for (Unpacker look = packed; look.next(f);) {
             if (!is_allowed(f)) return;
+        }
         const auto verdict = streams_.take(from, (to[0] & 1) != 0, packed.stamp(), arrival.time_ns);
-        if (verdict.lost != 0) Counting::add(counting_.lost, verdict.lost);
+        if (verdict.lost != 0) {
+            Counting::add(counting_.lost, verdict.lost);
+        }
         if (!verdict.fresh) return Counting::add(counting_.errors);
-        while (packed.next(f)) keep(f, from, arrival.time_ns);
+        while (packed.next(f)) {
+            keep(f, from, arrival.time_ns);
+        }
     }
 
-    void reject(Rejected::Why why, std::uint32_t id, const ethernet::Address& from, std::int64_t now_ns) noexcept {
+    void reject(Rejected::Why why, std::uint32_t id, const ethernet::Address& from,
+                std::int64_t now_ns) noexcept {
         Counting::add(counting_.rejected);
         rejections_.add(why, id, from, now_ns);
     }
 
     void keep(Frame& f, const ethernet::Address& from, std::int64_t time_ns) noexcept {
         f.time_ns = time_ns;
-        if (settings_.learns && !f.extended && !f.remote && !nodes_.learn(f.id, from, time_ns)) Counting::add(counting_.errors);
+        if (settings_.learns && !f.extended && !f.remote && !nodes_.learn(f.id, from, time_ns)) {
+            Counting::add(counting_.errors);
+        }
         if (!filters_.pass(f)) return;
         counting_.count_received(f);
         buffer_[filled_++] = f;
@@ -331,7 +442,8 @@ private:
     std::atomic<bool> line_up_{true};  // written by the receiving thread
 
     hal::Queue<Frame> process_data_, service_data_;  // used by the sending thread, as the next four
-    std::size_t held_ = 0;                     // at the front of process_data_: left by the last flush()
+    // at the front of process_data_: left by the last flush()
+    std::size_t held_ = 0;
     std::shared_ptr<Seal> seal_;
     std::array<std::uint8_t, ethernet::largest_frame> frame_{};
 
@@ -340,7 +452,8 @@ private:
     Rejections rejections_;
     Replays replays_;
     std::array<Frame, most_messages> buffer_;
-    std::size_t next_ = 0, filled_ = 0;
+    std::size_t next_ = 0;
+    std::size_t filled_ = 0;
     std::int64_t looked_at_ = ethernet::unclocked;
     std::uint32_t speed_ = 0;
     bool was_up_ = false;
@@ -356,34 +469,50 @@ Description describe(const std::string& place) {
 
 Opened open(const std::string& place, const Options& options) {
     Settings settings;
-    if (auto problem = parse(place, settings); !problem.empty()) return {nullptr, std::move(problem)};
-    if (options.fd) return {nullptr, "0x9023 frames cannot carry CAN FD; remove fd"};
+    if (auto problem = parse(place, settings); !problem.empty()) {
+        return {nullptr, std::move(problem)};
+    }
+    if (options.fd) {
+        return {nullptr, "0x9023 frames cannot carry CAN FD; remove fd"};
+    }
     ethernet::Options how;
     how.types = {ether_type};
     how.receive_capacity = std::clamp<std::size_t>(options.receive_capacity / 8, 64, 1024);
     const std::string segment = settings.segment + settings.segment_options;
     auto opened = ethernet::open(segment, how);
     if (!opened) {  // the caller adds the address as written
-        if (opened.problem.starts_with(segment + ": ")) opened.problem.erase(0, segment.size() + 2);
+        if (opened.problem.starts_with(segment + ": ")) {
+            opened.problem.erase(0, segment.size() + 2);
+        }
         return {nullptr, std::move(opened.problem)};
     }
     std::shared_ptr<ethernet::DisciplineHandle> discipline;
     if (settings.slot) {
         discipline = ethernet::discipline_of(*opened.port);
-        if (!discipline)
-            return {nullptr, "no TDMA runs on " + settings.segment + "; loadrt tdma for it first, or remove slot="};
+        if (!discipline) {
+            return {nullptr, "no TDMA runs on " + settings.segment +
+                                 "; loadrt tdma for it first, or remove slot="};
+        }
         std::size_t room = 0;
         discipline->with([&](const ethernet::Discipline& d) { room = d.room(*settings.slot); });
-        if (room < packed_header + longest_message + (settings.key ? counter_bytes + tag_bytes : 0))
-            return {nullptr, "TDMA on " + settings.segment + " has no slot " + std::to_string(*settings.slot) + " of at least " +
-                     (settings.key ? "60" : "46") + " bytes; add one to the schedule, or change slot="};
+        if (room <
+            packed_header + longest_message + (settings.key ? counter_bytes + tag_bytes : 0)) {
+            return {nullptr, "TDMA on " + settings.segment + " has no slot " +
+                                 std::to_string(*settings.slot) + " of at least " +
+                                 (settings.key ? "60" : "46") +
+                                 " bytes; add one to the schedule, or change slot="};
+        }
     }
     // Different for each link of this machine, and repeatable on a segment in memory.
     static std::atomic<std::uint16_t> opened_before{0};
     auto session = ++opened_before;
-    if (!opened.port->description().simulated) session = static_cast<std::uint16_t>(session ^ link::clock_ns(CLOCK_REALTIME) / 1'000'000);
+    if (!opened.port->description().simulated) {
+        session = static_cast<std::uint16_t>(session ^ link::clock_ns(CLOCK_REALTIME) / 1'000'000);
+    }
     session = static_cast<std::uint16_t>(session & ~services_alone);
-    return {std::make_unique<CaneLink>(std::move(settings), options, std::move(opened.port), std::move(discipline), session), {}};
+    return {std::make_unique<CaneLink>(std::move(settings), options, std::move(opened.port),
+                                       std::move(discipline), session),
+            {}};
 }
 
 }  // namespace hal::can::cane

@@ -16,8 +16,12 @@ inline constexpr std::uint16_t ether_type = 0x9023;
 inline constexpr std::size_t single_bytes = 5;       ///< header of a single message
 inline constexpr std::size_t packed_header = 10;     ///< header of a packed payload
 inline constexpr std::size_t longest_message = 15;   ///< longest packed message
-inline constexpr std::size_t counter_bytes = 8, tag_bytes = 8;  ///< of a signed frame: after its header, after its messages
-inline constexpr std::uint8_t packed_marker = 0xec, packed_version = 1, signed_version = 2;
+/// of a signed frame: after its header, after its messages
+inline constexpr std::size_t counter_bytes = 8;
+inline constexpr std::size_t tag_bytes = 8;
+inline constexpr std::uint8_t packed_marker = 0xec;
+inline constexpr std::uint8_t packed_version = 1;
+inline constexpr std::uint8_t signed_version = 2;
 
 /// One message per frame, or many.
 enum class Format : std::uint8_t { single, packed };
@@ -26,40 +30,45 @@ enum class Order : std::uint8_t { big, little };  ///< byte order of the COB-ID 
 /// Why a received frame is invalid.
 enum class Wrong : std::uint8_t {
     none,
-    cut,      ///< truncated
-    form,     ///< invalid message: length above 8, identifier out of range
+    cut,  ///< truncated
+    form,  ///< invalid message: length above 8, identifier out of range
     version,  ///< differs from the configured format, or an unsupported version
-    check,    ///< wrong check sequence
+    check,  ///< wrong check sequence
     not_signed,  ///< a key is configured, and the frame has no tag
-    tag,         ///< made with another key, or modified
+    tag,  ///< made with another key, or modified
 };
 
-/// Writes one message as the whole payload. Returns the bytes written, which the driver of the segment pads with zeros; 0 when the frame is
-/// not a classic one. [realtime]
+/// Writes one message as the whole payload. Returns the bytes written, which the driver of the
+/// segment pads with zeros; 0 when the frame is not a classic one. [realtime]
 std::size_t put_single(const Frame&, Order, std::span<std::uint8_t> room) noexcept;
 /// Reads a single message. [realtime]
 Wrong get_single(std::span<const std::uint8_t> payload, Order, Frame&) noexcept;
 
-/// Appends one message to a packed payload. Returns the bytes written; 0 when the frame is not a classic one or does not fit. [realtime]
+/// Appends one message to a packed payload. Returns the bytes written; 0 when the frame is not a
+/// classic one or does not fit. [realtime]
 std::size_t put_packed(const Frame&, std::span<std::uint8_t> room) noexcept;
 
 /// Sender and sequence of a packed frame.
 struct Stamp {
-    std::uint16_t session = 0;   ///< drawn by the sender when it opens its link
+    std::uint16_t session = 0;  ///< drawn by the sender when it opens its link
     std::uint16_t sequence = 0;
 };
 
-/// Writes the header of a packed payload before messages already in place. `whole` is the Ethernet frame from its destination to the
-/// end of the last message. [realtime]
+/// Writes the header of a packed payload before messages already in place. `whole` is the Ethernet
+/// frame from its destination to the end of the last message. [realtime]
 void close_packed(std::span<std::uint8_t> whole, std::uint8_t messages, Stamp) noexcept;
 
-/// Do the same in two steps: begin_packed() writes the header and leaves space for the fields that finish_packed() writes when the frame
-/// is sent: in a signed frame, `counter_bytes` after the header and `tag_bytes` after the last message. [realtime]
-void begin_packed(std::span<std::uint8_t> whole, std::uint8_t messages, std::uint16_t session, bool is_signed) noexcept;
-void finish_packed(std::span<std::uint8_t> whole, std::uint16_t sequence, std::uint64_t counter, const Key*) noexcept;
+/// Do the same in two steps: begin_packed() writes the header and leaves space for the fields that
+/// finish_packed() writes when the frame is sent: in a signed frame, `counter_bytes` after the
+/// header and `tag_bytes` after the last message. [realtime]
+void begin_packed(std::span<std::uint8_t> whole, std::uint8_t messages, std::uint16_t session,
+                  bool is_signed) noexcept;
+void finish_packed(std::span<std::uint8_t> whole, std::uint16_t sequence, std::uint64_t counter,
+                   const Key*) noexcept;
 /// Bit of the session set in frames of only SDO, heartbeats and LSS.
 inline constexpr std::uint16_t services_alone = 0x8000;
-bool is_service(std::span<const std::uint8_t> packed_whole) noexcept;  ///< Returns true for such a frame. [any]
+/// Returns true for such a frame. [any]
+bool is_service(std::span<const std::uint8_t> packed_whole) noexcept;
 
 /// Reads a packed frame: first open(), then next() for each message.
 class Unpacker {
@@ -73,12 +82,14 @@ public:
 
 private:
     std::span<const std::uint8_t> rest_;
-    unsigned messages_ = 0, left_ = 0;
+    unsigned messages_ = 0;
+    unsigned left_ = 0;
     std::uint64_t counter_ = 0;
     Stamp stamp_;
 };
 
-/// Continues the CRC-16 `crc` (polynomial 0x1021, most significant bit first, initial value 0xFFFF). [realtime]
+/// Continues the CRC-16 `crc` (polynomial 0x1021, most significant bit first, initial value
+/// 0xFFFF). [realtime]
 std::uint16_t crc16(std::span<const std::uint8_t>, std::uint16_t crc = 0xffff) noexcept;
 
 }  // namespace hal::can::cane

@@ -16,73 +16,117 @@ namespace hal::can::cane {
 
 namespace {
 
-constexpr std::string_view segment_keys[] = {"mac", "speed", "policy", "spin", "promiscuous", "forward", "noise"};
-constexpr std::string_view own_keys[] = {"format", "order", "slot", "priority", "learn", "to", "master", "also", "key"};
+constexpr std::string_view segment_keys[] = {"mac",         "speed",   "policy", "spin",
+                                             "promiscuous", "forward", "noise"};
+constexpr std::string_view own_keys[] = {"format", "order",  "slot", "priority", "learn",
+                                         "to",     "master", "also", "key"};
 
-bool is_in(const auto& keys, std::string_view key) { return std::find(std::begin(keys), std::end(keys), key) != std::end(keys); }
+bool is_in(const auto& keys, std::string_view key) {
+    return std::find(std::begin(keys), std::end(keys), key) != std::end(keys);
+}
 
 std::optional<unsigned> number(std::string_view text, unsigned least, unsigned most) {
     unsigned value = 0;
     const auto [end, wrong] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (wrong != std::errc{} || end != text.data() + text.size() || value < least || value > most) return std::nullopt;
+    if (wrong != std::errc{} || end != text.data() + text.size() || value < least || value > most) {
+        return std::nullopt;
+    }
     return value;
 }
 
 std::string is(std::string_view key, std::string_view value, std::string_view write) {
-    return "invalid " + std::string(key) + " '" + std::string(value) + "'; write " + std::string(write);
+    return "invalid " + std::string(key) + " '" + std::string(value) + "'; write " +
+           std::string(write);
 }
 
 /// Reads the key of a segment: 32 hexadecimal digits in a file that only its owner may read.
 std::string read_key(const std::string& file, std::optional<Key>& key) {
     struct stat about{};
-    if (::stat(file.c_str(), &about) != 0) return "cannot read key file '" + file + "': " + std::strerror(errno);
-    if ((about.st_mode & 077) != 0) return "key file '" + file + "' is readable by others; type: chmod 600 " + file;
+    if (::stat(file.c_str(), &about) != 0) {
+        return "cannot read key file '" + file + "': " + std::strerror(errno);
+    }
+    if ((about.st_mode & 077) != 0) {
+        return "key file '" + file + "' is readable by others; type: chmod 600 " + file;
+    }
     std::ifstream in(file);
     std::string text, more;
-    if (!S_ISREG(about.st_mode) || !(in >> text)) return "cannot read key file '" + file + "', or it is empty";
+    if (!S_ISREG(about.st_mode) || !(in >> text)) {
+        return "cannot read key file '" + file + "', or it is empty";
+    }
     std::array<std::uint8_t, 16> bytes{};
     bool good = text.size() == 32 && !(in >> more);
     for (std::size_t n = 0; good && n < 16; ++n) {
-        const auto [end, wrong] = std::from_chars(text.data() + 2 * n, text.data() + 2 * n + 2, bytes[n], 16);
+        const auto [end, wrong] =
+            std::from_chars(text.data() + 2 * n, text.data() + 2 * n + 2, bytes[n], 16);
         good = wrong == std::errc{} && end == text.data() + 2 * n + 2;
     }
-    if (!good)
-        return "invalid key file '" + file + "': expected 32 hexadecimal digits; to create one: (umask 077; openssl rand -hex 16 > " + file +
-               ")";
+    if (!good) {
+        return "invalid key file '" + file +
+               "': expected 32 hexadecimal digits; to create one: (umask 077; openssl rand -hex 16 "
+               "> " +
+               file + ")";
+    }
     key.emplace();
-    for (unsigned n = 0; n < 16; ++n) (*key)[n / 8] |= std::uint64_t{bytes[n]} << 8 * (n % 8);
+    for (unsigned n = 0; n < 16; ++n) {
+        (*key)[n / 8] |= std::uint64_t{bytes[n]} << 8 * (n % 8);
+    }
     return {};
 }
 
 std::string apply(std::string_view key, std::string_view value, Settings& s, bool reads_key) {
-    const auto one_of = [&](std::string_view first, std::string_view second, auto set) -> std::string {
-        if (value != first && value != second) return is(key, value, std::string(first) + " or " + std::string(second));
+    const auto one_of = [&](std::string_view first, std::string_view second,
+                            auto set) -> std::string {
+        if (value != first && value != second) {
+            return is(key, value, std::string(first) + " or " + std::string(second));
+        }
         set(value == first);
         return {};
     };
-    if (key == "format") return one_of("single", "packed", [&](bool first) { s.format = first ? Format::single : Format::packed; });
-    if (key == "order") return one_of("big", "little", [&](bool first) { s.order = first ? Order::big : Order::little; });
-    if (key == "to") return one_of("all", "master", [&](bool first) { s.produced_to_master = !first; });
-    if (key == "learn") return one_of("0", "1", [&](bool first) { s.learns = !first; });
+    if (key == "format") {
+        return one_of("single", "packed",
+                      [&](bool first) { s.format = first ? Format::single : Format::packed; });
+    }
+    if (key == "order") {
+        return one_of("big", "little",
+                      [&](bool first) { s.order = first ? Order::big : Order::little; });
+    }
+    if (key == "to") {
+        return one_of("all", "master", [&](bool first) { s.produced_to_master = !first; });
+    }
+    if (key == "learn") {
+        return one_of("0", "1", [&](bool first) { s.learns = !first; });
+    }
     if (key == "slot" || key == "priority") {
         const unsigned most = key == "slot" ? 255 : 30;
         const auto n = number(value, 0, most);
         if (!n) return is(key, value, "a whole number up to " + std::to_string(most));
-        if (key == "slot") s.slot = n;
-        else s.priority = *n;
+        if (key == "slot") {
+            s.slot = n;
+        } else {
+            s.priority = *n;
+        }
         return {};
     }
-    if (key == "key") return reads_key ? read_key(std::string(value), s.key) : std::string{};
+    if (key == "key") {
+        return reads_key ? read_key(std::string(value), s.key) : std::string{};
+    }
     const auto address = ethernet::parse_address(value);
     if (key == "master" || key == "also") {
-        if (!address || ((*address)[0] & 1) != 0) return is(key, value, "the address of a station, as in 02:00:00:00:00:05");
-        if (key == "master") s.master = address;
-        else s.also.push_back(*address);
+        if (!address || ((*address)[0] & 1) != 0) {
+            return is(key, value, "the address of a station, as in 02:00:00:00:00:05");
+        }
+        if (key == "master") {
+            s.master = address;
+        } else {
+            s.also.push_back(*address);
+        }
         return {};
     }
     const auto id = number(key.substr(4), 1, 127);
     if (!id) return "invalid node '" + std::string(key) + "'; write node5=02:00:00:00:00:05";
-    if (!address || ((*address)[0] & 1) != 0) return is(key, value, "the address of a station, as in 02:00:00:00:00:05");
+    if (!address || ((*address)[0] & 1) != 0) {
+        return is(key, value, "the address of a station, as in 02:00:00:00:00:05");
+    }
     s.nodes.emplace_back(*id, *address);
     return {};
 }
@@ -91,32 +135,46 @@ std::string apply(std::string_view key, std::string_view value, Settings& s, boo
 
 std::string own_options() {
     std::string text;
-    for (const auto key : own_keys) text += std::string(key) + ", ";
-    for (const auto key : segment_keys) text += std::string(key) + ", ";
+    for (const auto key : own_keys) {
+        text += std::string(key) + ", ";
+    }
+    for (const auto key : segment_keys) {
+        text += std::string(key) + ", ";
+    }
     return text + "node5";
 }
 
-bool is_own_option(std::string_view key) { return is_in(own_keys, key) || is_in(segment_keys, key) || key.starts_with("node"); }
+bool is_own_option(std::string_view key) {
+    return is_in(own_keys, key) || is_in(segment_keys, key) || key.starts_with("node");
+}
 
 std::string parse(std::string_view place, Settings& s, bool reads_key) {
     const auto question = std::min(place.find('?'), place.size());
     s.segment = place.substr(0, question);
-    if (s.segment.empty()) return "missing interface; write cane:enp3s0, or cane:sim:bus0 for a segment in memory";
-    if (s.segment.find(':') == std::string::npos) s.segment.insert(0, "eth:");
+    if (s.segment.empty()) {
+        return "missing interface; write cane:enp3s0, or cane:sim:bus0 for a segment in memory";
+    }
+    if (s.segment.find(':') == std::string::npos) {
+        s.segment.insert(0, "eth:");
+    }
     auto rest = place.substr(std::min(question + 1, place.size()));
     while (!rest.empty()) {
         const auto end = std::min(rest.find('&'), rest.size());
         const auto item = rest.substr(0, end);
         rest.remove_prefix(std::min(end + 1, rest.size()));
         const auto equals = std::min(item.find('='), item.size());
-        const auto key = item.substr(0, equals), value = item.substr(std::min(equals + 1, item.size()));
+        const auto key = item.substr(0, equals);
+
+        const auto value = item.substr(std::min(equals + 1, item.size()));
         if (is_in(segment_keys, key)) {
             s.segment_options += (s.segment_options.empty() ? '?' : '&') + std::string(item);
         } else if (auto problem = apply(key, value, s, reads_key); !problem.empty()) {
             return problem;
         }
     }
-    if (s.key && s.format == Format::single) return "key= signs packed frames only; remove format=single";
+    if (s.key && s.format == Format::single) {
+        return "key= signs packed frames only; remove format=single";
+    }
     return {};
 }
 

@@ -17,17 +17,20 @@ struct Settings {
     std::string segment_options;      ///< "?mac=…", or empty
     Format format = Format::packed;
     Order order = Order::big;
-    std::optional<unsigned> slot;     ///< slot of the discipline on the segment; none: frames are sent at once
-    unsigned priority = 8;            ///< priority of process data in the slot; SDO, heartbeats and LSS have the next lower one
+    /// slot of the discipline on the segment; none: frames are sent at once
+    std::optional<unsigned> slot;
+    /// priority of process data in the slot; SDO, heartbeats and LSS have the next lower one
+    unsigned priority = 8;
     bool learns = true;
     bool produced_to_master = false;
     std::vector<std::pair<unsigned, ethernet::Address>> nodes;
     std::optional<ethernet::Address> master;  ///< the only station that may command; none: learnt
-    std::vector<ethernet::Address> also;      ///< further stations that may command
-    std::optional<Key> key;                   ///< signs all frames
+    std::vector<ethernet::Address> also;  ///< further stations that may command
+    std::optional<Key> key;  ///< signs all frames
 };
 
-/// Parses `place` and sets the segment in any case. Returns the problem, or "". With `read_key` it also reads the file of `key=`. [setup]
+/// Parses `place` and sets the segment in any case. Returns the problem, or "". With `read_key` it
+/// also reads the file of `key=`. [setup]
 std::string parse(std::string_view place, Settings&, bool read_key = true);
 
 }  // namespace hal::can::cane

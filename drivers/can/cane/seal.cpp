@@ -12,10 +12,12 @@ namespace hal::can::cane {
 
 namespace {
 
-/// Grows with every frame of this process, and from one start to the next unless the clock is set back.
+/// Grows with every frame of this process, and from one start to the next unless the clock is set
+/// back.
 std::uint64_t next_counter(bool simulated) noexcept {
     static std::atomic<std::uint64_t> last{0};
-    const auto clock = simulated ? std::uint64_t{0} : static_cast<std::uint64_t>(link::clock_ns(CLOCK_REALTIME));
+    const auto clock =
+        simulated ? std::uint64_t{0} : static_cast<std::uint64_t>(link::clock_ns(CLOCK_REALTIME));
     auto before = last.load(std::memory_order_relaxed);
     for (;;) {
         const auto next = std::max(before + 1, clock);
@@ -32,23 +34,32 @@ ethernet::Address destination(std::span<const std::uint8_t> frame) noexcept {
 }  // namespace
 
 void Seal::leaves(std::span<std::uint8_t> frame) noexcept {
-    finish_packed(frame, sequences_of(frame).next(destination(frame)), key_ ? next_counter(simulated_) : 0, key_ ? &*key_ : nullptr);
+    finish_packed(frame, sequences_of(frame).next(destination(frame)),
+                  key_ ? next_counter(simulated_) : 0, key_ ? &*key_ : nullptr);
 }
 
-void Seal::stayed(std::span<const std::uint8_t> frame) noexcept { sequences_of(frame).take_back(destination(frame)); }
+void Seal::stayed(std::span<const std::uint8_t> frame) noexcept {
+    sequences_of(frame).take_back(destination(frame));
+}
 
 std::shared_ptr<Seal> Seal::take(const std::optional<Key>& key, bool simulated) {
     static std::mutex mutex;
     static std::vector<std::shared_ptr<Seal>> all;
-    constexpr long kept = 64;  // frames wait for a few cycles at most, so the seal returned first has none waiting
+    // frames wait for a few cycles at most, so the seal returned first has none waiting
+    constexpr long kept = 64;
     const std::lock_guard lock(mutex);
     const auto is_free = [](const auto& s) { return s.use_count() == 1; };
     const auto oldest = std::find_if(all.begin(), all.end(), is_free);
-    if (oldest == all.end() || std::count_if(all.begin(), all.end(), is_free) < kept) all.push_back(std::make_shared<Seal>());
-    else std::rotate(oldest, oldest + 1, all.end());
+    if (oldest == all.end() || std::count_if(all.begin(), all.end(), is_free) < kept) {
+        all.push_back(std::make_shared<Seal>());
+    } else {
+        std::rotate(oldest, oldest + 1, all.end());
+    }
     Seal& s = *all.back();
-    s.process_.clear(), s.service_.clear();
-    s.key_ = key, s.simulated_ = simulated;
+    s.process_.clear();
+    s.service_.clear();
+    s.key_ = key;
+    s.simulated_ = simulated;
     return all.back();
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Captures of a CAN bus: link type 227 (CAN frames, identifier big-endian) or 113 (the same after a 16-byte header of the interface).
+// Captures of a CAN bus: link type 227 (CAN frames, identifier big-endian) or 113 (the same after a
+// 16-byte header of the interface).
 #include "link/capture.hpp"
 
 #include <algorithm>
@@ -29,7 +30,8 @@ bool parse_packet(std::string_view packet, unsigned link, Frame& f) {
     } else {
         flexible = packet.size() > 16 || (byte(5) & 4) != 0 || byte(4) > 8;
     }
-    const std::uint32_t id = std::uint32_t{byte(0)} << 24 | byte(1) << 16U | byte(2) << 8U | byte(3);
+    const std::uint32_t id =
+        std::uint32_t{byte(0)} << 24 | byte(1) << 16U | byte(2) << 8U | byte(3);
     f.fd = flexible;
     f.error = (id & 0x20000000U) != 0;
     f.extended = !f.error && (id & 0x80000000U) != 0;
@@ -39,13 +41,16 @@ bool parse_packet(std::string_view packet, unsigned link, Frame& f) {
     f.bit_rate_switch = flexible && (byte(5) & 1) != 0;
     f.error_state = flexible && (byte(5) & 2) != 0;
     if (f.length > 64 || (!f.remote && packet.size() < 8U + f.length)) return false;
-    if (!f.remote && f.length != 0) std::memcpy(f.data.data(), packet.data() + 8, f.length);
+    if (!f.remote && f.length != 0) {
+        std::memcpy(f.data.data(), packet.data() + 8, f.length);
+    }
     return f.error ? f.length <= 8 : f.valid();
 }
 
 class LogRecorder final : public Recorder {
 public:
-    LogRecorder(const std::string& file, std::string_view channel) : file_(file), channel_(channel) {}
+    LogRecorder(const std::string& file, std::string_view channel)
+        : file_(file), channel_(channel) {}
     bool write(const Frame& f) override { return file_.put(log_line(f, channel_) + "\n"); }
     bool flush() override { return file_.flush(); }
     int error() const { return file_.error(); }
@@ -57,15 +62,22 @@ private:
 
 class PcapngRecorder final : public Recorder {
 public:
-    PcapngRecorder(const std::string& file, std::string_view channel) : writer_(file, link_can, channel) {}
+    PcapngRecorder(const std::string& file, std::string_view channel)
+        : writer_(file, link_can, channel) {}
     bool write(const Frame& f) override {
         std::string s;
-        const auto id = f.id | (f.extended ? 0x80000000U : 0U) | (f.remote ? 0x40000000U : 0U) | (f.error ? 0x20000000U : 0U);
-        for (int shift = 24; shift >= 0; shift -= 8) s += static_cast<char>(id >> shift & 0xff);
+        const auto id = f.id | (f.extended ? 0x80000000U : 0U) | (f.remote ? 0x40000000U : 0U) |
+                        (f.error ? 0x20000000U : 0U);
+        for (int shift = 24; shift >= 0; shift -= 8) {
+            s += static_cast<char>(id >> shift & 0xff);
+        }
         s += static_cast<char>(f.length);
-        s += static_cast<char>((f.bit_rate_switch ? 1 : 0) | (f.error_state ? 2 : 0) | (f.fd ? 4 : 0));
+        s += static_cast<char>((f.bit_rate_switch ? 1 : 0) | (f.error_state ? 2 : 0) |
+                               (f.fd ? 4 : 0));
         s += std::string(2, '\0');
-        for (const auto b : f.bytes()) s += static_cast<char>(b);
+        for (const auto b : f.bytes()) {
+            s += static_cast<char>(b);
+        }
         return writer_.write(f.time_ns, s);
     }
     bool flush() override { return writer_.flush(); }
@@ -89,7 +101,8 @@ Capture parse_capture(std::string_view bytes) {
     } else {
         capture.problem = parse_log(bytes, capture.frames);
     }
-    std::stable_sort(capture.frames.begin(), capture.frames.end(), [](const Frame& a, const Frame& b) { return a.time_ns < b.time_ns; });
+    std::stable_sort(capture.frames.begin(), capture.frames.end(),
+                     [](const Frame& a, const Frame& b) { return a.time_ns < b.time_ns; });
     return capture;
 }
 
@@ -102,7 +115,8 @@ Capture read_capture(const std::string& file) {
 namespace {
 
 template <class Made>
-std::unique_ptr<Recorder> made(const std::string& file, std::string_view channel, std::string& problem) {
+std::unique_ptr<Recorder> made(const std::string& file, std::string_view channel,
+                               std::string& problem) {
     auto recorder = std::make_unique<Made>(file, channel);
     if (recorder->error() == 0) return recorder;
     problem = "cannot write " + file + ": " + std::strerror(recorder->error());
@@ -111,7 +125,8 @@ std::unique_ptr<Recorder> made(const std::string& file, std::string_view channel
 
 }  // namespace
 
-std::unique_ptr<Recorder> record(const std::string& file, std::string_view channel, std::string& problem) {
+std::unique_ptr<Recorder> record(const std::string& file, std::string_view channel,
+                                 std::string& problem) {
     if (file.ends_with(".pcapng")) return made<PcapngRecorder>(file, channel, problem);
     return made<LogRecorder>(file, channel, problem);
 }

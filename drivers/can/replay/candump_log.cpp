@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
-// The candump log format: `(SECONDS.FRACTION) CHANNEL ID#DATA`, remote frames `ID#R` or `ID#R4`, FD `ID##FLAGSDATA`. Three digits are a
-// standard identifier, eight an extended one, or an error frame if bit 29 is set. The time may be a date, as `candump -L -tA` writes it; a direction
-// R or T may follow (`candump -x`, python-can); bytes may be separated by dots, and a raw DLC of 9 to 15 may follow eight of them (`_E`).
+// The candump log format: `(SECONDS.FRACTION) CHANNEL ID#DATA`, remote frames `ID#R` or `ID#R4`, FD
+// `ID##FLAGSDATA`. Three digits are a standard identifier, eight an extended one, or an error frame
+// if bit 29 is set. The time may be a date, as `candump -L -tA` writes it; a direction R or T may
+// follow (`candump -x`, python-can); bytes may be separated by dots, and a raw DLC of 9 to 15 may
+// follow eight of them (`_E`).
 // The terminal format is `(TIME)  CHANNEL  [RX|TX - -]  ID  [LENGTH]  BYTES`, with the time only for `candump -t`.
 #include <algorithm>
 #include <array>
@@ -27,15 +29,22 @@ bool hex(std::string_view text, std::uint32_t& value) {
 
 /// Parses the fraction; digits after the ninth are ignored.
 bool time_of(std::string_view text, std::int64_t& ns) {
-    std::int64_t whole = 0, fraction = 0, unit = 1'000'000'000;
-    bool point = false, digits = false;
+    std::int64_t whole = 0;
+    std::int64_t fraction = 0;
+    std::int64_t unit = 1'000'000'000;
+    bool point = false;
+    bool digits = false;
     for (const char c : text) {
         if (c == '.' && !point) {
             point = true;
         } else if (c >= '0' && c <= '9') {
             digits = true;
-            if (!point) whole = whole * 10 + (c - '0');
-            else if (unit > 1) unit /= 10, fraction += (c - '0') * unit;
+            if (!point) {
+                whole = whole * 10 + (c - '0');
+            } else if (unit > 1) {
+                unit /= 10;
+                fraction += (c - '0') * unit;
+            }
             if (whole > 9'000'000'000) return false;
         } else {
             return false;
@@ -48,10 +57,11 @@ bool time_of(std::string_view text, std::int64_t& ns) {
 /// Parses `2026-11-28 18:00:00.249713`, which candump writes in the time zone of its machine.
 bool date_of(std::string_view text, std::int64_t& ns) {
     std::tm local{};
-    int     size = 0;
+    int size = 0;
     const std::string copy(text);
-    const int fields = std::sscanf(copy.c_str(), "%4d-%2d-%2d %2d:%2d:%2d%n", &local.tm_year, &local.tm_mon, &local.tm_mday, &local.tm_hour,
-                                   &local.tm_min, &local.tm_sec, &size);
+    const int fields =
+        std::sscanf(copy.c_str(), "%4d-%2d-%2d %2d:%2d:%2d%n", &local.tm_year, &local.tm_mon,
+                    &local.tm_mday, &local.tm_hour, &local.tm_min, &local.tm_sec, &size);
     if (fields != 6 || local.tm_year < 1970) return false;
     local.tm_year -= 1900;
     local.tm_mon -= 1;
@@ -59,7 +69,10 @@ bool date_of(std::string_view text, std::int64_t& ns) {
     const std::time_t seconds = std::mktime(&local);
     std::int64_t fraction = 0;
     constexpr std::time_t max_seconds = 9'000'000'000;  // as in time_of()
-    if (seconds < 0 || seconds > max_seconds || !time_of("0" + copy.substr(static_cast<std::size_t>(size)), fraction)) return false;
+    if (seconds < 0 || seconds > max_seconds ||
+        !time_of("0" + copy.substr(static_cast<std::size_t>(size)), fraction)) {
+        return false;
+    }
     ns = std::int64_t{seconds} * 1'000'000'000 + fraction;
     return true;
 }
@@ -67,7 +80,9 @@ bool date_of(std::string_view text, std::int64_t& ns) {
 /// Takes `(TIME)` from the begin of a line.
 bool take_time(std::string_view& line, std::int64_t& ns) {
     const auto close = line.find(')');
-    if (line.empty() || line[0] != '(' || close == line.npos) return false;
+    if (line.empty() || line[0] != '(' || close == line.npos) {
+        return false;
+    }
     const std::string_view text = line.substr(1, close - 1);
     line.remove_prefix(close + 1);
     return text.find(' ') == text.npos ? time_of(text, ns) : date_of(text, ns);
@@ -78,18 +93,23 @@ bool set_identifier(std::string_view text, Frame& f) {
     if ((text.size() != 3 && text.size() != 8) || !hex(text, id)) return false;
     f.extended = text.size() == 8;
     f.error = f.extended && (id & 0x20000000U) != 0;
-    if (f.error) f.extended = false;
+    if (f.error) {
+        f.extended = false;
+    }
     f.id = f.error ? id & 0x1fffffffU : id;
     return true;
 }
 
 /// Parses `R`, `R4` or `R8_E`.
 bool parse_remote(std::string_view text, Frame& f) {
-    std::uint32_t length = 0, code = 0;
+    std::uint32_t length = 0;
+    std::uint32_t code = 0;
     f.remote = true;
     text.remove_prefix(1);
     const auto raw = text.find('_');
-    if (raw != text.npos && (!hex(text.substr(raw + 1), code) || text.size() != raw + 2)) return false;
+    if (raw != text.npos && (!hex(text.substr(raw + 1), code) || text.size() != raw + 2)) {
+        return false;
+    }
     text = text.substr(0, raw);
     if (text.size() > 1 || (!text.empty() && !hex(text, length))) return false;
     f.length = static_cast<std::uint8_t>(length);
@@ -99,8 +119,11 @@ bool parse_remote(std::string_view text, Frame& f) {
 bool parse_bytes(std::string_view text, Frame& f) {
     const std::size_t most = f.fd ? 64 : 8;
     while (!text.empty()) {
-        if (text[0] == '.') text.remove_prefix(1);  // a separator, as cansend accepts it
-        if (!f.fd && f.length == 8 && text.size() == 2 && text[0] == '_') return true;  // the raw DLC; it has no byte
+        if (text[0] == '.') {
+            text.remove_prefix(1);  // a separator, as cansend accepts it
+        }
+        // the raw DLC; it has no byte
+        if (!f.fd && f.length == 8 && text.size() == 2 && text[0] == '_') return true;
         std::uint32_t byte = 0;
         if (f.length >= most || text.size() < 2 || !hex(text.substr(0, 2), byte)) return false;
         f.data[f.length++] = static_cast<std::uint8_t>(byte);
@@ -133,7 +156,8 @@ std::string_view next_word(std::string_view& line) {
     return word;
 }
 
-/// The length in `[2]`, of an FD frame `[02]`, or the raw DLC in `{2}`. Returns false for anything else.
+/// The length in `[2]`, of an FD frame `[02]`, or the raw DLC in `{2}`. Returns false for anything
+/// else.
 bool parse_length(std::string_view word, bool& fd, std::uint32_t& length) {
     if (word.size() < 3 || word.size() > 4) return false;
     const bool raw = word.front() == '{' && word.back() == '}';
@@ -142,8 +166,12 @@ bool parse_length(std::string_view word, bool& fd, std::uint32_t& length) {
     std::int64_t ns = 0;
     if (raw && !hex(word.substr(1, word.size() - 2), length)) return false;
     if (!raw && !time_of(word.substr(1, word.size() - 2), ns)) return false;
-    if (!raw) length = static_cast<std::uint32_t>(ns / 1'000'000'000);
-    if (raw && length > 8) length = 8;
+    if (!raw) {
+        length = static_cast<std::uint32_t>(ns / 1'000'000'000);
+    }
+    if (raw && length > 8) {
+        length = 8;
+    }
     return length <= 64;
 }
 
@@ -163,7 +191,9 @@ Screen parse_screen_line(std::string_view line, Frame& f) {
         word = next_word(line);
     }
     std::uint32_t length = 0;
-    if (!set_identifier(word, f) || !parse_length(next_word(line), f.fd, length)) return Screen::other;
+    if (!set_identifier(word, f) || !parse_length(next_word(line), f.fd, length)) {
+        return Screen::other;
+    }
     if (!timed) return Screen::no_time;
     line.remove_prefix(std::min(line.find_first_not_of(' '), line.size()));
     if (line.starts_with("remote request")) {
@@ -173,7 +203,8 @@ Screen parse_screen_line(std::string_view line, Frame& f) {
     }
     for (std::uint32_t i = 0; i < length; ++i) {
         const std::string_view byte = next_word(line);
-        if (byte.size() != 2 || !parse_bytes(byte, f)) return Screen::not_hexadecimal;  // candump -i, -S
+        // candump -i, -S
+        if (byte.size() != 2 || !parse_bytes(byte, f)) return Screen::not_hexadecimal;
     }
     return f.error || f.valid() ? Screen::frame : Screen::other;
 }
@@ -182,24 +213,28 @@ Screen parse_screen_line(std::string_view line, Frame& f) {
 std::string plain(std::string_view line) {
     std::string text;
     for (std::size_t at = 0; at < line.size(); ++at) {
-        if (line[at] == '\x1b') at = std::min(line.find('m', at), line.size());
-        else
+        if (line[at] == '\x1b') {
+            at = std::min(line.find('m', at), line.size());
+        } else {
             text += line[at];
+        }
     }
-    while (!text.empty() && (text.back() == '\r' || text.back() == ' ')) text.pop_back();
+    while (!text.empty() && (text.back() == '\r' || text.back() == ' ')) {
+        text.pop_back();
+    }
     return text;
 }
 
 bool is_xl(std::string_view line) {
     const std::string_view frame = line.substr(line.rfind(' ') + 1);
-    const auto             first = frame.find('#');
+    const auto first = frame.find('#');
     return first == 5 && frame.find('#', first + 1) == first + 15;
 }
 
 struct OtherFormat {
     std::string_view begin;
-    const char*      name;
-    bool             converted;  // by python-can
+    const char* name;
+    bool converted;  // by python-can
 };
 
 constexpr std::array<OtherFormat, 9> other_formats{{
@@ -209,16 +244,20 @@ constexpr std::array<OtherFormat, 9> other_formats{{
     {"LOGG", "a Vector log (.blf)", true},
     {"MDF ", "a measurement file (.mf4)", true},
     {"SQLite format 3", "a database of python-can (.db)", true},
-    {"Timestamp: ", "the terminal output of python-can; record with: can_logger -f FILE.log", false},
+    {"Timestamp: ", "the terminal output of python-can; record with: can_logger -f FILE.log",
+     false},
     {"\x89MCAP", "an MCAP recording; hal replay and hal plot read it", false},
     {"time_s,", "a table of values; hal replay and hal plot read it", false},
 }};
 
 /// States which other format the text has; "" when it may be a log.
 std::string other_format(std::string_view text) {
-    for (const OtherFormat& format : other_formats)
-        if (text.starts_with(format.begin))
-            return std::string("not a candump log: it is ") + format.name + (format.converted ? "; convert it with: can_logconvert FILE FILE.log" : "");
+    for (const OtherFormat& format : other_formats) {
+        if (text.starts_with(format.begin)) {
+            return std::string("not a candump log: it is ") + format.name +
+                   (format.converted ? "; convert it with: can_logconvert FILE FILE.log" : "");
+        }
+    }
     return "";
 }
 
@@ -228,23 +267,38 @@ std::string log_line(const Frame& f, std::string_view channel) {
     char text[256];
     const auto time = f.time_ns > 0 ? f.time_ns : 0;
     // Always six digits: canplayer reads the digits after the point as microseconds.
-    const long long seconds = time / 1'000'000'000, microseconds = time % 1'000'000'000 / 1000;
+    const long long seconds = time / 1'000'000'000;
+    const long long microseconds = time % 1'000'000'000 / 1000;
     int size = std::snprintf(text, sizeof text, "(%010lld.%06lld) ", seconds, microseconds);
     std::string line(text, static_cast<std::size_t>(size));
     line += channel;
-    size = std::snprintf(text, sizeof text, f.extended || f.error ? " %08X#" : " %03X#", f.id | (f.error ? 0x20000000U : 0U));
+    size = std::snprintf(text, sizeof text, f.extended || f.error ? " %08X#" : " %03X#",
+                         f.id | (f.error ? 0x20000000U : 0U));
     line.append(text, static_cast<std::size_t>(size));
-    if (f.fd) line += "#", line += static_cast<char>('0' + (f.bit_rate_switch ? 1 : 0) + (f.error_state ? 2 : 0));
-    if (f.remote) line += f.length == 0 ? "R" : "R" + std::to_string(f.length);
-    for (const auto b : f.bytes()) line += "0123456789ABCDEF"[b >> 4], line += "0123456789ABCDEF"[b & 15];
+    if (f.fd) {
+        line += "#";
+
+        line += static_cast<char>('0' + (f.bit_rate_switch ? 1 : 0) + (f.error_state ? 2 : 0));
+    }
+    if (f.remote) {
+        line += f.length == 0 ? "R" : "R" + std::to_string(f.length);
+    }
+    for (const auto b : f.bytes()) {
+        line += "0123456789ABCDEF"[b >> 4];
+        line += "0123456789ABCDEF"[b & 15];
+    }
     return line;
 }
 
 bool parse_log_line(std::string_view line, Frame& f) {
     f = {};
-    while (!line.empty() && (line.back() == '\r' || line.back() == ' ')) line.remove_suffix(1);
-    if (line.size() >= 2 && line[line.size() - 2] == ' ' && std::string_view("RTrt").find(line.back()) != std::string_view::npos)
+    while (!line.empty() && (line.back() == '\r' || line.back() == ' ')) {
+        line.remove_suffix(1);
+    }
+    if (line.size() >= 2 && line[line.size() - 2] == ' ' &&
+        std::string_view("RTrt").find(line.back()) != std::string_view::npos) {
         line.remove_suffix(2);  // direction, as candump -x and python-can write it
+    }
     if (!take_time(line, f.time_ns)) return false;
     const auto space = line.rfind(' ');
     return space != line.npos && space > 0 && parse_frame(line.substr(space + 1), f);
@@ -253,33 +307,44 @@ bool parse_log_line(std::string_view line, Frame& f) {
 std::string parse_log(std::string_view text, std::vector<Frame>& frames) {
     std::string problem = other_format(text);
     if (!problem.empty()) return problem;
-    // candump -tz writes the time since the first frame, and -td that since the last one, in the same form
+    // candump -tz writes the time since the first frame, and -td that since the last one, in the
+    // same form
     const bool since = text.substr(std::min(text.find('('), text.size())).starts_with("(000.");
-    bool       details = false;  // of an error frame, candump -e: lines that begin with a tab
+    bool details = false;  // of an error frame, candump -e: lines that begin with a tab
     for (std::size_t at = 0, number = 1; at < text.size(); ++number) {
         const auto end = std::min(text.find('\n', at), text.size());
         const std::string line = plain(text.substr(at, end - at));
         at = end + 1;
-        if (line.empty() || line.starts_with("DROPCOUNT: ") || (details && line[0] == '\t')) continue;
-        Frame      f;
+        if (line.empty() || line.starts_with("DROPCOUNT: ") || (details && line[0] == '\t')) {
+            continue;
+        }
+        Frame f;
         const bool logged = parse_log_line(line, f);
-        Screen     screen = logged ? Screen::other : parse_screen_line(line, f);
+        Screen screen = logged ? Screen::other : parse_screen_line(line, f);
         details = screen == Screen::frame && f.error;
         if (logged || screen == Screen::frame) {
             const bool back = since && !frames.empty() && f.time_ns < frames.back().time_ns;
             frames.push_back(f);
             if (!back || !problem.empty()) continue;
-            problem = "line " + std::to_string(number) + ": the time goes back: differences, as candump -td prints them; record with: candump -L";
+            problem = "line " + std::to_string(number) +
+                      ": the time goes back: differences, as candump -td prints them; record with: "
+                      "candump -L";
         }
         if (!problem.empty()) continue;
         problem = "line " + std::to_string(number) + ": ";
-        if (screen == Screen::no_time) problem += "terminal format of candump, without times; record with: candump -L, or candump -ta";
-        else if (screen == Screen::not_hexadecimal)
-            problem += "terminal format of candump, not with plain hexadecimal bytes; record with: candump -L";
-        else if (is_xl(line))
+        if (screen == Screen::no_time) {
+            problem +=
+                "terminal format of candump, without times; record with: candump -L, or candump "
+                "-ta";
+        } else if (screen == Screen::not_hexadecimal) {
+            problem +=
+                "terminal format of candump, not with plain hexadecimal bytes; record with: "
+                "candump -L";
+        } else if (is_xl(line)) {
             problem += "CAN XL frame; supported: classic and FD frames";
-        else
+        } else {
             problem += "invalid frame; expected `(1436509052.249713) can0 181#0102`";
+        }
     }
     return problem;
 }

@@ -11,20 +11,23 @@ namespace hal::can::scocan {
 
 namespace {
 
-/// Identifiers of CANopen that the discipline uses itself, and those in their place on the bus, from the unassigned range.
+/// Identifiers of CANopen that the discipline uses itself, and those in their place on the bus,
+/// from the unassigned range.
 struct Replaced {
     std::uint32_t here, there;
 };
 constexpr Replaced replaced[] = {{0x000, 0x77a}, {0x7e4, 0x77b}, {0x7e5, 0x77c}};
 
 std::uint32_t on_bus(std::uint32_t id) noexcept {
-    for (const auto& r : replaced)
+    for (const auto& r : replaced) {
         if (id == r.here) return r.there;
+    }
     return id;
 }
 std::uint32_t of_user(std::uint32_t id) noexcept {
-    for (const auto& r : replaced)
+    for (const auto& r : replaced) {
         if (id == r.there) return r.here;
+    }
     return id;
 }
 
@@ -38,17 +41,23 @@ Place parse(const std::string& text) {
     const auto question = std::min(text.find('?'), text.size());
     Place place{text.substr(0, question)};
     if (question == text.size()) return place;
-    const std::string option = text.substr(question + 1), value = option.substr(std::min(option.find('=') + 1, option.size()));
-    const auto [end, wrong] = std::from_chars(value.data(), value.data() + value.size(), place.slot);
-    if (wrong != std::errc{} || end != value.data() + value.size() || place.slot == 0 || place.slot > 255)
-        place.problem = "invalid slot '" + value + "'; write the number of a private slot of " + place.node +
-                        ", as in scocan:" + place.node + "?slot=3";
+    const std::string option = text.substr(question + 1);
+
+    const std::string value = option.substr(std::min(option.find('=') + 1, option.size()));
+    const auto [end, wrong] =
+        std::from_chars(value.data(), value.data() + value.size(), place.slot);
+    if (wrong != std::errc{} || end != value.data() + value.size() || place.slot == 0 ||
+        place.slot > 255) {
+        place.problem = "invalid slot '" + value + "'; write the number of a private slot of " +
+                        place.node + ", as in scocan:" + place.node + "?slot=3";
+    }
     return place;
 }
 
 Description description_of(const Place& place) {
     Description d;
-    d.address = "scocan:" + place.node + (place.slot == SlotFrame::any_slot ? "" : "?slot=" + std::to_string(place.slot));
+    d.address = "scocan:" + place.node +
+                (place.slot == SlotFrame::any_slot ? "" : "?slot=" + std::to_string(place.slot));
     d.transport = "time slots on CAN (SCoCAN)";
     d.in_slots = true;
     if (const auto exchange = slots_of(place.node)) {
@@ -62,7 +71,10 @@ Description description_of(const Place& place) {
 class SlotLink final : public FilteringLink {
 public:
     SlotLink(const Place& place, std::shared_ptr<SlotExchange> exchange, const Options& options)
-        : place_(place), options_(options), exchange_(std::move(exchange)), user_(options.send_capacity, options.receive_capacity) {
+        : place_(place),
+          options_(options),
+          exchange_(std::move(exchange)),
+          user_(options.send_capacity, options.receive_capacity) {
         description_ = description_of(place);
     }
     ~SlotLink() override { exchange_->remove(user_); }
@@ -73,7 +85,9 @@ public:
             Counting::add(counting_.dropped);
             return why;
         };
-        if (!frame.valid() || frame.fd || frame.extended || options_.listen_only) return drop(Sent::rejected);
+        if (!frame.valid() || frame.fd || frame.extended || options_.listen_only) {
+            return drop(Sent::rejected);
+        }
         if (state() == State::down) return drop(Sent::down);
         SlotFrame outgoing{frame, place_.slot};
         outgoing.frame.id = on_bus(frame.id);
@@ -100,9 +114,12 @@ public:
         s.state = state();
         return s;
     }
-    State state() const noexcept override { return exchange_->state.load(std::memory_order_relaxed); }
+    State state() const noexcept override {
+        return exchange_->state.load(std::memory_order_relaxed);
+    }
     bool wait(std::int64_t at_most_ns) override {
-        constexpr std::int64_t step_ns = 100'000;  // the node does not wake a waiting thread: that would cost its cycle a system call
+        // the node does not wake a waiting thread: that would cost its cycle a system call
+        constexpr std::int64_t step_ns = 100'000;
         for (; user_.incoming.size() == 0; at_most_ns -= step_ns) {
             if (at_most_ns <= 0) return false;
             const timespec pause{0, static_cast<long>(std::min(step_ns, at_most_ns))};
@@ -127,18 +144,28 @@ Description describe(const std::string& place) { return description_of(parse(pla
 
 Opened open(const std::string& text, const Options& options) {
     const Place place = parse(text);
-    if (place.node.empty()) return {nullptr, "missing name of the node; write scocan:motor"};
-    if (!place.problem.empty()) return {nullptr, place.problem};
+    if (place.node.empty()) {
+        return {nullptr, "missing name of the node; write scocan:motor"};
+    }
+    if (!place.problem.empty()) {
+        return {nullptr, place.problem};
+    }
     auto exchange = slots_of(place.node);
     if (!exchange) {
         std::string names;
-        for (const auto& name : offered_slots()) names += (names.empty() ? "" : ", ") + name;
+        for (const auto& name : offered_slots()) {
+            names += (names.empty() ? "" : ", ") + name;
+        }
         return {nullptr,
                 "no node '" + place.node + "' in this process; " +
-                    (names.empty() ? "load it before: loadrt scocan config=FILE.scocan node=" + place.node : "nodes are " + names)};
+                    (names.empty()
+                         ? "load it before: loadrt scocan config=FILE.scocan node=" + place.node
+                         : "nodes are " + names)};
     }
     auto link = std::make_unique<SlotLink>(place, std::move(exchange), options);
-    if (!link->join()) return {nullptr, "node '" + place.node + "' has 16 links already"};
+    if (!link->join()) {
+        return {nullptr, "node '" + place.node + "' has 16 links already"};
+    }
     return {std::move(link), {}};
 }
 

@@ -22,7 +22,8 @@ Registry& registry() {
     return all;
 }
 
-/// Adds to a counter that only the pump writes: a locked addition would cost more than the rest of a delivery.
+/// Adds to a counter that only the pump writes: a locked addition would cost more than the rest of
+/// a delivery.
 void count(std::atomic<std::uint64_t>& counter, std::uint64_t more = 1) noexcept {
     counter.store(counter.load(std::memory_order_relaxed) + more, std::memory_order_relaxed);
 }
@@ -30,22 +31,29 @@ void count(std::atomic<std::uint64_t>& counter, std::uint64_t more = 1) noexcept
 }  // namespace
 
 Bus::Bus(std::string its_name, std::uint32_t rate, std::uint32_t fast, bool has_fd)
-    : name(std::move(its_name)), bit_rate(rate == unlimited ? 0 : rate), data_rate(fast), fd(has_fd) {
+    : name(std::move(its_name)),
+      bit_rate(rate == unlimited ? 0 : rate),
+      data_rate(fast),
+      fd(has_fd) {
     nodes.reserve(64);
     disturbances.reserve(64);
 }
 
-std::shared_ptr<Bus> Bus::find(const std::string& name, const Options& options, std::string& problem) {
+std::shared_ptr<Bus> Bus::find(const std::string& name, const Options& options,
+                               std::string& problem) {
     Registry& all = registry();
     const std::lock_guard lock(all.mutex);
     auto& known = all.buses[name];
     if (auto bus = known.lock()) {
         const auto wanted = options.bit_rate == unlimited ? 0 : options.bit_rate;
-        if (options.bit_rate != 0 && wanted != bus->bit_rate)
-            problem = "the bus already runs at " + (bus->bit_rate == 0 ? "no bit rate" : std::to_string(bus->bit_rate) + " bit/s") +
-                      "; use the same bitrate everywhere, or give it in one place only";
-        else if (options.fd && !bus->fd)
+        if (options.bit_rate != 0 && wanted != bus->bit_rate) {
+            problem =
+                "the bus already runs at " +
+                (bus->bit_rate == 0 ? "no bit rate" : std::to_string(bus->bit_rate) + " bit/s") +
+                "; use the same bitrate everywhere, or give it in one place only";
+        } else if (options.fd && !bus->fd) {
             problem = "the bus was opened without CAN FD; write sim:" + name + "?fd everywhere";
+        }
         return problem.empty() ? bus : nullptr;
     }
     const auto rate = options.bit_rate != 0 ? options.bit_rate : 1'000'000U;
@@ -56,16 +64,23 @@ std::shared_ptr<Bus> Bus::find(const std::string& name, const Options& options, 
 }
 
 Bus::Hold::Hold(Bus& held) noexcept : bus(held) {
-    while (bus.pumping_.test_and_set(std::memory_order_acquire)) std::this_thread::yield();
+    while (bus.pumping_.test_and_set(std::memory_order_acquire)) {
+        std::this_thread::yield();
+    }
 }
 Bus::Hold::~Hold() { bus.pumping_.clear(std::memory_order_release); }
 
 void Bus::add(Node& node) {
     const Hold hold(*this);
     int number = 0;  // the lowest free number: a program always gets the same numbers
-    while (std::any_of(nodes.begin(), nodes.end(), [&](const Node* n) { return n->number == number; })) ++number;
+    while (std::any_of(nodes.begin(), nodes.end(),
+                       [&](const Node* n) { return n->number == number; })) {
+        ++number;
+    }
     node.number = number;
-    nodes.insert(std::upper_bound(nodes.begin(), nodes.end(), &node, [](auto* a, auto* b) { return a->number < b->number; }), &node);
+    nodes.insert(std::upper_bound(nodes.begin(), nodes.end(), &node,
+                                  [](auto* a, auto* b) { return a->number < b->number; }),
+                 &node);
 }
 
 void Bus::remove(std::unique_ptr<Node> node) {
@@ -84,12 +99,18 @@ void Bus::remove(std::unique_ptr<Node> node) {
 
 void Bus::pump(std::int64_t now) noexcept {
     auto latest = latest_.load(std::memory_order_relaxed);
-    while (now > latest && !latest_.compare_exchange_weak(latest, now, std::memory_order_relaxed)) {}
-    if (now == unclocked) now = latest;
+    while (now > latest && !latest_.compare_exchange_weak(latest, now, std::memory_order_relaxed)) {
+    }
+    if (now == unclocked) {
+        now = latest;
+    }
     if (bit_rate != 0 && now <= worked_until_.load(std::memory_order_relaxed)) return;
     if (now == INT64_MIN || pumping_.test_and_set(std::memory_order_acquire)) return;
-    if (bit_rate != 0) work(now);
-    else recover(now);
+    if (bit_rate != 0) {
+        work(now);
+    } else {
+        recover(now);
+    }
     pumping_.clear(std::memory_order_release);
 }
 
@@ -98,7 +119,8 @@ void Bus::sent(std::int64_t now) noexcept {
     calls_.fetch_add(1, std::memory_order_seq_cst);
     for (;;) {
         const auto seen = calls_.load(std::memory_order_seq_cst);
-        if (pumping_.test_and_set(std::memory_order_seq_cst)) return;  // the thread that works now checks again afterwards
+        // the thread that works now checks again afterwards
+        if (pumping_.test_and_set(std::memory_order_seq_cst)) return;
         work_untimed(now);
         pumping_.clear(std::memory_order_seq_cst);
         if (calls_.load(std::memory_order_seq_cst) == seen) return;
@@ -108,7 +130,9 @@ void Bus::sent(std::int64_t now) noexcept {
 void Bus::recover(std::int64_t now) noexcept {
     for (Node* n : nodes) {
         if (!n->off) continue;
-        if (n->wants_restart.exchange(false)) n->back_at = std::min(n->back_at, now + bits(128 * 11));
+        if (n->wants_restart.exchange(false)) {
+            n->back_at = std::min(n->back_at, now + bits(128 * 11));
+        }
         if (n->back_at > now) continue;
         n->off = false;
         n->tec = n->rec = 0;
@@ -125,12 +149,20 @@ std::int64_t Bus::earliest() noexcept {
     std::int64_t first = INT64_MAX;
     for (Node* n : nodes) {
         if (n->off) {
-            while (n->outgoing.front() != nullptr) n->outgoing.drop(), count(n->thrown_away);
+            while (n->outgoing.front() != nullptr) {
+                n->outgoing.drop();
+                count(n->thrown_away);
+            }
             continue;
         }
-        if (const Frame* f = n->outgoing.front()) first = std::min(first, std::max(f->time_ns, n->hold_until));
-        else if (n->leaving) n->cut.store(true, std::memory_order_relaxed);
-        if (n->babble_period > 0 && !n->cut.load(std::memory_order_relaxed)) first = std::min(first, std::max(n->babble_at, n->hold_until));
+        if (const Frame* f = n->outgoing.front()) {
+            first = std::min(first, std::max(f->time_ns, n->hold_until));
+        } else if (n->leaving) {
+            n->cut.store(true, std::memory_order_relaxed);
+        }
+        if (n->babble_period > 0 && !n->cut.load(std::memory_order_relaxed)) {
+            first = std::min(first, std::max(n->babble_at, n->hold_until));
+        }
     }
     return first;
 }
@@ -138,7 +170,9 @@ std::int64_t Bus::earliest() noexcept {
 void Bus::work(std::int64_t now) noexcept {
     if (window_start_ == INT64_MIN) {
         window_start_ = now;
-        if (earliest() == INT64_MIN) free_at_ = now - 1;  // sent before the bus knew a time
+        if (earliest() == INT64_MIN) {
+            free_at_ = now - 1;  // sent before the bus knew a time
+        }
     }
     for (;;) {
         recover(now);
@@ -151,7 +185,9 @@ void Bus::work(std::int64_t now) noexcept {
     }
     worked_until_.store(now, std::memory_order_relaxed);
     if (now - window_start_ >= load_window_ns) {
-        load_.store(std::min(1.0, static_cast<double>(busy_ns_) / static_cast<double>(now - window_start_)), std::memory_order_relaxed);
+        load_.store(
+            std::min(1.0, static_cast<double>(busy_ns_) / static_cast<double>(now - window_start_)),
+            std::memory_order_relaxed);
         window_start_ = now;
         busy_ns_ = 0;
     }
@@ -170,15 +206,23 @@ void Bus::work_untimed(std::int64_t now) noexcept {
                 continue;
             }
             const Active* fault = struck(c, time);
-            if (fault != nullptr && fault->what.fault == Fault::delay) time += fault->what.delay_ns;
-            if (fault != nullptr && fault->what.fault == Fault::duplicate) deliver(*n, *c.frame, time);
-            if (fault == nullptr || fault->what.fault != Fault::loss) deliver(*n, *c.frame, time);
+            if (fault != nullptr && fault->what.fault == Fault::delay) {
+                time += fault->what.delay_ns;
+            }
+            if (fault != nullptr && fault->what.fault == Fault::duplicate) {
+                deliver(*n, *c.frame, time);
+            }
+            if (fault == nullptr || fault->what.fault != Fault::loss) {
+                deliver(*n, *c.frame, time);
+            }
             done(c, time);
         }
     }
 }
 
-bool Bus::hears(const Node& n) const noexcept { return !n.off && !n.cut.load(std::memory_order_relaxed); }
+bool Bus::hears(const Node& n) const noexcept {
+    return !n.off && !n.cut.load(std::memory_order_relaxed);
+}
 
 /// Arbitrates between all frames ready at `start`; the winner is sent, disturbed or not.
 void Bus::transmit(std::int64_t start, std::int64_t now) noexcept {
@@ -186,7 +230,9 @@ void Bus::transmit(std::int64_t start, std::int64_t now) noexcept {
     std::uint32_t best = UINT32_MAX;
     unsigned acknowledging = 0;
     for (Node* n : nodes) {
-        if (hears(*n) && !n->listen_only) ++acknowledging;
+        if (hears(*n) && !n->listen_only) {
+            ++acknowledging;
+        }
         if (n->off || n->hold_until > start) continue;
         const auto compete = [&](const Frame& f, bool babbling) {
             const auto rank = arbitration_rank(f);
@@ -197,87 +243,133 @@ void Bus::transmit(std::int64_t start, std::int64_t now) noexcept {
         if (n->cut.load(std::memory_order_relaxed)) {
             const Frame* f = n->outgoing.front();
             if (f == nullptr || f->time_ns > start) continue;
-            // Alone on the bus: no acknowledgement. Once passive it stays passive and repeats for ever.
-            if (n->tec < 128) n->tec += 8;
-            n->hold_until = n->tec < 128 ? start + duration_ns(frame_bits(*f), bit_rate, data_rate) + bits(error_frame_bits) : now;
+            // Alone on the bus: no acknowledgement. Once passive it stays passive and repeats for
+            // ever.
+            if (n->tec < 128) {
+                n->tec += 8;
+            }
+            n->hold_until = n->tec < 128
+                                ? start + duration_ns(frame_bits(*f), bit_rate, data_rate) +
+                                      bits(error_frame_bits)
+                                : now;
             count(n->errors);
             publish(*n);
             event(*n, error_no_acknowledge, start);
             continue;
         }
-        if (n->babble_period > 0 && n->babble_at <= start) compete(n->babble, true);
-        if (const Frame* f = n->outgoing.front(); f != nullptr && f->time_ns <= start) compete(*f, false);
+        if (n->babble_period > 0 && n->babble_at <= start) {
+            compete(n->babble, true);
+        }
+        if (const Frame* f = n->outgoing.front(); f != nullptr && f->time_ns <= start) {
+            compete(*f, false);
+        }
     }
     if (winner.node == nullptr) return;
     Node& sender = *winner.node;
     const Frame frame = *winner.frame;
 
     const Bits length = frame_bits(frame);
-    const auto end = start + duration_ns({length.nominal - intermission_bits, length.data}, bit_rate, data_rate);
+    const auto end =
+        start + duration_ns({length.nominal - intermission_bits, length.data}, bit_rate, data_rate);
     const auto idle = start + duration_ns(length, bit_rate, data_rate);
     if (acknowledging < 2) {  // only the sender
-        if (sender.tec < 128) sender.tec += 8;
+        if (sender.tec < 128) {
+            sender.tec += 8;
+        }
         occupy(start, sender.tec < 128 ? idle + bits(error_frame_bits) : std::max(now, idle));
-        if (winner.babbling) sender.babble_at = free_at_ + sender.babble_period;
-        else if (sender.outgoing.front()->single_shot) discard(sender);
+        if (winner.babbling) {
+            sender.babble_at = free_at_ + sender.babble_period;
+        } else if (sender.outgoing.front()->single_shot) {
+            discard(sender);
+        }
         count(sender.errors);
         publish(sender);
         return event(sender, error_no_acknowledge, end);
     }
 
-    // Nodes with the same identifier do not detect lost arbitration. Equal frames merge; different ones destroy each other.
+    // Nodes with the same identifier do not detect lost arbitration. Equal frames merge; different
+    // ones destroy each other.
     bool collision = false;
     for (Node* n : nodes) {
         if (n == &sender || !hears(*n) || n->hold_until > start) continue;
         const Frame* f = n->outgoing.front();
-        collision = collision || (f != nullptr && f->time_ns <= start && arbitration_rank(*f) == best && !f->same(frame));
+        collision = collision || (f != nullptr && f->time_ns <= start &&
+                                  arbitration_rank(*f) == best && !f->same(frame));
     }
     Active* const fault = struck(winner, start);
     if (fault != nullptr && fault->what.fault == Fault::delay) {
         sender.hold_until = start + std::max<std::int64_t>(1, fault->what.delay_ns);
-        if (winner.babbling) sender.babble_at = sender.hold_until;
+        if (winner.babbling) {
+            sender.babble_at = sender.hold_until;
+        }
         return;
     }
     if (collision || (fault != nullptr && fault->what.fault == Fault::error)) {
         const unsigned body = length.total() - intermission_bits;
-        const unsigned broken = collision ? std::min(body, 40U) : 1 + static_cast<unsigned>(draw() % body);
+        const unsigned broken =
+            collision ? std::min(body, 40U) : 1 + static_cast<unsigned>(draw() % body);
         const unsigned slow = std::min(broken, length.nominal);
         const auto noticed = start + duration_ns({slow, broken - slow}, bit_rate, data_rate);
         const auto also_sends = [&](Node& n) {
             const Frame* f = n.outgoing.front();
-            return collision && n.hold_until <= start && f != nullptr && f->time_ns <= start && arbitration_rank(*f) == best;
+            return collision && n.hold_until <= start && f != nullptr && f->time_ns <= start &&
+                   arbitration_rank(*f) == best;
         };
         occupy(start, noticed + bits(error_frame_bits));
         for (Node* n : nodes) {
             if (!hears(*n)) continue;
             const bool sending = n == &sender || also_sends(*n);
-            if (sending) n->tec += 8;
-            else if (n->rec < 255) ++n->rec;
-            if (sending && !(n == &sender && winner.babbling) && n->outgoing.front()->single_shot) discard(*n);
+            if (sending) {
+                n->tec += 8;
+            } else if (n->rec < 255) {
+                ++n->rec;
+            }
+            if (sending && !(n == &sender && winner.babbling) && n->outgoing.front()->single_shot) {
+                discard(*n);
+            }
             count(n->errors);
-            if (sending && n->tec > 255) failed(*n, noticed);
-            else if (n->tec >= 128 && sending) n->hold_until = free_at_ + bits(8);  // passive nodes suspend transmission
+            if (sending && n->tec > 255) {
+                failed(*n, noticed);
+            }
+            // passive nodes suspend transmission
+            else if (n->tec >= 128 && sending) {
+                n->hold_until = free_at_ + bits(8);
+            }
             publish(*n);
             event(*n, error_protocol, noticed);
         }
-        if (winner.babbling) sender.babble_at = free_at_ + sender.babble_period;
+        if (winner.babbling) {
+            sender.babble_at = free_at_ + sender.babble_period;
+        }
         return;
     }
     occupy(start, idle);
-    if (fault == nullptr || fault->what.fault == Fault::duplicate) deliver(sender, frame, end);
-    for (Node* n : nodes)
-        if (n != &sender && hears(*n) && n->rec > 0) n->rec = n->rec > 127 ? 127 : n->rec - 1, publish(*n);
+    if (fault == nullptr || fault->what.fault == Fault::duplicate) {
+        deliver(sender, frame, end);
+    }
+    for (Node* n : nodes) {
+        if (n != &sender && hears(*n) && n->rec > 0) {
+            n->rec = n->rec > 127 ? 127 : n->rec - 1;
+            publish(*n);
+        }
+    }
     if (fault != nullptr && fault->what.fault == Fault::duplicate) {
         sender.tec += 8;
         sender.doubled = true;
-        if (!winner.babbling && sender.outgoing.front()->single_shot) discard(sender);
-        if (sender.tec > 255) failed(sender, end);
+        if (!winner.babbling && sender.outgoing.front()->single_shot) {
+            discard(sender);
+        }
+        if (sender.tec > 255) {
+            failed(sender, end);
+        }
         return publish(sender);
     }
     for (Node* n : nodes) {  // those whose equal frame was merged with this one
         const Frame* f = n->outgoing.front();
-        if (n != &sender && hears(*n) && n->hold_until <= start && f != nullptr && f->time_ns <= start && f->same(frame))
+        if (n != &sender && hears(*n) && n->hold_until <= start && f != nullptr &&
+            f->time_ns <= start && f->same(frame)) {
             done({n, f, false}, end);
+        }
     }
     done(winner, end);
 }
@@ -291,10 +383,17 @@ void Bus::done(const Candidate& c, std::int64_t time) noexcept {
         Frame echo = *c.frame;
         echo.own = true;
         echo.time_ns = time;
-        if (!n.incoming.push(echo)) count(n.lost);
+        if (!n.incoming.push(echo)) {
+            count(n.lost);
+        }
     }
-    if (n.tec > 0) --n.tec, publish(n);
-    if (n.tec >= 128) n.hold_until = free_at_ + bits(8);
+    if (n.tec > 0) {
+        --n.tec;
+        publish(n);
+    }
+    if (n.tec >= 128) {
+        n.hold_until = free_at_ + bits(8);
+    }
     n.delayed = n.doubled = n.counted = false;
     if (!c.babbling) return n.outgoing.drop();
     n.babble_at = std::max(n.babble_at + n.babble_period, time);
@@ -303,10 +402,13 @@ void Bus::done(const Candidate& c, std::int64_t time) noexcept {
 void Bus::failed(Node& n, std::int64_t time) noexcept {
     n.off = true;
     count(n.bus_offs);
-    n.back_at = n.restart_ms == 0 ? INT64_MAX : time + std::int64_t{n.restart_ms} * 1'000'000 + bits(128 * 11);
+    n.back_at = n.restart_ms == 0 ? INT64_MAX
+                                  : time + std::int64_t{n.restart_ms} * 1'000'000 + bits(128 * 11);
     n.wants_restart.store(false);
     n.delayed = n.doubled = n.counted = false;
-    for (; n.outgoing.front() != nullptr; n.outgoing.drop()) count(n.thrown_away);
+    for (; n.outgoing.front() != nullptr; n.outgoing.drop()) {
+        count(n.thrown_away);
+    }
     publish(n);
     event(n, error_bus_off, time);
 }
@@ -316,7 +418,9 @@ void Bus::deliver(Node& from, const Frame& frame, std::int64_t time) noexcept {
         if (n == &from || !hears(*n) || n->leaving) continue;
         if (frame.fd && !n->fd) continue;
         const auto matches = [&](const Filter& f) { return f.matches(frame); };
-        if (!n->filters.empty() && std::none_of(n->filters.begin(), n->filters.end(), matches)) continue;
+        if (!n->filters.empty() && std::none_of(n->filters.begin(), n->filters.end(), matches)) {
+            continue;
+        }
         Frame* const copy = n->incoming.place();
         if (copy == nullptr) {
             count(n->lost);
@@ -340,7 +444,9 @@ void Bus::event(Node& n, std::uint32_t error_class, std::int64_t time) noexcept 
     f.time_ns = time;
     f.data[6] = static_cast<std::uint8_t>(std::min(n.tec, 255U));
     f.data[7] = static_cast<std::uint8_t>(std::min(n.rec, 255U));
-    if (!n.incoming.push(f)) count(n.lost);
+    if (!n.incoming.push(f)) {
+        count(n.lost);
+    }
 }
 
 void Bus::occupy(std::int64_t start, std::int64_t end) noexcept {
@@ -351,12 +457,17 @@ void Bus::occupy(std::int64_t start, std::int64_t end) noexcept {
 
 void Bus::publish(Node& n) noexcept {
     const auto worst = std::max(n.tec, n.rec);
-    const auto state = n.off ? State::bus_off : worst >= 128 ? State::passive : worst >= 96 ? State::warning : State::active;
+    const auto state = n.off          ? State::bus_off
+                       : worst >= 128 ? State::passive
+                       : worst >= 96  ? State::warning
+                                      : State::active;
     n.state.store(state, std::memory_order_relaxed);
-    n.counters.store(std::min(n.tec, 255U) << 16 | std::min(n.rec, 255U), std::memory_order_relaxed);
+    n.counters.store(std::min(n.tec, 255U) << 16 | std::min(n.rec, 255U),
+                     std::memory_order_relaxed);
 }
 
-/// Returns the first disturbance that hits this frame. Except for errors it is asked once, however often the frame is repeated.
+/// Returns the first disturbance that hits this frame. Except for errors it is asked once, however
+/// often the frame is repeated.
 Bus::Active* Bus::struck(const Candidate& c, std::int64_t start) noexcept {
     Node& n = *c.node;
     Active* found = nullptr;
@@ -364,14 +475,20 @@ Bus::Active* Bus::struck(const Candidate& c, std::int64_t start) noexcept {
         const Disturbance& w = d.what;
         if (((c.frame->id ^ w.id) & w.mask) != 0 || (w.node >= 0 && w.node != n.number)) continue;
         if (start < w.from_ns || start >= w.until_ns) continue;
-        if (d.hits >= w.count || (w.fault == Fault::delay && n.delayed) || (w.fault == Fault::duplicate && n.doubled)) continue;
+        if (d.hits >= w.count || (w.fault == Fault::delay && n.delayed) ||
+            (w.fault == Fault::duplicate && n.doubled)) {
+            continue;
+        }
         if (w.every != 0 && n.counted && w.fault != Fault::error) continue;
         ++d.matched;
-        const bool hit = w.every != 0 ? d.matched % w.every == 0 : static_cast<double>(draw() >> 11) * 0x1p-53 < w.probability;
+        const bool hit = w.every != 0 ? d.matched % w.every == 0
+                                      : static_cast<double>(draw() >> 11) * 0x1p-53 < w.probability;
         if (!hit || found != nullptr) continue;
         ++d.hits;
         found = &d;
-        if (w.fault == Fault::delay) n.delayed = true;
+        if (w.fault == Fault::delay) {
+            n.delayed = true;
+        }
     }
     n.counted = true;
     return found;

@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: MIT
-// A CAN bus in memory. Its time is the newest `now_ns` its users passed in; everything up to that time is processed by whichever of them
-// calls first ("the pump"). Frames that start strictly before now are sent, so that all nodes that send at the same time take part
-// in the same arbitration, whatever the order of their functions.
+// A CAN bus in memory. Its time is the newest `now_ns` its users passed in; everything up to that
+// time is processed by whichever of them calls first ("the pump"). Frames that start strictly
+// before now are sent, so that all nodes that send at the same time take part in the same
+// arbitration, whatever the order of their functions.
 //
-// Threads: every node has a queue to the bus and one from it, each with one writer and one reader. The bus itself belongs to the thread
-// that holds `pumping_`. A cycle only tries to take it: if another thread is working, that thread does the work and the cycle proceeds.
+// Threads: every node has a queue to the bus and one from it, each with one writer and one reader.
+// The bus itself belongs to the thread that holds `pumping_`. A cycle only tries to take it: if
+// another thread is working, that thread does the work and the cycle proceeds.
 //   1. thread A takes pumping_, works up to its now      2. thread B queues a frame, fails to take pumping_, proceeds
 //   3. A releases pumping_                               4. the next call of any thread finds B's frame: it is late, not lost
-// On a bus without a bit rate (`unlimited`) A checks again after 3, so that B's frame does not wait for a later call.
+// On a bus without a bit rate (`unlimited`) A checks again after 3, so that B's frame does not wait
+// for a later call.
 #pragma once
 
 #include <array>
@@ -17,8 +20,8 @@
 #include <string>
 #include <vector>
 
-#include "link/can.hpp"
 #include "hal/queue.hpp"
+#include "link/can.hpp"
 #include "link/simulation.hpp"
 #include "link/timing.hpp"
 
@@ -27,36 +30,54 @@ namespace hal::can::simbus {
 /// A frame to be sent; `time_ns` is when it was queued or, with a window, when that begins.
 struct Outgoing : Frame {
     std::int64_t last_start = INT64_MAX;
-    std::int64_t idle_from = 0, idle_until = 0;
+    std::int64_t idle_from = 0;
+    std::int64_t idle_until = 0;
     bool single_shot = false;
 };
 
 /// One end of the bus. Fields without a comment belong to the pump.
 struct Node {
-    Node(const Options& options) : outgoing(options.send_capacity), incoming(options.receive_capacity) {}
+    Node(const Options& options)
+        : outgoing(options.send_capacity), incoming(options.receive_capacity) {}
 
     hal::Queue<Outgoing> outgoing;  ///< writer: the sending thread
     hal::Queue<Frame> incoming;  ///< reader: the receiving thread; `time_ns` is when it is complete
     std::vector<Filter> filters;
     int number = 0;
-    bool fd = false, own_frames = false, error_frames = false, listen_only = false;
+    bool fd = false;
+    bool own_frames = false;
+    bool error_frames = false;
+    bool listen_only = false;
     std::uint32_t restart_ms = 0;
 
-    unsigned tec = 0, rec = 0;
-    bool off = false;                     ///< bus off
-    bool leaving = false;                 ///< its link is closed
-    std::int64_t back_at = INT64_MAX;     ///< when bus off ends
+    unsigned tec = 0;
+    unsigned rec = 0;
+    bool off = false;  ///< bus off
+    bool leaving = false;  ///< its link is closed
+    std::int64_t back_at = INT64_MAX;  ///< when bus off ends
     std::int64_t hold_until = INT64_MIN;  ///< does not start a frame before
-    bool delayed = false, doubled = false, counted = false;  ///< of the frame at the front of `outgoing`
+    /// of the frame at the front of `outgoing`
+    bool delayed = false;
+    bool doubled = false;
+    bool counted = false;
     Frame babble;
-    std::int64_t babble_period = 0, babble_at = 0;
+    std::int64_t babble_period = 0;
+    std::int64_t babble_at = 0;
 
-    std::atomic<bool> cut{false};            ///< written by anyone
+    std::atomic<bool> cut{false};  ///< written by anyone
     std::atomic<bool> wants_restart{false};  ///< written by the sending thread
     std::atomic<State> state{State::active};
     std::atomic<std::uint32_t> counters{0};  ///< tec << 16 | rec, for readers in other threads
-    std::atomic<std::uint64_t> sent{0}, sent_bytes{0}, received{0}, received_bytes{0}, lost{0}, thrown_away{0}, errors{0}, bus_offs{0},
-        restarts{0};
+    std::atomic<std::uint64_t> sent{0};
+    std::atomic<std::uint64_t> sent_bytes{0};
+    std::atomic<std::uint64_t> received{0};
+    std::atomic<std::uint64_t> received_bytes{0};
+    std::atomic<std::uint64_t> lost{0};
+
+    std::atomic<std::uint64_t> thrown_away{0};
+    std::atomic<std::uint64_t> errors{0};
+    std::atomic<std::uint64_t> bus_offs{0};
+    std::atomic<std::uint64_t> restarts{0};
     std::atomic<std::uint64_t> dropped{0};  ///< written by the sending thread
 };
 
@@ -64,17 +85,21 @@ class Bus {
 public:
     Bus(std::string name, std::uint32_t bit_rate, std::uint32_t data_rate, bool fd);
 
-    /// Returns the bus of that name, created if necessary. It lives as long as one of its links. [setup]
+    /// Returns the bus of that name, created if necessary. It lives as long as one of its links.
+    /// [setup]
     static std::shared_ptr<Bus> find(const std::string& name, const Options&, std::string& problem);
 
-    void add(Node&);     ///< [setup]
-    /// Removes a node; its queued frames are still sent, as by a controller whose program ended. [setup]
+    void add(Node&);  ///< [setup]
+    /// Removes a node; its queued frames are still sent, as by a controller whose program ended.
+    /// [setup]
     void remove(std::unique_ptr<Node>);
 
     /// Processes the bus up to `now_ns`, unless another thread is doing so. [realtime]
     void pump(std::int64_t now_ns) noexcept;
     /// Returns `now_ns`, or for `unclocked` the newest time known to the bus. [any]
-    std::int64_t time(std::int64_t now_ns) const noexcept { return now_ns == unclocked ? latest_.load(std::memory_order_relaxed) : now_ns; }
+    std::int64_t time(std::int64_t now_ns) const noexcept {
+        return now_ns == unclocked ? latest_.load(std::memory_order_relaxed) : now_ns;
+    }
     /// Notes that frames were queued; on a bus without a bit rate it delivers them. [realtime]
     void sent(std::int64_t now_ns) noexcept;
 
@@ -87,7 +112,8 @@ public:
 
     struct Active {
         Disturbance what;
-        std::uint64_t matched = 0, hits = 0;
+        std::uint64_t matched = 0;
+        std::uint64_t hits = 0;
     };
     std::vector<Active> disturbances;  ///< only within exclusively(), as the next two
     std::vector<Node*> nodes;
@@ -133,11 +159,13 @@ private:
     std::atomic_flag pumping_;
     std::atomic<std::int64_t> latest_{INT64_MIN};
     std::atomic<std::uint64_t> calls_{0};  ///< of sent(): a pump that sees it change checks again
-    std::int64_t free_at_ = INT64_MIN;     ///< the bus is idle from here on
+    std::int64_t free_at_ = INT64_MIN;  ///< the bus is idle from here on
     std::atomic<std::int64_t> worked_until_{INT64_MIN};
-    std::int64_t window_start_ = INT64_MIN, busy_ns_ = 0;
+    std::int64_t window_start_ = INT64_MIN;
+    std::int64_t busy_ns_ = 0;
     std::atomic<double> load_{0.0};
-    std::array<std::int64_t, 512> starts_{};  ///< of the last frames, for windows that require an idle bus
+    /// of the last frames, for windows that require an idle bus
+    std::array<std::int64_t, 512> starts_{};
     std::size_t started_ = 0;
 };
 

@@ -25,7 +25,10 @@ public:
         node_.listen_only = options.listen_only;
         node_.restart_ms = options.restart_ms;
         description_ = describe(bus_->name);
-        description_.bit_rate = bus_->bit_rate, description_.data_rate = bus_->data_rate, description_.fd = bus_->fd;
+        description_.bit_rate = bus_->bit_rate;
+        description_.data_rate = bus_->data_rate;
+
+        description_.fd = bus_->fd;
         description_.has_windows = bus_->bit_rate != 0;
         bus_->add(node_);
     }
@@ -36,15 +39,24 @@ public:
             node_.dropped.fetch_add(1, std::memory_order_relaxed);
             return why;
         };
-        if (!frame.valid() || node_.listen_only || (frame.fd && !bus_->fd)) return drop(Sent::rejected);
+        if (!frame.valid() || node_.listen_only || (frame.fd && !bus_->fd)) {
+            return drop(Sent::rejected);
+        }
         if (state() == State::bus_off) return drop(Sent::bus_off);
         return queue({frame}, bus_->time(now_ns), now_ns);
     }
-    Sent send_within(const Frame& frame, const Window& window, std::int64_t now_ns) noexcept override {
-        if (!frame.valid() || node_.listen_only || (frame.fd && !bus_->fd) || bus_->bit_rate == 0)
-            return node_.dropped.fetch_add(1, std::memory_order_relaxed), Sent::rejected;
-        if (state() == State::bus_off) return node_.dropped.fetch_add(1, std::memory_order_relaxed), Sent::bus_off;
-        const Outgoing outgoing{frame, window.last_start_ns, window.idle_from_ns, window.idle_until_ns, window.single_shot};
+    Sent send_within(const Frame& frame, const Window& window,
+                     std::int64_t now_ns) noexcept override {
+        if (!frame.valid() || node_.listen_only || (frame.fd && !bus_->fd) || bus_->bit_rate == 0) {
+            node_.dropped.fetch_add(1, std::memory_order_relaxed);
+            return Sent::rejected;
+        }
+        if (state() == State::bus_off) {
+            node_.dropped.fetch_add(1, std::memory_order_relaxed);
+            return Sent::bus_off;
+        }
+        const Outgoing outgoing{frame, window.last_start_ns, window.idle_from_ns,
+                                window.idle_until_ns, window.single_shot};
         return queue(outgoing, std::max(window.not_before_ns, bus_->time(now_ns)), now_ns);
     }
     void flush(std::int64_t now_ns) noexcept override {
@@ -66,18 +78,23 @@ public:
     }
 
     Statistics statistics() const noexcept override {
-        const auto read = [](const auto& counter) { return counter.load(std::memory_order_relaxed); };
+        const auto read = [](const auto& counter) {
+            return counter.load(std::memory_order_relaxed);
+        };
         const auto counters = read(node_.counters);
         Statistics s;
         s.state = state();
         s.send_errors = static_cast<std::uint8_t>(counters >> 16);
         s.receive_errors = static_cast<std::uint8_t>(counters & 0xff);
-        s.sent = read(node_.sent), s.sent_bytes = read(node_.sent_bytes);
-        s.received = read(node_.received), s.received_bytes = read(node_.received_bytes);
+        s.sent = read(node_.sent);
+        s.sent_bytes = read(node_.sent_bytes);
+        s.received = read(node_.received);
+        s.received_bytes = read(node_.received_bytes);
         s.lost = read(node_.lost);
         s.dropped = read(node_.dropped) + read(node_.thrown_away);
         s.errors = read(node_.errors);
-        s.bus_offs = read(node_.bus_offs), s.restarts = read(node_.restarts);
+        s.bus_offs = read(node_.bus_offs);
+        s.restarts = read(node_.restarts);
         s.queued = static_cast<std::uint32_t>(node_.outgoing.size());
         s.load = bus_->load();
         return s;
@@ -121,13 +138,17 @@ public:
     std::uint64_t hits(int number) const override {
         return bus_->exclusively([&] {
             const auto index = static_cast<std::size_t>(number);
-            return number >= 0 && index < bus_->disturbances.size() ? bus_->disturbances[index].hits : 0;
+            return number >= 0 && index < bus_->disturbances.size() ? bus_->disturbances[index].hits
+                                                                    : 0;
         });
     }
     void calm() override {
         bus_->exclusively([&] {
             bus_->disturbances.clear();
-            for (Node* n : bus_->nodes) n->babble_period = 0, n->cut.store(false);
+            for (Node* n : bus_->nodes) {
+                n->babble_period = 0;
+                n->cut.store(false);
+            }
         });
     }
     void babble(const Frame& frame, std::int64_t period_ns) override {
@@ -139,14 +160,23 @@ public:
     }
     void cut(int node, bool is_cut) override {
         bus_->exclusively([&] {
-            for (Node* n : bus_->nodes)
-                if (n->number == node) n->cut.store(is_cut, std::memory_order_relaxed);
+            for (Node* n : bus_->nodes) {
+                if (n->number == node) {
+                    n->cut.store(is_cut, std::memory_order_relaxed);
+                }
+            }
         });
     }
     void set_counters(int node, unsigned send_errors, unsigned receive_errors) override {
         bus_->exclusively([&] {
-            for (Node* n : bus_->nodes)
-                if (n->number == node) n->tec = std::min(send_errors, 255U), n->rec = std::min(receive_errors, 255U), bus_->publish(*n);
+            for (Node* n : bus_->nodes) {
+                if (n->number == node) {
+                    n->tec = std::min(send_errors, 255U);
+                    n->rec = std::min(receive_errors, 255U);
+
+                    bus_->publish(*n);
+                }
+            }
         });
     }
     std::int64_t time_ns() const noexcept override { return bus_->time(unclocked); }
@@ -172,14 +202,22 @@ private:
 }  // namespace
 
 Description describe(const std::string& name) {
-    return {.address = "sim:" + name, .transport = "bus in memory", .simulated = true, .in_memory = true, .has_stamps = true};
+    return {.address = "sim:" + name,
+            .transport = "bus in memory",
+            .simulated = true,
+            .in_memory = true,
+            .has_stamps = true};
 }
 
 Opened open(const std::string& name, const Options& options) {
-    if (name.empty()) return {nullptr, "missing name of the bus; write sim:bus0"};
+    if (name.empty()) {
+        return {nullptr, "missing name of the bus; write sim:bus0"};
+    }
     std::string problem;
     auto bus = Bus::find(name, options, problem);
-    if (!bus) return {nullptr, problem};
+    if (!bus) {
+        return {nullptr, problem};
+    }
     return {std::make_unique<SimulatedLink>(std::move(bus), options), {}};
 }
 

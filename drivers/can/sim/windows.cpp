@@ -6,13 +6,17 @@
 
 namespace hal::can::simbus {
 
-/// Discards the frames whose window does not allow a start any more. Returns true when there was one.
+/// Discards the frames whose window does not allow a start any more. Returns true when there was
+/// one.
 bool Bus::discard_expired(std::int64_t start) noexcept {
     bool any = false;
     for (Node* n : nodes) {
         const Outgoing* f = n->outgoing.front();
         if (f == nullptr || f->time_ns > start) continue;
-        if (std::max(start, n->hold_until) <= f->last_start && was_idle(f->idle_from, f->idle_until)) continue;
+        if (std::max(start, n->hold_until) <= f->last_start &&
+            was_idle(f->idle_from, f->idle_until)) {
+            continue;
+        }
         discard(*n);
         any = true;
     }

@@ -15,8 +15,8 @@
 #include <utility>
 #include <vector>
 
-#include "link/filtering.hpp"
 #include "hal/queue.hpp"
+#include "link/filtering.hpp"
 #include "link/system.hpp"
 #include "slcan_line.hpp"
 
@@ -27,8 +27,12 @@ namespace {
 /// Returns the commands that open the channel.
 std::string greeting(const Options& o) {
     std::string text = "C\r";
-    if (o.bit_rate != 0 && o.bit_rate != unlimited) text += std::string(rate_command(o.bit_rate)) + "\r";
-    if (o.data_rate != 0) text += o.data_rate == 5'000'000 ? "Y5\r" : "Y2\r";
+    if (o.bit_rate != 0 && o.bit_rate != unlimited) {
+        text += std::string(rate_command(o.bit_rate)) + "\r";
+    }
+    if (o.data_rate != 0) {
+        text += o.data_rate == 5'000'000 ? "Y5\r" : "Y2\r";
+    }
     return text + (o.listen_only ? "L\r" : "O\r");
 }
 
@@ -36,10 +40,12 @@ std::string greeting(const Options& o) {
 link::Descriptor open_line(const std::string& device, const Options& o, std::string& problem) {
     link::Descriptor fd(::open(device.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
     if (!fd) {
-        problem = errno == ENOENT   ? "no such device; to list adapters: ls /dev/serial/by-id"
-          : errno == EACCES ? "permission denied; type: sudo usermod -aG dialout $USER, and log in again"
-          : errno == EBUSY  ? "the line is in use by another program; to find it: fuser " + device
-                            : "cannot open: " + link::reason();
+        problem = errno == ENOENT ? "no such device; to list adapters: ls /dev/serial/by-id"
+                  : errno == EACCES
+                      ? "permission denied; type: sudo usermod -aG dialout $USER, and log in again"
+                  : errno == EBUSY
+                      ? "the line is in use by another program; to find it: fuser " + device
+                      : "cannot open: " + link::reason();
         return {};
     }
     termios t{};
@@ -49,7 +55,8 @@ link::Descriptor open_line(const std::string& device, const Options& o, std::str
     }
     cfmakeraw(&t);
     t.c_cflag |= CLOCAL | CREAD;
-    t.c_cc[VMIN] = 0, t.c_cc[VTIME] = 0;
+    t.c_cc[VMIN] = 0;
+    t.c_cc[VTIME] = 0;
     cfsetspeed(&t, B115200);  // ignored by USB adapters
     tcsetattr(fd.get(), TCSANOW, &t);
     tcflush(fd.get(), TCIOFLUSH);
@@ -64,11 +71,18 @@ link::Descriptor open_line(const std::string& device, const Options& o, std::str
 class SerialLink final : public FilteringLink {
 public:
     SerialLink(const std::string& device, const Options& options, link::Descriptor fd)
-        : options_(options), device_(device), line_(std::move(fd)), outgoing_(options.send_capacity), watcher_([this] { watch(); }) {
+        : options_(options),
+          device_(device),
+          line_(std::move(fd)),
+          outgoing_(options.send_capacity),
+          watcher_([this] { watch(); }) {
         counting_.bit_rate = options.bit_rate != unlimited ? options.bit_rate : 0;
         counting_.data_rate = options.data_rate;
         description_ = describe(device);
-        description_.bit_rate = counting_.bit_rate, description_.data_rate = counting_.data_rate, description_.fd = options.fd;
+        description_.bit_rate = counting_.bit_rate;
+        description_.data_rate = counting_.data_rate;
+
+        description_.fd = options.fd;
     }
     ~SerialLink() override {
         {
@@ -83,18 +97,27 @@ public:
 
     /// A bus at 10 kbit/s needs seconds for what is queued, the safe values at its end among it.
     std::int64_t closing_ns() const noexcept override {
-        constexpr std::int64_t least_bits = 47, most_ns = 50'000'000'000;  // frame without data
-        constexpr std::int64_t shortest_line = 6;                          // "t1230\r"
+        constexpr std::int64_t least_bits = 47;
+        constexpr std::int64_t most_ns = 50'000'000'000;  // frame without data
+        constexpr std::int64_t shortest_line = 6;  // "t1230\r"
         if (state() == State::down) return 0;
-        const auto lines = static_cast<std::int64_t>(outgoing_.size()) + (static_cast<std::int64_t>(text_size_) + held_by_kernel()) / shortest_line;
+        const auto lines =
+            static_cast<std::int64_t>(outgoing_.size()) +
+            (static_cast<std::int64_t>(text_size_) + held_by_kernel()) / shortest_line;
         if (lines == 0) return 0;
-        const std::int64_t rate = counting_.bit_rate != 0 ? static_cast<std::int64_t>(counting_.bit_rate) : slowest_rate;
+        const std::int64_t rate =
+            counting_.bit_rate != 0 ? static_cast<std::int64_t>(counting_.bit_rate) : slowest_rate;
         return std::min(most_ns, 1'000'000'000 + lines * 4 * least_bits * 1'000'000'000 / rate);
     }
 
     Sent send(const Frame& frame, std::int64_t now_ns) noexcept override {
-        const auto drop = [this](Sent why) { return Counting::add(counting_.dropped), why; };
-        if (!frame.valid() || options_.listen_only || (frame.fd && !options_.fd)) return drop(Sent::rejected);
+        const auto drop = [this](Sent why) {
+            Counting::add(counting_.dropped);
+            return why;
+        };
+        if (!frame.valid() || options_.listen_only || (frame.fd && !options_.fd)) {
+            return drop(Sent::rejected);
+        }
         if (state() == State::down) return drop(Sent::down);
         if (outgoing_.push(frame)) return Sent::queued;
         flush(now_ns);
@@ -117,7 +140,9 @@ public:
             if (text_size_ == 0) return;
             const auto written = ::write(line_.get(), text_, text_size_);
             if (written <= 0) {
-                if (written < 0 && errno != EAGAIN && errno != EINTR) lose();
+                if (written < 0 && errno != EAGAIN && errno != EINTR) {
+                    lose();
+                }
                 return;  // the line is slower than the sender: continue in the next cycle
             }
             const auto done = static_cast<std::size_t>(written);
@@ -131,12 +156,17 @@ public:
         std::size_t count = 0;
         for (int reads = 0; count < room.size();) {
             if (next_ == filled_) {
-                if (reads++ == 4) break;  // continue with an endless line in the next cycle
+                if (reads++ == 4) {
+                    break;  // continue with an endless line in the next cycle
+                }
                 const auto got = ::read(line_.get(), in_, sizeof in_);
                 next_ = filled_ = 0;
                 if (got <= 0) {
-                    // A pseudo-terminal without a peer reads as an error, an unplugged serial adapter as end of file.
-                    if (got == 0 ? hung_up() : errno != EAGAIN && errno != EINTR) lose();
+                    // A pseudo-terminal without a peer reads as an error, an unplugged serial
+                    // adapter as end of file.
+                    if (got == 0 ? hung_up() : errno != EAGAIN && errno != EINTR) {
+                        lose();
+                    }
                     break;
                 }
                 filled_ = static_cast<std::size_t>(got);
@@ -165,7 +195,8 @@ public:
         if (next_ != filled_) return true;
         if (state() != State::down) return link::readable_within(line_.get(), at_most_ns);
         std::unique_lock lock(mutex_);  // a dead line is always readable
-        return changed_.wait_for(lock, std::chrono::nanoseconds(at_most_ns), [this] { return state() != State::down; });
+        return changed_.wait_for(lock, std::chrono::nanoseconds(at_most_ns),
+                                 [this] { return state() != State::down; });
     }
     int descriptor() const noexcept override { return line_.get(); }
 
@@ -178,9 +209,11 @@ private:
         return ::ioctl(line_.get(), TIOCOUTQ, &bytes) == 0 ? bytes : 0;
     }
     std::int64_t unsent() const noexcept {
-        return static_cast<std::int64_t>(outgoing_.size()) + static_cast<std::int64_t>(text_size_) + held_by_kernel();
+        return static_cast<std::int64_t>(outgoing_.size()) + static_cast<std::int64_t>(text_size_) +
+               held_by_kernel();
     }
-    /// Writes what is queued until then, as long as the adapter takes some. What remains is discarded: closing a line would wait for it.
+    /// Writes what is queued until then, as long as the adapter takes some. What remains is
+    /// discarded: closing a line would wait for it.
     void drain(std::int64_t until_ns) noexcept {
         constexpr std::int64_t most_idle_ns = 2'000'000'000;
         flush(0);
@@ -192,30 +225,43 @@ private:
             pollfd p{line_.get(), static_cast<short>(full ? POLLOUT : 0), 0};
             ::poll(&p, 1, 10);
             flush(0);
-            if (const std::int64_t before = std::exchange(left, unsent()); left != before) moved_ns = now_ns;
+            if (const std::int64_t before = std::exchange(left, unsent()); left != before) {
+                moved_ns = now_ns;
+            }
         }
-        if (left != 0) tcflush(line_.get(), TCOFLUSH);
+        if (left != 0) {
+            tcflush(line_.get(), TCOFLUSH);
+        }
     }
     void take_status(unsigned bits) noexcept {  // Lawicel: 2 warning, 3 overrun, 5 passive
-        if ((bits & 8) != 0) Counting::add(counting_.lost);
-        const auto state = (bits & 32) != 0 ? State::passive : (bits & 4) != 0 ? State::warning : State::active;
+        if ((bits & 8) != 0) {
+            Counting::add(counting_.lost);
+        }
+        const auto state = (bits & 32) != 0  ? State::passive
+                           : (bits & 4) != 0 ? State::warning
+                                             : State::active;
         counting_.state.store(state, std::memory_order_relaxed);
     }
     bool hung_up() const noexcept {
         pollfd p{line_.get(), 0, 0};
         return ::poll(&p, 1, 0) > 0 && (p.revents & (POLLHUP | POLLERR)) != 0;
     }
-    /// Discards queued frames, stale when the line returns, and a partial line, which would corrupt the next one. Sending thread.
+    /// Discards queued frames, stale when the line returns, and a partial line, which would corrupt
+    /// the next one. Sending thread.
     void forget() noexcept {
         text_size_ = 0;
-        for (; outgoing_.front() != nullptr; outgoing_.drop()) Counting::add(counting_.dropped);
+        for (; outgoing_.front() != nullptr; outgoing_.drop()) {
+            Counting::add(counting_.dropped);
+        }
     }
     void lose() noexcept { counting_.state.store(State::down, std::memory_order_relaxed); }
 
-    /// Reopens a lost device, in the watcher's thread; the new line takes the descriptor of the old one.
+    /// Reopens a lost device, in the watcher's thread; the new line takes the descriptor of the old
+    /// one.
     void watch() {
         std::unique_lock lock(mutex_);
-        while (!changed_.wait_for(lock, std::chrono::milliseconds(500), [this] { return ending_; })) {
+        while (
+            !changed_.wait_for(lock, std::chrono::milliseconds(500), [this] { return ending_; })) {
             if (state() != State::down) continue;
             std::string problem;
             const link::Descriptor fresh = open_line(device_, options_, problem);
@@ -234,7 +280,8 @@ private:
     char text_[4096]{};  // sending thread: lines not written yet
     std::size_t text_size_ = 0;
     char in_[4096]{};  // from here on: used by the receiving thread
-    std::size_t next_ = 0, filled_ = 0;
+    std::size_t next_ = 0;
+    std::size_t filled_ = 0;
     std::int64_t arrived_ns_ = 0;
     Decoder decoder_;
 
@@ -251,15 +298,26 @@ Description describe(const std::string& device) {
 }
 
 Opened open(const std::string& device, const Options& options) {
-    if (device.empty()) return {nullptr, "missing device; write slcan:/dev/ttyACM0"};
-    if (options.bit_rate != 0 && options.bit_rate != unlimited && rate_command(options.bit_rate) == nullptr)
-        return {nullptr, "unsupported bit rate " + std::to_string(options.bit_rate) +
-                             " of a serial-line adapter; use 10k, 20k, 50k, 100k, 125k, 250k, 500k, 800k or 1M"};
-    if (options.data_rate != 0 && options.data_rate != 2'000'000 && options.data_rate != 5'000'000)
-        return {nullptr, "unsupported data rate " + std::to_string(options.data_rate) + " of a serial-line adapter; use 2M or 5M"};
+    if (device.empty()) {
+        return {nullptr, "missing device; write slcan:/dev/ttyACM0"};
+    }
+    if (options.bit_rate != 0 && options.bit_rate != unlimited &&
+        rate_command(options.bit_rate) == nullptr) {
+        return {
+            nullptr,
+            "unsupported bit rate " + std::to_string(options.bit_rate) +
+                " of a serial-line adapter; use 10k, 20k, 50k, 100k, 125k, 250k, 500k, 800k or 1M"};
+    }
+    if (options.data_rate != 0 && options.data_rate != 2'000'000 &&
+        options.data_rate != 5'000'000) {
+        return {nullptr, "unsupported data rate " + std::to_string(options.data_rate) +
+                             " of a serial-line adapter; use 2M or 5M"};
+    }
     std::string problem;
     link::Descriptor line = open_line(device, options, problem);
-    if (!line) return {nullptr, problem};
+    if (!line) {
+        return {nullptr, problem};
+    }
     return {std::make_unique<SerialLink>(device, options, std::move(line)), {}};
 }
 

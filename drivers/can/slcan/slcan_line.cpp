@@ -11,7 +11,7 @@ constexpr char digits[] = "0123456789ABCDEF";
 bool number(std::string_view text, std::uint32_t& value) noexcept {
     value = 0;
     for (const char c : text) {
-        const unsigned digit = c >= '0' && c <= '9' ? static_cast<unsigned>(c - '0')
+        const unsigned digit = c >= '0' && c <= '9'   ? static_cast<unsigned>(c - '0')
                                : c >= 'A' && c <= 'F' ? static_cast<unsigned>(c - 'A' + 10)
                                : c >= 'a' && c <= 'f' ? static_cast<unsigned>(c - 'a' + 10)
                                                       : 16U;
@@ -26,22 +26,33 @@ bool number(std::string_view text, std::uint32_t& value) noexcept {
 std::size_t encode(const Frame& f, Line& out) noexcept {
     std::size_t size = 0;
     const auto hex = [&](std::uint32_t v, int width) {
-        while (width-- > 0) out[size++] = digits[v >> width * 4 & 15U];
+        while (width-- > 0) {
+            out[size++] = digits[v >> width * 4 & 15U];
+        }
     };
     const char letter = f.fd ? (f.bit_rate_switch ? 'b' : 'd') : f.remote ? 'r' : 't';
     out[size++] = f.extended ? static_cast<char>(letter - 'a' + 'A') : letter;
     hex(f.id, f.extended ? 8 : 3);
     hex(code_of_length(f.length), 1);
-    for (const auto b : f.bytes()) hex(b, 2);
+    for (const auto b : f.bytes()) {
+        hex(b, 2);
+    }
     out[size++] = '\r';
     return size;
 }
 
 Decoder::Found Decoder::take(char c) noexcept {
-    if (c == '\a') return size_ = 0, too_long_ = false, Found::error;
+    if (c == '\a') {
+        size_ = 0;
+        too_long_ = false;
+        return Found::error;
+    }
     if (c != '\r' && c != '\n') {
-        if (size_ < text_.size()) text_[size_++] = c;
-        else too_long_ = true;
+        if (size_ < text_.size()) {
+            text_[size_++] = c;
+        } else {
+            too_long_ = true;
+        }
         return Found::nothing;
     }
     const std::string_view text(text_.data(), size_);
@@ -53,14 +64,19 @@ Decoder::Found Decoder::take(char c) noexcept {
 
 Decoder::Found Decoder::line(std::string_view text) noexcept {
     if (text.empty()) return Found::nothing;
-    if (text[0] == 'z' || text[0] == 'Z') {  // an adapter's "sent" may precede a frame on the same line
+    // an adapter's "sent" may precede a frame on the same line
+    if (text[0] == 'z' || text[0] == 'Z') {
         text.remove_prefix(1);
         if (text.empty()) return Found::nothing;
     }
     const char letter = text[0];
-    if (letter == 'F' && text.size() == 3) return number(text.substr(1), status_) ? Found::status : Found::error;
+    if (letter == 'F' && text.size() == 3) {
+        return number(text.substr(1), status_) ? Found::status : Found::error;
+    }
     const std::string_view letters = "tTrRdDbB";
-    if (letters.find(letter) == letters.npos) return Found::nothing;  // a command or its response
+    if (letters.find(letter) == letters.npos) {
+        return Found::nothing;  // a command or its response
+    }
     Frame& f = frame_;
     f = {};
     f.extended = letter < 'a';
@@ -70,12 +86,18 @@ Decoder::Found Decoder::line(std::string_view text) noexcept {
     f.bit_rate_switch = kind == 'b';
     const std::size_t width = f.extended ? 8 : 3;
     std::uint32_t code = 0;
-    if (text.size() < width + 2 || !number(text.substr(1, width), f.id) || !number(text.substr(1 + width, 1), code)) return Found::error;
+    if (text.size() < width + 2 || !number(text.substr(1, width), f.id) ||
+        !number(text.substr(1 + width, 1), code)) {
+        return Found::error;
+    }
     if (!f.fd && code > 8) return Found::error;
     f.length = length_of_code(code);
     auto data = text.substr(width + 2);
     const std::size_t wanted = f.bytes().size() * 2;
-    if (data.size() != wanted && data.size() != wanted + 4 && data.size() != wanted + 8) return Found::error;  // optionally with a timestamp
+    // optionally with a timestamp
+    if (data.size() != wanted && data.size() != wanted + 4 && data.size() != wanted + 8) {
+        return Found::error;
+    }
     for (std::size_t i = 0; i < wanted; i += 2) {
         std::uint32_t byte = 0;
         if (!number(data.substr(i, 2), byte)) return Found::error;
@@ -88,10 +110,12 @@ const char* rate_command(std::uint32_t bit_rate) noexcept {
     constexpr struct {
         std::uint32_t rate;
         const char* command;
-    } rates[] = {{10'000, "S0"},  {20'000, "S1"},  {50'000, "S2"},  {100'000, "S3"},  {125'000, "S4"},
-                 {250'000, "S5"}, {500'000, "S6"}, {800'000, "S7"}, {1'000'000, "S8"}};
-    for (const auto& r : rates)
+    } rates[] = {{10'000, "S0"},  {20'000, "S1"},  {50'000, "S2"},
+                 {100'000, "S3"}, {125'000, "S4"}, {250'000, "S5"},
+                 {500'000, "S6"}, {800'000, "S7"}, {1'000'000, "S8"}};
+    for (const auto& r : rates) {
         if (r.rate == bit_rate) return r.command;
+    }
     return nullptr;
 }
 

@@ -11,7 +11,8 @@
 
 namespace hal::can::slcan {
 
-inline constexpr std::size_t longest_line = 1 + 8 + 1 + 128 + 8 + 1;  // letter, identifier, length, data, time stamp, end
+// letter, identifier, length, data, time stamp, end
+inline constexpr std::size_t longest_line = 1 + 8 + 1 + 128 + 8 + 1;
 using Line = std::array<char, longest_line>;
 
 /// Encodes a valid frame with its end of line. Returns the number of characters. [realtime]

@@ -22,23 +22,32 @@ struct Request {
     char attributes[256]{};
 
     rtattr* add(unsigned short type, const void* data, std::size_t size) {
-        auto* a = reinterpret_cast<rtattr*>(reinterpret_cast<char*>(this) + NLMSG_ALIGN(header.nlmsg_len));
+        auto* a = reinterpret_cast<rtattr*>(reinterpret_cast<char*>(this) +
+                                            NLMSG_ALIGN(header.nlmsg_len));
         a->rta_type = type;
         a->rta_len = static_cast<unsigned short>(RTA_LENGTH(size));
-        if (size != 0) std::memcpy(RTA_DATA(a), data, size);
-        header.nlmsg_len = static_cast<std::uint32_t>(NLMSG_ALIGN(header.nlmsg_len) + RTA_ALIGN(a->rta_len));
+        if (size != 0) {
+            std::memcpy(RTA_DATA(a), data, size);
+        }
+        header.nlmsg_len =
+            static_cast<std::uint32_t>(NLMSG_ALIGN(header.nlmsg_len) + RTA_ALIGN(a->rta_len));
         return a;
     }
     void end(rtattr* nest) {
-        nest->rta_len = static_cast<unsigned short>(reinterpret_cast<char*>(this) + header.nlmsg_len - reinterpret_cast<char*>(nest));
+        nest->rta_len = static_cast<unsigned short>(
+            reinterpret_cast<char*>(this) + header.nlmsg_len - reinterpret_cast<char*>(nest));
     }
 };
 
 /// Sends a request and returns the first response; empty with `errno` set on failure.
 std::vector<char> answer(Request& request) {
     const link::Descriptor socket(::socket(AF_NETLINK, SOCK_RAW | SOCK_CLOEXEC, NETLINK_ROUTE));
-    if (!socket || ::send(socket.get(), &request, request.header.nlmsg_len, 0) < 0) return {};
-    if (!link::readable_within(socket.get(), 1'000'000'000)) return {};
+    if (!socket || ::send(socket.get(), &request, request.header.nlmsg_len, 0) < 0) {
+        return {};
+    }
+    if (!link::readable_within(socket.get(), 1'000'000'000)) {
+        return {};
+    }
     std::vector<char> buffer(32768);
     const auto size = ::recv(socket.get(), buffer.data(), buffer.size(), MSG_DONTWAIT);
     buffer.resize(size > 0 ? static_cast<std::size_t>(size) : 0);
@@ -47,7 +56,9 @@ std::vector<char> answer(Request& request) {
 
 template <class Visit>
 void each_attribute(const rtattr* a, std::size_t left, const Visit& visit) {
-    for (auto size = static_cast<int>(left); RTA_OK(a, size); a = RTA_NEXT(a, size)) visit(a->rta_type & NLA_TYPE_MASK, a);
+    for (auto size = static_cast<int>(left); RTA_OK(a, size); a = RTA_NEXT(a, size)) {
+        visit(a->rta_type & NLA_TYPE_MASK, a);
+    }
 }
 template <class Visit>
 void each_within(const rtattr* nest, const Visit& visit) {
@@ -73,17 +84,28 @@ State state_of(std::uint32_t kernel) {
 void read_controller(const rtattr* info, Interface& found) {
     each_within(info, [&](int type, const rtattr* a) {
         const auto* text = static_cast<const char*>(RTA_DATA(a));
-        if (type == IFLA_INFO_KIND) found.kind.assign(text, strnlen(text, RTA_PAYLOAD(a)));
+        if (type == IFLA_INFO_KIND) {
+            found.kind.assign(text, strnlen(text, RTA_PAYLOAD(a)));
+        }
         if (type != IFLA_INFO_DATA || found.kind != "can") return;
         each_within(a, [&](int what, const rtattr* b) {
-            if (what == IFLA_CAN_BITTIMING) found.bit_rate = value<can_bittiming>(b).bitrate;
-            if (what == IFLA_CAN_DATA_BITTIMING) found.data_rate = value<can_bittiming>(b).bitrate;
-            if (what == IFLA_CAN_STATE) found.has_state = true, found.state = state_of(value<std::uint32_t>(b));
+            if (what == IFLA_CAN_BITTIMING) {
+                found.bit_rate = value<can_bittiming>(b).bitrate;
+            }
+            if (what == IFLA_CAN_DATA_BITTIMING) {
+                found.data_rate = value<can_bittiming>(b).bitrate;
+            }
+            if (what == IFLA_CAN_STATE) {
+                found.has_state = true;
+                found.state = state_of(value<std::uint32_t>(b));
+            }
             if (what != IFLA_CAN_BERR_COUNTER) return;
             const auto counters = value<can_berr_counter>(b);
             found.has_counters = true;
-            found.send_errors = static_cast<std::uint8_t>(counters.txerr < 255 ? counters.txerr : 255);
-            found.receive_errors = static_cast<std::uint8_t>(counters.rxerr < 255 ? counters.rxerr : 255);
+            found.send_errors =
+                static_cast<std::uint8_t>(counters.txerr < 255 ? counters.txerr : 255);
+            found.receive_errors =
+                static_cast<std::uint8_t>(counters.rxerr < 255 ? counters.rxerr : 255);
         });
     });
 }
@@ -99,21 +121,31 @@ Interface ask(const std::string& name) {
     request.add(IFLA_IFNAME, name.c_str(), name.size() < IFNAMSIZ ? name.size() + 1 : IFNAMSIZ);
     const auto buffer = answer(request);
     const auto* header = reinterpret_cast<const nlmsghdr*>(buffer.data());
-    if (buffer.empty() || !NLMSG_OK(header, buffer.size()) || header->nlmsg_type != RTM_NEWLINK) return found;
+    if (buffer.empty() || !NLMSG_OK(header, buffer.size()) || header->nlmsg_type != RTM_NEWLINK) {
+        return found;
+    }
     const auto* info = static_cast<const ifinfomsg*>(NLMSG_DATA(header));
     found.index = info->ifi_index;
     found.is_can = info->ifi_type == ARPHRD_CAN;
     found.up = (info->ifi_flags & IFF_UP) != 0;
     each_attribute(IFLA_RTA(info), IFLA_PAYLOAD(header), [&](int type, const rtattr* a) {
-        if (type == IFLA_MTU) found.mtu = value<std::uint32_t>(a);
-        if (type == IFLA_LINKINFO) read_controller(a, found);
+        if (type == IFLA_MTU) {
+            found.mtu = value<std::uint32_t>(a);
+        }
+        if (type == IFLA_LINKINFO) {
+            read_controller(a, found);
+        }
     });
     return found;
 }
 
-ControllerMonitor::ControllerMonitor(std::string name, Counting& counting, int index, std::uint32_t restart_ms,
-                                     std::function<bool(int)> reopen)
-    : name_(std::move(name)), counting_(counting), index_(index), restart_ms_(restart_ms), reopen_(std::move(reopen)) {
+ControllerMonitor::ControllerMonitor(std::string name, Counting& counting, int index,
+                                     std::uint32_t restart_ms, std::function<bool(int)> reopen)
+    : name_(std::move(name)),
+      counting_(counting),
+      index_(index),
+      restart_ms_(restart_ms),
+      reopen_(std::move(reopen)) {
     monitor_.emplace("can-monitor", 500, [this] { look(); });
 }
 
@@ -127,17 +159,33 @@ void ControllerMonitor::look() {
     }
     counting_.bit_rate.store(now.bit_rate != 0 ? now.bit_rate : counting_.bit_rate.load());
     counting_.data_rate.store(now.data_rate != 0 ? now.data_rate : counting_.data_rate.load());
-    if (now.has_counters) counting_.send_errors.store(now.send_errors), counting_.receive_errors.store(now.receive_errors);
+    if (now.has_counters) {
+        counting_.send_errors.store(now.send_errors);
+
+        counting_.receive_errors.store(now.receive_errors);
+    }
     State state = before;  // for an interface without a state, error frames report it
-    if (now.has_state) counting_.state.store(state = now.state);
-    else if (before != State::down || !counting_.state.compare_exchange_strong(state, State::active)) state = counting_.state.load();
-    else state = State::active;
-    if (before == State::down && state != State::down) Counting::add(counting_.restarts);
+    if (now.has_state) {
+        counting_.state.store(state = now.state);
+    } else if (before != State::down ||
+               !counting_.state.compare_exchange_strong(state, State::active)) {
+        state = counting_.state.load();
+    } else {
+        state = State::active;
+    }
+    if (before == State::down && state != State::down) {
+        Counting::add(counting_.restarts);
+    }
 
     if (state != State::bus_off) return void(off_since_ns_ = 0);
-    if (off_since_ns_ == 0) off_since_ns_ = link::monotonic_ns();
-    const bool due = restart_ms_ != 0 && link::monotonic_ns() - off_since_ns_ >= restart_ms_ * 1'000'000LL;
-    if ((due || wants_restart.exchange(false)) && restart_controller(now.index)) off_since_ns_ = 0;
+    if (off_since_ns_ == 0) {
+        off_since_ns_ = link::monotonic_ns();
+    }
+    const bool due =
+        restart_ms_ != 0 && link::monotonic_ns() - off_since_ns_ >= restart_ms_ * 1'000'000LL;
+    if ((due || wants_restart.exchange(false)) && restart_controller(now.index)) {
+        off_since_ns_ = 0;
+    }
 }
 
 /// Restarts the controller. Needs CAP_NET_ADMIN; without it the interface's own restart-ms does it.
@@ -156,7 +204,9 @@ bool ControllerMonitor::restart_controller(int index) {
     request.end(link);
     const auto buffer = answer(request);
     const auto* header = reinterpret_cast<const nlmsghdr*>(buffer.data());
-    if (buffer.empty() || !NLMSG_OK(header, buffer.size()) || header->nlmsg_type != NLMSG_ERROR) return false;
+    if (buffer.empty() || !NLMSG_OK(header, buffer.size()) || header->nlmsg_type != NLMSG_ERROR) {
+        return false;
+    }
     return static_cast<const nlmsgerr*>(NLMSG_DATA(header))->error == 0;
 }
 

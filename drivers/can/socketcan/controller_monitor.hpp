@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Monitors one interface in a thread of its own, so that no cycle has to: up or down, lost and returned, bit rate, state of the
-// controller. All of it is reported by rtnetlink.
+// Monitors one interface in a thread of its own, so that no cycle has to: up or down, lost and
+// returned, bit rate, state of the controller. All of it is reported by rtnetlink.
 #pragma once
 
 #include <atomic>
@@ -17,14 +17,17 @@ namespace hal::can::socketcan {
 /// An interface as the kernel describes it.
 struct Interface {
     int index = 0;  ///< 0: no such interface
-    bool is_can = false, up = false;
+    bool is_can = false;
+    bool up = false;
     unsigned mtu = 0;
     std::string kind;  ///< "vcan", "can", "vxcan", …
-    std::uint32_t bit_rate = 0, data_rate = 0;
+    std::uint32_t bit_rate = 0;
+    std::uint32_t data_rate = 0;
     bool has_state = false;
     State state = State::active;
     bool has_counters = false;
-    std::uint8_t send_errors = 0, receive_errors = 0;
+    std::uint8_t send_errors = 0;
+    std::uint8_t receive_errors = 0;
 };
 
 /// Queries the kernel. [setup]
@@ -32,8 +35,10 @@ Interface ask(const std::string& name);
 
 class ControllerMonitor {
 public:
-    /// Starts the thread. It calls `reopen` when an interface of that name has returned under another number. [setup]
-    ControllerMonitor(std::string name, Counting&, int index, std::uint32_t restart_ms, std::function<bool(int index)> reopen);
+    /// Starts the thread. It calls `reopen` when an interface of that name has returned under
+    /// another number. [setup]
+    ControllerMonitor(std::string name, Counting&, int index, std::uint32_t restart_ms,
+                      std::function<bool(int index)> reopen);
 
     /// Checks now. One write to an eventfd, which never waits. [realtime]
     void nudge() noexcept { monitor_->nudge(); }

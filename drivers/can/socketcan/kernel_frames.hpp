@@ -11,8 +11,9 @@
 
 namespace hal::can::socketcan {
 
-static_assert(error_send_timeout == CAN_ERR_TX_TIMEOUT && error_controller == CAN_ERR_CRTL && error_bus_off == CAN_ERR_BUSOFF &&
-              error_no_acknowledge == CAN_ERR_ACK && error_restarted == CAN_ERR_RESTARTED && error_bus == CAN_ERR_BUSERROR);
+static_assert(error_send_timeout == CAN_ERR_TX_TIMEOUT && error_controller == CAN_ERR_CRTL &&
+              error_bus_off == CAN_ERR_BUSOFF && error_no_acknowledge == CAN_ERR_ACK &&
+              error_restarted == CAN_ERR_RESTARTED && error_bus == CAN_ERR_BUSERROR);
 
 /// Converts a valid frame. Returns the number of bytes to write. [realtime]
 inline std::size_t to_kernel(const Frame& f, canfd_frame& out) noexcept {
@@ -20,12 +21,15 @@ inline std::size_t to_kernel(const Frame& f, canfd_frame& out) noexcept {
     out.can_id = f.id | (f.extended ? CAN_EFF_FLAG : 0U) | (f.remote ? CAN_RTR_FLAG : 0U);
     out.len = f.length;
     if (f.fd) {
-        out.flags = static_cast<__u8>((f.bit_rate_switch ? CANFD_BRS : 0) | (f.error_state ? CANFD_ESI : 0));
+        out.flags = static_cast<__u8>((f.bit_rate_switch ? CANFD_BRS : 0) |
+                                      (f.error_state ? CANFD_ESI : 0));
 #ifdef CANFD_FDF
         out.flags |= CANFD_FDF;
 #endif
     }
-    if (!f.bytes().empty()) std::memcpy(out.data, f.bytes().data(), f.bytes().size());
+    if (!f.bytes().empty()) {
+        std::memcpy(out.data, f.bytes().data(), f.bytes().size());
+    }
     return f.fd ? CANFD_MTU : CAN_MTU;
 }
 
@@ -41,7 +45,9 @@ inline bool from_kernel(const canfd_frame& in, std::size_t size, Frame& f) noexc
     f.error_state = f.fd && (in.flags & CANFD_ESI) != 0;
     f.length = in.len < (f.fd ? 64 : 8) ? in.len : static_cast<std::uint8_t>(f.fd ? 64 : 8);
     f.own = false;
-    if (!f.remote) std::memcpy(f.data.data(), in.data, f.length);
+    if (!f.remote) {
+        std::memcpy(f.data.data(), in.data, f.length);
+    }
     return true;
 }
 

@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "datagram.hpp"
-#include "link/filtering.hpp"
 #include "hal/queue.hpp"
+#include "link/filtering.hpp"
 #include "link/system.hpp"
 
 namespace hal::can::canudp {
@@ -31,39 +31,56 @@ struct Place {
     bool is_six() const { return address.ss_family == AF_INET6; }
 };
 
-/// Parses `GROUP`, `GROUP:PORT`, `[GROUP6]:PORT`, each with an optional `%INTERFACE` after the group.
+/// Parses `GROUP`, `GROUP:PORT`, `[GROUP6]:PORT`, each with an optional `%INTERFACE` after the
+/// group.
 Place parse(std::string text, std::string& problem) {
     std::string port = "43113", group = "239.74.163.2", interface;
     if (!text.empty() && text[0] == '[') {
         const auto end = text.find(']');
         group = text.substr(1, end == text.npos ? end : end - 1);
-        if (end != text.npos && end + 1 < text.size() && text[end + 1] == ':') port = text.substr(end + 2);
+        if (end != text.npos && end + 1 < text.size() && text[end + 1] == ':') {
+            port = text.substr(end + 2);
+        }
     } else if (!text.empty()) {
         const auto colon = text.find(':');
-        if (colon != 0) group = text.substr(0, colon);
-        if (colon != text.npos) port = text.substr(colon + 1);
+        if (colon != 0) {
+            group = text.substr(0, colon);
+        }
+        if (colon != text.npos) {
+            port = text.substr(colon + 1);
+        }
     }
-    if (const auto percent = group.find('%'); percent != group.npos) interface = group.substr(percent + 1), group.resize(percent);
+    if (const auto percent = group.find('%'); percent != group.npos) {
+        interface = group.substr(percent + 1);
+        group.resize(percent);
+    }
     Place p;
     char* end = nullptr;
     const unsigned long number = std::strtoul(port.c_str(), &end, 10);
-    if (port.empty() || *end != '\0' || number == 0 || number > 65535) problem = "invalid port '" + port + "'; write udp:239.74.163.2:43113";
-    if (!interface.empty() && (p.interface = if_nametoindex(interface.c_str())) == 0)
+    if (port.empty() || *end != '\0' || number == 0 || number > 65535) {
+        problem = "invalid port '" + port + "'; write udp:239.74.163.2:43113";
+    }
+    if (!interface.empty() && (p.interface = if_nametoindex(interface.c_str())) == 0) {
         problem = "no interface " + interface + "; to list them: ip -br link";
+    }
     auto& four = reinterpret_cast<sockaddr_in&>(p.address);
     auto& six = reinterpret_cast<sockaddr_in6&>(p.address);
-    if (inet_pton(AF_INET, group.c_str(), &four.sin_addr) == 1 && IN_MULTICAST(ntohl(four.sin_addr.s_addr))) {
+    if (inet_pton(AF_INET, group.c_str(), &four.sin_addr) == 1 &&
+        IN_MULTICAST(ntohl(four.sin_addr.s_addr))) {
         four.sin_family = AF_INET;
         four.sin_port = htons(static_cast<std::uint16_t>(number));
         p.size = sizeof four;
-    } else if (inet_pton(AF_INET6, group.c_str(), &six.sin6_addr) == 1 && IN6_IS_ADDR_MULTICAST(&six.sin6_addr)) {
+    } else if (inet_pton(AF_INET6, group.c_str(), &six.sin6_addr) == 1 &&
+               IN6_IS_ADDR_MULTICAST(&six.sin6_addr)) {
         six.sin6_family = AF_INET6;
         six.sin6_port = htons(static_cast<std::uint16_t>(number));
         p.size = sizeof six;
     } else if (problem.empty()) {
-        problem = "invalid multicast group '" + group + "'; write udp:239.74.163.2:" + port + ", the default of stock tools";
+        problem = "invalid multicast group '" + group + "'; write udp:239.74.163.2:" + port +
+                  ", the default of stock tools";
     }
-    p.text = "udp:" + (p.is_six() ? "[" + group + "]" : group) + (interface.empty() ? "" : "%" + interface) + ":" + port;
+    p.text = "udp:" + (p.is_six() ? "[" + group + "]" : group) +
+             (interface.empty() ? "" : "%" + interface) + ":" + port;
     return p;
 }
 
@@ -73,14 +90,19 @@ bool set(int fd, int level, int name, const T& value) {
 }
 
 link::Descriptor receiver(const Place& p, const Options& o, std::string& problem) {
-    link::Descriptor fd(::socket(p.address.ss_family, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
+    link::Descriptor fd(
+        ::socket(p.address.ss_family, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
     const int yes = 1;
     set(fd.get(), SOL_SOCKET, SO_REUSEADDR, yes);
     set(fd.get(), SOL_SOCKET, SO_REUSEPORT, yes);
     set(fd.get(), SOL_SOCKET, SO_TIMESTAMPNS, yes);
     set(fd.get(), SOL_SOCKET, SO_RXQ_OVFL, yes);
-    const int room = static_cast<int>((o.receive_capacity < 65536 ? o.receive_capacity : 65536) * 1024);  // the kernel's cost of a datagram
-    if (!set(fd.get(), SOL_SOCKET, SO_RCVBUFFORCE, room)) set(fd.get(), SOL_SOCKET, SO_RCVBUF, room);
+    // the kernel's cost of a datagram
+    const int room =
+        static_cast<int>((o.receive_capacity < 65536 ? o.receive_capacity : 65536) * 1024);
+    if (!set(fd.get(), SOL_SOCKET, SO_RCVBUFFORCE, room)) {
+        set(fd.get(), SOL_SOCKET, SO_RCVBUF, room);
+    }
     sockaddr_storage any = p.address;
     bool joined = false;
     if (p.is_six()) {
@@ -94,45 +116,67 @@ link::Descriptor receiver(const Place& p, const Options& o, std::string& problem
         joined = set(fd.get(), IPPROTO_IP, IP_ADD_MEMBERSHIP, request);
         // Bind to the group: any address would receive every group on this port.
     }
-    if (!joined)
-        problem = "cannot join the group: " + link::reason() + "; without a route to it, type: sudo ip route add 224.0.0.0/4 dev lo";
-    else if (::bind(fd.get(), reinterpret_cast<const sockaddr*>(&any), p.size) != 0)
-        problem = "cannot bind to the port: " + link::reason() + "; to find another user of it: ss -ulp";
+    if (!joined) {
+        problem = "cannot join the group: " + link::reason() +
+                  "; without a route to it, type: sudo ip route add 224.0.0.0/4 dev lo";
+    } else if (::bind(fd.get(), reinterpret_cast<const sockaddr*>(&any), p.size) != 0) {
+        problem =
+            "cannot bind to the port: " + link::reason() + "; to find another user of it: ss -ulp";
+    }
     return fd;
 }
 
 link::Descriptor sender(const Place& p, std::string& problem) {
-    link::Descriptor fd(::socket(p.address.ss_family, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
+    link::Descriptor fd(
+        ::socket(p.address.ss_family, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
     const int one = 1;  // hop limit 1, and loopback to this machine
     if (p.is_six()) {
         set(fd.get(), IPPROTO_IPV6, IPV6_MULTICAST_HOPS, one);
-        if (p.interface != 0) set(fd.get(), IPPROTO_IPV6, IPV6_MULTICAST_IF, p.interface);
+        if (p.interface != 0) {
+            set(fd.get(), IPPROTO_IPV6, IPV6_MULTICAST_IF, p.interface);
+        }
     } else {
         set(fd.get(), IPPROTO_IP, IP_MULTICAST_TTL, one);
-        if (p.interface != 0) set(fd.get(), IPPROTO_IP, IP_MULTICAST_IF, ip_mreqn{{}, {INADDR_ANY}, static_cast<int>(p.interface)});
+        if (p.interface != 0) {
+            set(fd.get(), IPPROTO_IP, IP_MULTICAST_IF,
+                ip_mreqn{{}, {INADDR_ANY}, static_cast<int>(p.interface)});
+        }
     }
-    if (::connect(fd.get(), reinterpret_cast<const sockaddr*>(&p.address), p.size) != 0)
-        problem = "no route to the group: " + link::reason() + "; type: sudo ip route add 224.0.0.0/4 dev lo";
+    if (::connect(fd.get(), reinterpret_cast<const sockaddr*>(&p.address), p.size) != 0) {
+        problem = "no route to the group: " + link::reason() +
+                  "; type: sudo ip route add 224.0.0.0/4 dev lo";
+    }
     return fd;
 }
 
 class UdpLink final : public FilteringLink {
 public:
     UdpLink(const Place& place, const Options& options, link::Descriptor in, link::Descriptor out)
-        : options_(options), in_(std::move(in)), out_(std::move(out)), outgoing_(options.send_capacity) {
+        : options_(options),
+          in_(std::move(in)),
+          out_(std::move(out)),
+          outgoing_(options.send_capacity) {
         counting_.bit_rate = options.bit_rate != unlimited ? options.bit_rate : 0;
         counting_.data_rate = options.data_rate;
-        description_.address = place.text, description_.transport = "CAN over UDP multicast";
-        description_.bit_rate = counting_.bit_rate, description_.data_rate = counting_.data_rate, description_.fd = options.fd;
+        description_.address = place.text;
+        description_.transport = "CAN over UDP multicast";
+        description_.bit_rate = counting_.bit_rate;
+        description_.data_rate = counting_.data_rate;
+
+        description_.fd = options.fd;
         socklen_t size = sizeof self_;
         getsockname(out_.get(), reinterpret_cast<sockaddr*>(&self_), &size);
     }
 
     Sent send(const Frame& frame, std::int64_t now_ns) noexcept override {
-        if (!frame.valid() || options_.listen_only || (frame.fd && !options_.fd)) return Counting::add(counting_.dropped), Sent::rejected;
+        if (!frame.valid() || options_.listen_only || (frame.fd && !options_.fd)) {
+            Counting::add(counting_.dropped);
+            return Sent::rejected;
+        }
         if (outgoing_.push(frame)) return Sent::queued;
         flush(now_ns);
-        return outgoing_.push(frame) ? Sent::queued : (Counting::add(counting_.dropped), Sent::full);
+        return outgoing_.push(frame) ? Sent::queued
+                                     : (Counting::add(counting_.dropped), Sent::full);
     }
 
     void flush(std::int64_t) noexcept override {
@@ -154,11 +198,14 @@ public:
             if (sent <= 0) {
                 if (errno == EINTR) continue;
                 const bool waits = errno == EAGAIN || errno == ENOBUFS || errno == ECONNREFUSED;
-                counting_.state.store(waits ? State::active : State::down, std::memory_order_relaxed);
+                counting_.state.store(waits ? State::active : State::down,
+                                      std::memory_order_relaxed);
                 return;  // continue in the next cycle
             }
             counting_.state.store(State::active, std::memory_order_relaxed);
-            for (int i = 0; i < sent; ++i) counting_.count_sent(*outgoing_.at(static_cast<std::size_t>(i)));
+            for (int i = 0; i < sent; ++i) {
+                counting_.count_sent(*outgoing_.at(static_cast<std::size_t>(i)));
+            }
             outgoing_.drop(static_cast<std::size_t>(sent));
         }
     }
@@ -177,16 +224,20 @@ public:
     }
 
     Statistics statistics() const noexcept override { return counting_.read(outgoing_.size()); }
-    bool wait(std::int64_t at_most_ns) override { return next_ != filled_ || link::readable_within(in_.get(), at_most_ns); }
+    bool wait(std::int64_t at_most_ns) override {
+        return next_ != filled_ || link::readable_within(in_.get(), at_most_ns);
+    }
     int descriptor() const noexcept override { return in_.get(); }
 
 private:
     bool refill(std::int64_t now_ns) noexcept {
-        if (now_ns != unclocked && was_short_ && now_ns == asked_at_) return false;  // one system call per cycle unless the batch was full
+        // one system call per cycle unless the batch was full
+        if (now_ns != unclocked && was_short_ && now_ns == asked_at_) return false;
         mmsghdr messages[batch]{};
         iovec parts[batch]{};
         sockaddr_storage from[batch];
-        alignas(cmsghdr) char control[batch][CMSG_SPACE(sizeof(timespec)) + CMSG_SPACE(sizeof(std::uint32_t))];
+        alignas(cmsghdr) char
+            control[batch][CMSG_SPACE(sizeof(timespec)) + CMSG_SPACE(sizeof(std::uint32_t))];
         for (std::size_t i = 0; i < batch; ++i) {
             parts[i] = {in_buffers_[i].data(), in_buffers_[i].size()};
             messages[i].msg_hdr.msg_iov = &parts[i];
@@ -219,13 +270,18 @@ private:
                     lost_before_ = lost;
                 }
             }
-            if ((header.msg_flags & MSG_TRUNC) != 0 || !decode({in_buffers_[static_cast<std::size_t>(i)].data(), messages[i].msg_len}, f)) {
+            if ((header.msg_flags & MSG_TRUNC) != 0 ||
+                !decode({in_buffers_[static_cast<std::size_t>(i)].data(), messages[i].msg_len},
+                        f)) {
                 Counting::add(counting_.errors);
                 continue;
             }
             f.time_ns = time;
             f.own = is_self(from[i]);
-            if ((f.own && !options_.own_frames) || (f.error && !options_.error_frames) || (f.fd && !options_.fd)) continue;
+            if ((f.own && !options_.own_frames) || (f.error && !options_.error_frames) ||
+                (f.fd && !options_.fd)) {
+                continue;
+            }
             if (!f.error && !filters_.pass(f)) continue;
             counting_.count_received(f);
             ++filled_;
@@ -236,11 +292,14 @@ private:
     bool is_self(const sockaddr_storage& a) const noexcept {
         if (a.ss_family != self_.ss_family) return false;
         if (a.ss_family == AF_INET) {
-            const auto &x = reinterpret_cast<const sockaddr_in&>(a), &y = reinterpret_cast<const sockaddr_in&>(self_);
+            const auto &x = reinterpret_cast<const sockaddr_in&>(a),
+                       &y = reinterpret_cast<const sockaddr_in&>(self_);
             return x.sin_port == y.sin_port && x.sin_addr.s_addr == y.sin_addr.s_addr;
         }
-        const auto &x = reinterpret_cast<const sockaddr_in6&>(a), &y = reinterpret_cast<const sockaddr_in6&>(self_);
-        return x.sin6_port == y.sin6_port && std::memcmp(&x.sin6_addr, &y.sin6_addr, sizeof x.sin6_addr) == 0;
+        const auto &x = reinterpret_cast<const sockaddr_in6&>(a),
+                   &y = reinterpret_cast<const sockaddr_in6&>(self_);
+        return x.sin6_port == y.sin6_port &&
+               std::memcmp(&x.sin6_addr, &y.sin6_addr, sizeof x.sin6_addr) == 0;
     }
 
     const Options options_;
@@ -251,7 +310,8 @@ private:
     Datagram out_buffers_[batch];                             // used by the sending thread
     std::array<std::uint8_t, 512> in_buffers_[batch];  // from here on: used by the receiving thread
     Frame buffer_[batch];
-    std::size_t next_ = 0, filled_ = 0;
+    std::size_t next_ = 0;
+    std::size_t filled_ = 0;
     std::int64_t asked_at_ = unclocked;
     bool was_short_ = false;
     std::uint32_t lost_before_ = 0;
@@ -262,16 +322,21 @@ private:
 Description describe(const std::string& place) {
     std::string problem;
     const std::string text = parse(place, problem).text;
-    return {.address = problem.empty() ? text : "udp:" + place, .transport = "CAN over UDP multicast"};
+    return {.address = problem.empty() ? text : "udp:" + place,
+            .transport = "CAN over UDP multicast"};
 }
 
 Opened open(const std::string& place, const Options& options) {
     std::string problem;
     const Place p = parse(place, problem);
-    if (!problem.empty()) return {nullptr, problem};
+    if (!problem.empty()) {
+        return {nullptr, problem};
+    }
     link::Descriptor in = receiver(p, options, problem);
     link::Descriptor out = problem.empty() ? sender(p, problem) : link::Descriptor{};
-    if (!problem.empty()) return {nullptr, problem};
+    if (!problem.empty()) {
+        return {nullptr, problem};
+    }
     return {std::make_unique<UdpLink>(p, options, std::move(in), std::move(out)), {}};
 }
 

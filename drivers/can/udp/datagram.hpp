@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// One frame as a msgpack map in the exact format of python-can: eleven keys and no more, or its receiver fails.
+// One frame as a msgpack map in the exact format of python-can: eleven keys and no more, or its
+// receiver fails.
 #pragma once
 
 #include <array>
@@ -14,8 +15,8 @@ using Datagram = std::array<std::uint8_t, 256>;
 
 /// Encodes a valid frame. Returns the size. [realtime]
 std::size_t encode(const Frame&, std::int64_t real_time_ns, Datagram& out) noexcept;
-/// Decodes a map with the keys in any order and integers of any width; unknown keys are skipped. Returns false, with an unspecified frame,
-/// for anything but a valid frame. [realtime]
+/// Decodes a map with the keys in any order and integers of any width; unknown keys are skipped.
+/// Returns false, with an unspecified frame, for anything but a valid frame. [realtime]
 bool decode(std::span<const std::uint8_t> in, Frame&) noexcept;
 
 }  // namespace hal::can::canudp

@@ -20,24 +20,36 @@ Interface ask(const std::string& name) {
     if (!socket || name.empty() || name.size() >= IFNAMSIZ) return found;
     ifreq request{};
     name.copy(request.ifr_name, IFNAMSIZ - 1);
-    const auto answered = [&](unsigned long what) { return ioctl(socket.get(), what, &request) == 0; };
+    const auto answered = [&](unsigned long what) {
+        return ioctl(socket.get(), what, &request) == 0;
+    };
     if (!answered(SIOCGIFINDEX)) return found;
     found.index = request.ifr_ifindex;
-    if (answered(SIOCGIFFLAGS)) found.up = (request.ifr_flags & IFF_UP) != 0 && (request.ifr_flags & IFF_RUNNING) != 0;
-    if (answered(SIOCGIFMTU)) found.mtu = static_cast<std::uint32_t>(request.ifr_mtu);
+    if (answered(SIOCGIFFLAGS)) {
+        found.up = (request.ifr_flags & IFF_UP) != 0 && (request.ifr_flags & IFF_RUNNING) != 0;
+    }
+    if (answered(SIOCGIFMTU)) {
+        found.mtu = static_cast<std::uint32_t>(request.ifr_mtu);
+    }
     if (answered(SIOCGIFHWADDR)) {
-        found.ethernet = request.ifr_hwaddr.sa_family == ARPHRD_ETHER || request.ifr_hwaddr.sa_family == ARPHRD_LOOPBACK;
+        found.ethernet = request.ifr_hwaddr.sa_family == ARPHRD_ETHER ||
+                         request.ifr_hwaddr.sa_family == ARPHRD_LOOPBACK;
         std::memcpy(found.address.data(), request.ifr_hwaddr.sa_data, found.address.size());
     }
     // The first request returns the number of link mode words, the second the settings.
-    alignas(ethtool_link_settings) std::array<char, sizeof(ethtool_link_settings) + std::size_t{3} * 127 * sizeof(std::uint32_t)> room{};
+    alignas(ethtool_link_settings)
+        std::array<char,
+                   sizeof(ethtool_link_settings) + std::size_t{3} * 127 * sizeof(std::uint32_t)>
+            room{};
     auto& link = reinterpret_cast<ethtool_link_settings&>(room);
     link.cmd = ETHTOOL_GLINKSETTINGS;
     request.ifr_data = room.data();
     if (answered(SIOCETHTOOL) && link.link_mode_masks_nwords < 0) {
         link.cmd = ETHTOOL_GLINKSETTINGS;
         link.link_mode_masks_nwords = static_cast<std::int8_t>(-link.link_mode_masks_nwords);
-        if (answered(SIOCETHTOOL) && link.speed != static_cast<std::uint32_t>(SPEED_UNKNOWN)) found.speed = link.speed;
+        if (answered(SIOCETHTOOL) && link.speed != static_cast<std::uint32_t>(SPEED_UNKNOWN)) {
+            found.speed = link.speed;
+        }
     }
     return found;
 }
@@ -45,7 +57,9 @@ Interface ask(const std::string& name) {
 std::string interfaces() {
     std::string names;
     if (auto* const all = if_nameindex()) {
-        for (const auto* i = all; i->if_index != 0; ++i) names += (names.empty() ? "" : ", ") + std::string(i->if_name);
+        for (const auto* i = all; i->if_index != 0; ++i) {
+            names += (names.empty() ? "" : ", ") + std::string(i->if_name);
+        }
         if_freenameindex(all);
     }
     return names;

@@ -12,7 +12,8 @@ struct Interface {
     int index = 0;         ///< 0: no such interface
     bool ethernet = false; ///< its frames have an Ethernet header
     bool up = false;       ///< set up, and with a carrier
-    std::uint32_t mtu = 0, speed = 0;
+    std::uint32_t mtu = 0;
+    std::uint32_t speed = 0;
     Address address{};
 };
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Monitors one interface in a thread of its own, so that no cycle has to: carrier, MTU, speed, loss and return under another number,
-// frames dropped by the kernel, steps of the clock that stamps frames.
+// Monitors one interface in a thread of its own, so that no cycle has to: carrier, MTU, speed, loss
+// and return under another number, frames dropped by the kernel, steps of the clock that stamps
+// frames.
 #pragma once
 
 #include <atomic>
@@ -20,7 +21,8 @@ public:
     EthernetMonitor(std::string name, const Interface& found, Receiver&, Sender&, RealTime&);
 
     std::atomic<std::uint32_t> speed{0};
-    std::atomic<std::uint64_t> downs{0}, lost{0};
+    std::atomic<std::uint64_t> downs{0};
+    std::atomic<std::uint64_t> lost{0};
 
 private:
     void look();

@@ -23,7 +23,8 @@ constexpr long futex_call = SYS_futex;
 #endif
 
 constexpr std::int64_t wake_up_ns = 30'000;  // latency of waking a thread on another CPU
-constexpr std::int64_t nothing_new_ns = 10'000;  // before a frame's time; a frame queued later leaves after it, even if due earlier
+// before a frame's time; a frame queued later leaves after it, even if due earlier
+constexpr std::int64_t nothing_new_ns = 10'000;
 
 }  // namespace
 
@@ -34,11 +35,18 @@ bool SpinBudget::is_needed() {
 }
 
 Pacer::Pacer(Sender& sender, const Options& options)
-    : sender_(sender), spin_ns_(options.policy == Policy::block ? 0 : options.policy == Policy::spin ? INT64_MAX : options.spin_ns),
-      places_(hal::Queue<std::uint32_t>(options.send_capacity).capacity()), unused_(options.send_capacity), outgoing_(options.send_capacity),
+    : sender_(sender),
+      spin_ns_(options.policy == Policy::block  ? 0
+               : options.policy == Policy::spin ? INT64_MAX
+                                                : options.spin_ns),
+      places_(hal::Queue<std::uint32_t>(options.send_capacity).capacity()),
+      unused_(options.send_capacity),
+      outgoing_(options.send_capacity),
 
       budget_(SpinBudget::is_needed()) {
-    for (std::uint32_t i = 0; i < places_.size(); ++i) unused_.push(i);
+    for (std::uint32_t i = 0; i < places_.size(); ++i) {
+        unused_.push(i);
+    }
     waiting_.reserve(places_.size());
     thread_ = std::thread([this, options] {
         prepare(options);
@@ -62,15 +70,21 @@ void Pacer::prepare(const Options& options) {
         cpu_set_t cpus;
         CPU_ZERO(&cpus);
         CPU_SET(static_cast<std::size_t>(options.pacer_cpu), &cpus);
-        if (sched_setaffinity(0, sizeof cpus, &cpus) != 0) remark_ = "cannot run the pacer on CPU " + std::to_string(options.pacer_cpu);
+        if (sched_setaffinity(0, sizeof cpus, &cpus) != 0) {
+            remark_ = "cannot run the pacer on CPU " + std::to_string(options.pacer_cpu);
+        }
     }
     sched_param wanted{};
     wanted.sched_priority = options.pacer_priority;
-    if (pthread_setschedparam(pthread_self(), SCHED_FIFO, &wanted) != 0)
-        remark_ = "the pacer runs without real-time priority: frames may leave late; to grant it, see: hal doctor";
+    if (pthread_setschedparam(pthread_self(), SCHED_FIFO, &wanted) != 0) {
+        remark_ =
+            "the pacer runs without real-time priority: frames may leave late; to grant it, see: "
+            "hal doctor";
+    }
 }
 
-Sent Pacer::send(std::span<const std::uint8_t> frame, const Launch& launch, std::int64_t now_ns) noexcept {
+Sent Pacer::send(std::span<const std::uint8_t> frame, const Launch& launch,
+                 std::int64_t now_ns) noexcept {
     const auto asleep_until = asleep_until_.load(std::memory_order_relaxed);
     if (launch.at_ns - now_ns < wake_up_ns && asleep_until > launch.at_ns) {
         sender_.await(launch.at_ns);
@@ -85,13 +99,16 @@ Sent Pacer::send(std::span<const std::uint8_t> frame, const Launch& launch, std:
     place.launch = launch;
     outgoing_.push(number);  // the queue is as large as the pool
     const auto wanted = spin_ns_ < launch.at_ns ? launch.at_ns - spin_ns_ : 0;
-    if (wanted < asleep_until_.fetch_add(0, std::memory_order_acq_rel)) ring();
+    if (wanted < asleep_until_.fetch_add(0, std::memory_order_acq_rel)) {
+        ring();
+    }
     return Sent::queued;
 }
 
 void Pacer::ring() noexcept {
     bell_.fetch_add(1, std::memory_order_release);
-    syscall(futex_call, reinterpret_cast<std::uint32_t*>(&bell_), FUTEX_WAKE_PRIVATE, 1, nullptr, nullptr, 0);
+    syscall(futex_call, reinterpret_cast<std::uint32_t*>(&bell_), FUTEX_WAKE_PRIVATE, 1, nullptr,
+            nullptr, 0);
 }
 
 /// Sleeps until the time or the bell.
@@ -101,8 +118,8 @@ void Pacer::sleep(std::int64_t until_ns) noexcept {
     if (outgoing_.front() == nullptr && !ending_.load()) {
         const timespec t = link::to_timespec(until_ns);
         // FUTEX_WAIT_BITSET takes an absolute time of CLOCK_MONOTONIC (futex(2)).
-        syscall(futex_call, reinterpret_cast<std::uint32_t*>(&bell_), FUTEX_WAIT_BITSET_PRIVATE, bell, until_ns == INT64_MAX ? nullptr : &t,
-                nullptr, FUTEX_BITSET_MATCH_ANY);
+        syscall(futex_call, reinterpret_cast<std::uint32_t*>(&bell_), FUTEX_WAIT_BITSET_PRIVATE,
+                bell, until_ns == INT64_MAX ? nullptr : &t, nullptr, FUTEX_BITSET_MATCH_ANY);
     }
     asleep_until_.exchange(INT64_MIN, std::memory_order_acq_rel);
 }
@@ -126,7 +143,9 @@ bool Pacer::look_until(std::int64_t time_ns) noexcept {
         if (outgoing_.front() != nullptr || ending_.load(std::memory_order_relaxed)) break;
         pause_processor();
     }
-    if (!budget_.spent(began, now) && now < time_ns) sleep(std::min(now + SpinBudget::rest_ns, time_ns));
+    if (!budget_.spent(began, now) && now < time_ns) {
+        sleep(std::min(now + SpinBudget::rest_ns, time_ns));
+    }
     return now >= time_ns;
 }
 

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: MIT
-// A thread that sends frames at their times. Frames are in a pool of buffers, whose numbers circulate:
-// sender -> `outgoing` -> pacer -> `unused` -> sender. The sender rings only when the pacer would sleep too long:
+// A thread that sends frames at their times. Frames are in a pool of buffers, whose numbers
+// circulate: sender -> `outgoing` -> pacer -> `unused` -> sender. The sender rings only when the
+// pacer would sleep too long:
 //   1. sender: frame into `outgoing`       2. pacer: exchanges `asleep_until`
 //   3. sender: adds nothing to it          4. pacer: checks `outgoing`
-// 2 and 3 are read-modify-writes of one variable, so one comes first: 3 then reads what 2 wrote, or 4 sees what 1 queued.
+// 2 and 3 are read-modify-writes of one variable, so one comes first: 3 then reads what 2 wrote, or
+// 4 sees what 1 queued.
 #pragma once
 
 #include <atomic>
@@ -22,7 +24,8 @@ public:
     Pacer(Sender&, const Options&);
     ~Pacer();
 
-    /// Sends a frame at its time; from the calling thread when that is nearer than a wake-up takes. [realtime] sender
+    /// Sends a frame at its time; from the calling thread when that is nearer than a wake-up takes.
+    /// [realtime] sender
     Sent send(std::span<const std::uint8_t> frame, const Launch&, std::int64_t now_ns) noexcept;
     /// Returns what the thread could not obtain, as a sentence; empty: nothing. [setup]
     const std::string& remark() const noexcept { return remark_; }
@@ -37,7 +40,9 @@ private:
         std::int64_t at_ns;
         std::uint64_t sequence;
         std::uint32_t place;
-        bool operator<(const Waiting& o) const noexcept { return at_ns != o.at_ns ? at_ns > o.at_ns : sequence > o.sequence; }
+        bool operator<(const Waiting& o) const noexcept {
+            return at_ns != o.at_ns ? at_ns > o.at_ns : sequence > o.sequence;
+        }
     };
 
     void prepare(const Options&);
@@ -54,9 +59,11 @@ private:
     std::vector<Waiting> waiting_;  ///< a heap, the next to leave first; the pacer's
     std::uint64_t sequence_ = 0;
     SpinBudget budget_;
-    std::atomic<std::int64_t> asleep_until_{INT64_MIN};  ///< written by the pacer; INT64_MIN: it is awake
+    /// written by the pacer; INT64_MIN: it is awake
+    std::atomic<std::int64_t> asleep_until_{INT64_MIN};
     std::atomic<std::uint32_t> bell_{0};
-    std::atomic<bool> ending_{false}, ready_{false};
+    std::atomic<bool> ending_{false};
+    std::atomic<bool> ready_{false};
     std::string remark_;
     std::thread thread_;
 };

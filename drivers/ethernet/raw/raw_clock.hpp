@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The kernel stamps frames on CLOCK_REALTIME, which is set by people and NTP; the runtime uses CLOCK_MONOTONIC. Both are slewed alike,
-// so their offset is constant until the former is stepped.
+// The kernel stamps frames on CLOCK_REALTIME, which is set by people and NTP; the runtime uses
+// CLOCK_MONOTONIC. Both are slewed alike, so their offset is constant until the former is stepped.
 #pragma once
 
 #include <atomic>
@@ -16,9 +16,13 @@ public:
 
     /// Measures the offset; a change of less than 1 us is measurement error. [any]
     void measure() noexcept {
-        std::int64_t narrowest = INT64_MAX, distance = 0;
+        std::int64_t narrowest = INT64_MAX;
+        std::int64_t distance = 0;
         for (int i = 0; i < 5; ++i) {
-            const auto before = link::monotonic_ns(), real = link::clock_ns(CLOCK_REALTIME), after = link::monotonic_ns();
+            const auto before = link::monotonic_ns();
+            const auto real = link::clock_ns(CLOCK_REALTIME);
+
+            const auto after = link::monotonic_ns();
             if (after - before >= narrowest) continue;
             narrowest = after - before;
             distance = before + narrowest / 2 - real;
@@ -29,35 +33,47 @@ public:
         distance_.store(distance, std::memory_order_relaxed);
     }
 
-    /// Converts the stamp of a frame received after `last_ns` and before `now_ns`, also across a step of the clock. [realtime]
-    std::int64_t to_monotonic(std::int64_t stamp_ns, std::int64_t last_ns, std::int64_t now_ns) noexcept {
-        constexpr std::int64_t disorder_ns = 100'000;  // queues of one interface are not emptied in order
+    /// Converts the stamp of a frame received after `last_ns` and before `now_ns`, also across a
+    /// step of the clock. [realtime]
+    std::int64_t to_monotonic(std::int64_t stamp_ns, std::int64_t last_ns,
+                              std::int64_t now_ns) noexcept {
+        // queues of one interface are not emptied in order
+        constexpr std::int64_t disorder_ns = 100'000;
         const auto fits = [&](std::int64_t t) { return t <= now_ns && t >= last_ns - disorder_ns; };
         const auto time = stamp_ns + distance_.load(std::memory_order_relaxed);
         if (fits(time)) return time;
         measure();
-        for (const auto* d : {&distance_, &before_})
+        for (const auto* d : {&distance_, &before_}) {
             if (const auto t = stamp_ns + d->load(std::memory_order_relaxed); fits(t)) return t;
+        }
         return now_ns;
     }
 
 private:
     // Every thread that measures writes the same value; all read.
-    std::atomic<std::int64_t> distance_{INT64_MIN / 2}, before_{INT64_MIN / 2};
+    std::atomic<std::int64_t> distance_{INT64_MIN / 2};
+
+private:
+    // Every thread that measures writes the same value; all read.
+    std::atomic<std::int64_t> before_{INT64_MIN / 2};
 };
 
-/// Limits how long a thread spins. The kernel throttles real-time threads that use more than 95 % of a CPU (kernel.sched_rt_runtime_us) for
-/// tens of milliseconds: this one sleeps 0.1 ms before that happens. For one thread.
+/// Limits how long a thread spins. The kernel throttles real-time threads that use more than 95 %
+/// of a CPU (kernel.sched_rt_runtime_us) for tens of milliseconds: this one sleeps 0.1 ms before
+/// that happens. For one thread.
 class SpinBudget {
 public:
     explicit SpinBudget(bool bounded) noexcept : bounded_(bounded) {}
 
-    /// Accounts for spinning from `from_ns` to `to_ns`. Returns false when the thread must sleep rest_ns now. [realtime]
+    /// Accounts for spinning from `from_ns` to `to_ns`. Returns false when the thread must sleep
+    /// rest_ns now. [realtime]
     bool spent(std::int64_t from_ns, std::int64_t to_ns) noexcept {
         if (!bounded_) return true;
         credit_ns_ += (to_ns - last_ns_) / 20 * 17 - (to_ns - from_ns);
         last_ns_ = to_ns;
-        if (credit_ns_ > most_ns) credit_ns_ = most_ns;
+        if (credit_ns_ > most_ns) {
+            credit_ns_ = most_ns;
+        }
         return credit_ns_ > 0;
     }
     static constexpr std::int64_t rest_ns = 100'000;
@@ -67,7 +83,8 @@ public:
 private:
     static constexpr std::int64_t most_ns = 100'000'000;
     const bool bounded_;
-    std::int64_t credit_ns_ = most_ns, last_ns_ = link::monotonic_ns();
+    std::int64_t credit_ns_ = most_ns;
+    std::int64_t last_ns_ = link::monotonic_ns();
 };
 
 inline void pause_processor() noexcept {

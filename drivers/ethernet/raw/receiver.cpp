@@ -19,7 +19,8 @@ namespace hal::ethernet::rawether {
 
 namespace {
 
-constexpr std::size_t place_bytes = 2048, block_bytes = 65536;
+constexpr std::size_t place_bytes = 2048;
+constexpr std::size_t block_bytes = 65536;
 
 template <class T>
 bool set(int fd, int level, int name, const T& value) {
@@ -29,8 +30,10 @@ bool set(int fd, int level, int name, const T& value) {
 /// Builds a filter that passes frames for this station, of the given types.
 std::vector<sock_filter> filter(const std::vector<std::uint16_t>& types, bool promiscuous) {
     std::vector<sock_filter> code;
-    const auto add = [&](std::uint16_t what, std::uint32_t value, std::size_t when_true = 0, std::size_t when_false = 0) {
-        code.push_back({what, static_cast<std::uint8_t>(when_true), static_cast<std::uint8_t>(when_false), value});
+    const auto add = [&](std::uint16_t what, std::uint32_t value, std::size_t when_true = 0,
+                         std::size_t when_false = 0) {
+        code.push_back({what, static_cast<std::uint8_t>(when_true),
+                        static_cast<std::uint8_t>(when_false), value});
     };
     const auto place = [](int of) { return static_cast<std::uint32_t>(SKF_AD_OFF + of); };
     if (!promiscuous) {
@@ -40,7 +43,9 @@ std::vector<sock_filter> filter(const std::vector<std::uint16_t>& types, bool pr
     }
     if (!types.empty()) {
         add(BPF_LD | BPF_W | BPF_ABS, place(SKF_AD_PROTOCOL));
-        for (std::size_t i = 0; i < types.size(); ++i) add(BPF_JMP | BPF_JEQ | BPF_K, types[i], types.size() - i, 0);
+        for (std::size_t i = 0; i < types.size(); ++i) {
+            add(BPF_JMP | BPF_JEQ | BPF_K, types[i], types.size() - i, 0);
+        }
         add(BPF_RET | BPF_K, 0);
     }
     add(BPF_RET | BPF_K, UINT32_MAX);
@@ -52,34 +57,46 @@ std::vector<sock_filter> filter(const std::vector<std::uint16_t>& types, bool pr
 const std::uint32_t Receiver::user_ = TP_STATUS_USER;
 
 Receiver::~Receiver() {
-    if (memory_ != nullptr) munmap(memory_, frames_ * place_bytes);
+    if (memory_ != nullptr) {
+        munmap(memory_, frames_ * place_bytes);
+    }
 }
 
 std::string Receiver::open(const Options& options) {
     if (options.types.size() > 64) return "more than 64 Ethertypes on one port; open several ports";
     socket_ = link::Descriptor(::socket(AF_PACKET, SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
     const int refusal = socket_ ? 0 : errno;
-    if (refusal == EPERM || refusal == EACCES)
-        return "raw Ethernet needs the capability CAP_NET_RAW; grant it with: " + grant_command() + "; to see the capabilities: hal doctor";
+    if (refusal == EPERM || refusal == EACCES) {
+        return "raw Ethernet needs the capability CAP_NET_RAW; grant it with: " + grant_command() +
+               "; to see the capabilities: hal doctor";
+    }
     if (!socket_) return "cannot open a packet socket: " + link::reason(refusal);
     protocol_ = options.types.size() == 1 ? options.types[0] : std::uint16_t{ETH_P_ALL};
     promiscuous_ = options.promiscuous;
-    const int yes = 1, version = TPACKET_V2;
+    const int yes = 1;
+    const int version = TPACKET_V2;
     set(socket_.get(), SOL_PACKET, PACKET_IGNORE_OUTGOING, yes);
     // Timestamps from where the frame enters the kernel rather than this socket.
-    set(socket_.get(), SOL_SOCKET, SO_TIMESTAMPING, int{SOF_TIMESTAMPING_RX_SOFTWARE | SOF_TIMESTAMPING_SOFTWARE});
+    set(socket_.get(), SOL_SOCKET, SO_TIMESTAMPING,
+        int{SOF_TIMESTAMPING_RX_SOFTWARE | SOF_TIMESTAMPING_SOFTWARE});
     auto code = filter(options.types, options.promiscuous);
-    if (!set(socket_.get(), SOL_SOCKET, SO_ATTACH_FILTER, sock_fprog{static_cast<unsigned short>(code.size()), code.data()}))
+    if (!set(socket_.get(), SOL_SOCKET, SO_ATTACH_FILTER,
+             sock_fprog{static_cast<unsigned short>(code.size()), code.data()})) {
         return "cannot attach the filter: " + link::reason();
+    }
     frames_ = std::bit_ceil(std::clamp<std::size_t>(options.receive_capacity, 32, 16384));
     tpacket_req ring{};
     ring.tp_frame_size = place_bytes;
     ring.tp_frame_nr = static_cast<unsigned>(frames_);
     ring.tp_block_size = static_cast<unsigned>(std::min(block_bytes, frames_ * place_bytes));
     ring.tp_block_nr = static_cast<unsigned>(frames_ * place_bytes / ring.tp_block_size);
-    if (!set(socket_.get(), SOL_PACKET, PACKET_VERSION, version) || !set(socket_.get(), SOL_PACKET, PACKET_RX_RING, ring))
-        return "cannot create the receive ring: " + link::reason() + "; try a smaller one: ?receivequeue=64";
-    void* memory = mmap(nullptr, frames_ * place_bytes, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_POPULATE, socket_.get(), 0);
+    if (!set(socket_.get(), SOL_PACKET, PACKET_VERSION, version) ||
+        !set(socket_.get(), SOL_PACKET, PACKET_RX_RING, ring)) {
+        return "cannot create the receive ring: " + link::reason() +
+               "; try a smaller one: ?receivequeue=64";
+    }
+    void* memory = mmap(nullptr, frames_ * place_bytes, PROT_READ | PROT_WRITE,
+                        MAP_SHARED | MAP_POPULATE, socket_.get(), 0);
     if (memory == MAP_FAILED) return "cannot map the receive ring: " + link::reason();
     memory_ = static_cast<std::uint8_t*>(memory);
     return {};
@@ -90,7 +107,9 @@ bool Receiver::bind(int index) noexcept {
     address.sll_family = AF_PACKET;
     address.sll_protocol = htons(protocol_);
     address.sll_ifindex = index;
-    if (::bind(socket_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) return false;
+    if (::bind(socket_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
+        return false;
+    }
     if (!promiscuous_) return true;
     packet_mreq membership{};
     membership.mr_ifindex = index;
@@ -99,7 +118,8 @@ bool Receiver::bind(int index) noexcept {
 }
 
 std::atomic_ref<std::uint32_t> Receiver::status(std::size_t frame) noexcept {
-    return std::atomic_ref(reinterpret_cast<tpacket2_hdr*>(memory_ + frame * place_bytes)->tp_status);
+    return std::atomic_ref(
+        reinterpret_cast<tpacket2_hdr*>(memory_ + frame * place_bytes)->tp_status);
 }
 
 void Receiver::release() noexcept {
@@ -114,7 +134,8 @@ std::optional<Arrival> Receiver::next(RealTime& clock) noexcept {
         const auto& header = *reinterpret_cast<const tpacket2_hdr*>(place);
         next_ = (next_ + 1) & (frames_ - 1);
         held_ = true;
-        if (header.tp_len != header.tp_snaplen || header.tp_snaplen < header_bytes || header.tp_mac + header.tp_snaplen > place_bytes) {
+        if (header.tp_len != header.tp_snaplen || header.tp_snaplen < header_bytes ||
+            header.tp_mac + header.tp_snaplen > place_bytes) {
             errors.fetch_add(1, std::memory_order_relaxed);
             continue;
         }
@@ -130,7 +151,9 @@ std::optional<Arrival> Receiver::next(RealTime& clock) noexcept {
 std::uint64_t Receiver::lost() noexcept {
     tpacket_stats counts{};
     socklen_t size = sizeof counts;
-    return getsockopt(socket_.get(), SOL_PACKET, PACKET_STATISTICS, &counts, &size) == 0 ? counts.tp_drops : 0;
+    return getsockopt(socket_.get(), SOL_PACKET, PACKET_STATISTICS, &counts, &size) == 0
+               ? counts.tp_drops
+               : 0;
 }
 
 }  // namespace hal::ethernet::rawether

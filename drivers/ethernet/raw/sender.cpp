@@ -11,11 +11,15 @@
 namespace hal::ethernet::rawether {
 
 std::string Sender::open(bool transmit_stamps) {
-    socket_ = link::Descriptor(::socket(AF_PACKET, SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));  // protocol 0: receives nothing
+    // protocol 0: receives nothing
+    socket_ = link::Descriptor(::socket(AF_PACKET, SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
     if (!socket_) return link::reason();
-    const int yes = 1, stamps = SOF_TIMESTAMPING_TX_SOFTWARE | SOF_TIMESTAMPING_SOFTWARE | SOF_TIMESTAMPING_OPT_TSONLY;
+    const int yes = 1;
+    const int stamps =
+        SOF_TIMESTAMPING_TX_SOFTWARE | SOF_TIMESTAMPING_SOFTWARE | SOF_TIMESTAMPING_OPT_TSONLY;
     setsockopt(socket_.get(), SOL_PACKET, PACKET_QDISC_BYPASS, &yes, sizeof yes);
-    transmit_stamps_ = transmit_stamps && setsockopt(socket_.get(), SOL_SOCKET, SO_TIMESTAMPING, &stamps, sizeof stamps) == 0;
+    transmit_stamps_ = transmit_stamps && setsockopt(socket_.get(), SOL_SOCKET, SO_TIMESTAMPING,
+                                                     &stamps, sizeof stamps) == 0;
     return {};
 }
 
@@ -27,19 +31,27 @@ bool Sender::bind(int index) noexcept {
 }
 
 void Sender::await(std::int64_t time_ns) noexcept {
-    constexpr std::int64_t cold_after = 30'000, ahead = 8'000, least = 4'000;
+    constexpr std::int64_t cold_after = 30'000;
+    constexpr std::int64_t ahead = 8'000;
+    constexpr std::int64_t least = 4'000;
     static constexpr std::array<std::uint8_t, header_bytes - 1> runt{};
     auto now = link::monotonic_ns();
     if (time_ns - now > least && time_ns - last_ns_.load(std::memory_order_relaxed) > cold_after) {
-        for (; now < time_ns - ahead; now = link::monotonic_ns()) pause_processor();
+        for (; now < time_ns - ahead; now = link::monotonic_ns()) {
+            pause_processor();
+        }
         (void)!::send(socket_.get(), runt.data(), runt.size(), MSG_DONTWAIT);
     }
-    while (link::monotonic_ns() < time_ns) pause_processor();
+    while (link::monotonic_ns() < time_ns) {
+        pause_processor();
+    }
 }
 
 Sent Sender::drop(Sent why) noexcept {
     (why == Sent::late ? late : dropped).fetch_add(1, std::memory_order_relaxed);
-    if (why == Sent::rejected) errors.fetch_add(1, std::memory_order_relaxed);
+    if (why == Sent::rejected) {
+        errors.fetch_add(1, std::memory_order_relaxed);
+    }
     return why;
 }
 
@@ -64,33 +76,48 @@ Sent Sender::leave(std::span<const std::uint8_t> frame, const Launch& launch) no
     if (launch.stamp_at != 0) {
         auto* place = own + launch.stamp_at;
         auto stamp = static_cast<std::uint64_t>(now + launch.stamp_add_ns);
-        for (int i = 8; i-- > 0; stamp >>= 8) place[i] = static_cast<std::uint8_t>(stamp);
+        for (int i = 8; i-- > 0; stamp >>= 8) {
+            place[i] = static_cast<std::uint8_t>(stamp);
+        }
     }
-    if (launch.finisher != nullptr) launch.finisher->leaves({own, length});
+    if (launch.finisher != nullptr) {
+        launch.finisher->leaves({own, length});
+    }
     for (int tries = 0;; ++tries) {
         if (::send(socket_.get(), frame.data(), frame.size(), MSG_DONTWAIT) >= 0) break;
         const int error = errno;
         if (error == EINTR) continue;
-        if (error == ENETDOWN && tries == 0) continue;  // a stale error
-        if (launch.finisher != nullptr) launch.finisher->stayed({own, length});
+        if (error == ENETDOWN && tries == 0) {
+            continue;  // a stale error
+        }
+        if (launch.finisher != nullptr) {
+            launch.finisher->stayed({own, length});
+        }
         errors.fetch_add(1, std::memory_order_relaxed);
         dropped.fetch_add(1, std::memory_order_relaxed);
         if (error == ENETDOWN || error == ENXIO || error == ENODEV) return Sent::down;
         return error == EMSGSIZE ? Sent::rejected : Sent::full;
     }
-    if (now != 0) last_ns_.store(now, std::memory_order_relaxed);
+    if (now != 0) {
+        last_ns_.store(now, std::memory_order_relaxed);
+    }
     sent.fetch_add(1, std::memory_order_relaxed);
     sent_bytes.fetch_add(frame.size(), std::memory_order_relaxed);
-    if (launch.at_ns != 0) launch_error_ns.store(now - launch.at_ns, std::memory_order_relaxed);
+    if (launch.at_ns != 0) {
+        launch_error_ns.store(now - launch.at_ns, std::memory_order_relaxed);
+    }
     if (transmit_stamps_) {
         read_stamps();
-        if (const auto left = departure_ns.load(std::memory_order_relaxed); launch.at_ns != 0 && left >= now)
+        if (const auto left = departure_ns.load(std::memory_order_relaxed);
+            launch.at_ns != 0 && left >= now) {
             launch_error_ns.store(left - launch.at_ns, std::memory_order_relaxed);
+        }
     }
     return Sent::queued;
 }
 
-/// Reads the transmit timestamps, which the kernel puts on the error queue, mostly before send() returns.
+/// Reads the transmit timestamps, which the kernel puts on the error queue, mostly before send()
+/// returns.
 void Sender::read_stamps() noexcept {
     for (int i = 0; i < 8; ++i) {
         alignas(cmsghdr) char control[256];
@@ -104,7 +131,8 @@ void Sender::read_stamps() noexcept {
             std::memcpy(&stamps, CMSG_DATA(c), sizeof stamps);
             const auto stamp = stamps.ts[0].tv_sec * 1'000'000'000LL + stamps.ts[0].tv_nsec;
             const auto last = departure_ns.load(std::memory_order_relaxed);
-            departure_ns.store(clock_.to_monotonic(stamp, last, link::monotonic_ns()), std::memory_order_relaxed);
+            departure_ns.store(clock_.to_monotonic(stamp, last, link::monotonic_ns()),
+                               std::memory_order_relaxed);
         }
     }
 }

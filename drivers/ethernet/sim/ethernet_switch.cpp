@@ -11,8 +11,11 @@ namespace hal::ethernet::simbus {
 
 namespace {
 
-constexpr std::size_t most_events = 8192, most_disturbances = 64, most_stations = 256;
-constexpr std::size_t egress_bytes = 65536;  // memory of a small switch per line; frames beyond it are lost
+constexpr std::size_t most_events = 8192;
+constexpr std::size_t most_disturbances = 64;
+constexpr std::size_t most_stations = 256;
+// memory of a small switch per line; frames beyond it are lost
+constexpr std::size_t egress_bytes = 65536;
 
 struct Registry {
     std::mutex mutex;
@@ -35,28 +38,34 @@ User::User(const Options& o)
       types(o.types),
       promiscuous(o.promiscuous),
       noise_ns(o.noise_ns) {
-    for (std::uint32_t i = 0; i < places.size(); ++i) unused.push(i);
+    for (std::uint32_t i = 0; i < places.size(); ++i) {
+        unused.push(i);
+    }
     waiting.reserve(places.size());
 }
 
 Switch::Switch(std::string its_name, const Options& o)
-    : name(std::move(its_name)), speed(o.speed != 0 ? o.speed : 100), forward_ns(o.forward_ns >= 0 ? o.forward_ns : 2000) {
+    : name(std::move(its_name)),
+      speed(o.speed != 0 ? o.speed : 100),
+      forward_ns(o.forward_ns >= 0 ? o.forward_ns : 2000) {
     events_.reserve(most_events);
     disturbances.reserve(most_disturbances);
     stations.reserve(most_stations);
 }
 
-std::shared_ptr<Switch> Switch::find(const std::string& name, const Options& options, std::string& problem) {
+std::shared_ptr<Switch> Switch::find(const std::string& name, const Options& options,
+                                     std::string& problem) {
     Registry& all = registry();
     const std::lock_guard lock(all.mutex);
     auto& known = all.segments[name];
     if (auto segment = known.lock()) {
-        if (options.speed != 0 && options.speed != segment->speed)
+        if (options.speed != 0 && options.speed != segment->speed) {
             problem = "the segment already runs at " + std::to_string(segment->speed) +
                       " Mbit/s; use the same speed everywhere, or give it in one place only";
-        else if (options.forward_ns >= 0 && options.forward_ns != segment->forward_ns)
+        } else if (options.forward_ns >= 0 && options.forward_ns != segment->forward_ns) {
             problem = "the switch already has a delay of " + std::to_string(segment->forward_ns) +
                       " ns; use the same forward everywhere, or give it in the first place only";
+        }
         return problem.empty() ? segment : nullptr;
     }
     auto segment = std::make_shared<Switch>(name, options);
@@ -66,17 +75,21 @@ std::shared_ptr<Switch> Switch::find(const std::string& name, const Options& opt
 }
 
 Switch::Hold::Hold(Switch& its) noexcept : held(its) {
-    while (held.pumping_.test_and_set(std::memory_order_acquire)) std::this_thread::yield();
+    while (held.pumping_.test_and_set(std::memory_order_acquire)) {
+        std::this_thread::yield();
+    }
 }
 Switch::Hold::~Hold() { held.pumping_.clear(std::memory_order_release); }
 
 Station* Switch::station(int number) noexcept {
-    for (auto& s : stations)
+    for (auto& s : stations) {
         if (s->number == number) return s.get();
+    }
     return nullptr;
 }
 
-bool Switch::add(User& user, const std::string& wanted, const Options& options, std::string& problem) {
+bool Switch::add(User& user, const std::string& wanted, const Options& options,
+                 std::string& problem) {
     std::vector<std::unique_ptr<User>> gone;  // freed after the segment is released
     std::vector<std::unique_ptr<Station>> empty;
     const Hold hold(*this);
@@ -84,19 +97,29 @@ bool Switch::add(User& user, const std::string& wanted, const Options& options, 
     const auto same = [&](const auto& s) { return !wanted.empty() && s->name == wanted; };
     auto found = std::find_if(stations.begin(), stations.end(), same);
     if (found == stations.end()) {
-        if (stations.size() == most_stations) return problem = "too many stations: the segment already has " + std::to_string(most_stations), false;
+        if (stations.size() == most_stations) {
+            problem = "too many stations: the segment already has " + std::to_string(most_stations);
+
+            return false;
+        }
         int number = 0;  // the lowest free number: a program always gets the same numbers
-        while (station(number) != nullptr) ++number;
+        while (station(number) != nullptr) {
+            ++number;
+        }
         auto made = std::make_unique<Station>();
         made->name = wanted;
         made->number = number;
         made->address = options.address;
-        if (options.address == Address{}) made->address = {2, 'H', 'A', 'L', 0, static_cast<std::uint8_t>(number + 1)};
+        if (options.address == Address{}) {
+            made->address = {2, 'H', 'A', 'L', 0, static_cast<std::uint8_t>(number + 1)};
+        }
         made->users.reserve(64);
         const auto after = [](int n, const auto& s) { return n < s->number; };
-        found = stations.insert(std::upper_bound(stations.begin(), stations.end(), number, after), std::move(made));
+        found = stations.insert(std::upper_bound(stations.begin(), stations.end(), number, after),
+                                std::move(made));
     } else if (options.address != Address{} && options.address != (*found)->address) {
-        problem = "station " + wanted + " already has the address " + to_string((*found)->address) + "; give mac= in one place only";
+        problem = "station " + wanted + " already has the address " + to_string((*found)->address) +
+                  "; give mac= in one place only";
         return false;
     }
     user.station = found->get();
@@ -111,21 +134,28 @@ void Switch::remove(std::unique_ptr<User> user) {
     const auto now = latest_.load(std::memory_order_relaxed);
     collect(now);
     auto& waiting = user->waiting;
-    for (auto& w : waiting)
-        if (w.at_ns > now) give_back(*user, w.place);
+    for (auto& w : waiting) {
+        if (w.at_ns > now) {
+            give_back(*user, w.place);
+        }
+    }
     std::erase_if(waiting, [&](const auto& w) { return w.at_ns > now; });
     std::make_heap(waiting.begin(), waiting.end());
     user->leaving = true;
     user->responder = nullptr;
-    if (responding == user.get()) responding = nullptr;
+    if (responding == user.get()) {
+        responding = nullptr;
+    }
     leaving_.push_back(std::move(user));
     sweep(gone, empty);
 }
 
 /// Removes closed users without pending frames, and stations without users.
-void Switch::sweep(std::vector<std::unique_ptr<User>>& gone, std::vector<std::unique_ptr<Station>>& empty) {
+void Switch::sweep(std::vector<std::unique_ptr<User>>& gone,
+                   std::vector<std::unique_ptr<Station>>& empty) {
     const auto busy = [&](const User* u) {
-        return std::any_of(events_.begin(), events_.end(), [&](const Event& e) { return e.from == u; });
+        return std::any_of(events_.begin(), events_.end(),
+                           [&](const Event& e) { return e.from == u; });
     };
     std::erase_if(leaving_, [&](std::unique_ptr<User>& u) {
         if (!u->waiting.empty() || u->outgoing.front() != nullptr || busy(u.get())) return false;
@@ -142,8 +172,11 @@ void Switch::sweep(std::vector<std::unique_ptr<User>>& gone, std::vector<std::un
 
 void Switch::pump(std::int64_t now) noexcept {
     auto latest = latest_.load(std::memory_order_relaxed);
-    while (now > latest && !latest_.compare_exchange_weak(latest, now, std::memory_order_relaxed)) {}
-    if (now == unclocked) now = latest;
+    while (now > latest && !latest_.compare_exchange_weak(latest, now, std::memory_order_relaxed)) {
+    }
+    if (now == unclocked) {
+        now = latest;
+    }
     if (now == unclocked || now <= worked_until_.load(std::memory_order_relaxed)) return;
     if (pumping_.test_and_set(std::memory_order_acquire)) return;
     work(now);
@@ -153,14 +186,19 @@ void Switch::pump(std::int64_t now) noexcept {
 /// Moves sent frames to the heaps, once a time is known.
 void Switch::collect(std::int64_t now) noexcept {
     if (now == unclocked) return;
-    for (auto& s : stations)
-        for (User* u : s->users)
-            for (const std::uint32_t* place = nullptr; (place = u->outgoing.front()) != nullptr; u->outgoing.drop()) {
+    for (auto& s : stations) {
+        for (User* u : s->users) {
+            for (const std::uint32_t* place = nullptr; (place = u->outgoing.front()) != nullptr;
+                 u->outgoing.drop()) {
                 auto& at = u->places[*place].at_ns;
-                if (at == unclocked) at = now - 1;  // sent before a time was known
+                if (at == unclocked) {
+                    at = now - 1;  // sent before a time was known
+                }
                 u->waiting.push_back({at, u->sequence++, *place});
                 std::push_heap(u->waiting.begin(), u->waiting.end());
             }
+        }
+    }
 }
 
 void Switch::work(std::int64_t now) noexcept {
@@ -170,11 +208,17 @@ void Switch::work(std::int64_t now) noexcept {
         Station* next = nullptr;
         for (auto& s : stations) {
             std::int64_t at = s->babble_period > 0 ? s->babble_at : INT64_MAX;
-            for (const User* u : s->users)
-                if (!u->waiting.empty()) at = std::min(at, u->waiting.front().at_ns);
+            for (const User* u : s->users) {
+                if (!u->waiting.empty()) {
+                    at = std::min(at, u->waiting.front().at_ns);
+                }
+            }
             if (at == INT64_MAX) continue;
             at = std::max(at, s->to_switch_free);
-            if (at < first) first = at, next = s.get();
+            if (at < first) {
+                first = at;
+                next = s.get();
+            }
         }
         const auto passing = events_.empty() ? INT64_MAX : events_.front().time_ns;
         if (std::min(first, passing) >= now) break;
@@ -184,7 +228,9 @@ void Switch::work(std::int64_t now) noexcept {
             events_.pop_back();
             pass_on(event);
             release(event);
-            if (responding != nullptr) collect(now);  // its replies
+            if (responding != nullptr) {
+                collect(now);  // its replies
+            }
         } else {
             launch(*next, first);
         }
@@ -195,10 +241,15 @@ void Switch::work(std::int64_t now) noexcept {
 /// Sends the first frame in turn from its station.
 void Switch::launch(Station& s, std::int64_t start) noexcept {
     User* from = nullptr;
-    for (User* u : s.users)
-        if (!u->waiting.empty() && (from == nullptr || u->waiting.front().at_ns < from->waiting.front().at_ns)) from = u;
+    for (User* u : s.users) {
+        if (!u->waiting.empty() &&
+            (from == nullptr || u->waiting.front().at_ns < from->waiting.front().at_ns)) {
+            from = u;
+        }
+    }
     std::uint32_t place = 0;
-    const bool babbled = s.babble_period > 0 && (from == nullptr || s.babble_at <= from->waiting.front().at_ns);
+    const bool babbled =
+        s.babble_period > 0 && (from == nullptr || s.babble_at <= from->waiting.front().at_ns);
     if (babbled) {
         s.babble_at = std::max(s.babble_at + s.babble_period, start + 1);
         from = s.babbler.get();
@@ -217,19 +268,41 @@ void Switch::launch(Station& s, std::int64_t start) noexcept {
         from->waiting.pop_back();
     }
     Outgoing& f = from->places[place];
-    const auto count = [](auto& counter, std::uint64_t by = 1) { counter.fetch_add(by, std::memory_order_relaxed); };
-    if (s.cut.load(std::memory_order_relaxed)) return count(from->thrown_away), give_back(*from, place);
-    if (f.launch.is_late(start)) return count(from->late), give_back(*from, place);
-    if (f.launch.at_ns != 0) from->launch_error_ns.store(start - f.launch.at_ns, std::memory_order_relaxed);
+    const auto count = [](auto& counter, std::uint64_t by = 1) {
+        counter.fetch_add(by, std::memory_order_relaxed);
+    };
+    if (s.cut.load(std::memory_order_relaxed)) {
+        count(from->thrown_away);
+        return give_back(*from, place);
+    }
+    if (f.launch.is_late(start)) {
+        count(from->late);
+        return give_back(*from, place);
+    }
+    if (f.launch.at_ns != 0) {
+        from->launch_error_ns.store(start - f.launch.at_ns, std::memory_order_relaxed);
+    }
     if (f.launch.stamp_at != 0) {
         auto stamp = static_cast<std::uint64_t>(start + f.launch.stamp_add_ns);
-        for (std::size_t i = 8; i-- > 0; stamp >>= 8) f.bytes[f.launch.stamp_at + i] = static_cast<std::uint8_t>(stamp);
+        for (std::size_t i = 8; i-- > 0; stamp >>= 8) {
+            f.bytes[f.launch.stamp_at + i] = static_cast<std::uint8_t>(stamp);
+        }
     }
-    count(from->sent), count(from->sent_bytes, f.length);
+    count(from->sent);
+    count(from->sent_bytes, f.length);
     s.to_switch_free = start + wire_ns(f.length);
     f.references = 1;  // until all its events are created
-    Event e{s.to_switch_free + (responding != nullptr ? 0 : forward_ns), 0, from, place, -1, static_cast<std::uint32_t>(f.length), -1, 0};
-    if (!disturbed(e, false)) add_event(e);
+    Event e{s.to_switch_free + (responding != nullptr ? 0 : forward_ns),
+            0,
+            from,
+            place,
+            -1,
+            static_cast<std::uint32_t>(f.length),
+            -1,
+            0};
+    if (!disturbed(e, false)) {
+        add_event(e);
+    }
     release(e);
 }
 
@@ -237,45 +310,62 @@ void Switch::launch(Station& s, std::int64_t start) noexcept {
 void Switch::pass_on(const Event& e) noexcept {
     const Bytes& bytes = e.from->places[e.place].bytes;
     if (e.to >= 0) {
-        if (Station* s = station(e.to)) deliver(e, *s);
+        if (Station* s = station(e.to)) {
+            deliver(e, *s);
+        }
         return;
     }
     Address to;
     std::memcpy(to.data(), bytes.data(), to.size());
     const bool to_group = (to[0] & 1) != 0;
-    const bool known = !to_group && std::any_of(stations.begin(), stations.end(), [&](auto& s) { return s->address == to; });
+    const bool known = !to_group && std::any_of(stations.begin(), stations.end(),
+                                                [&](auto& s) { return s->address == to; });
     for (auto& s : stations) {
         if (s.get() == e.from->station) continue;
         const auto listens = [](const User* u) { return u->promiscuous && !u->leaving; };
-        if (known && s->address != to && std::none_of(s->users.begin(), s->users.end(), listens)) continue;
+        if (known && s->address != to && std::none_of(s->users.begin(), s->users.end(), listens)) {
+            continue;
+        }
         Event one = e;
         one.to = s->number;
-        if (!disturbed(one, true)) deliver(one, *s);
+        if (!disturbed(one, true)) {
+            deliver(one, *s);
+        }
     }
 }
 
 /// Sends a frame on the line of one station, and delivers it to its users at the end.
 void Switch::deliver(const Event& e, Station& s) noexcept {
-    const auto count = [](auto& counter, std::uint64_t by = 1) { counter.fetch_add(by, std::memory_order_relaxed); };
+    const auto count = [](auto& counter, std::uint64_t by = 1) {
+        counter.fetch_add(by, std::memory_order_relaxed);
+    };
     if (s.cut.load(std::memory_order_relaxed)) return;
     const bool cable = responding != nullptr;
     const auto start = cable ? e.time_ns : std::max(e.time_ns, s.from_switch_free);
     const bool crowded = start - e.time_ns > static_cast<std::int64_t>(egress_bytes * 8000 / speed);
-    if (!crowded) s.from_switch_free = cable ? start : start + wire_ns(e.length);
+    if (!crowded) {
+        s.from_switch_free = cable ? start : start + wire_ns(e.length);
+    }
     const Outgoing& f = e.from->places[e.place];
     Address to;
     std::memcpy(to.data(), f.bytes.data(), to.size());
     for (User* u : s.users) {
         if (u->leaving || (!u->promiscuous && (to[0] & 1) == 0 && to != s.address)) continue;
-        if (!u->types.empty() && std::find(u->types.begin(), u->types.end(), type_of(f.bytes)) == u->types.end()) continue;
+        if (!u->types.empty() &&
+            std::find(u->types.begin(), u->types.end(), type_of(f.bytes)) == u->types.end()) {
+            continue;
+        }
         if (e.length < header_bytes) {
             count(u->runts);
             continue;
         }
         if (u->responder != nullptr) {
             Bytes bytes = f.bytes;
-            if (e.garbled >= 0) bytes[static_cast<std::size_t>(e.garbled)] ^= e.mask;
-            count(u->received), count(u->received_bytes, e.length);
+            if (e.garbled >= 0) {
+                bytes[static_cast<std::size_t>(e.garbled)] ^= e.mask;
+            }
+            count(u->received);
+            count(u->received_bytes, e.length);
             u->responder->arrived({bytes.data(), e.length}, e.time_ns - wire_ns(e.length));
             continue;
         }
@@ -285,28 +375,40 @@ void Switch::deliver(const Event& e, Station& s) noexcept {
             continue;
         }
         std::memcpy(in->bytes.data(), f.bytes.data(), in->length = e.length);
-        if (e.garbled >= 0) in->bytes[static_cast<std::size_t>(e.garbled)] ^= e.mask;
+        if (e.garbled >= 0) {
+            in->bytes[static_cast<std::size_t>(e.garbled)] ^= e.mask;
+        }
         in->stamp_ns = s.from_switch_free;
-        if (u->noise_ns > 0) in->stamp_ns += static_cast<std::int64_t>(noise() * static_cast<double>(u->noise_ns));
+        if (u->noise_ns > 0) {
+            in->stamp_ns += static_cast<std::int64_t>(noise() * static_cast<double>(u->noise_ns));
+        }
         in->time_ns = std::max(s.from_switch_free, in->stamp_ns);
         u->incoming.commit();
-        count(u->received), count(u->received_bytes, e.length);
+        count(u->received);
+        count(u->received_bytes, e.length);
     }
 }
 
-/// Applies disturbances to the frame. Returns true when nothing of it proceeds unchanged. Those of one receiver apply at its line,
-/// all others where the frame leaves.
+/// Applies disturbances to the frame. Returns true when nothing of it proceeds unchanged. Those of
+/// one receiver apply at its line, all others where the frame leaves.
 bool Switch::disturbed(Event& e, bool only_one) noexcept {
     const Bytes& bytes = e.from->places[e.place].bytes;
     Active* found = nullptr;
     for (auto& d : disturbances) {
         const Disturbance& w = d.what;
         if ((w.to >= 0) != only_one || (only_one && w.to != e.to)) continue;
-        if ((w.type != 0 && w.type != type_of(bytes)) || (w.from >= 0 && w.from != e.from->station->number)) continue;
-        if (w.at != 0 && (w.at + std::size_t{2} > e.length || (bytes[w.at] << 8 | bytes[w.at + 1U]) != w.is)) continue;
+        if ((w.type != 0 && w.type != type_of(bytes)) ||
+            (w.from >= 0 && w.from != e.from->station->number)) {
+            continue;
+        }
+        if (w.at != 0 &&
+            (w.at + std::size_t{2} > e.length || (bytes[w.at] << 8 | bytes[w.at + 1U]) != w.is)) {
+            continue;
+        }
         if (e.time_ns < w.from_ns || e.time_ns >= w.until_ns || d.hits >= w.count) continue;
         ++d.matched;
-        const bool hit = w.every != 0 ? d.matched % w.every == 0 : static_cast<double>(draw() >> 11) * 0x1p-53 < w.probability;
+        const bool hit = w.every != 0 ? d.matched % w.every == 0
+                                      : static_cast<double>(draw() >> 11) * 0x1p-53 < w.probability;
         if (!hit || found != nullptr) continue;
         ++d.hits;
         found = &d;
@@ -320,7 +422,9 @@ bool Switch::disturbed(Event& e, bool only_one) noexcept {
         e.time_ns += w.delay_ns;
         add_event(e);
         return true;
-    case Fault::cut: e.length = static_cast<std::uint32_t>(std::min<std::size_t>(e.length, w.length)); return false;
+    case Fault::cut:
+        e.length = static_cast<std::uint32_t>(std::min<std::size_t>(e.length, w.length));
+        return false;
     case Fault::garble:
         if (e.length == 0) return false;
         e.garbled = static_cast<std::int32_t>(draw() % e.length);
@@ -340,7 +444,9 @@ bool Switch::add_event(const Event& e) noexcept {
 }
 
 void Switch::release(const Event& e) noexcept {
-    if (--e.from->places[e.place].references == 0) give_back(*e.from, e.place);
+    if (--e.from->places[e.place].references == 0) {
+        give_back(*e.from, e.place);
+    }
 }
 
 void Switch::give_back(User& user, std::uint32_t place) noexcept { user.unused.push(place); }
@@ -356,8 +462,11 @@ std::uint64_t Switch::draw() noexcept {  // splitmix64
 /// Returns a normal random number with sigma 1, as the sum of twelve uniform ones.
 double Switch::noise() noexcept {
     double sum = -6.0;
-    for (int i = 0; i < 3; ++i)
-        for (auto [bits, k] = std::pair{draw(), 0}; k < 4; ++k, bits >>= 16) sum += (static_cast<double>(bits & 0xffff) + 0.5) / 65536.0;
+    for (int i = 0; i < 3; ++i) {
+        for (auto [bits, k] = std::pair{draw(), 0}; k < 4; ++k, bits >>= 16) {
+            sum += (static_cast<double>(bits & 0xffff) + 0.5) / 65536.0;
+        }
+    }
     return sum;
 }
 

@@ -11,12 +11,14 @@ namespace hal::ethernet::simbus {
 
 namespace {
 
-constexpr std::size_t most_disturbances = 64, babbled_places = 256;
+constexpr std::size_t most_disturbances = 64;
+constexpr std::size_t babbled_places = 256;
 
 class SimulatedPort final : public Port, public Segment {
 public:
     /// `user` is already on the segment.
-    SimulatedPort(std::shared_ptr<Switch> segment, std::unique_ptr<User> user, Description description)
+    SimulatedPort(std::shared_ptr<Switch> segment, std::unique_ptr<User> user,
+                  Description description)
         : switch_(std::move(segment)),
           owned_(std::move(user)),
           user_(*owned_),
@@ -26,19 +28,35 @@ public:
 
     const Address& address() const noexcept override { return station_.address; }
 
-    Sent send(std::span<const std::uint8_t> frame, const Launch& launch, std::int64_t now_ns) noexcept override {
+    Sent send(std::span<const std::uint8_t> frame, const Launch& launch,
+              std::int64_t now_ns) noexcept override {
         switch_->pump(now_ns);
         const auto now = switch_->time(now_ns);
-        if (!launch.fits(frame.size()) || frame.size() > largest_frame) return count(user_.rejected), Sent::rejected;
-        if (station_.cut.load(std::memory_order_relaxed)) return count(user_.dropped), Sent::down;
-        if (launch.is_late(now)) return count(user_.late), Sent::late;
+        if (!launch.fits(frame.size()) || frame.size() > largest_frame) {
+            count(user_.rejected);
+            return Sent::rejected;
+        }
+        if (station_.cut.load(std::memory_order_relaxed)) {
+            count(user_.dropped);
+            return Sent::down;
+        }
+        if (launch.is_late(now)) {
+            count(user_.late);
+            return Sent::late;
+        }
         const std::uint32_t* unused = user_.unused.front();
-        if (unused == nullptr) return count(user_.dropped), Sent::full;
+        if (unused == nullptr) {
+            count(user_.dropped);
+            return Sent::full;
+        }
         const auto place = *unused;
         user_.unused.drop();
         Outgoing& f = user_.places[place];
         std::memcpy(f.bytes.data(), frame.data(), frame.size());
-        if (launch.finisher != nullptr) launch.finisher->leaves({f.bytes.data(), frame.size()});  // frames of a station leave in order
+        // frames of a station leave in order
+        if (launch.finisher != nullptr) {
+            launch.finisher->leaves({f.bytes.data(), frame.size()});
+        }
         f.length = std::max(frame.size(), smallest_frame);
         std::memset(f.bytes.data() + frame.size(), 0, f.length - frame.size());
         f.launch = launch;
@@ -49,7 +67,10 @@ public:
     }
 
     std::optional<Arrival> receive(std::int64_t now_ns) noexcept override {
-        if (held_) user_.incoming.drop(), held_ = false;
+        if (held_) {
+            user_.incoming.drop();
+            held_ = false;
+        }
         switch_->pump(now_ns);
         const Incoming* next = user_.incoming.front();
         if (next == nullptr || next->time_ns > switch_->time(now_ns)) return std::nullopt;
@@ -65,12 +86,16 @@ public:
     }
 
     Statistics statistics() const noexcept override {
-        const auto read = [](const auto& counter) { return counter.load(std::memory_order_relaxed); };
+        const auto read = [](const auto& counter) {
+            return counter.load(std::memory_order_relaxed);
+        };
         Statistics s;
         s.up = !read(station_.cut);
         s.speed = switch_->speed;
-        s.sent = read(user_.sent), s.sent_bytes = read(user_.sent_bytes);
-        s.received = read(user_.received), s.received_bytes = read(user_.received_bytes);
+        s.sent = read(user_.sent);
+        s.sent_bytes = read(user_.sent_bytes);
+        s.received = read(user_.received);
+        s.received_bytes = read(user_.received_bytes);
         s.lost = read(user_.lost);
         s.dropped = read(user_.dropped) + read(user_.thrown_away) + read(user_.rejected);
         s.late = read(user_.late);
@@ -96,13 +121,18 @@ public:
     std::uint64_t hits(int number) const override {
         return switch_->exclusively([&] {
             const auto index = static_cast<std::size_t>(number);
-            return number >= 0 && index < switch_->disturbances.size() ? switch_->disturbances[index].hits : 0;
+            return number >= 0 && index < switch_->disturbances.size()
+                       ? switch_->disturbances[index].hits
+                       : 0;
         });
     }
     void calm() override {
         switch_->exclusively([&] {
             switch_->disturbances.clear();
-            for (auto& s : switch_->stations) s->babble_period = 0, s->cut.store(false);
+            for (auto& s : switch_->stations) {
+                s->babble_period = 0;
+                s->cut.store(false);
+            }
         });
     }
     void babble(int port, std::span<const std::uint8_t> frame, std::int64_t period_ns) override {
@@ -119,10 +149,15 @@ public:
         switch_->exclusively([&] {
             Station* s = switch_->station(port);
             if (s == nullptr || (!s->babbler && !babbler)) return;
-            if (!s->babbler) s->babbler = std::move(babbler), s->babbler->station = s;
+            if (!s->babbler) {
+                s->babbler = std::move(babbler);
+                s->babbler->station = s;
+            }
             s->babble.fill(0);
             const auto length = std::min(frame.size(), largest_frame);
-            if (length != 0) std::memcpy(s->babble.data(), frame.data(), length);
+            if (length != 0) {
+                std::memcpy(s->babble.data(), frame.data(), length);
+            }
             s->babble_length = std::max(length, smallest_frame);
             s->babble_period = length >= header_bytes && period_ns > 0 ? period_ns : 0;
             s->babble_at = std::max(switch_->time(unclocked), std::int64_t{0});
@@ -131,7 +166,9 @@ public:
     void cut(int port, bool is_cut) override {
         switch_->exclusively([&] {
             Station* s = switch_->station(port);
-            if (s != nullptr && s->cut.exchange(is_cut) != is_cut && is_cut) s->downs.fetch_add(1);
+            if (s != nullptr && s->cut.exchange(is_cut) != is_cut && is_cut) {
+                s->downs.fetch_add(1);
+            }
         });
     }
     std::int64_t time_ns() const noexcept override { return switch_->time(unclocked); }
@@ -145,7 +182,9 @@ public:
     }
 
 private:
-    static void count(std::atomic<std::uint64_t>& counter) noexcept { counter.fetch_add(1, std::memory_order_relaxed); }
+    static void count(std::atomic<std::uint64_t>& counter) noexcept {
+        counter.fetch_add(1, std::memory_order_relaxed);
+    }
 
     const std::shared_ptr<Switch> switch_;
     std::unique_ptr<User> owned_;
@@ -159,22 +198,34 @@ private:
 
 Description describe(const std::string& place) {
     const auto slash = place.find('/');
-    return {.address = "sim:" + place, .transport = "segment in memory", .interface = slash + 1 < place.size() ? place.substr(slash + 1) : place,
-            .simulated = true, .in_memory = true};
+    return {.address = "sim:" + place,
+            .transport = "segment in memory",
+            .interface = slash + 1 < place.size() ? place.substr(slash + 1) : place,
+            .simulated = true,
+            .in_memory = true};
 }
 
 Opened open(const std::string& place, const Options& options) {
     const auto slash = place.find('/');
     const auto name = place.substr(0, slash);
     const auto station = slash == place.npos ? std::string{} : place.substr(slash + 1);
-    if (name.empty()) return {nullptr, "missing name of the segment; write sim:net0"};
-    if (slash != place.npos && station.empty()) return {nullptr, "missing name of the station; write sim:" + name + "/master"};
+    if (name.empty()) {
+        return {nullptr, "missing name of the segment; write sim:net0"};
+    }
+    if (slash != place.npos && station.empty()) {
+        return {nullptr, "missing name of the station; write sim:" + name + "/master"};
+    }
     std::string problem;
     auto segment = Switch::find(name, options, problem);
-    if (!segment) return {nullptr, problem};
+    if (!segment) {
+        return {nullptr, problem};
+    }
     auto user = std::make_unique<User>(options);
-    if (!segment->add(*user, station, options, problem)) return {nullptr, problem};
-    return {std::make_unique<SimulatedPort>(std::move(segment), std::move(user), describe(place)), {}};
+    if (!segment->add(*user, station, options, problem)) {
+        return {nullptr, problem};
+    }
+    return {std::make_unique<SimulatedPort>(std::move(segment), std::move(user), describe(place)),
+            {}};
 }
 
 }  // namespace hal::ethernet::simbus

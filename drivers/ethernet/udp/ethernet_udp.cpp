@@ -18,14 +18,19 @@ namespace hal::ethernet {
 
 namespace {
 
-constexpr std::uint32_t ip_and_udp_bytes = 28, most_payload = largest_frame - header_bytes;
+constexpr std::uint32_t ip_and_udp_bytes = 28;
+constexpr std::uint32_t most_payload = largest_frame - header_bytes;
 constexpr std::size_t most_peers = 8;
-constexpr std::int64_t peer_timeout_ns = 2'000'000'000, announce_every_ns = 500'000'000;
-constexpr std::int64_t refusal_ns = 5'000'000;  ///< in which a host answers that nothing listens there
+constexpr std::int64_t peer_timeout_ns = 2'000'000'000;
+constexpr std::int64_t announce_every_ns = 500'000'000;
+/// in which a host answers that nothing listens there
+constexpr std::int64_t refusal_ns = 5'000'000;
 constexpr unsigned datagrams_at_once = 64;  ///< read in one call without a frame among them
 
 /// A peer as one word, so that the sending and the receiving thread share it.
-std::uint64_t pack(const sockaddr_in& a) noexcept { return std::uint64_t{a.sin_addr.s_addr} << 16 | a.sin_port; }
+std::uint64_t pack(const sockaddr_in& a) noexcept {
+    return std::uint64_t{a.sin_addr.s_addr} << 16 | a.sin_port;
+}
 sockaddr_in unpack(std::uint64_t peer) noexcept {
     sockaddr_in a{};
     a.sin_family = AF_INET;
@@ -41,7 +46,8 @@ bool set(int fd, int level, int name, const T& value) {
 
 class UdpPort final : public Port {
 public:
-    UdpPort(const std::string& place, const Options& options, std::uint16_t type) : options_(options), type_(type) {
+    UdpPort(const std::string& place, const Options& options, std::uint16_t type)
+        : options_(options), type_(type) {
         description_ = udp::describe(place);
     }
 
@@ -51,46 +57,81 @@ public:
         if (!socket_) return "cannot open a socket: " + link::reason();
         set(socket_.get(), SOL_SOCKET, SO_NO_CHECK, 1);
         set(socket_.get(), SOL_SOCKET, SO_TIMESTAMPNS, 1);
-        set(socket_.get(), SOL_SOCKET, SO_RCVBUF, static_cast<int>(std::min<std::size_t>(options_.receive_capacity, 16384) * 2048));
+        set(socket_.get(), SOL_SOCKET, SO_RCVBUF,
+            static_cast<int>(std::min<std::size_t>(options_.receive_capacity, 16384) * 2048));
         const auto* address = reinterpret_cast<const sockaddr*>(&at);
         const std::string where = host + ":" + std::to_string(ntohs(at.sin_port));
         if (options_.listen) {
-            if (::bind(socket_.get(), address, sizeof at) == 0) return name_station(), std::string();
-            if (errno == EADDRNOTAVAIL) return host + " is not an address of this machine; to listen on all of them, write udp:0.0.0.0";
-            return "cannot listen on " + where + ": " + link::reason() + "; to find the program that does: ss -ulpn";
+            if (::bind(socket_.get(), address, sizeof at) == 0) {
+                name_station();
+                return std::string();
+            }
+            if (errno == EADDRNOTAVAIL) {
+                return host +
+                       " is not an address of this machine; to listen on all of them, write "
+                       "udp:0.0.0.0";
+            }
+            return "cannot listen on " + where + ": " + link::reason() +
+                   "; to find the program that does: ss -ulpn";
         }
-        if (::connect(socket_.get(), address, sizeof at) != 0) return "no route to " + where + ": " + link::reason() + "; see: ip route";
+        if (::connect(socket_.get(), address, sizeof at) != 0) {
+            return "no route to " + where + ": " + link::reason() + "; see: ip route";
+        }
         int mtu = 0;
         socklen_t size = sizeof mtu;
-        if (getsockopt(socket_.get(), IPPROTO_IP, IP_MTU, &mtu, &size) == 0 && mtu > static_cast<int>(ip_and_udp_bytes))
+        if (getsockopt(socket_.get(), IPPROTO_IP, IP_MTU, &mtu, &size) == 0 &&
+            mtu > static_cast<int>(ip_and_udp_bytes)) {
             mtu_ = std::min(static_cast<std::uint32_t>(mtu) - ip_and_udp_bytes, most_payload);
+        }
         name_station();
         announce(link::monotonic_ns());
         pollfd refused{socket_.get(), 0, 0};
         const timespec limit{0, refusal_ns};
-        if (::ppoll(&refused, 1, &limit, nullptr) > 0) note_refusal();
+        if (::ppoll(&refused, 1, &limit, nullptr) > 0) {
+            note_refusal();
+        }
         return {};
     }
 
     const Address& address() const noexcept override { return address_; }
 
-    Sent send(std::span<const std::uint8_t> frame, const Launch& launch, std::int64_t) noexcept override {
-        if (!launch.fits(frame.size()) || frame.size() > largest_frame) return add(dropped_), add(errors_), Sent::rejected;
+    Sent send(std::span<const std::uint8_t> frame, const Launch& launch,
+              std::int64_t) noexcept override {
+        if (!launch.fits(frame.size()) || frame.size() > largest_frame) {
+            add(dropped_);
+            add(errors_);
+            return Sent::rejected;
+        }
         std::int64_t now = link::monotonic_ns();
-        if (launch.at_ns - now > options_.spin_ns) return add(dropped_), Sent::full;
-        while (now < launch.at_ns) now = link::monotonic_ns();
-        if (launch.is_late(now)) return add(late_), Sent::late;
+        if (launch.at_ns - now > options_.spin_ns) {
+            add(dropped_);
+            return Sent::full;
+        }
+        while (now < launch.at_ns) {
+            now = link::monotonic_ns();
+        }
+        if (launch.is_late(now)) {
+            add(late_);
+            return Sent::late;
+        }
         std::array<std::uint8_t, largest_frame> own;
         if (launch.stamp_at != 0 || launch.finisher != nullptr) {
             std::memcpy(own.data(), frame.data(), frame.size());
             auto stamp = static_cast<std::uint64_t>(now + launch.stamp_add_ns);
-            for (unsigned i = 8; launch.stamp_at != 0 && i-- > 0; stamp >>= 8) own[launch.stamp_at + i] = static_cast<std::uint8_t>(stamp);
-            if (launch.finisher != nullptr) launch.finisher->leaves({own.data(), frame.size()});
+            for (unsigned i = 8; launch.stamp_at != 0 && i-- > 0; stamp >>= 8) {
+                own[launch.stamp_at + i] = static_cast<std::uint8_t>(stamp);
+            }
+            if (launch.finisher != nullptr) {
+                launch.finisher->leaves({own.data(), frame.size()});
+            }
             frame = {own.data(), frame.size()};
         }
         if (!send_to_all(frame.subspan(header_bytes), now)) {
-            if (launch.finisher != nullptr) launch.finisher->stayed({own.data(), frame.size()});
-            return add(dropped_), Sent::full;
+            if (launch.finisher != nullptr) {
+                launch.finisher->stayed({own.data(), frame.size()});
+            }
+            add(dropped_);
+            return Sent::full;
         }
         link::trace_frame(link::ethernet_sent, frame);
         add(sent_);
@@ -104,9 +145,12 @@ public:
             alignas(cmsghdr) char control[CMSG_SPACE(sizeof(timespec))];
             iovec part{frame_.data() + header_bytes, frame_.size() - header_bytes};
             msghdr header{};
-            header.msg_name = &from, header.msg_namelen = sizeof from;
-            header.msg_iov = &part, header.msg_iovlen = 1;
-            header.msg_control = control, header.msg_controllen = sizeof control;
+            header.msg_name = &from;
+            header.msg_namelen = sizeof from;
+            header.msg_iov = &part;
+            header.msg_iovlen = 1;
+            header.msg_control = control;
+            header.msg_controllen = sizeof control;
             const auto got = ::recvmsg(socket_.get(), &header, MSG_DONTWAIT);
             if (got < 0 && errno == EINTR) continue;
             if (got < 0 && errno == ECONNREFUSED) {
@@ -116,14 +160,18 @@ public:
             if (got < 0) return std::nullopt;
             const auto now = link::monotonic_ns();
             set_up(true);
-            if (options_.listen) remember(pack(from), now);
+            if (options_.listen) {
+                remember(pack(from), now);
+            }
             if (got == 0) continue;
             if ((header.msg_flags & MSG_TRUNC) != 0) {
                 add(errors_);
                 continue;
             }
             auto length = header_bytes + static_cast<std::size_t>(got);
-            for (; length < smallest_frame; ++length) frame_[length] = 0;
+            for (; length < smallest_frame; ++length) {
+                frame_[length] = 0;
+            }
             link::trace_frame(link::ethernet_received, {frame_.data(), length});
             add(received_);
             received_bytes_.fetch_add(length, std::memory_order_relaxed);
@@ -137,7 +185,9 @@ public:
             auto end = until_ns;
             if (!options_.listen) {
                 const auto due = last_sent_ns_.load(std::memory_order_relaxed) + announce_every_ns;
-                if (now >= due) announce(now);
+                if (now >= due) {
+                    announce(now);
+                }
                 end = std::min(end, std::max(due, now + 1));
             }
             pollfd p{socket_.get(), POLLIN, 0};
@@ -145,18 +195,29 @@ public:
             const timespec limit = link::to_timespec(left);
             ::ppoll(&p, 1, &limit, nullptr);
             if ((p.revents & POLLIN) != 0) return true;
-            if ((p.revents & POLLERR) != 0) note_refusal();
+            if ((p.revents & POLLERR) != 0) {
+                note_refusal();
+            }
             if (link::monotonic_ns() >= until_ns) return false;
         }
     }
 
     Statistics statistics() const noexcept override {
-        const auto read = [](const auto& counter) { return counter.load(std::memory_order_relaxed); };
+        const auto read = [](const auto& counter) {
+            return counter.load(std::memory_order_relaxed);
+        };
         Statistics s;
-        s.up = read(up_), s.mtu = mtu_;
-        s.sent = read(sent_), s.sent_bytes = read(sent_bytes_);
-        s.received = read(received_), s.received_bytes = read(received_bytes_);
-        s.dropped = read(dropped_), s.late = read(late_), s.errors = read(errors_), s.downs = read(downs_);
+        s.up = read(up_);
+        s.mtu = mtu_;
+        s.sent = read(sent_);
+        s.sent_bytes = read(sent_bytes_);
+        s.received = read(received_);
+        s.received_bytes = read(received_bytes_);
+        s.dropped = read(dropped_);
+        s.late = read(late_);
+        s.errors = read(errors_);
+
+        s.downs = read(downs_);
         return s;
     }
     const Description& description() const noexcept override { return description_; }
@@ -170,18 +231,27 @@ private:
         std::atomic<std::int64_t> heard_ns{0};
     };
 
-    /// Derives the own address and the header of received frames. Frames of the listening end passed the devices there, which their
-    /// source address shows (locally administered).
+    /// Derives the own address and the header of received frames. Frames of the listening end
+    /// passed the devices there, which their source address shows (locally administered).
     void name_station() noexcept {
         sockaddr_in self{};
         socklen_t size = sizeof self;
         getsockname(socket_.get(), reinterpret_cast<sockaddr*>(&self), &size);
         const auto port = ntohs(self.sin_port);
-        address_ = {2, 'U', 'D', 'P', static_cast<std::uint8_t>(port >> 8), static_cast<std::uint8_t>(port)};
+        address_ = {2,
+                    'U',
+                    'D',
+                    'P',
+                    static_cast<std::uint8_t>(port >> 8),
+                    static_cast<std::uint8_t>(port)};
         std::fill_n(frame_.begin(), 6, std::uint8_t{0xff});
         std::copy(address_.begin(), address_.end(), frame_.begin() + 6);
-        if (options_.listen) frame_[6] = 0;
-        frame_[12] = static_cast<std::uint8_t>(type_ >> 8), frame_[13] = static_cast<std::uint8_t>(type_);
+        if (options_.listen) {
+            frame_[6] = 0;
+        }
+        frame_[12] = static_cast<std::uint8_t>(type_ >> 8);
+
+        frame_[13] = static_cast<std::uint8_t>(type_);
     }
 
     /// Registers this end at the listening one, without a frame. Errors show in receive().
@@ -192,23 +262,34 @@ private:
     void note_refusal() noexcept {
         int error = 0;
         socklen_t size = sizeof error;
-        if (getsockopt(socket_.get(), SOL_SOCKET, SO_ERROR, &error, &size) == 0 && error == ECONNREFUSED) set_up(false);
+        if (getsockopt(socket_.get(), SOL_SOCKET, SO_ERROR, &error, &size) == 0 &&
+            error == ECONNREFUSED) {
+            set_up(false);
+        }
     }
     void set_up(bool up) noexcept {
-        if (up_.exchange(up, std::memory_order_relaxed) && !up) add(downs_);
+        if (up_.exchange(up, std::memory_order_relaxed) && !up) {
+            add(downs_);
+        }
     }
 
     void remember(std::uint64_t address, std::int64_t now) noexcept {
         Peer* place = peers_.data();
         for (Peer& p : peers_) {
-            if (p.address.load(std::memory_order_relaxed) == address) return p.heard_ns.store(now, std::memory_order_relaxed);
-            if (p.heard_ns.load(std::memory_order_relaxed) < place->heard_ns.load(std::memory_order_relaxed)) place = &p;
+            if (p.address.load(std::memory_order_relaxed) == address) {
+                return p.heard_ns.store(now, std::memory_order_relaxed);
+            }
+            if (p.heard_ns.load(std::memory_order_relaxed) <
+                place->heard_ns.load(std::memory_order_relaxed)) {
+                place = &p;
+            }
         }
         place->address.store(address, std::memory_order_relaxed);
         place->heard_ns.store(now, std::memory_order_relaxed);
     }
 
-    /// Sends to the listening end, or to all that were heard of. Returns whether the system took a datagram.
+    /// Sends to the listening end, or to all that were heard of. Returns whether the system took a
+    /// datagram.
     bool send_to_all(std::span<const std::uint8_t> payload, std::int64_t now) noexcept {
         if (!options_.listen) {
             last_sent_ns_.store(now, std::memory_order_relaxed);
@@ -217,7 +298,10 @@ private:
         bool taken = false;
         for (const Peer& p : peers_) {
             const auto address = p.address.load(std::memory_order_relaxed);
-            if (address == 0 || now - p.heard_ns.load(std::memory_order_relaxed) > peer_timeout_ns) continue;
+            if (address == 0 ||
+                now - p.heard_ns.load(std::memory_order_relaxed) > peer_timeout_ns) {
+                continue;
+            }
             const sockaddr_in to = unpack(address);
             taken |= send_to(&to, payload);
         }
@@ -225,11 +309,15 @@ private:
     }
     bool send_to(const sockaddr_in* to, std::span<const std::uint8_t> payload) noexcept {
         for (int tries = 0; tries < 3; ++tries) {
-            const auto sent = ::sendto(socket_.get(), payload.data(), payload.size(), MSG_DONTWAIT | MSG_NOSIGNAL,
-                                       reinterpret_cast<const sockaddr*>(to), to == nullptr ? 0 : sizeof *to);
+            const auto sent =
+                ::sendto(socket_.get(), payload.data(), payload.size(), MSG_DONTWAIT | MSG_NOSIGNAL,
+                         reinterpret_cast<const sockaddr*>(to), to == nullptr ? 0 : sizeof *to);
             if (sent >= 0) return true;
-            if (errno == ECONNREFUSED) set_up(false);  // of an earlier datagram
-            else if (errno != EINTR) break;
+            if (errno == ECONNREFUSED) {
+                set_up(false);  // of an earlier datagram
+            } else if (errno != EINTR) {
+                break;
+            }
         }
         add(errors_);
         return false;
@@ -251,7 +339,15 @@ private:
     Address address_{};
     Description description_;
     std::uint32_t mtu_ = most_payload;
-    Count sent_{0}, sent_bytes_{0}, received_{0}, received_bytes_{0}, dropped_{0}, late_{0}, errors_{0}, downs_{0};
+    Count sent_{0};
+    Count sent_bytes_{0};
+    Count received_{0};
+    Count received_bytes_{0};
+    Count dropped_{0};
+    Count late_{0};
+
+    Count errors_{0};
+    Count downs_{0};
     std::atomic<bool> up_{true};
     std::atomic<std::int64_t> last_sent_ns_{0};
     std::array<Peer, most_peers> peers_;
@@ -263,31 +359,49 @@ private:
 namespace udp {
 
 Description describe(const std::string& place) {
-    return {.address = "udp:" + place, .transport = "frames in UDP datagrams", .interface = place, .datagrams = true};
+    return {.address = "udp:" + place,
+            .transport = "frames in UDP datagrams",
+            .interface = place,
+            .datagrams = true};
 }
 
 Opened open(const std::string& place, const Options& options) {
-    if (options.types.size() != 1) return {nullptr, "UDP datagrams carry frames of one type only; write eth:enp3s0 or sim:NAME"};
+    if (options.types.size() != 1) {
+        return {nullptr,
+                "UDP datagrams carry frames of one type only; write eth:enp3s0 or sim:NAME"};
+    }
     const auto colon = std::min(place.find(':'), place.size());
-    const std::string host = place.substr(0, colon), port = place.substr(std::min(colon + 1, place.size()));
-    if (host.empty()) return {nullptr, "missing host; write udp:127.0.0.1 for this machine"};
+    const std::string host = place.substr(0, colon);
+
+    const std::string port = place.substr(std::min(colon + 1, place.size()));
+    if (host.empty()) {
+        return {nullptr, "missing host; write udp:127.0.0.1 for this machine"};
+    }
     unsigned number = options.types.front();
     if (colon != place.size()) {
         const auto [end, wrong] = std::from_chars(port.data(), port.data() + port.size(), number);
-        if (wrong != std::errc{} || end != port.data() + port.size() || number == 0 || number > 65535)
-            return {nullptr, "invalid port '" + port + "'; write udp:" + host + ":" + std::to_string(options.types.front())};
+        if (wrong != std::errc{} || end != port.data() + port.size() || number == 0 ||
+            number > 65535) {
+            return {nullptr, "invalid port '" + port + "'; write udp:" + host + ":" +
+                                 std::to_string(options.types.front())};
+        }
     }
     addrinfo wanted{}, *found = nullptr;
-    wanted.ai_family = AF_INET, wanted.ai_socktype = SOCK_DGRAM;
-    if (const int wrong = getaddrinfo(host.c_str(), nullptr, &wanted, &found); wrong != 0)
-        return {nullptr, "no IPv4 address for host '" + host + "': " + gai_strerror(wrong) + "; write an address, as in udp:127.0.0.1"};
+    wanted.ai_family = AF_INET;
+    wanted.ai_socktype = SOCK_DGRAM;
+    if (const int wrong = getaddrinfo(host.c_str(), nullptr, &wanted, &found); wrong != 0) {
+        return {nullptr, "no IPv4 address for host '" + host + "': " + gai_strerror(wrong) +
+                             "; write an address, as in udp:127.0.0.1"};
+    }
     sockaddr_in at{};
     std::memcpy(&at, found->ai_addr, std::min<std::size_t>(found->ai_addrlen, sizeof at));
     freeaddrinfo(found);
     at.sin_port = htons(static_cast<std::uint16_t>(number));
     auto opened = std::make_unique<UdpPort>(place, options, options.types.front());
     auto problem = opened->open(host, at);
-    if (!problem.empty()) return {nullptr, std::move(problem)};
+    if (!problem.empty()) {
+        return {nullptr, std::move(problem)};
+    }
     return {std::move(opened), {}};
 }
 

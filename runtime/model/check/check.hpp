@@ -1,21 +1,27 @@
 // SPDX-License-Identifier: MIT
-// The rules over a whole model: one file per rule. (What a single edit can break is rejected in model/edit.)
+// The rules over a whole model: one file per rule. (What a single edit can break is rejected in
+// model/edit.)
 #pragma once
 
 #include <string>
 #include <vector>
 
-#include "text/diagnostic.hpp"
 #include "model/model.hpp"
+#include "text/diagnostic.hpp"
 
 namespace hal {
 
-void check_periods(const Model& model, Diagnostics& diagnostics);               ///< error period-multiple
-void check_spread_pins(const Model& model, Diagnostics& diagnostics);           ///< error spread-pins
-void check_arrows(const Model& model, Diagnostics& diagnostics);                ///< warning wrong-arrow
-void check_unthreaded_functions(const Model& model, Diagnostics& diagnostics);  ///< warning unthreaded-function
-void check_cross_thread_io(const Model& model, Diagnostics& diagnostics);       ///< note cross-thread-io
-void check_stale_reads(const Model& model, Diagnostics& diagnostics);           ///< note stale-read
+/// error period-multiple
+void check_periods(const Model& model, Diagnostics& diagnostics);
+/// error spread-pins
+void check_spread_pins(const Model& model, Diagnostics& diagnostics);
+/// warning wrong-arrow
+void check_arrows(const Model& model, Diagnostics& diagnostics);
+/// warning unthreaded-function
+void check_unthreaded_functions(const Model& model, Diagnostics& diagnostics);
+/// note cross-thread-io
+void check_cross_thread_io(const Model& model, Diagnostics& diagnostics);
+void check_stale_reads(const Model& model, Diagnostics& diagnostics);  ///< note stale-read
 
 /// How old a value is when a function reads it: the table in docs/design.md.
 struct Delay {
@@ -25,7 +31,8 @@ struct Delay {
 };
 std::vector<Delay> delays(const Model& model);
 
-/// Where a pin's function stands in its thread: the last position of a writer's, the first of a reader's functions.
+/// Where a pin's function stands in its thread: the last position of a writer's, the first of a
+/// reader's functions.
 int first_position(const Pin& pin);
 int last_position(const Pin& pin);
 

@@ -9,13 +9,17 @@ void check_cross_thread_io(const Model& model, Diagnostics& diagnostics) {
         for (const Pin* pin : signal->pins) {
             const Thread* const thread = pin->dir == HAL_DIR_IO ? thread_of(*pin) : nullptr;
             if (!thread) continue;
-            if (!first) first = pin;
+            if (!first) {
+                first = pin;
+            }
             if (thread == thread_of(*first)) continue;
             Diagnostic d{Severity::note,
                          "cross-thread-io",
-                         "I/O pins of '" + signal->name + "' are in threads '" + thread_of(*first)->name + "' and '" + thread->name +
+                         "I/O pins of '" + signal->name + "' are in threads '" +
+                             thread_of(*first)->name + "' and '" + thread->name +
                              "': its value may change within a cycle",
-                         {{pin->linked_at, "in " + thread->name}, {first->linked_at, "in " + thread_of(*first)->name}},
+                         {{pin->linked_at, "in " + thread->name},
+                          {first->linked_at, "in " + thread_of(*first)->name}},
                          {}};
             diagnostics.add(std::move(d));
             break;

@@ -14,10 +14,13 @@ void check_periods(const Model& model, Diagnostics& diagnostics) {
         Diagnostic d{Severity::error,
                      "period-multiple",
                      "the period of thread '" + thread->name + "' (" + std::to_string(period) +
-                         " ns) is not a multiple of the fastest thread's (" + fastest.name + ", " + std::to_string(base) + " ns)",
+                         " ns) is not a multiple of the fastest thread's (" + fastest.name + ", " +
+                         std::to_string(base) + " ns)",
                      {{thread->made, ""}},
                      {}};
-        if (fastest.made.known()) d.labels.push_back({fastest.made, "fastest thread"});
+        if (fastest.made.known()) {
+            d.labels.push_back({fastest.made, "fastest thread"});
+        }
         d.help.push_back("use " + std::to_string(lower) + " or " + std::to_string(lower + base));
         diagnostics.add(std::move(d));
     }

@@ -6,19 +6,26 @@
 namespace hal {
 
 void check_unthreaded_functions(const Model& model, Diagnostics& diagnostics) {
-    for (const auto& component : model.components)
+    for (const auto& component : model.components) {
         for (const auto& function : component->functions) {
             if (function->thread) continue;
-            const bool linked = std::any_of(function->instances.begin(), function->instances.end(), [&](const Instance* instance) {
-                return !instance->own_threads && std::any_of(instance->pins.begin(), instance->pins.end(),
-                                   [&](const auto& pin) { return pin->signal && (!pin->function || pin->function == function.get()); });
+            const bool linked = std::any_of(function->instances.begin(), function->instances.end(),
+                                            [&](const Instance* instance) {
+                return !instance->own_threads &&
+                       std::any_of(instance->pins.begin(), instance->pins.end(),
+                                   [&](const auto& pin) {
+                    return pin->signal && (!pin->function || pin->function == function.get());
+                });
             });
             if (!linked) continue;
-            const std::string thread = model.threads.empty() ? "THREAD" : model.threads.back()->name;
+            const std::string thread =
+                model.threads.empty() ? "THREAD" : model.threads.back()->name;
             diagnostics.warning("unthreaded-function", function->instances.front()->loaded,
-                                "function '" + function->name + "' is in no thread, so its linked pins never change", "",
-                                "addf " + function->name + " " + thread);
+                                "function '" + function->name +
+                                    "' is in no thread, so its linked pins never change",
+                                "", "addf " + function->name + " " + thread);
         }
+    }
 }
 
 }  // namespace hal

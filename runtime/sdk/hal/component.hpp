@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
-// What a component author includes: Component, pins (In Out Io Param), Function, Cycle, HAL_COMPONENT.
+// What a component author includes: Component, pins (In Out Io Param), Function, Cycle,
+// HAL_COMPONENT.
 //
-// A pin, a function or a load argument is a member of the component; its constructor declares it, once.
-// Everything here is header-only glue over the C interface in hal/abi.h; nothing of it crosses that border.
+// A pin, a function or a load argument is a member of the component; its constructor declares it,
+// once. Everything here is header-only glue over the C interface in hal/abi.h; nothing of it
+// crosses that border.
 #pragma once
 
 #include <algorithm>
@@ -33,98 +35,129 @@ public:
     explicit Cycle(const hal_cycle* cycle) noexcept : cycle_(cycle) {}
     double seconds() const noexcept { return cycle_->period_s; }           ///< nominal period, s
     std::int64_t period_ns() const noexcept { return cycle_->period_ns; }  ///< nominal period, ns
-    std::int64_t start_ns() const noexcept { return cycle_->start_ns; }    ///< when this cycle was due, runtime clock
-    std::uint64_t number() const noexcept { return cycle_->number; }       ///< cycles of the thread so far
+    /// when this cycle was due, runtime clock
+    std::int64_t start_ns() const noexcept { return cycle_->start_ns; }
+    /// cycles of the thread so far
+    std::uint64_t number() const noexcept { return cycle_->number; }
 
 private:
     const hal_cycle* cycle_;
 };
-static_assert(sizeof(Cycle) == sizeof(void*) && std::is_trivially_copyable_v<Cycle>, "passed in a register, like the pointer");
+static_assert(sizeof(Cycle) == sizeof(void*) && std::is_trivially_copyable_v<Cycle>,
+              "passed in a register, like the pointer");
 
 template <class T>
-concept PinType = std::same_as<T, bool> || std::same_as<T, double> || std::same_as<T, std::int32_t> || std::same_as<T, std::uint32_t> ||
-                  std::same_as<T, std::int64_t> || std::same_as<T, std::uint64_t> || std::same_as<T, Port>;
+concept PinType =
+    std::same_as<T, bool> || std::same_as<T, double> || std::same_as<T, std::int32_t> ||
+    std::same_as<T, std::uint32_t> || std::same_as<T, std::int64_t> ||
+    std::same_as<T, std::uint64_t> || std::same_as<T, Port>;
 
 /// What may follow a pin's documentation.
 template <PinType T>
 struct PinOptions {
-    T initial{};                        ///< value before anything is linked or set
-    const char* unit = "";              ///< "mm", "rad/s", "V" …
-    std::optional<T> safe = {};         ///< outputs: written on stop, unload, a fault that stops the thread, end of process
-    bool finite = false;                ///< float outputs: NaN or infinity here is a fault
+    T initial{};  ///< value before anything is linked or set
+    const char* unit = "";  ///< "mm", "rad/s", "V" …
+    /// outputs: written on stop, unload, a fault that stops the thread, end of process
+    std::optional<T> safe = {};
+    bool finite = false;  ///< float outputs: NaN or infinity here is a fault
 };
 
 /// What may follow a function's documentation.
 struct FunctionOptions {
-    bool shared = false;  ///< one function per component that runs all instances (`encoder.update-counters`)
+    /// one function per component that runs all instances (`encoder.update-counters`)
+    bool shared = false;
 };
 
 /// What may follow an argument's documentation.
 struct ArgumentOptions {
     bool per_instance = false;  ///< a comma list with an element per instance (`step_type=0,2`)
-    std::int64_t min = INT64_MIN, max = INT64_MAX;
+    std::int64_t min = INT64_MIN;
+    std::int64_t max = INT64_MAX;
 };
 
 namespace detail {
 template <class T>
 constexpr hal_type type_of() {
-    if constexpr (std::same_as<T, bool>) return HAL_TYPE_BIT;
-    else if constexpr (std::same_as<T, double>) return HAL_TYPE_FLOAT;
-    else if constexpr (std::same_as<T, std::int32_t>) return HAL_TYPE_S32;
-    else if constexpr (std::same_as<T, std::uint32_t>) return HAL_TYPE_U32;
-    else if constexpr (std::same_as<T, std::int64_t>) return HAL_TYPE_S64;
-    else if constexpr (std::same_as<T, std::uint64_t>) return HAL_TYPE_U64;
-    else return HAL_TYPE_PORT;
+    if constexpr (std::same_as<T, bool>) {
+        return HAL_TYPE_BIT;
+    } else if constexpr (std::same_as<T, double>) {
+        return HAL_TYPE_FLOAT;
+    } else if constexpr (std::same_as<T, std::int32_t>) {
+        return HAL_TYPE_S32;
+    } else if constexpr (std::same_as<T, std::uint32_t>) {
+        return HAL_TYPE_U32;
+    } else if constexpr (std::same_as<T, std::int64_t>) {
+        return HAL_TYPE_S64;
+    } else if constexpr (std::same_as<T, std::uint64_t>) {
+        return HAL_TYPE_U64;
+    } else {
+        return HAL_TYPE_PORT;
+    }
 }
 
 template <class T>
 hal_value to_value(T v) {
     hal_value value{};
     value.raw = 0;
-    if constexpr (std::same_as<T, Port>) value.port = nullptr;
-    else std::memcpy(&value, &v, sizeof v);
+    if constexpr (std::same_as<T, Port>) {
+        value.port = nullptr;
+    } else {
+        std::memcpy(&value, &v, sizeof v);
+    }
     return value;
 }
 
-// A slot is written by one thread only, and that thread's pins read it by plain moves. Stores are atomic because the
-// shell may look at a single value at any moment; loads of `Io` pins are, because several threads may share their cell.
-// On every machine we run on the instruction is the same.
+// A slot is written by one thread only, and that thread's pins read it by plain moves. Stores are
+// atomic because the shell may look at a single value at any moment; loads of `Io` pins are,
+// because several threads may share their cell. On every machine we run on the instruction is the
+// same.
 template <class T, bool Shared>
 T load(const hal_value* slot) noexcept {
-    if constexpr (std::same_as<T, Port>) return Port{slot->port};
-    else if constexpr (Shared) {
+    if constexpr (std::same_as<T, Port>) {
+        return Port{slot->port};
+    } else if constexpr (Shared) {
         T v;
         __atomic_load(reinterpret_cast<const T*>(slot), &v, __ATOMIC_RELAXED);
         return v;
-    } else return *reinterpret_cast<const T*>(slot);
+    } else {
+        return *reinterpret_cast<const T*>(slot);
+    }
 }
 template <class T>
 void store(hal_value* slot, T v) noexcept {
     __atomic_store(reinterpret_cast<T*>(slot), &v, __ATOMIC_RELAXED);
 }
 
-[[noreturn]] inline void rejected() { throw std::runtime_error(""); }  // the host has recorded the reason already
+// the host has recorded the reason already
+[[noreturn]] inline void rejected() { throw std::runtime_error(""); }
 
 template <class T>
-void declare(hal_pin& pin, hal_dir dir, const char* name, const char* doc, const PinOptions<T>& options, const void* function) {
+void declare(hal_pin& pin, hal_dir dir, const char* name, const char* doc,
+             const PinOptions<T>& options, const void* function) {
     hal_pin_decl decl{};
     decl.size = sizeof decl;
     decl.type = type_of<T>();
     decl.dir = dir;
-    decl.flags = (options.finite ? unsigned{HAL_PIN_FINITE} : 0u) | (options.safe ? unsigned{HAL_PIN_SAFE} : 0u);
+    decl.flags = (options.finite ? unsigned{HAL_PIN_FINITE} : 0u) |
+                 (options.safe ? unsigned{HAL_PIN_SAFE} : 0u);
     decl.name = name;
     decl.doc = doc;
     decl.unit = options.unit;
     decl.initial = to_value<T>(options.initial);
-    if (options.safe) decl.safe = to_value<T>(*options.safe);
+    if (options.safe) {
+        decl.safe = to_value<T>(*options.safe);
+    }
     decl.function = function;
     pin.own = decl.initial;
     pin.slot = &pin.own;
-    if (!creating->pin(creating, &decl, &pin)) rejected();
+    if (!creating->pin(creating, &decl, &pin)) {
+        rejected();
+    }
 }
 }  // namespace detail
 
-/// Base of every component: empty, so that instances stay small. Derived classes write `using Component::Component;`.
+/// Base of every component: empty, so that instances stay small. Derived classes write `using
+/// Component::Component;`.
 class Component {
 public:
     explicit Component(const hal_host* host) { detail::creating = host; }
@@ -134,7 +167,8 @@ public:
 
 namespace detail {
 template <class B, auto step>
-void run_row(const hal_call* call, const hal_call* last, const hal_cycle* cycle, const hal_call* volatile* current) noexcept {
+void run_row(const hal_call* call, const hal_call* last, const hal_cycle* cycle,
+             const hal_call* volatile* current) noexcept {
     for (; call != last; ++call) {
         *current = call;
         (static_cast<B*>(call->self)->*step)(Cycle{cycle});
@@ -142,61 +176,73 @@ void run_row(const hal_call* call, const hal_call* last, const hal_cycle* cycle,
 }
 }  // namespace detail
 
-/// A member function as a constant: `Function run{*this, "", hal::step<&And2::update>, "computes out"}`. Consecutive instances
-/// in a thread are run by one loop in the plugin, in which the compiler can inline `update`: useful when the work is only a few
-/// instructions, comparable to the cost of a call.
+/// A member function as a constant: `Function run{*this, "", hal::step<&And2::update>, "computes
+/// out"}`. Consecutive instances in a thread are run by one loop in the plugin, in which the
+/// compiler can inline `update`: useful when the work is only a few instructions, comparable to the
+/// cost of a call.
 template <auto member>
 struct Step {};
 template <auto member>
 inline constexpr Step<member> step{};
 
-/// A function that can be added to a thread with `addf`. `step` must be a noexcept member taking a hal::Cycle.
+/// A function that can be added to a thread with `addf`. `step` must be a noexcept member taking a
+/// hal::Cycle.
 class Function {
 public:
     template <std::derived_from<Component> C, class B>
         requires std::derived_from<C, B>
-    Function(C& component, const char* name, void (B::*step)(Cycle) noexcept, const char* doc, FunctionOptions options = {}) {
-        declare(static_cast<B*>(&component), name, entry(step), doc, options.shared ? unsigned{HAL_FUNCTION_SHARED} : 0u);
+    Function(C& component, const char* name, void (B::*step)(Cycle) noexcept, const char* doc,
+             FunctionOptions options = {}) {
+        declare(static_cast<B*>(&component), name, entry(step), doc,
+                options.shared ? unsigned{HAL_FUNCTION_SHARED} : 0u);
     }
     template <std::derived_from<Component> C, class B, void (B::*step)(Cycle) noexcept>
         requires std::derived_from<C, B>
-    Function(C& component, const char* name, Step<step>, const char* doc, FunctionOptions options = {}) {
-        declare(static_cast<B*>(&component), name, entry(step), doc, options.shared ? unsigned{HAL_FUNCTION_SHARED} : 0u,
-                detail::run_row<B, step>);
+    Function(C& component, const char* name, Step<step>, const char* doc,
+             FunctionOptions options = {}) {
+        declare(static_cast<B*>(&component), name, entry(step), doc,
+                options.shared ? unsigned{HAL_FUNCTION_SHARED} : 0u, detail::run_row<B, step>);
     }
     // The compiler shows this line where something else was given.
     template <std::derived_from<Component> C, class F>
-    Function(C&, const char*, F, const char*, FunctionOptions = {}) = delete;  // must be: void NAME(hal::Cycle) noexcept
+    Function(C&, const char*, F, const char*,
+             FunctionOptions = {}) = delete;  // must be: void NAME(hal::Cycle) noexcept
     Function(const Function&) = delete;
     Function& operator=(const Function&) = delete;
 
 protected:
     Function() = default;
 
-    // Itanium C++ ABI 2.3: a pointer to a non-virtual member function starts with the function's address, and the
-    // member takes `this` and the one-pointer Cycle in the registers of a hal_step's two arguments. Calling it
-    // directly saves a thunk per function and cycle.
+    // Itanium C++ ABI 2.3: a pointer to a non-virtual member function starts with the function's
+    // address, and the member takes `this` and the one-pointer Cycle in the registers of a
+    // hal_step's two arguments. Calling it directly saves a thunk per function and cycle.
     template <class B>
     static hal_step entry(void (B::*step)(Cycle) noexcept) {
         static_assert(sizeof step == 2 * sizeof(void*));
         std::uintptr_t words[2];
         std::memcpy(words, &step, sizeof step);
 #if defined(__aarch64__) || defined(__arm__)
-        const bool plain = words[1] == 0;  // ABI for ARM, 3.2.1: the mark of a virtual one is there; bit 0 of the address is Thumb's
+        const bool plain =
+            words[1] ==
+            0;  // ABI for ARM, 3.2.1: the mark of a virtual one is there; bit 0 of the address is Thumb's
 #else
         const bool plain = (words[0] & 1) == 0 && words[1] == 0;
 #endif
         if (!plain) throw std::logic_error("a component's function must not be virtual");
         return reinterpret_cast<hal_step>(words[0]);
     }
-    void declare(void* self, const char* name, hal_step step, const char* doc, unsigned flags, hal_row row = nullptr) {
+    void declare(void* self, const char* name, hal_step step, const char* doc, unsigned flags,
+                 hal_row row = nullptr) {
         const hal_function_decl decl{sizeof decl, flags, name, doc, step, self, this, row};
-        if (!detail::creating->function(detail::creating, &decl)) detail::rejected();
+        if (!detail::creating->function(detail::creating, &decl)) {
+            detail::rejected();
+        }
     }
 };
 
-/// What the host calls to make hardware outputs safe: on stop, unload, a fault that stops the thread, the end of the process
-/// and in a crash handler. Must be async-signal-safe: it may write to devices and must not allocate, lock or log.
+/// What the host calls to make hardware outputs safe: on stop, unload, a fault that stops the
+/// thread, the end of the process and in a crash handler. Must be async-signal-safe: it may write
+/// to devices and must not allocate, lock or log.
 class Emergency : Function {
 public:
     template <std::derived_from<Component> C>
@@ -208,19 +254,28 @@ public:
 /// An integer load argument: `loadrt logic inputs=6`.
 class Argument {
 public:
-    Argument(Component&, const char* name, std::int64_t fallback, const char* doc, ArgumentOptions options = {}) {
+    Argument(Component&, const char* name, std::int64_t fallback, const char* doc,
+             ArgumentOptions options = {}) {
         const std::string text = ask(name, std::to_string(fallback).c_str(), doc, options);
         char* end = nullptr;
         errno = 0;
         value_ = std::strtoll(text.c_str(), &end, 0);
-        if (text.empty() || *end != '\0' || errno != 0) throw ArgumentError(name, std::string(name) + "=" + text + " is not a whole number");
-        if (value_ < options.min || value_ > options.max)
-            throw ArgumentError(name, std::string(name) + "=" + text + " is outside " + std::to_string(options.min) + ".." + std::to_string(options.max));
+        if (text.empty() || *end != '\0' || errno != 0) {
+            throw ArgumentError(name, std::string(name) + "=" + text + " is not a whole number");
+        }
+        if (value_ < options.min || value_ > options.max) {
+            throw ArgumentError(name, std::string(name) + "=" + text + " is outside " +
+                                          std::to_string(options.min) + ".." +
+                                          std::to_string(options.max));
+        }
     }
     operator std::int64_t() const noexcept { return value_; }
 
-    static std::string ask(const char* name, const char* fallback, const char* doc, const ArgumentOptions& options) {
-        const hal_argument_decl decl{sizeof decl, options.per_instance ? unsigned{HAL_ARGUMENT_PER_INSTANCE} : 0u, name, doc, fallback};
+    static std::string ask(const char* name, const char* fallback, const char* doc,
+                           const ArgumentOptions& options) {
+        const hal_argument_decl decl{
+            sizeof decl, options.per_instance ? unsigned{HAL_ARGUMENT_PER_INSTANCE} : 0u, name, doc,
+            fallback};
         const char* text = detail::creating->argument(detail::creating, &decl);
         return text ? text : fallback;
     }
@@ -232,7 +287,8 @@ private:
 /// A text load argument: `loadrt sampler cfg=ffb`. Valid as long as the component.
 class TextArgument {
 public:
-    TextArgument(Component&, const char* name, const char* fallback, const char* doc, ArgumentOptions options = {})
+    TextArgument(Component&, const char* name, const char* fallback, const char* doc,
+                 ArgumentOptions options = {})
         : text_(Argument::ask(name, fallback, doc, options)) {}
     const std::string& get() const noexcept { return text_; }
 
@@ -243,13 +299,16 @@ private:
 /// A floating-point load argument: `loadrt furuta arm_length=0.2`.
 class RealArgument {
 public:
-    RealArgument(Component&, const char* name, double fallback, const char* doc, ArgumentOptions options = {}) {
+    RealArgument(Component&, const char* name, double fallback, const char* doc,
+                 ArgumentOptions options = {}) {
         char shortest[32] = {};  // the shortest text that parses to the same number
         std::to_chars(shortest, shortest + sizeof shortest - 1, fallback);
         const std::string text = Argument::ask(name, shortest, doc, options);
         char* end = nullptr;
         value_ = std::strtod(text.c_str(), &end);
-        if (text.empty() || *end != '\0' || !std::isfinite(value_)) throw ArgumentError(name, std::string(name) + "=" + text + " is not a number");
+        if (text.empty() || *end != '\0' || !std::isfinite(value_)) {
+            throw ArgumentError(name, std::string(name) + "=" + text + " is not a number");
+        }
     }
     operator double() const noexcept { return value_; }
 
@@ -261,13 +320,16 @@ namespace detail {
 template <PinType T, hal_dir Dir>
 class Pin {
 public:
-    Pin(Component&, const char* name, const char* doc, PinOptions<T> options = {}) { declare<T>(pin_, Dir, name, doc, options, nullptr); }
-    Pin(Component&, const Function& function, const char* name, const char* doc, PinOptions<T> options = {}) {
+    Pin(Component&, const char* name, const char* doc, PinOptions<T> options = {}) {
+        declare<T>(pin_, Dir, name, doc, options, nullptr);
+    }
+    Pin(Component&, const Function& function, const char* name, const char* doc,
+        PinOptions<T> options = {}) {
         declare<T>(pin_, Dir, name, doc, options, &function);
     }
     Pin(const Pin&) = delete;
 
-    T get() const noexcept { return detail::load<T, Dir == HAL_DIR_IO>(pin_.slot); }
+    T get() const noexcept { return detail::load < T, Dir == HAL_DIR_IO > (pin_.slot); }
     operator T() const noexcept { return get(); }
     /// True while a signal is connected. [realtime]
     bool linked() const noexcept { return pin_.slot != &pin_.own; }
@@ -280,7 +342,8 @@ private:
 };
 }  // namespace detail
 
-/// An input: reads the signal it is linked to, or its own value (`setp`). Assigning to it does not compile.
+/// An input: reads the signal it is linked to, or its own value (`setp`). Assigning to it does not
+/// compile.
 template <PinType T>
 class In : public detail::Pin<T, HAL_DIR_IN> {
 public:
@@ -303,8 +366,14 @@ template <PinType T>
 class Out : public detail::Pin<T, HAL_DIR_OUT> {
 public:
     using detail::Pin<T, HAL_DIR_OUT>::Pin;
-    Out& operator=(T value) noexcept { return this->put(value), *this; }
-    Out& operator=(const Out& other) noexcept { return this->put(other.get()), *this; }
+    Out& operator=(T value) noexcept {
+        this->put(value);
+        return *this;
+    }
+    Out& operator=(const Out& other) noexcept {
+        this->put(other.get());
+        return *this;
+    }
 };
 
 /// Read and written by the component and by others (`index-enable`).
@@ -312,20 +381,34 @@ template <PinType T>
 class Io : public detail::Pin<T, HAL_DIR_IO> {
 public:
     using detail::Pin<T, HAL_DIR_IO>::Pin;
-    Io& operator=(T value) noexcept { return this->put(value), *this; }
-    Io& operator=(const Io& other) noexcept { return this->put(other.get()), *this; }
+    Io& operator=(T value) noexcept {
+        this->put(value);
+        return *this;
+    }
+    Io& operator=(const Io& other) noexcept {
+        this->put(other.get());
+        return *this;
+    }
 };
 
-/// An array of pins. In `name` and `doc` a block of `#` is replaced by the index, padded with zeros to the width of the block.
+/// An array of pins. In `name` and `doc` a block of `#` is replaced by the index, padded with zeros
+/// to the width of the block.
 template <class P, class T>
 class Pins {
 public:
-    Pins(Component& component, const char* name, std::int64_t count, const char* doc, PinOptions<T> options = {}) { make(component, nullptr, name, count, doc, options, 0); }
-    Pins(Component& component, const Function& function, const char* name, std::int64_t count, const char* doc, PinOptions<T> options = {}) {
+    Pins(Component& component, const char* name, std::int64_t count, const char* doc,
+         PinOptions<T> options = {}) {
+        make(component, nullptr, name, count, doc, options, 0);
+    }
+    Pins(Component& component, const Function& function, const char* name, std::int64_t count,
+         const char* doc, PinOptions<T> options = {}) {
         make(component, &function, name, count, doc, options, 0);
     }
     /// The same, counting from `first` (LinuxCNC numbers some arrays from 1).
-    Pins(Component& component, const char* name, std::int64_t count, std::int64_t first, const char* doc, PinOptions<T> options = {}) { make(component, nullptr, name, count, doc, options, first); }
+    Pins(Component& component, const char* name, std::int64_t count, std::int64_t first,
+         const char* doc, PinOptions<T> options = {}) {
+        make(component, nullptr, name, count, doc, options, first);
+    }
     std::size_t size() const noexcept { return size_; }
     P& operator[](std::size_t i) noexcept { return pins_[i]; }
     const P& operator[](std::size_t i) const noexcept { return pins_[i]; }
@@ -341,20 +424,33 @@ public:
         if (at == std::string::npos) return name;
         const auto width = std::min(name.find_first_not_of('#', at), name.size()) - at;
         std::string digits = std::to_string(index);
-        if (digits.size() < width) digits.insert(0, width - digits.size(), '0');
+        if (digits.size() < width) {
+            digits.insert(0, width - digits.size(), '0');
+        }
         return name.replace(at, width, digits);
     }
 
 private:
-    void make(Component& component, const Function* function, const char* name, std::int64_t count, const char* doc, const PinOptions<T>& options, std::int64_t first) {
-        if (count < 0) throw Rejection(HAL_SUBJECT_PIN, name, std::string("negative number of pins '") + name + "': " + std::to_string(count));
+    void make(Component& component, const Function* function, const char* name, std::int64_t count,
+              const char* doc, const PinOptions<T>& options, std::int64_t first) {
+        if (count < 0) {
+            throw Rejection(
+                HAL_SUBJECT_PIN, name,
+                std::string("negative number of pins '") + name + "': " + std::to_string(count));
+        }
         size_ = static_cast<std::size_t>(count);
-        pins_ = static_cast<P*>(detail::creating->allocate(detail::creating, size_ * sizeof(P), alignof(P)));
+        pins_ = static_cast<P*>(
+            detail::creating->allocate(detail::creating, size_ * sizeof(P), alignof(P)));
         if (size_ != 0 && pins_ == nullptr) throw std::bad_alloc();
         for (std::size_t i = 0; i < size_; ++i) {
-            const std::string pin = numbered(name, first + static_cast<std::int64_t>(i)), text = numbered(doc, first + static_cast<std::int64_t>(i));
-            if (function) new (pins_ + i) P(component, *function, pin.c_str(), text.c_str(), options);
-            else new (pins_ + i) P(component, pin.c_str(), text.c_str(), options);
+            const std::string pin = numbered(name, first + static_cast<std::int64_t>(i));
+
+            const std::string text = numbered(doc, first + static_cast<std::int64_t>(i));
+            if (function) {
+                new (pins_ + i) P(component, *function, pin.c_str(), text.c_str(), options);
+            } else {
+                new (pins_ + i) P(component, pin.c_str(), text.c_str(), options);
+            }
         }
     }
     P* pins_ = nullptr;
@@ -373,5 +469,8 @@ const Extension* extension(const char* id) {
 
 }  // namespace hal
 
-/// HAL_COMPONENT(Type, "name", "one line of summary") or with a fourth argument: the manual's text, in Markdown.
-#define HAL_COMPONENT(Type, ...) extern "C" HAL_EXPORT constexpr hal_component hal_plugin = ::hal::detail::component<Type>(__VA_ARGS__);
+/// HAL_COMPONENT(Type, "name", "one line of summary") or with a fourth argument: the manual's text,
+/// in Markdown.
+#define HAL_COMPONENT(Type, ...)                               \
+    extern "C" HAL_EXPORT constexpr hal_component hal_plugin = \
+        ::hal::detail::component<Type>(__VA_ARGS__);

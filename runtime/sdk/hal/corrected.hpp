@@ -13,7 +13,9 @@ public:
     using Param<T>::Param;
     /// Sets the parameter. [realtime]
     void correct(T value) noexcept {
-        if (this->get() != value) this->put(value);
+        if (this->get() != value) {
+            this->put(value);
+        }
     }
 };
 
@@ -24,7 +26,9 @@ public:
     using In<T>::In;
     /// Sets the input while it is unlinked; a signal keeps the value of its writer. [realtime]
     void correct(T value) noexcept {
-        if (!this->linked() && this->get() != value) this->put(value);
+        if (!this->linked() && this->get() != value) {
+            this->put(value);
+        }
     }
 };
 

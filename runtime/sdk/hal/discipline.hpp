@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Disciplines the clock of the threads to an external reference (CANopen SYNC, TDMA sync frames, the reference clock of EtherCAT):
-// Discipline computes clock adjustments from measured phase errors; DisciplinedClock applies them to all threads of the runtime.
+// Disciplines the clock of the threads to an external reference (CANopen SYNC, TDMA sync frames,
+// the reference clock of EtherCAT): Discipline computes clock adjustments from measured phase
+// errors; DisciplinedClock applies them to all threads of the runtime.
 //
 //     hal::DisciplinedClock clock_;                       // in the component
 //     hal::Discipline       discipline_;
@@ -23,62 +24,89 @@ namespace hal {
 /// The clock of the threads, for the one instance that disciplines it.
 class DisciplinedClock {
 public:
-    /// Claims the clock in start(), until this instance is stopped. Throws if another instance leads. [setup]
+    /// Claims the clock in start(), until this instance is stopped. Throws if another instance
+    /// leads. [setup]
     void claim() {
         clock_ = hal::extension<hal_clock>("hal.clock/1");
-        if (!clock_) throw std::runtime_error("this host does not support external clock adjustment");
-        if (!clock_->claim(clock_, detail::creating)) detail::rejected();
+        if (!clock_) {
+            throw std::runtime_error("this host does not support external clock adjustment");
+        }
+        if (!clock_->claim(clock_, detail::creating)) {
+            detail::rejected();
+        }
     }
-    /// Delays all later deadlines of all threads by `ns` (negative: advances them), limited to limit_ns() per cycle. [realtime]
+    /// Delays all later deadlines of all threads by `ns` (negative: advances them), limited to
+    /// limit_ns() per cycle. [realtime]
     void step(std::int64_t ns) const noexcept {
-        if (clock_ && ns != 0) clock_->step(clock_, ns);
+        if (clock_ && ns != 0) {
+            clock_->step(clock_, ns);
+        }
     }
     /// Returns the largest adjustment per cycle: a tenth of the period of the fastest thread. [any]
-    std::int64_t limit_ns() const noexcept { return clock_ ? __atomic_load_n(&clock_->limit_ns, __ATOMIC_RELAXED) : 0; }
+    std::int64_t limit_ns() const noexcept {
+        return clock_ ? __atomic_load_n(&clock_->limit_ns, __ATOMIC_RELAXED) : 0;
+    }
     /// Returns the sum of all adjustments. [any]
-    std::int64_t shift_ns() const noexcept { return clock_ ? __atomic_load_n(&clock_->shift_ns, __ATOMIC_RELAXED) : 0; }
+    std::int64_t shift_ns() const noexcept {
+        return clock_ ? __atomic_load_n(&clock_->shift_ns, __ATOMIC_RELAXED) : 0;
+    }
 
 private:
     const hal_clock* clock_ = nullptr;
 };
 
 struct DisciplineOptions {
-    double memory = 40;          ///< number of events per estimate, 2 or more: more reduce noise, fewer track a changing rate sooner
-    double max_rate = 1e-3;      ///< largest rate deviation of the reference; quartz is within 100e-6
-    std::int64_t lock_ns = 0;    ///< mean phase error below which the clock is locked; 0: period / 20
+    /// number of events per estimate, 2 or more: more reduce noise, fewer track a changing rate
+    /// sooner
+    double memory = 40;
+    /// largest rate deviation of the reference; quartz is within 100e-6
+    double max_rate = 1e-3;
+    /// mean phase error below which the clock is locked; 0: period / 20
+    std::int64_t lock_ns = 0;
 };
 
 /// Tracks an external reference by its measured phase errors.
 ///
-/// A phase error is the arrival time of an event minus its expected time by this clock, all adjustments included; the caller folds it into
-/// half a period. With p the predicted phase error, r the drift of the reference per period, a and b gains, and m the limited residual:
+/// A phase error is the arrival time of an event minus its expected time by this clock, all
+/// adjustments included; the caller folds it into half a period. With p the predicted phase error,
+/// r the drift of the reference per period, a and b gains, and m the limited residual:
 ///
 ///     m = clip(error - p, 4 s)        p += a m        r += b m        step = clip(p + r, limit)        p += r - step
 ///
-/// Unless the limit applies, p is 0 afterwards and this is a PI controller: step = (a + b) error + sum of b error. As p includes the steps,
-/// a limited one neither winds up the integral nor disturbs the estimate: the same formula acquires and tracks. The gains are those of
-/// the growing-memory filter, a straight line fitted to all n events so far, until n reaches `memory`: a = 2(2n-1)/(n(n+1)),
-/// b = 6/(n(n+1)); so the first event sets the phase, the second the rate, and noise falls with every further one. s is the mean size of
-/// the residuals: the residual of a delayed event is limited to four times that; four such events in a row on one side are a phase jump
-/// of the reference, which is adopted at once while the rate is kept. There is no dead band.
-/// Source: Brookner, Tracking and Kalman Filtering Made Easy, 1.2.6 (growing memory), 1.2.10 (limits on noise); the clipping is Huber's.
+/// Unless the limit applies, p is 0 afterwards and this is a PI controller: step = (a + b) error +
+/// sum of b error. As p includes the steps, a limited one neither winds up the integral nor
+/// disturbs the estimate: the same formula acquires and tracks. The gains are those of the
+/// growing-memory filter, a straight line fitted to all n events so far, until n reaches `memory`:
+/// a = 2(2n-1)/(n(n+1)), b = 6/(n(n+1)); so the first event sets the phase, the second the rate,
+/// and noise falls with every further one. s is the mean size of the residuals: the residual of a
+/// delayed event is limited to four times that; four such events in a row on one side are a phase
+/// jump of the reference, which is adopted at once while the rate is kept. There is no dead band.
+/// Source: Brookner, Tracking and Kalman Filtering Made Easy, 1.2.6 (growing memory), 1.2.10
+/// (limits on noise); the clipping is Huber's.
 class Discipline {
 public:
     explicit Discipline(DisciplineOptions options = {}) noexcept : options_(options) {}
 
-    /// Takes the phase error `error_ns` of an event and returns the adjustment to apply now, at most `limit_ns` (0: a tenth of the
-    /// period). `period_ns` is the interval of the reference. [realtime]
-    std::int64_t follow(std::int64_t error_ns, std::int64_t period_ns, std::int64_t limit_ns = 0) noexcept {
-        const auto error = static_cast<double>(error_ns), period = static_cast<double>(period_ns);
+    /// Takes the phase error `error_ns` of an event and returns the adjustment to apply now, at
+    /// most `limit_ns` (0: a tenth of the period). `period_ns` is the interval of the reference.
+    /// [realtime]
+    std::int64_t follow(std::int64_t error_ns, std::int64_t period_ns,
+                        std::int64_t limit_ns = 0) noexcept {
+        const auto error = static_cast<double>(error_ns);
+        const auto period = static_cast<double>(period_ns);
         double residual = error - phase_;
         if (events_ == 0) {
             phase_ = error;
             events_ = rate_known_ ? options_.memory / 2 : 1;
-            if (!rate_known_) scatter_ = period * 1e-2;  // unknown yet, too: assume a large value
+            if (!rate_known_) {
+                scatter_ = period * 1e-2;  // unknown yet, too: assume a large value
+            }
         } else {
             const double gate = std::max(4 * scatter_, period * 1e-3);
             const bool beyond = std::abs(residual) > gate;
-            beyond_ = !beyond ? 0 : residual > 0 ? std::max(beyond_, 0) + 1 : std::min(beyond_, 0) - 1;
+            beyond_ = !beyond        ? 0
+                      : residual > 0 ? std::max(beyond_, 0) + 1
+                                     : std::min(beyond_, 0) - 1;
             scatter_ += (std::min(std::abs(residual), 2 * gate) - scatter_) / 16;
             if (std::abs(beyond_) >= 4) {
                 phase_ = error;
@@ -96,17 +124,20 @@ public:
         judge(std::abs(error), period);
         if (in_vain_) return 0;
         const std::int64_t step = advance(period, limit_ns);
-        pulled_ = locked_ ? 0 : pulled_ * (1 - 1.0 / 256) + static_cast<double>(step) - drift_;  // noise of the rate does not add up
+        // noise of the rate does not add up
+        pulled_ = locked_ ? 0 : pulled_ * (1 - 1.0 / 256) + static_cast<double>(step) - drift_;
         in_vain_ = std::abs(pulled_) > 2 * period;
         return step;
     }
 
-    /// Continues at the estimated rate after a missing event. Returns the adjustment to apply now. [realtime]
+    /// Continues at the estimated rate after a missing event. Returns the adjustment to apply now.
+    /// [realtime]
     std::int64_t coast(std::int64_t period_ns, std::int64_t limit_ns = 0) noexcept {
         return events_ < 2 || in_vain_ ? 0 : advance(static_cast<double>(period_ns), limit_ns);
     }
 
-    /// Unlocks after loss of the reference. The next event starts a new acquisition from the last known rate. [realtime]
+    /// Unlocks after loss of the reference. The next event starts a new acquisition from the last
+    /// known rate. [realtime]
     void lose() noexcept {
         rate_known_ = rate_known_ || events_ >= options_.memory / 2;
         phase_ = 0;
@@ -117,14 +148,18 @@ public:
         locked_ = in_vain_ = false;
     }
 
-    /// True after 16 consecutive events whose mean error is within `lock_ns`; false again at twice that error. [any]
+    /// True after 16 consecutive events whose mean error is within `lock_ns`; false again at twice
+    /// that error. [any]
     bool locked() const noexcept { return locked_; }
-    /// True for a feedback loop: adjustments of two periods in total have not reduced the error, since this clock itself drives the
-    /// reference. No more adjustments are made until lose(). [any]
+    /// True for a feedback loop: adjustments of two periods in total have not reduced the error,
+    /// since this clock itself drives the reference. No more adjustments are made until lose().
+    /// [any]
     bool in_vain() const noexcept { return in_vain_; }
-    std::int64_t error_ns() const noexcept { return error_ns_; }  ///< measured error of the last event
-    double scatter_ns() const noexcept { return scatter_; }       ///< mean residual
-    double rate() const noexcept { return rate_; }  ///< 200e-6: a second of the reference is 200 us longer than one of this clock
+    /// measured error of the last event
+    std::int64_t error_ns() const noexcept { return error_ns_; }
+    double scatter_ns() const noexcept { return scatter_; }  ///< mean residual
+    /// 200e-6: a second of the reference is 200 us longer than one of this clock
+    double rate() const noexcept { return rate_; }
 
 private:
     std::int64_t advance(double period, std::int64_t limit_ns) noexcept {
@@ -136,22 +171,27 @@ private:
         return static_cast<std::int64_t>(step);
     }
     void judge(double distance, double period) noexcept {
-        const double lock = options_.lock_ns > 0 ? static_cast<double>(options_.lock_ns) : period / 20;
+        const double lock =
+            options_.lock_ns > 0 ? static_cast<double>(options_.lock_ns) : period / 20;
         distance_ = judged_ == 0 ? distance : distance_ + (distance - distance_) / 16;
         judged_ = std::min(judged_ + 1, 16);
         locked_ = distance_ < (locked_ ? 2 * lock : lock) && (locked_ || judged_ == 16);
     }
 
     DisciplineOptions options_;
-    double phase_ = 0, drift_ = 0;        // p and r of the formula, ns and ns per period
-    double scatter_ = 0, distance_ = 0, rate_ = 0;
-    double events_ = 0;                    // n
-    double pulled_ = 0;                   // adjustments beyond the drift since the last lock
-    bool rate_known_ = false;             // kept from before the loss of the reference
-    int beyond_ = 0;                      // consecutive residuals beyond the gate, with their sign
+    double phase_ = 0;
+    double drift_ = 0;  // p and r of the formula, ns and ns per period
+    double scatter_ = 0;
+    double distance_ = 0;
+    double rate_ = 0;
+    double events_ = 0;  // n
+    double pulled_ = 0;  // adjustments beyond the drift since the last lock
+    bool rate_known_ = false;  // kept from before the loss of the reference
+    int beyond_ = 0;  // consecutive residuals beyond the gate, with their sign
     int judged_ = 0;
     std::int64_t error_ns_ = 0;
-    bool locked_ = false, in_vain_ = false;
+    bool locked_ = false;
+    bool in_vain_ = false;
 };
 
 }  // namespace hal

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A fault whose condition lasts: a node that is offline, a link without carrier. `fault clear` does not acknowledge it before it is over.
+// A fault whose condition lasts: a node that is offline, a link without carrier. `fault clear` does
+// not acknowledge it before it is over.
 #pragma once
 
 #include <limits>
@@ -9,11 +10,12 @@
 
 namespace hal {
 
-/// One condition of an instance, with the reason it has now: of one node, of one link. It belongs to one thread at a time.
+/// One condition of an instance, with the reason it has now: of one node, of one link. It belongs
+/// to one thread at a time.
 class LastingFault {
 public:
-    /// Raises a fault that lasts until end(). A condition that lasts already is raised again, with the new reason. `reason`: as in
-    /// hal_faults::raise. Does nothing without a record. [realtime]
+    /// Raises a fault that lasts until end(). A condition that lasts already is raised again, with
+    /// the new reason. `reason`: as in hal_faults::raise. Does nothing without a record. [realtime]
     void begin(const hal_faults* record, const void* self, const char* reason,
                double detail = std::numeric_limits<double>::quiet_NaN()) noexcept {
         if (record == nullptr) return;
@@ -26,13 +28,16 @@ public:
     }
     /// The condition is over: `fault clear` acknowledges its faults from now on. [realtime]
     void end(const hal_faults* record, const void* self) noexcept {
-        if (reason_ != nullptr && record != nullptr) set(record, self, std::exchange(reason_, nullptr), false);
+        if (reason_ != nullptr && record != nullptr) {
+            set(record, self, std::exchange(reason_, nullptr), false);
+        }
     }
     /// Returns true from begin() to end(), unless the host does not know lasting faults. [realtime]
     bool lasts() const noexcept { return reason_ != nullptr; }
 
 private:
-    static void set(const hal_faults* record, const void* self, const char* reason, bool lasts) noexcept {
+    static void set(const hal_faults* record, const void* self, const char* reason,
+                    bool lasts) noexcept {
         reinterpret_cast<const hal_lasting_faults*>(record)->lasts(record, self, reason, lasts);
     }
 

@@ -15,15 +15,24 @@ namespace hal {
 /// What a limit of 0 means.
 enum class ZeroLimit { lets_nothing_pass, disables };
 
-/// A pin with a limit. While its value is NaN, the last value that was a number applies, and a fault is raised once. Before the first number the
-/// default applies if it is a limit, else nothing passes. One function of an instance reads it.
+/// A pin with a limit. While its value is NaN, the last value that was a number applies, and a
+/// fault is raised once. Before the first number the default applies if it is a limit, else nothing
+/// passes. One function of an instance reads it.
 template <class P, ZeroLimit zero = ZeroLimit::lets_nothing_pass>
 class LimitPin : public P {
 public:
-    LimitPin(Component& component, const char* name, const char* doc, PinOptions<double> options = {})
-        : P(component, name, doc, options), valid_(first_limit(options.initial)), self_(&component), faults_(fault_record()) {}
-    LimitPin(Component& component, const Function& function, const char* name, const char* doc, PinOptions<double> options = {})
-        : P(component, function, name, doc, options), valid_(first_limit(options.initial)), self_(&component), faults_(fault_record()) {}
+    LimitPin(Component& component, const char* name, const char* doc,
+             PinOptions<double> options = {})
+        : P(component, name, doc, options),
+          valid_(first_limit(options.initial)),
+          self_(&component),
+          faults_(fault_record()) {}
+    LimitPin(Component& component, const Function& function, const char* name, const char* doc,
+             PinOptions<double> options = {})
+        : P(component, function, name, doc, options),
+          valid_(first_limit(options.initial)),
+          self_(&component),
+          faults_(fault_record()) {}
     LimitPin& operator=(double value) noexcept
         requires std::derived_from<P, Io<double>>
     {
@@ -47,22 +56,25 @@ private:
     static constexpr double largest_limit = 1e9;
 
     static double first_limit(double initial) noexcept {
-        const bool is_limit = std::fabs(initial) < largest_limit && !(zero == ZeroLimit::disables && initial == 0.0);
+        const bool is_limit =
+            std::fabs(initial) < largest_limit && !(zero == ZeroLimit::disables && initial == 0.0);
         if (is_limit) return initial;
         return zero == ZeroLimit::disables ? std::numeric_limits<double>::denorm_min() : 0.0;
     }
     static const hal_faults* fault_record() { return extension<hal_faults>("hal.faults/1"); }
 
     double last_valid() const noexcept {
-        if (!reported_ && faults_ != nullptr)
-            faults_->raise(faults_, self_, "a limit is not a number; its last valid value applies", std::numeric_limits<double>::quiet_NaN());
+        if (!reported_ && faults_ != nullptr) {
+            faults_->raise(faults_, self_, "a limit is not a number; its last valid value applies",
+                           std::numeric_limits<double>::quiet_NaN());
+        }
         reported_ = true;
         return valid_;
     }
 
-    mutable double    valid_;
-    mutable bool      reported_ = false;
-    const Component*  self_;
+    mutable double valid_;
+    mutable bool reported_ = false;
+    const Component* self_;
     const hal_faults* faults_;
 };
 

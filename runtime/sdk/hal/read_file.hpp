@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Reading a file that a user names. Opening a FIFO would block until another process writes into it, and a device may never end: only regular
-// files are read.
+// Reading a file that a user names. Opening a FIFO would block until another process writes into
+// it, and a device may never end: only regular files are read.
 #pragma once
 
 #include <cerrno>
@@ -26,31 +26,46 @@ inline const char* special_kind(mode_t mode) {
 
 /// A descriptor that this process was given, as the shell's `<(command)` names it.
 inline bool names_descriptor(std::string_view path) {
-    return path == "/dev/stdin" || path.starts_with("/dev/fd/") || path.starts_with("/proc/self/fd/");
+    return path == "/dev/stdin" || path.starts_with("/dev/fd/") ||
+           path.starts_with("/proc/self/fd/");
 }
 
-/// Reads a whole regular file of at most `most` bytes. False: `bytes` is the reason. With `descriptors`, a file that was opened for this
-/// process (/dev/fd/N) may be a pipe, too. [setup]
-inline bool read_regular_file(const std::string& path, std::size_t most, std::string& bytes, bool descriptors = false) {
+/// Reads a whole regular file of at most `most` bytes. False: `bytes` is the reason. With
+/// `descriptors`, a file that was opened for this process (/dev/fd/N) may be a pipe, too. [setup]
+inline bool read_regular_file(const std::string& path, std::size_t most, std::string& bytes,
+                              bool descriptors = false) {
     const bool any = descriptors && names_descriptor(path);
     const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOCTTY | (any ? 0 : O_NONBLOCK));
     struct stat about{};
     std::string problem;
     bytes.clear();
-    if (file < 0 || ::fstat(file, &about) != 0) problem = errno == ENXIO ? "it is a socket or a device without a driver" : std::strerror(errno);
-    else if (!any || S_ISDIR(about.st_mode)) problem = special_kind(about.st_mode);
-    if (problem.empty() && S_ISREG(about.st_mode) && about.st_size > 0)
-        bytes.reserve(static_cast<std::size_t>(about.st_size) < most ? static_cast<std::size_t>(about.st_size) + 1 : most);
+    if (file < 0 || ::fstat(file, &about) != 0) {
+        problem =
+            errno == ENXIO ? "it is a socket or a device without a driver" : std::strerror(errno);
+    } else if (!any || S_ISDIR(about.st_mode)) {
+        problem = special_kind(about.st_mode);
+    }
+    if (problem.empty() && S_ISREG(about.st_mode) && about.st_size > 0) {
+        bytes.reserve(static_cast<std::size_t>(about.st_size) < most
+                          ? static_cast<std::size_t>(about.st_size) + 1
+                          : most);
+    }
     char part[65536];
     while (problem.empty()) {
         const ssize_t got = ::read(file, part, sizeof part);
         if (got == 0) break;
         if (got < 0 && errno == EINTR) continue;
-        if (got < 0) problem = std::strerror(errno);
-        else if (bytes.size() + static_cast<std::size_t>(got) > most) problem = "it is longer than " + std::to_string(most) + " bytes";
-        else bytes.append(part, static_cast<std::size_t>(got));
+        if (got < 0) {
+            problem = std::strerror(errno);
+        } else if (bytes.size() + static_cast<std::size_t>(got) > most) {
+            problem = "it is longer than " + std::to_string(most) + " bytes";
+        } else {
+            bytes.append(part, static_cast<std::size_t>(got));
+        }
     }
-    if (file >= 0) ::close(file);
+    if (file >= 0) {
+        ::close(file);
+    }
     if (problem.empty()) return true;
     bytes = problem;
     return false;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What happened in a cycle, in sentences on standard error: numbers out of the cycle, words outside of it.
+// What happened in a cycle, in sentences on standard error: numbers out of the cycle, words outside
+// of it.
 #pragma once
 
 #include <atomic>
@@ -15,14 +16,18 @@
 namespace hal {
 
 /// `Event` must be trivially copyable. A cycle queues events, one thread formats them; on the virtual clock they are printed at the end of
-/// the instant, so that the sentences of several instances come in the same order every time. The rate is limited as MessageLog states.
+/// the instant, so that the sentences of several instances come in the same order every time. The
+/// rate is limited as MessageLog states.
 template <class Event>
 class Reporter {
 public:
-    using Words = std::function<std::string(const Event&)>;    ///< the sentence; empty: nothing is printed
-    using Subject = std::function<MessageSubject(const Event&, const std::string& sentence)>;  ///< what it is about
+    /// the sentence; empty: nothing is printed
+    using Words = std::function<std::string(const Event&)>;
+    /// what it is about
+    using Subject = std::function<MessageSubject(const Event&, const std::string& sentence)>;
 
-    /// Sentences are "INSTANCE: SENTENCE". Without `subject`, sentences that differ only in their numbers are about the same. [setup]
+    /// Sentences are "INSTANCE: SENTENCE". Without `subject`, sentences that differ only in their
+    /// numbers are about the same. [setup]
     Reporter(const std::string& instance, Words words, std::size_t room = 256, Subject subject = {})
         : words_(std::move(words)), subject_(std::move(subject)), events_(room), log_(instance) {}
     ~Reporter() { stop(); }
@@ -41,31 +46,43 @@ public:
     }
     /// Queues an event; if the queue is full, only counts it. [realtime]
     void tell(const Event& event) noexcept {
-        if (!events_.push(event)) lost_.fetch_add(1, std::memory_order_relaxed);
+        if (!events_.push(event)) {
+            lost_.fetch_add(1, std::memory_order_relaxed);
+        }
     }
 
 private:
     void print(std::int64_t now_ns) noexcept {
         now_ns_ = now_ns;
-        for (Event e; events_.pop(e);)
-            if (const std::string sentence = words_(e); !sentence.empty())
-                log_.print(subject_ ? subject_(e, sentence) : MessageSubject{MessageLog::without_numbers(sentence)}, sentence, now_ns);
-        if (const auto lost = lost_.exchange(0, std::memory_order_relaxed); lost != 0)
-            log_.print(std::to_string(lost) + (lost == 1 ? " message was" : " messages were") + " lost: the queue for them was full", now_ns);
+        for (Event e; events_.pop(e);) {
+            if (const std::string sentence = words_(e); !sentence.empty()) {
+                log_.print(subject_ ? subject_(e, sentence)
+                                    : MessageSubject{MessageLog::without_numbers(sentence)},
+                           sentence, now_ns);
+            }
+        }
+        if (const auto lost = lost_.exchange(0, std::memory_order_relaxed); lost != 0) {
+            log_.print(std::to_string(lost) + (lost == 1 ? " message was" : " messages were") +
+                           " lost: the queue for them was full",
+                       now_ns);
+        }
         log_.flush(now_ns);
     }
     void turn(std::int64_t now_ns, bool may_wait) noexcept {
         print(now_ns);
-        if (may_wait) std::this_thread::sleep_for(std::chrono::milliseconds(20));
+        if (may_wait) {
+            std::this_thread::sleep_for(std::chrono::milliseconds(20));
+        }
     }
 
-    const Words                words_;
-    const Subject              subject_;
-    Queue<Event>               events_;
+    const Words words_;
+    const Subject subject_;
+    Queue<Event> events_;
     std::atomic<std::uint64_t> lost_{0};  // written by the cycle
-    std::int64_t               now_ns_ = 0;
-    MessageLog                 log_;
-    Background background_{[this](std::int64_t now, bool may_wait) { turn(now, may_wait); }};  // the last: it uses the others
+    std::int64_t now_ns_ = 0;
+    MessageLog log_;
+    // the last: it uses the others
+    Background background_{[this](std::int64_t now, bool may_wait) { turn(now, may_wait); }};
 };
 
 }  // namespace hal

@@ -6,8 +6,9 @@
 
 namespace hal {
 
-/// A variable of an instance that survives `reload`: `hal::State<double> sum{*this, "sum", "integral of the error"}`. The new version starts
-/// with the value of the old one where it declares a state of the same name and type; else with `initial`. It is a read-only parameter,
+/// A variable of an instance that survives `reload`: `hal::State<double> sum{*this, "sum",
+/// "integral of the error"}`. The new version starts with the value of the old one where it
+/// declares a state of the same name and type; else with `initial`. It is a read-only parameter,
 /// shown by `show param` and read by `getp`; only its component writes it.
 template <PinType T>
     requires(!std::same_as<T, Port>)
@@ -25,13 +26,16 @@ public:
         decl.initial = detail::to_value<T>(initial);
         pin_.own = decl.initial;
         pin_.slot = &pin_.own;
-        if (!detail::creating->pin(detail::creating, &decl, &pin_)) detail::rejected();
+        if (!detail::creating->pin(detail::creating, &decl, &pin_)) {
+            detail::rejected();
+        }
     }
     State(const State&) = delete;
 
     T get() const noexcept { return detail::load<T, false>(pin_.slot); }  ///< [realtime]
     operator T() const noexcept { return get(); }
-    State& operator=(T value) noexcept { return detail::store<T>(pin_.slot, value), *this; }  ///< [realtime]
+    /// [realtime]
+    State& operator=(T value) noexcept { return detail::store<T>(pin_.slot, value), *this; }
     State& operator=(const State& other) noexcept { return *this = other.get(); }
     State& operator+=(T value) noexcept
         requires(!std::same_as<T, bool>)

@@ -8,8 +8,10 @@
 /* What is published is `stream`, with stream.size = sizeof(hal_timed_stream). */
 typedef struct hal_timed_stream {
     hal_stream stream;
-    const int64_t *times;   /* depth entries, hal_cycle.start_ns of each record; written before head is */
-    const uint64_t *losses; /* depth entries, stream.lost when the record was made; NULL: not known */
+    const int64_t*
+        times; /* depth entries, hal_cycle.start_ns of each record; written before head is */
+    const uint64_t*
+        losses; /* depth entries, stream.lost when the record was made; NULL: not known */
 } hal_timed_stream;
 
 /* The size of a stream that has times only. */

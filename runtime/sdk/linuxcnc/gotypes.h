@@ -38,13 +38,26 @@ enum {
 /* What a joint moves. */
 enum { GO_QUANTITY_NONE, GO_QUANTITY_LENGTH, GO_QUANTITY_ANGLE };
 
-static inline const char *go_result_to_string(int result) {
-    static const char *const names[] = {"Ok", "Ignored", "Bad Args", "Range Error", "Domain Error", "General Error", "Implementation Error",
-                                        "Norm Error", "Div Error", "Singular", "No Space", "Empty", "Bug"};
+static inline const char* go_result_to_string(int result) {
+    static const char* const names[] = {"Ok",
+                                        "Ignored",
+                                        "Bad Args",
+                                        "Range Error",
+                                        "Domain Error",
+                                        "General Error",
+                                        "Implementation Error",
+                                        "Norm Error",
+                                        "Div Error",
+                                        "Singular",
+                                        "No Space",
+                                        "Empty",
+                                        "Bug"};
     return result >= 0 && result <= GO_RESULT_BUG ? names[result] : "?";
 }
-static inline const char *go_quantity_to_string(int quantity) {
-    return quantity == GO_QUANTITY_LENGTH ? "Length" : quantity == GO_QUANTITY_ANGLE ? "Angle" : "None";
+static inline const char* go_quantity_to_string(int quantity) {
+    return quantity == GO_QUANTITY_LENGTH  ? "Length"
+           : quantity == GO_QUANTITY_ANGLE ? "Angle"
+                                           : "None";
 }
 
 #endif

@@ -16,22 +16,25 @@
 enum { component_id = 1 }; /* in a plugin */
 
 /* Names the host of the instance that is being created, else NULL; a program has the same host all the time. plugin.c, program.c */
-extern const hal_host *halcyon_current_host;
-const hal_host *halcyon_host_of(int comp); /* of a component that hal_init() made; NULL: none, or not while an instance is created */
+extern const hal_host* halcyon_current_host;
+const hal_host* halcyon_host_of(
+    int comp); /* of a component that hal_init() made; NULL: none, or not while an instance is created */
 
 /* declare.c: pins, parameters, functions */
-void halcyon_set_instance(const char *name); /* of a .comp file; the runtime takes names below it. "": names are whole */
-void halcyon_sync_parameters(void);          /* copies those declared by pointer from and to their pins */
-void halcyon_mark_pins(void);                /* those declared later can be dropped */
+void halcyon_set_instance(
+    const char* name); /* of a .comp file; the runtime takes names below it. "": names are whole */
+void halcyon_sync_parameters(void); /* copies those declared by pointer from and to their pins */
+void halcyon_mark_pins(void); /* those declared later can be dropped */
 void halcyon_drop_marked_pins(void);
 void halcyon_drop_pins(void);
 void halcyon_detach_pins(void); /* lets the user's pointers lead to the pins' own slots */
-bool halcyon_step(const hal_host *of, hal_function_decl *decl);
-int halcyon_number_of_port(const hal_pin *pin); /* runtime/programs/ports.c: > 0 */
+bool halcyon_step(const hal_host* of, hal_function_decl* decl);
+int halcyon_number_of_port(const hal_pin* pin); /* runtime/programs/ports.c: > 0 */
 
 /* plugin.c. Both report the failure of an instance's creation to the host and return false. */
-bool halcyon_fail(const char *format, ...) __attribute__((format(printf, 1, 2)));
-bool halcyon_fail_setup(const char *function, int result); /* with the messages that it has printed */
+bool halcyon_fail(const char* format, ...) __attribute__((format(printf, 1, 2)));
+bool halcyon_fail_setup(const char* function,
+                        int result); /* with the messages that it has printed */
 
 /* arguments.c: takes the values of the file's module parameters. False after reporting why not. */
 bool halcyon_take_arguments(void);
@@ -47,6 +50,6 @@ void halcyon_start_printing(void);
 void halcyon_stop_printing(void);
 
 /* streams.c */
-bool halcyon_publish_streams(const hal_host *of);
+bool halcyon_publish_streams(const hal_host* of);
 
 #endif

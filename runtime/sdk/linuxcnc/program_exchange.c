@@ -42,20 +42,27 @@ bool halcyon_find_machine(void) {
 }
 static void report_loss(void) {
     if (loss_reported) return;
-    const char *const wanted = getenv("HALCYON_LOST");
+    const char* const wanted = getenv("HALCYON_LOST");
     const bool end = wanted && strcmp(wanted, "end") == 0;
     /* The kernel's SIGTERM, or the machine's, is on its way. A program that has a handler and begins to wait after it has come needs another. */
     if (end && tied && ++loss_rounds < patient_rounds) return;
     loss_reported = true;
-    rtapi_print_msg(RTAPI_MSG_ERR, "%s: the machine '%s' (process %ld) has ended; %s\n", halcyon_program_name(), halcyon_instance(), machine,
-                    end ? "ending" : "pins keep their values until it returns (HALCYON_LOST=end ends the program instead)");
-    if (end) kill(getpid(), SIGTERM);
+    rtapi_print_msg(RTAPI_MSG_ERR, "%s: the machine '%s' (process %ld) has ended; %s\n",
+                    halcyon_program_name(), halcyon_instance(), machine,
+                    end ? "ending"
+                        : "pins keep their values until it returns (HALCYON_LOST=end ends the "
+                          "program instead)");
+    if (end) {
+        kill(getpid(), SIGTERM);
+    }
 }
 
-bool halcyon_announce(struct halcyon_program *of, bool is_ready, bool whole) {
+bool halcyon_announce(struct halcyon_program* of, bool is_ready, bool whole) {
     halcyon_add("{\"component\":");
     halcyon_add_string(of->name);
-    if (of->every_ms > 0) halcyon_add(",\"every_ms\":%u,\"timeout_ms\":%u", of->every_ms, of->timeout_ms);
+    if (of->every_ms > 0) {
+        halcyon_add(",\"every_ms\":%u,\"timeout_ms\":%u", of->every_ms, of->timeout_ms);
+    }
     bool first = true;
     for (size_t i = 0; whole && i < of->link_count; ++i) {
         if (!of->links[i].safe) continue;
@@ -67,33 +74,36 @@ bool halcyon_announce(struct halcyon_program *of, bool is_ready, bool whole) {
     return halcyon_ask();
 }
 
-bool halcyon_declare(struct halcyon_program *of, struct halcyon_link *one) {
+bool halcyon_declare(struct halcyon_program* of, struct halcyon_link* one) {
     halcyon_add("{\"component\":");
     halcyon_add_string(of->name);
     halcyon_add(",\"prefix\":");
     halcyon_add_string(one->prefix);
     halcyon_add(",\"pins\":[{\"name\":");
     halcyon_add_string(one->name);
-    static const char *const types[] = {"bit", "float", "s32", "u32", "s64", "u64", "port"}, *const dirs[] = {"in", "out", "io", "rw"};
-    halcyon_add(",\"type\":\"%s\",\"dir\":\"%s\",\"doc\":", types[one->type], one->read_only ? "ro" : dirs[one->dir]);
+    static const char *const types[] = {"bit", "float", "s32", "u32", "s64", "u64", "port"},
+                             *const dirs[] = {"in", "out", "io", "rw"};
+    halcyon_add(",\"type\":\"%s\",\"dir\":\"%s\",\"doc\":", types[one->type],
+                one->read_only ? "ro" : dirs[one->dir]);
     halcyon_add_string(one->doc);
     if (one->type != HAL_TYPE_PORT) {
         halcyon_add(",\"value\":");
         halcyon_add_value(one->type, *one->pin->slot);
     }
     halcyon_add("}]}");
-    const char *const answer = halcyon_ask();
-    const char *at = answer ? strstr(answer, "\"values\":[") : NULL;
+    const char* const answer = halcyon_ask();
+    const char* at = answer ? strstr(answer, "\"values\":[") : NULL;
     if (!at) return false;
     at += 10;
     one->fresh = one->dir == HAL_DIR_OUT || one->read_only;
     if (one->type == HAL_TYPE_PORT || one->fresh) return true;
-    *one->pin->slot = halcyon_take_value(&at, one->type); /* of a predecessor's pin: what that has */
+    *one->pin->slot =
+        halcyon_take_value(&at, one->type); /* of a predecessor's pin: what that has */
     one->last = halcyon_significant(one->type, one->pin->slot->raw);
     return true;
 }
 
-void halcyon_unregister(struct halcyon_program *of) {
+void halcyon_unregister(struct halcyon_program* of) {
     if (halcyon_connection >= 0) {
         halcyon_add("{\"exit\":");
         halcyon_add_string(of->name);
@@ -101,23 +111,30 @@ void halcyon_unregister(struct halcyon_program *of) {
         halcyon_ask();
     }
     bool last = true;
-    for (size_t i = 0; i < halcyon_most_programs; ++i) last = last && (!*halcyon_programs[i].name || &halcyon_programs[i] == of);
-    if (last) halcyon_disconnect();
+    for (size_t i = 0; i < halcyon_most_programs; ++i) {
+        last = last && (!*halcyon_programs[i].name || &halcyon_programs[i] == of);
+    }
+    if (last) {
+        halcyon_disconnect();
+    }
 }
 
 /* --- exchange --------------------------------------------------------------------------------------------------------------------- */
 
-static bool own(const struct halcyon_link *one) { return one->dir == HAL_DIR_OUT || one->read_only; }
+static bool own(const struct halcyon_link* one) {
+    return one->dir == HAL_DIR_OUT || one->read_only;
+}
 
-void halcyon_exchange(struct halcyon_program *of) {
-    bool read = false, write = false;
+void halcyon_exchange(struct halcyon_program* of) {
+    bool read = false;
+    bool write = false;
     const long long now = rtapi_get_time();
     halcyon_sync_parameters();
     uint64_t seen[of->link_count + 1];
     halcyon_add("{\"exchange\":");
     halcyon_add_string(of->name);
     for (size_t i = 0; i < of->link_count; ++i) {
-        struct halcyon_link *const one = &of->links[i];
+        struct halcyon_link* const one = &of->links[i];
         seen[i] = __atomic_load_n(&one->pin->slot->raw, __ATOMIC_ACQUIRE);
         if (one->type == HAL_TYPE_PORT) continue;
         read = read || !own(one);
@@ -131,31 +148,43 @@ void halcyon_exchange(struct halcyon_program *of) {
         one->last = halcyon_significant(one->type, seen[i]);
         one->written_ns = now;
     }
-    if (write) halcyon_add("]");
+    if (write) {
+        halcyon_add("]");
+    }
     const bool lives = __atomic_exchange_n(&of->alive, false, __ATOMIC_ACQ_REL);
-    const bool reports = of->every_ms > 0 && lives && (read || now - of->alive_ns > of->every_ms * 250000LL);
-    if (of->every_ms > 0 && !lives) halcyon_add(",\"alive\":false");
-    if (reports || (write && lives)) of->alive_ns = now;
-    else if (lives && !write) __atomic_store_n(&of->alive, true, __ATOMIC_RELEASE); /* with the next one */
+    const bool reports =
+        of->every_ms > 0 && lives && (read || now - of->alive_ns > of->every_ms * 250000LL);
+    if (of->every_ms > 0 && !lives) {
+        halcyon_add(",\"alive\":false");
+    }
+    if (reports || (write && lives)) {
+        of->alive_ns = now;
+    } else if (lives && !write) {
+        __atomic_store_n(&of->alive, true, __ATOMIC_RELEASE); /* with the next one */
+    }
     halcyon_add(read ? ",\"read\":true}" : "}");
     if (!read && !write && !reports) {
         halcyon_drop_request();
         return;
     }
     const char *const answer = halcyon_ask(), *at = answer ? strstr(answer, "\"values\":[") : NULL;
-    if (!answer) halcyon_disconnect();
+    if (!answer) {
+        halcyon_disconnect();
+    }
     if (!at) return;
     at += 10;
     for (size_t i = 0; i < of->link_count; ++i) {
-        struct halcyon_link *const one = &of->links[i];
+        struct halcyon_link* const one = &of->links[i];
         if (own(one)) continue;
         const hal_value value = halcyon_take_value(&at, one->type);
         const uint64_t there = halcyon_significant(one->type, value.raw);
         if (one->type == HAL_TYPE_PORT || there == one->last) continue;
         /* what was written takes a cycle to arrive: until then the old value is still there */
         if (there == one->before && now - one->written_ns < settle_ns) continue;
-        if (__atomic_compare_exchange_n(&one->pin->slot->raw, &seen[i], value.raw, false, __ATOMIC_ACQ_REL, __ATOMIC_RELAXED))
+        if (__atomic_compare_exchange_n(&one->pin->slot->raw, &seen[i], value.raw, false,
+                                        __ATOMIC_ACQ_REL, __ATOMIC_RELAXED)) {
             one->last = there;
+        }
     }
     halcyon_sync_parameters();
 }
@@ -166,22 +195,33 @@ static void reconnect(void) {
         return;
     }
     bool good = true;
-    for (struct halcyon_program *of = halcyon_programs; of < halcyon_programs + halcyon_most_programs && good; ++of) {
+    for (struct halcyon_program* of = halcyon_programs;
+         of < halcyon_programs + halcyon_most_programs && good; ++of) {
         if (!*of->name) continue;
         good = halcyon_announce(of, false, false);
-        for (size_t i = 0; good && i < of->link_count; ++i) good = halcyon_declare(of, &of->links[i]);
-        if (good) halcyon_exchange(of);
+        for (size_t i = 0; good && i < of->link_count; ++i) {
+            good = halcyon_declare(of, &of->links[i]);
+        }
+        if (good) {
+            halcyon_exchange(of);
+        }
         good = good && halcyon_connection >= 0 && halcyon_announce(of, of->ready, true);
     }
-    if (!good) halcyon_disconnect();
+    if (!good) {
+        halcyon_disconnect();
+    }
 }
 
 static void exchange_all(void) {
-    for (struct halcyon_program *of = halcyon_programs; of < halcyon_programs + halcyon_most_programs && halcyon_connection >= 0; ++of)
-        if (of->ready) halcyon_exchange(of);
+    for (struct halcyon_program* of = halcyon_programs;
+         of < halcyon_programs + halcyon_most_programs && halcyon_connection >= 0; ++of) {
+        if (of->ready) {
+            halcyon_exchange(of);
+        }
+    }
 }
 
-static void *run_helper(void *unused) {
+static void* run_helper(void* unused) {
     for (bool on = true; on;) {
         const bool lost = halcyon_connection_lost();
         const struct timespec pause = {0, lost ? reconnect_ns : round_ns};
@@ -189,13 +229,19 @@ static void *run_helper(void *unused) {
         const locale_t before = halcyon_lock();
         on = !halcyon_ending;
         if (asked_to_end) {
-            for (size_t i = 0; i < halcyon_most_programs; ++i)
-                if (*halcyon_programs[i].name) halcyon_unregister(&halcyon_programs[i]);
+            for (size_t i = 0; i < halcyon_most_programs; ++i) {
+                if (*halcyon_programs[i].name) {
+                    halcyon_unregister(&halcyon_programs[i]);
+                }
+            }
             fflush(stdout);
             _exit(0);
         }
-        if (on && lost) reconnect();
-        else if (on) exchange_all();
+        if (on && lost) {
+            reconnect();
+        } else if (on) {
+            exchange_all();
+        }
         halcyon_unlock(before);
     }
     return unused;
@@ -203,7 +249,9 @@ static void *run_helper(void *unused) {
 
 static void on_end_signal(int signal) {
     (void)signal;
-    if (!helper_runs) _exit(0);
+    if (!helper_runs) {
+        _exit(0);
+    }
     asked_to_end = 1;
 }
 
@@ -228,6 +276,8 @@ bool halcyon_start_helper(void) {
     return helper_runs;
 }
 void halcyon_stop_helper(void) {
-    if (helper_runs) pthread_join(helper, NULL);
+    if (helper_runs) {
+        pthread_join(helper, NULL);
+    }
     helper_runs = halcyon_ending = false;
 }

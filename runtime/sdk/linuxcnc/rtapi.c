@@ -31,7 +31,7 @@ static uint64_t printed_line, lost_lines;
 static pthread_t printer;
 static bool printing, printer_made;
 
-static void print_text(int level, const char *text) {
+static void print_text(int level, const char* text) {
     const int file = level == RTAPI_MSG_ALL ? STDOUT_FILENO : STDERR_FILENO;
     for (size_t left = strlen(text); left > 0;) {
         const ssize_t n = write(file, text, left);
@@ -43,7 +43,7 @@ static void print_text(int level, const char *text) {
 
 static void print_lines(void) {
     for (;; ++printed_line) {
-        struct line *line = &lines[printed_line % lines_in_flight];
+        struct line* line = &lines[printed_line % lines_in_flight];
         if (__atomic_load_n(&line->turn, __ATOMIC_ACQUIRE) != printed_line + 1) break;
         print_text(line->level, line->text);
         __atomic_store_n(&line->turn, printed_line + lines_in_flight, __ATOMIC_RELEASE);
@@ -51,12 +51,13 @@ static void print_lines(void) {
     const uint64_t lost = __atomic_exchange_n(&lost_lines, 0, __ATOMIC_RELAXED);
     if (lost > 0) {
         char text[96];
-        snprintf(text, sizeof text, HALCYON_COMPONENT ": %llu messages lost\n", (unsigned long long)lost);
+        snprintf(text, sizeof text, HALCYON_COMPONENT ": %llu messages lost\n",
+                 (unsigned long long)lost);
         print_text(RTAPI_MSG_ERR, text);
     }
 }
 
-static void *print_until_stopped(void *unused) {
+static void* print_until_stopped(void* unused) {
     const struct timespec pause = {0, 20 * 1000 * 1000};
     while (__atomic_load_n(&printing, __ATOMIC_ACQUIRE)) {
         print_lines();
@@ -68,40 +69,49 @@ static void *print_until_stopped(void *unused) {
 #ifndef HALCYON_PROGRAM
 static uint64_t next_line;
 
-static void queue_message(int level, const char *format, va_list arguments) {
+static void queue_message(int level, const char* format, va_list arguments) {
     uint64_t mine = __atomic_load_n(&next_line, __ATOMIC_RELAXED);
-    struct line *line;
+    struct line* line;
     do {
         line = &lines[mine % lines_in_flight];
         if (__atomic_load_n(&line->turn, __ATOMIC_ACQUIRE) != mine) {
             __atomic_fetch_add(&lost_lines, 1, __ATOMIC_RELAXED);
             return;
         }
-    } while (!__atomic_compare_exchange_n(&next_line, &mine, mine + 1, true, __ATOMIC_RELAXED, __ATOMIC_RELAXED));
+    } while (!__atomic_compare_exchange_n(&next_line, &mine, mine + 1, true, __ATOMIC_RELAXED,
+                                          __ATOMIC_RELAXED));
     line->level = level;
     vsnprintf(line->text, sizeof line->text, format, arguments);
     __atomic_store_n(&line->turn, mine + 1, __ATOMIC_RELEASE);
 }
 #endif
 
-static void print_message(int level, const char *format, va_list arguments) {
-    if (message_handler) message_handler((msg_level_t)level, format, arguments);
+static void print_message(int level, const char* format, va_list arguments) {
+    if (message_handler) {
+        message_handler((msg_level_t)level, format, arguments);
+    }
 #ifdef HALCYON_PROGRAM
-    else vfprintf(level == RTAPI_MSG_ALL ? stdout : stderr, format, arguments);
+    else {
+        vfprintf(level == RTAPI_MSG_ALL ? stdout : stderr, format, arguments);
+    }
 #else
-    else if (in_cycles) queue_message(level, format, arguments);
-    else if (strlen(halcyon_messages) + 1 < sizeof halcyon_messages) vsnprintf(halcyon_messages + strlen(halcyon_messages), sizeof halcyon_messages - strlen(halcyon_messages), format, arguments);
+    else if (in_cycles) {
+        queue_message(level, format, arguments);
+    } else if (strlen(halcyon_messages) + 1 < sizeof halcyon_messages) {
+        vsnprintf(halcyon_messages + strlen(halcyon_messages),
+                  sizeof halcyon_messages - strlen(halcyon_messages), format, arguments);
+    }
 #endif
 }
 
-void rtapi_print(const char *format, ...) {
+void rtapi_print(const char* format, ...) {
     va_list arguments;
     va_start(arguments, format);
     print_message(RTAPI_MSG_ALL, format, arguments);
     va_end(arguments);
 }
 
-void rtapi_print_msg(msg_level_t level, const char *format, ...) {
+void rtapi_print_msg(msg_level_t level, const char* format, ...) {
     if ((int)level > message_level) return;
     va_list arguments;
     va_start(arguments, format);
@@ -119,7 +129,9 @@ void rtapi_set_msg_handler(rtapi_msg_handler_t handler) { message_handler = hand
 rtapi_msg_handler_t rtapi_get_msg_handler(void) { return message_handler; }
 
 void halcyon_prepare_messages(void) {
-    for (size_t i = 0; i < lines_in_flight; ++i) lines[i].turn = i;
+    for (size_t i = 0; i < lines_in_flight; ++i) {
+        lines[i].turn = i;
+    }
 }
 void halcyon_print_messages(void) {
     print_text(RTAPI_MSG_ERR, halcyon_messages);
@@ -127,21 +139,26 @@ void halcyon_print_messages(void) {
 }
 void halcyon_start_printing(void) {
     printing = true;
-    printer_made = pthread_create(&printer, NULL, print_until_stopped, NULL) == 0; /* without it the last lines are printed at the end */
+    printer_made = pthread_create(&printer, NULL, print_until_stopped, NULL) ==
+                   0; /* without it the last lines are printed at the end */
     in_cycles = true;
 }
 void halcyon_stop_printing(void) {
     in_cycles = false;
     __atomic_store_n(&printing, false, __ATOMIC_RELEASE);
-    if (printer_made) pthread_join(printer, NULL);
+    if (printer_made) {
+        pthread_join(printer, NULL);
+    }
     printer_made = false;
     print_lines();
 }
 
 /* --- rtapi ------------------------------------------------------------------------------------------------------------------ */
 
-int rtapi_vsnprintf(char *to, unsigned long size, const char *format, va_list arguments) { return vsnprintf(to, size, format, arguments); }
-int rtapi_snprintf(char *to, unsigned long size, const char *format, ...) {
+int rtapi_vsnprintf(char* to, unsigned long size, const char* format, va_list arguments) {
+    return vsnprintf(to, size, format, arguments);
+}
+int rtapi_snprintf(char* to, unsigned long size, const char* format, ...) {
     va_list arguments;
     va_start(arguments, format);
     const int length = vsnprintf(to, size, format, arguments);
@@ -158,14 +175,15 @@ long long rtapi_get_clocks(void) { return rtapi_get_time(); }
 long rtapi_delay_max(void) { return 10000; }
 void rtapi_delay(long ns) {
     const long long end = rtapi_get_time() + (ns < rtapi_delay_max() ? ns : rtapi_delay_max());
-    while (rtapi_get_time() < end) {}
+    while (rtapi_get_time() < end) {
+    }
 }
 
 #ifdef HALCYON_PROGRAM
-int rtapi_init(const char *name) { return name ? 1 : -EINVAL; } /* hal_init() comes next */
+int rtapi_init(const char* name) { return name ? 1 : -EINVAL; } /* hal_init() comes next */
 int rtapi_exit(int module) { return module == 1 ? 0 : -EINVAL; }
 #else
-int rtapi_init(const char *name) { return hal_init(name); }
+int rtapi_init(const char* name) { return hal_init(name); }
 int rtapi_exit(int module) { return hal_exit(module); }
 #endif
 int rtapi_is_kernelspace(void) { return 0; }
@@ -180,18 +198,22 @@ int rtapi_prio_next_higher(int priority) { return priority < 98 ? priority + 1 :
 int rtapi_prio_next_lower(int priority) { return priority > 1 ? priority - 1 : 1; }
 long rtapi_clock_set_period(long ns) { return ns == 0 ? 1000000 : -ENOSYS; }
 
-char **rtapi_argv_split(rtapi_gfp_t how, const char *text, int *count) {
+char** rtapi_argv_split(rtapi_gfp_t how, const char* text, int* count) {
     (void)how;
     const size_t length = strlen(text);
-    char **const words = malloc((length / 2 + 2) * sizeof *words + length + 1);
+    char** const words = malloc((length / 2 + 2) * sizeof *words + length + 1);
     if (!words) return NULL;
-    char *copy = (char *)(words + length / 2 + 2);
+    char* copy = (char*)(words + length / 2 + 2);
     memcpy(copy, text, length + 1);
     int found = 0;
-    char *rest = NULL;
-    for (char *word = strtok_r(copy, " \t\n", &rest); word; word = strtok_r(NULL, " \t\n", &rest)) words[found++] = word;
+    char* rest = NULL;
+    for (char* word = strtok_r(copy, " \t\n", &rest); word; word = strtok_r(NULL, " \t\n", &rest)) {
+        words[found++] = word;
+    }
     words[found] = NULL;
-    if (count) *count = found;
+    if (count) {
+        *count = found;
+    }
     return words;
 }
-void rtapi_argv_free(char **words) { free(words); }
+void rtapi_argv_free(char** words) { free(words); }

@@ -9,8 +9,12 @@
 static inline unsigned char rtapi_inb(unsigned port) { return inb((unsigned short)port); }
 static inline unsigned short rtapi_inw(unsigned port) { return inw((unsigned short)port); }
 static inline unsigned rtapi_inl(unsigned port) { return inl((unsigned short)port); }
-static inline void rtapi_outb(unsigned char value, unsigned port) { outb(value, (unsigned short)port); }
-static inline void rtapi_outw(unsigned short value, unsigned port) { outw(value, (unsigned short)port); }
+static inline void rtapi_outb(unsigned char value, unsigned port) {
+    outb(value, (unsigned short)port);
+}
+static inline void rtapi_outw(unsigned short value, unsigned port) {
+    outw(value, (unsigned short)port);
+}
 static inline void rtapi_outl(unsigned value, unsigned port) { outl(value, (unsigned short)port); }
 #else
 #error "this computer has no I/O ports"

@@ -17,24 +17,30 @@ namespace hal::ethernet {
 namespace {
 
 constexpr std::uint16_t type = 0x88b5;
-constexpr std::int64_t ms = 1'000'000, us = 1'000;
+constexpr std::int64_t ms = 1'000'000;
+constexpr std::int64_t us = 1'000;
 
 std::int64_t number_at(std::span<const std::uint8_t> bytes, std::size_t place) {
     std::int64_t value = 0;
-    for (std::size_t i = 0; i < 8; ++i) value = value << 8 | bytes[place + i];
+    for (std::size_t i = 0; i < 8; ++i) {
+        value = value << 8 | bytes[place + i];
+    }
     return value;
 }
 
 TEST_F(Raw, a_frame_arrives_whole_with_the_time_of_its_arrival) {
-    auto here = a(), there = b();
+    auto here = a();
+    auto there = b();
     const auto before = link::monotonic_ns();
-    EXPECT_EQ(here->send(frame(there->address(), *here, type, {1, 2, 3}), {}, before), Sent::queued);
+    EXPECT_EQ(here->send(frame(there->address(), *here, type, {1, 2, 3}), {}, before),
+              Sent::queued);
     ASSERT_TRUE(there->wait(before + 5000 * ms));
     const auto arrival = there->receive(before);
     const auto after = link::monotonic_ns();
     ASSERT_TRUE(arrival);
     EXPECT_EQ(arrival->bytes.size(), smallest_frame);
-    EXPECT_EQ((Bytes{arrival->bytes.begin() + 14, arrival->bytes.begin() + 18}), (Bytes{1, 2, 3, 0}));
+    EXPECT_EQ((Bytes{arrival->bytes.begin() + 14, arrival->bytes.begin() + 18}),
+              (Bytes{1, 2, 3, 0}));
     EXPECT_GE(arrival->time_ns, before);
     EXPECT_LE(arrival->time_ns, after);
     EXPECT_TRUE(silent(*there));
@@ -47,10 +53,15 @@ TEST_F(Raw, a_frame_arrives_whole_with_the_time_of_its_arrival) {
 
 TEST_F(Raw, frames_go_there_and_back_with_every_policy) {
     for (const auto policy : {Policy::block, Policy::hybrid, Policy::spin}) {
-        auto here = a({.types = {type}, .policy = policy}), there = b({.types = {type}, .policy = policy});
-        const auto waited = [](Port& port) {  // hybrid sleeps until shortly before the end, whatever comes
+        auto here = a({.types = {type}, .policy = policy});
+
+        auto there = b({.types = {type}, .policy = policy});
+        // hybrid sleeps until shortly before the end, whatever comes
+        const auto waited = [](Port& port) {
             bool there_is = false;
-            for (int i = 0; i < 5000 && !there_is; ++i) there_is = port.wait(link::monotonic_ns() + ms);
+            for (int i = 0; i < 5000 && !there_is; ++i) {
+                there_is = port.wait(link::monotonic_ns() + ms);
+            }
             return there_is;
         };
         std::thread echo([&] {
@@ -80,9 +91,14 @@ TEST_F(Raw, frames_go_there_and_back_with_every_policy) {
 
 TEST_F(Raw, types_and_stations_are_chosen_by_the_kernel) {
     auto here = a();
-    auto one = b(), several = b({.types = {0x9021, 0x9022}, .policy = Policy::block}), all = b({.policy = Policy::block});
+    auto one = b();
+    auto several = b({.types = {0x9021, 0x9022}, .policy = Policy::block});
+
+    auto all = b({.policy = Policy::block});
     auto ear = b({.policy = Policy::block, .promiscuous = true});
-    const auto send = [&](const Address& to, std::uint16_t of, std::uint8_t mark) { here->send(frame(to, *here, of, {mark}), {}, 0); };
+    const auto send = [&](const Address& to, std::uint16_t of, std::uint8_t mark) {
+        here->send(frame(to, *here, of, {mark}), {}, 0);
+    };
     send(broadcast, type, 1);
     send(one->address(), 0x9021, 2);
     send(broadcast, 0x9022, 3);
@@ -91,11 +107,15 @@ TEST_F(Raw, types_and_stations_are_chosen_by_the_kernel) {
     EXPECT_EQ(firsts(*several, 2), "23");
     EXPECT_EQ(firsts(*all, 3), "123");
     EXPECT_EQ(firsts(*ear, 4), "1234");
-    for (auto* port : {one.get(), several.get(), all.get(), ear.get()}) EXPECT_TRUE(silent(*port));
+    for (auto* port : {one.get(), several.get(), all.get(), ear.get()}) {
+        EXPECT_TRUE(silent(*port));
+    }
 }
 
 TEST_F(Raw, two_users_of_one_interface_do_not_hear_each_other) {
-    auto bus = a({.types = {0x9021}, .policy = Policy::block}), can = a({.types = {0x9023}, .policy = Policy::block});
+    auto bus = a({.types = {0x9021}, .policy = Policy::block});
+
+    auto can = a({.types = {0x9023}, .policy = Policy::block});
     auto there = b({.policy = Policy::block});
     EXPECT_EQ(bus->address(), can->address());
     bus->send(frame(broadcast, *bus, 0x9023, {1}), {}, 0);
@@ -109,12 +129,15 @@ TEST_F(Raw, two_users_of_one_interface_do_not_hear_each_other) {
 }
 
 TEST_F(Raw, the_mtu_of_the_interface_is_the_limit) {
-    auto here = a(), there = b();
+    auto here = a();
+    auto there = b();
     EXPECT_EQ(here->send(Bytes(13), {}, 0), Sent::rejected);
     EXPECT_EQ(here->send(frame(broadcast, *here, type, Bytes(1501)), {}, 0), Sent::rejected);
-    EXPECT_EQ(here->send(frame(broadcast, *here, type, Bytes(15)), {.stamp_at = 22}, 0), Sent::rejected);
+    EXPECT_EQ(here->send(frame(broadcast, *here, type, Bytes(15)), {.stamp_at = 22}, 0),
+              Sent::rejected);
     EXPECT_EQ(here->send(frame(broadcast, *here, type, Bytes(1500, 1)), {}, 0), Sent::queued);
-    EXPECT_EQ(here->send(frame(broadcast, *here, type, Bytes(1500, 1)), {.stamp_at = 22}, 0), Sent::queued);
+    EXPECT_EQ(here->send(frame(broadcast, *here, type, Bytes(1500, 1)), {.stamp_at = 22}, 0),
+              Sent::queued);
     EXPECT_EQ(firsts(*there, 2), "11");
     EXPECT_EQ(there->statistics().received_bytes, 3028U);
     EXPECT_EQ(here->statistics().dropped, 3U);
@@ -127,7 +150,8 @@ TEST_F(Raw, the_mtu_of_the_interface_is_the_limit) {
 }
 
 TEST_F(Raw, a_lost_carrier_is_told_and_heals) {
-    auto here = a(), there = b();
+    auto here = a();
+    auto there = b();
     ASSERT_TRUE(command("ip link set " + b_ + " down"));
     ASSERT_TRUE(eventually([&] { return !here->statistics().up && !there->statistics().up; }));
     const auto f = frame(broadcast, *here, type, {1});
@@ -144,7 +168,8 @@ TEST_F(Raw, a_lost_carrier_is_told_and_heals) {
 }
 
 TEST_F(Raw, an_interface_that_is_removed_may_come_back) {
-    auto here = a(), there = b({.types = {type}, .policy = Policy::block, .promiscuous = true});
+    auto here = a();
+    auto there = b({.types = {type}, .policy = Policy::block, .promiscuous = true});
     ASSERT_TRUE(command("ip link del " + a_));
     ASSERT_TRUE(eventually([&] { return !here->statistics().up && !there->statistics().up; }));
     EXPECT_EQ(here->send(frame(broadcast, *here, type, {1}), {}, 0), Sent::down);
@@ -178,13 +203,16 @@ TEST_F(Raw, what_warms_the_way_is_on_no_wire) {
         auto there = b({.promiscuous = true});
         auto here = a({.types = {type}, .spin_ns = 10 * ms, .pacer = pacer});
         for (std::uint8_t mark = 1; mark < 9; ++mark) {
-            EXPECT_EQ(here->send(frame(broadcast, *here, type, {mark}), {.at_ns = link::monotonic_ns() + ms}, 0), Sent::queued);
+            EXPECT_EQ(here->send(frame(broadcast, *here, type, {mark}),
+                                 {.at_ns = link::monotonic_ns() + ms}, 0),
+                      Sent::queued);
             for (bool ours = false; !ours;) {  // the kernel may send on a new interface
                 ASSERT_TRUE(there->wait(link::monotonic_ns() + 5000 * ms));
                 const auto arrival = there->receive(0);
                 ASSERT_TRUE(arrival);
                 const auto bytes = arrival->bytes;
-                EXPECT_FALSE(std::all_of(bytes.begin(), bytes.begin() + 12, [](std::uint8_t byte) { return byte == 0; }));
+                EXPECT_FALSE(std::all_of(bytes.begin(), bytes.begin() + 12,
+                                         [](std::uint8_t byte) { return byte == 0; }));
                 ours = bytes[12] == type >> 8 && bytes[13] == (type & 0xff);
                 EXPECT_TRUE(!ours || bytes[14] == mark);
             }
@@ -195,7 +223,8 @@ TEST_F(Raw, what_warms_the_way_is_on_no_wire) {
 }
 
 TEST_F(Raw, the_pacer_sends_in_order_of_the_times) {
-    auto there = b(), here = a({.types = {type}, .pacer = true});
+    auto there = b();
+    auto here = a({.types = {type}, .pacer = true});
     const auto now = link::monotonic_ns();
     const auto send = [&](std::uint8_t mark, std::int64_t at) {
         return here->send(frame(broadcast, *here, type, {mark}), {.at_ns = at}, now);
@@ -209,7 +238,8 @@ TEST_F(Raw, the_pacer_sends_in_order_of_the_times) {
 }
 
 TEST_F(Raw, what_is_later_than_its_guard_is_dropped_and_counted) {
-    auto there = b(), here = a({.types = {type}, .pacer = true});
+    auto there = b();
+    auto here = a({.types = {type}, .pacer = true});
     auto plain = a({.types = {type}, .spin_ns = ms});
     const auto now = link::monotonic_ns();
     for (auto* port : {here.get(), plain.get()}) {
@@ -220,7 +250,8 @@ TEST_F(Raw, what_is_later_than_its_guard_is_dropped_and_counted) {
         EXPECT_GE(port->statistics().launch_error_ns, ms);
     }
     const auto f = frame(broadcast, *plain, type, {1});
-    EXPECT_EQ(plain->send(f, {.at_ns = now + 3'600'000 * ms}, now), Sent::full);  // beyond what it would wait
+    // beyond what it would wait
+    EXPECT_EQ(plain->send(f, {.at_ns = now + 3'600'000 * ms}, now), Sent::full);
     EXPECT_EQ(plain->statistics().dropped, 1U);
     EXPECT_EQ(firsts(*there, 2), "11");
     EXPECT_TRUE(silent(*there));
@@ -230,7 +261,9 @@ TEST_F(Raw, a_pacer_that_is_full_says_so_and_ends_with_its_port) {
     auto here = a({.types = {type}, .pacer = true, .send_capacity = 4});
     const auto now = link::monotonic_ns();
     const auto f = frame(broadcast, *here, type, {1});
-    for (int i = 0; i < 4; ++i) EXPECT_EQ(here->send(f, {.at_ns = now + 3'600'000 * ms}, now), Sent::queued);
+    for (int i = 0; i < 4; ++i) {
+        EXPECT_EQ(here->send(f, {.at_ns = now + 3'600'000 * ms}, now), Sent::queued);
+    }
     EXPECT_EQ(here->send(f, {.at_ns = now + 3'600'000 * ms}, now), Sent::full);
     EXPECT_EQ(here->statistics().dropped, 1U);
     EXPECT_EQ(here->statistics().sent, 0U);
@@ -245,15 +278,20 @@ TEST_F(Raw, the_kernel_stamps_what_leaves_when_asked_to) {
     const auto arrival = there->receive(0);
     ASSERT_TRUE(arrival);
     const auto left = here->statistics().departure_ns;
-    if (left == 0) GTEST_SKIP() << "this kernel gives no transmit timestamps on veth";
+    if (left == 0) {
+        GTEST_SKIP() << "this kernel gives no transmit timestamps on veth";
+    }
     EXPECT_GE(left, before);
     EXPECT_LE(left, arrival->time_ns);
     EXPECT_EQ(there->statistics().departure_ns, 0);
 }
 
 TEST_F(Raw, a_ring_that_is_full_loses_and_counts) {
-    auto here = a(), there = b({.types = {type}, .policy = Policy::block, .receive_capacity = 32});
-    for (int i = 0; i < 100; ++i) here->send(frame(broadcast, *here, type, {static_cast<std::uint8_t>(i % 10)}), {}, 0);
+    auto here = a();
+    auto there = b({.types = {type}, .policy = Policy::block, .receive_capacity = 32});
+    for (int i = 0; i < 100; ++i) {
+        here->send(frame(broadcast, *here, type, {static_cast<std::uint8_t>(i % 10)}), {}, 0);
+    }
     EXPECT_EQ(firsts(*there, 32), "01234567890123456789012345678901");
     EXPECT_TRUE(silent(*there));
     EXPECT_TRUE(eventually([&] { return there->statistics().lost == 68; }));
@@ -262,19 +300,27 @@ TEST_F(Raw, a_ring_that_is_full_loses_and_counts) {
 }
 
 TEST_F(Raw, a_frame_stays_until_the_next_is_asked_for) {
-    auto here = a(), there = b();
-    for (std::uint8_t i = 1; i <= 3; ++i) here->send(frame(broadcast, *here, type, {i}), {}, 0);
+    auto here = a();
+    auto there = b();
+    for (std::uint8_t i = 1; i <= 3; ++i) {
+        here->send(frame(broadcast, *here, type, {i}), {}, 0);
+    }
     const auto first = there->receive(0);
     ASSERT_TRUE(first);
-    for (int i = 0; i < 100; ++i) here->send(frame(broadcast, *here, type, {9}), {}, 0);
+    for (int i = 0; i < 100; ++i) {
+        here->send(frame(broadcast, *here, type, {9}), {}, 0);
+    }
     EXPECT_EQ(first->bytes[14], 1);
     EXPECT_EQ(firsts(*there, 2), "23");
 }
 
 TEST_F(Raw, lost_and_doubled_and_late_frames_of_a_bad_line_come_as_they_do) {
-    auto here = a(), there = b({.types = {type}, .policy = Policy::block, .receive_capacity = 2048});
-    if (!command("tc qdisc add dev " + a_ + " root netem loss 20% duplicate 10% delay 1ms 1ms"))
+    auto here = a();
+
+    auto there = b({.types = {type}, .policy = Policy::block, .receive_capacity = 2048});
+    if (!command("tc qdisc add dev " + a_ + " root netem loss 20% duplicate 10% delay 1ms 1ms")) {
         GTEST_SKIP() << "this kernel has no netem, or `tc` is missing";
+    }
     // Ours go past the queueing discipline; these are sent by a socket that does not.
     const link::Descriptor plain(::socket(AF_PACKET, SOCK_RAW | SOCK_CLOEXEC, 0));
     sockaddr_ll place{};
@@ -283,11 +329,14 @@ TEST_F(Raw, lost_and_doubled_and_late_frames_of_a_bad_line_come_as_they_do) {
     ASSERT_EQ(::bind(plain.get(), reinterpret_cast<const sockaddr*>(&place), sizeof place), 0);
     constexpr int count = 500;
     for (int i = 0; i < count; ++i) {
-        const auto f = frame(broadcast, *here, type, {static_cast<std::uint8_t>(i), static_cast<std::uint8_t>(i >> 8)});
+        const auto f = frame(broadcast, *here, type,
+                             {static_cast<std::uint8_t>(i), static_cast<std::uint8_t>(i >> 8)});
         ASSERT_EQ(::send(plain.get(), f.data(), f.size(), 0), static_cast<ssize_t>(f.size()));
     }
     std::vector<int> times(count);
-    int came = 0, overtaken = 0, newest = -1;
+    int came = 0;
+    int overtaken = 0;
+    int newest = -1;
     for (std::int64_t last = 0; there->wait(link::monotonic_ns() + 200 * ms);) {
         const auto arrival = there->receive(0);
         ASSERT_TRUE(arrival);
@@ -297,7 +346,8 @@ TEST_F(Raw, lost_and_doubled_and_late_frames_of_a_bad_line_come_as_they_do) {
         last = arrival->time_ns;
         overtaken += number < newest;
         newest = std::max(newest, number);
-        ++times[static_cast<std::size_t>(number)], ++came;
+        ++times[static_cast<std::size_t>(number)];
+        ++came;
     }
     EXPECT_GT(std::count(times.begin(), times.end(), 0), count / 20);
     EXPECT_GT(std::count(times.begin(), times.end(), 2), count / 50);
@@ -307,8 +357,11 @@ TEST_F(Raw, lost_and_doubled_and_late_frames_of_a_bad_line_come_as_they_do) {
 }
 
 TEST_F(Raw, stamps_do_not_jump_when_the_clock_is_set) {
-    if (std::getenv("HALCYON_MAY_SET_CLOCK") == nullptr) GTEST_SKIP() << "sets the system's clock: runs in user-mode-linux only";
-    auto here = a(), there = b();
+    if (std::getenv("HALCYON_MAY_SET_CLOCK") == nullptr) {
+        GTEST_SKIP() << "sets the system's clock: runs in user-mode-linux only";
+    }
+    auto here = a();
+    auto there = b();
     const auto set = [](std::int64_t by) {
         const auto time = link::clock_ns(CLOCK_REALTIME) + by;
         const timespec t{time / 1'000'000'000, time % 1'000'000'000};
@@ -316,10 +369,14 @@ TEST_F(Raw, stamps_do_not_jump_when_the_clock_is_set) {
     };
     const auto come = [&] {  // a busy kernel delivers a moment later
         auto arrival = there->receive(0);
-        for (int n = 0; n < 1000 && !arrival; ++n) usleep(1000), arrival = there->receive(0);
+        for (int n = 0; n < 1000 && !arrival; ++n) {
+            usleep(1000);
+            arrival = there->receive(0);
+        }
         return arrival;
     };
-    constexpr std::int64_t between = 100'000;  // the two clocks are read one after the other, each by a call of that kernel
+    // the two clocks are read one after the other, each by a call of that kernel
+    constexpr std::int64_t between = 100'000;
     const auto f = frame(broadcast, *here, type, {1});
     for (const std::int64_t step : {0, 3'600'000, -7'200'000, 500, -20}) {
         const auto first = link::monotonic_ns();
@@ -340,9 +397,11 @@ TEST_F(Raw, stamps_do_not_jump_when_the_clock_is_set) {
 }
 
 TEST_F(Raw, open_reports_what_to_do_on_failure) {
-    EXPECT_EQ(open("eth:nosuch0").problem.substr(0, 52), "eth:nosuch0: no interface 'nosuch0'; interfaces are ");
+    EXPECT_EQ(open("eth:nosuch0").problem.substr(0, 52),
+              "eth:nosuch0: no interface 'nosuch0'; interfaces are ");
     EXPECT_NE(open("eth:nosuch0").problem.find(a_), std::string::npos);
-    EXPECT_EQ(open("eth:").problem.substr(0, 57), "eth:: missing interface; write eth:enp3s0; interfaces are");
+    EXPECT_EQ(open("eth:").problem.substr(0, 57),
+              "eth:: missing interface; write eth:enp3s0; interfaces are");
     EXPECT_EQ(open("eth:" + a_, {.types = std::vector<std::uint16_t>(65)}).problem,
               "eth:" + a_ + ": more than 64 Ethertypes on one port; open several ports");
 }
@@ -354,17 +413,22 @@ TEST_F(Raw, open_reports_how_to_grant_a_missing_capability) {
         __user_cap_data_struct none[2]{};
         syscall(SYS_capset, &header, none);
         problem = open("eth:" + a_).problem;
-    }).join();
+    })
+        .join();
     const std::string grant = grant_command();
-    EXPECT_TRUE(grant.starts_with("sudo setcap cap_sys_nice,cap_ipc_lock,cap_net_raw=ep /")) << grant;
-    EXPECT_EQ(problem, "eth:" + a_ + ": raw Ethernet needs the capability CAP_NET_RAW; grant it with: " + grant +
-                           "; to see the capabilities: hal doctor");
+    EXPECT_TRUE(grant.starts_with("sudo setcap cap_sys_nice,cap_ipc_lock,cap_net_raw=ep /"))
+        << grant;
+    EXPECT_EQ(problem, "eth:" + a_ +
+                           ": raw Ethernet needs the capability CAP_NET_RAW; grant it with: " +
+                           grant + "; to see the capabilities: hal doctor");
 }
 
 TEST(RawClock, a_stamp_that_does_not_fit_is_of_a_clock_that_was_set) {
     rawether::RealTime clock;
-    const auto now = link::monotonic_ns(), real = link::clock_ns(CLOCK_REALTIME);
-    EXPECT_NEAR(static_cast<double>(clock.to_monotonic(real, now - ms, now + ms)), static_cast<double>(now), 200'000.0);
+    const auto now = link::monotonic_ns();
+    const auto real = link::clock_ns(CLOCK_REALTIME);
+    EXPECT_NEAR(static_cast<double>(clock.to_monotonic(real, now - ms, now + ms)),
+                static_cast<double>(now), 200'000.0);
     constexpr std::int64_t hour = 3'600'000 * ms;
     EXPECT_EQ(clock.to_monotonic(real + hour, now - ms, now), now);
     EXPECT_EQ(clock.to_monotonic(real - hour, now - ms, now), now);
@@ -373,13 +437,17 @@ TEST(RawClock, a_stamp_that_does_not_fit_is_of_a_clock_that_was_set) {
 
 TEST(RawClock, who_looks_all_the_time_is_told_to_rest_before_the_kernel_makes_him) {
     rawether::SpinBudget bounded(true), unbounded(false);
-    std::int64_t now = link::monotonic_ns(), rested = 0;
+    std::int64_t now = link::monotonic_ns();
+    std::int64_t rested = 0;
     const auto start = now;
     for (int i = 0; i < 50'000; ++i) {
         EXPECT_TRUE(unbounded.spent(now, now + 50 * us));
         const bool may = bounded.spent(now, now + 50 * us);
         now += 50 * us;
-        if (!may) now += rawether::SpinBudget::rest_ns, rested += rawether::SpinBudget::rest_ns;
+        if (!may) {
+            now += rawether::SpinBudget::rest_ns;
+            rested += rawether::SpinBudget::rest_ns;
+        }
     }
     const auto share = static_cast<double>(rested) / static_cast<double>(now - start);
     EXPECT_GT(share, 0.08);

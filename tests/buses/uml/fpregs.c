@@ -10,7 +10,14 @@
 #include <sys/uio.h>
 #include <unistd.h>
 
-enum { peek_text = 1, peek_user = 3, get_register_set = 0x4204, set_register_set = 0x4205, largest = 16384, places = 1024 };
+enum {
+    peek_text = 1,
+    peek_user = 3,
+    get_register_set = 0x4204,
+    set_register_set = 0x4205,
+    largest = 16384,
+    places = 1024
+};
 
 static struct {
     const void* of;
@@ -20,13 +27,17 @@ static struct {
 static unsigned char* kept_state(const void* of) {
     unsigned place = (unsigned)((unsigned long)of / 64) % places;
     for (unsigned tries = 0; tries < places; ++tries, place = (place + 1) % places) {
-        if (!kept[place].of) kept[place].of = of;
+        if (!kept[place].of) {
+            kept[place].of = of;
+        }
         if (kept[place].of == of) return kept[place].state;
     }
     return 0;
 }
 
-static long raw(long request, long process, long address, void* data) { return syscall(SYS_ptrace, request, process, address, data); }
+static long raw(long request, long process, long address, void* data) {
+    return syscall(SYS_ptrace, request, process, address, data);
+}
 
 static long get_state(long process, struct iovec* to) {
     unsigned char* const state = kept_state(to->iov_base);
@@ -34,7 +45,9 @@ static long get_state(long process, struct iovec* to) {
     struct iovec whole = {state, largest};
     const long result = raw(get_register_set, process, NT_X86_XSTATE, &whole);
     if (result < 0) return result;
-    if (to->iov_len > whole.iov_len) to->iov_len = whole.iov_len;
+    if (to->iov_len > whole.iov_len) {
+        to->iov_len = whole.iov_len;
+    }
     memcpy(to->iov_base, state, to->iov_len);
     return result;
 }
@@ -44,7 +57,9 @@ static long set_state(long process, const struct iovec* from) {
     struct iovec whole = {now, largest};
     if (raw(get_register_set, process, NT_X86_XSTATE, &whole) < 0) return -1;
     unsigned char* const state = kept_state(from->iov_base);
-    if (state) memcpy(now, state, whole.iov_len);
+    if (state) {
+        memcpy(now, state, whole.iov_len);
+    }
     memcpy(now, from->iov_base, from->iov_len < whole.iov_len ? from->iov_len : whole.iov_len);
     return raw(set_register_set, process, NT_X86_XSTATE, &whole);
 }

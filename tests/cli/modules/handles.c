@@ -9,10 +9,10 @@ struct handles {
     volatile int *to, *from;
     volatile uint64_t most;
 };
-static struct handles *h;
+static struct handles* h;
 static int comp;
 
-static void copy(void *unused, long period) {
+static void copy(void* unused, long period) {
     char byte = 0;
     (void)unused, (void)period;
     *h->bit_out = (uint8_t)*h->bit;
@@ -22,11 +22,16 @@ static void copy(void *unused, long period) {
     *h->s32_out = (int32_t)*h->s32;
     *h->s64_out = *h->s64;
     *h->old = -*h->s64;
-    if ((uint64_t)*h->cycles < h->most) ++*h->cycles;
+    if ((uint64_t)*h->cycles < h->most) {
+        ++*h->cycles;
+    }
     ++*h->hidden;
     byte = (char)*h->hidden;
-    if (hal_port_readable(h->from) > 0) hal_port_read(h->from, &byte, 1);
-    else hal_port_write(h->to, &byte, 1);
+    if (hal_port_readable(h->from) > 0) {
+        hal_port_read(h->from, &byte, 1);
+    } else {
+        hal_port_write(h->to, &byte, 1);
+    }
 }
 
 int rtapi_app_main(void) {
@@ -34,25 +39,43 @@ int rtapi_app_main(void) {
     comp = hal_init("handles");
     h = hal_malloc(sizeof *h);
     int bad = !before || comp < 0 || !h;
-    bad = bad || hal_pin_new_bool(comp, IN, &h->bit, true, "handles.%s", "bit") || hal_pin_new_bool(comp, OUT, &h->bit_out, false, "handles.bit-out");
-    bad = bad || hal_pin_new_ui32(comp, IN, &h->u32, 4000000000u, "handles.u32") || hal_pin_new_ui32(comp, OUT, &h->u32_out, 0, "handles.u32-out");
-    bad = bad || hal_pin_new_uint(comp, IN, &h->u64, ~0ull, "handles.u64") || hal_pin_new_uint(comp, OUT, &h->u64_out, 0, "handles.u64-out");
-    bad = bad || hal_pin_new_real(comp, IN, &h->real, 1.5, "handles.real") || hal_pin_new_real(comp, OUT, &h->real_out, 0, "handles.real-out");
-    bad = bad || hal_pin_new_si32(comp, IN, &h->s32, -3, "handles.s32") || hal_pin_new_si32(comp, OUT, &h->s32_out, 0, "handles.s32-out");
-    bad = bad || hal_pin_new_sint(comp, IN, &h->s64, -5000000000, "handles.s64") || hal_pin_new_sint(comp, OUT, &h->s64_out, 0, "handles.s64-out");
-    bad = bad || hal_pin_s64_newf(OUT, &h->old, comp, "handles.%s", "old") || hal_param_u64_newf(RW, &h->most, comp, "handles.most");
-    bad = bad || hal_param_new_real(comp, RW, &h->step, 0.25, "handles.step") || hal_param_new_sint(comp, RO, &h->cycles, 0, "handles.cycles");
+    bad = bad || hal_pin_new_bool(comp, IN, &h->bit, true, "handles.%s", "bit") ||
+          hal_pin_new_bool(comp, OUT, &h->bit_out, false, "handles.bit-out");
+    bad = bad || hal_pin_new_ui32(comp, IN, &h->u32, 4000000000u, "handles.u32") ||
+          hal_pin_new_ui32(comp, OUT, &h->u32_out, 0, "handles.u32-out");
+    bad = bad || hal_pin_new_uint(comp, IN, &h->u64, ~0ull, "handles.u64") ||
+          hal_pin_new_uint(comp, OUT, &h->u64_out, 0, "handles.u64-out");
+    bad = bad || hal_pin_new_real(comp, IN, &h->real, 1.5, "handles.real") ||
+          hal_pin_new_real(comp, OUT, &h->real_out, 0, "handles.real-out");
+    bad = bad || hal_pin_new_si32(comp, IN, &h->s32, -3, "handles.s32") ||
+          hal_pin_new_si32(comp, OUT, &h->s32_out, 0, "handles.s32-out");
+    bad = bad || hal_pin_new_sint(comp, IN, &h->s64, -5000000000, "handles.s64") ||
+          hal_pin_new_sint(comp, OUT, &h->s64_out, 0, "handles.s64-out");
+    bad = bad || hal_pin_s64_newf(OUT, &h->old, comp, "handles.%s", "old") ||
+          hal_param_u64_newf(RW, &h->most, comp, "handles.most");
+    bad = bad || hal_param_new_real(comp, RW, &h->step, 0.25, "handles.step") ||
+          hal_param_new_sint(comp, RO, &h->cycles, 0, "handles.cycles");
     bad = bad || hal_param_new_fake(comp, &h->hidden) || *h->hidden != 0;
-    bad = bad || hal_pin_new_port(comp, OUT, &h->to, "handles.%s", "to") || hal_pin_new_port(comp, IN, &h->from, "handles.from");
+    bad = bad || hal_pin_new_port(comp, OUT, &h->to, "handles.%s", "to") ||
+          hal_pin_new_port(comp, IN, &h->from, "handles.from");
     if (bad) return -1;
     h->most = 3;
     /* a name of 55 characters is the longest; a pin is not a parameter */
     const int level = rtapi_get_msg_level();
-    volatile double *other = 0;
+    volatile double* other = 0;
     rtapi_set_msg_level(0);
-    if (hal_pin_new_real(comp, IN, &other, 0, "handles.%048d", 0) != -12 || hal_pin_new_real(comp, IN, &other, 0, "handles.%047d", 0) != 0) return -2;
-    if (hal_pin_new_real(comp, RW, &other, 0, "handles.a") != -22 || hal_param_new_real(comp, IN, &other, 0, "handles.b") != -22) return -3;
-    if (hal_pin_new_real(comp, IN, &other, 0, "handles.real") != -22 || hal_param_new_fake(comp, 0) != -22) return -4;
+    if (hal_pin_new_real(comp, IN, &other, 0, "handles.%048d", 0) != -12 ||
+        hal_pin_new_real(comp, IN, &other, 0, "handles.%047d", 0) != 0) {
+        return -2;
+    }
+    if (hal_pin_new_real(comp, RW, &other, 0, "handles.a") != -22 ||
+        hal_param_new_real(comp, IN, &other, 0, "handles.b") != -22) {
+        return -3;
+    }
+    if (hal_pin_new_real(comp, IN, &other, 0, "handles.real") != -22 ||
+        hal_param_new_fake(comp, 0) != -22) {
+        return -4;
+    }
     if (hal_get_realtime_type() < 0 || !hal_strerror(-22) || !hal_strerror(-12345)) return -5;
     rtapi_set_msg_level(level);
     if (hal_export_functf(copy, 0, 1, 0, comp, "handles.%s", "copy")) return -6;

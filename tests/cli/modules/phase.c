@@ -5,16 +5,18 @@
 static int comp;
 static struct {
     volatile int32_t *correction, *result, *period;
-    volatile bool *set;
-} *own;
+    volatile bool* set;
+}* own;
 
-static void update(void *arg, long period) {
+static void update(void* arg, long period) {
     static long long before;
     (void)arg, (void)period;
     const long long now = rtapi_task_pll_get_reference();
     *own->period = (int32_t)(now - before);
     before = now;
-    if (*own->set) *own->result = rtapi_task_pll_set_correction(*own->correction);
+    if (*own->set) {
+        *own->result = rtapi_task_pll_set_correction(*own->correction);
+    }
 }
 int rtapi_app_main(void) {
     comp = hal_init("phase");
@@ -24,8 +26,13 @@ int rtapi_app_main(void) {
     hal_pin_s32_newf(OUT, &own->period, comp, "phase.period");
     hal_pin_bit_newf(IN, &own->set, comp, "phase.set");
     hal_export_funct("phase", update, 0, 1, 0, comp);
-    const long before = rtapi_clock_set_period(0), set = rtapi_clock_set_period(400000), again = rtapi_clock_set_period(500000), now = rtapi_clock_set_period(0);
-    rtapi_print_msg(1, "phase: %d, %ld %ld %ld %ld\n", rtapi_task_pll_set_correction(1), before, set, again, now);
+    const long before = rtapi_clock_set_period(0);
+    const long set = rtapi_clock_set_period(400000);
+
+    const long again = rtapi_clock_set_period(500000);
+    const long now = rtapi_clock_set_period(0);
+    rtapi_print_msg(1, "phase: %d, %ld %ld %ld %ld\n", rtapi_task_pll_set_correction(1), before,
+                    set, again, now);
     hal_create_thread("phase-thread", 1100000, 1); /* a multiple of that: 1200000 */
     return hal_ready(comp);
 }

@@ -3,9 +3,13 @@
 #include "linuxcnc.h"
 
 static int comp;
-static struct { volatile double *scale, *last; } *pins;
+static struct {
+    volatile double *scale, *last;
+}* pins;
 
-__attribute__((visibility("default"))) double planner_next(double now) { return *pins->last = now + *pins->scale; }
+__attribute__((visibility("default"))) double planner_next(double now) {
+    return *pins->last = now + *pins->scale;
+}
 int rtapi_app_main(void) {
     comp = hal_init("planner");
     pins = hal_malloc(sizeof *pins);

@@ -2,11 +2,15 @@
 /* Reads the status byte of a parallel port in a cycle, by machine code as drivers do. */
 #include "linuxcnc.h"
 
-struct port { unsigned short base, base_hi; int fd; };
-int rtapi_parport_get(const char *name, struct port *, unsigned short base, unsigned short base_hi, unsigned modes);
-void rtapi_parport_release(struct port *);
+struct port {
+    unsigned short base, base_hi;
+    int fd;
+};
+int rtapi_parport_get(const char* name, struct port*, unsigned short base, unsigned short base_hi,
+                      unsigned modes);
+void rtapi_parport_release(struct port*);
 
-static volatile uint32_t **status;
+static volatile uint32_t** status;
 static struct port port;
 static int comp, base = 0x378;
 PARAMETER(base, "i", "address")
@@ -20,7 +24,7 @@ static uint8_t in(unsigned short at) {
     return (uint8_t)at;
 #endif
 }
-static void update(void *unused, long period) {
+static void update(void* unused, long period) {
     (void)unused, (void)period;
     **status = 256u + in((unsigned short)(port.base + 1));
 }
@@ -28,7 +32,10 @@ static void update(void *unused, long period) {
 int rtapi_app_main(void) {
     comp = hal_init("port");
     const int result = rtapi_parport_get("port", &port, (unsigned short)base, 0, 0);
-    if (result != 0) return hal_exit(comp), result;
+    if (result != 0) {
+        hal_exit(comp);
+        return result;
+    }
     status = hal_malloc(sizeof *status);
     hal_pin_u32_newf(OUT, status, comp, "port.status");
     hal_export_funct("port.read", update, 0, 0, 0, comp);

@@ -4,7 +4,7 @@
 
 static int comp;
 
-static void update(void *arg, long period) {
+static void update(void* arg, long period) {
     char text[16];
     (void)arg, (void)period;
     rtapi_print_msg(1, "speaker: %d -0x%04x %-6s %5.2f %g\n", 7, 0xff, "text", 3.25, 1e10);

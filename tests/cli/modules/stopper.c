@@ -3,9 +3,11 @@
 #include "linuxcnc.h"
 
 static int comp;
-static struct { volatile int32_t *result; } *pins;
+static struct {
+    volatile int32_t* result;
+}* pins;
 
-static void update(void *arg, long period) {
+static void update(void* arg, long period) {
     (void)arg, (void)period;
     *pins->result = hal_stop_threads();
 }
@@ -17,7 +19,10 @@ int rtapi_app_main(void) {
     return hal_ready(comp);
 }
 void rtapi_app_exit(void) {
-    const int stop = hal_stop_threads(), own = hal_del_funct_from_thread("stopper", "t"), foreign = hal_del_funct_from_thread("other", "t");
+    const int stop = hal_stop_threads();
+    const int own = hal_del_funct_from_thread("stopper", "t");
+
+    const int foreign = hal_del_funct_from_thread("other", "t");
     rtapi_print_msg(1, "stopper: %d %d %d\n", stop, own, foreign);
     hal_exit(comp);
 }

@@ -10,16 +10,24 @@ namespace {
 struct Stuck : hal::Component {
     using Component::Component;
 
-    hal::Argument hangs_at_start{*this, "start", 0, "1: start() does not return", {.min = 0, .max = 1}};
+    hal::Argument hangs_at_start{
+        *this, "start", 0, "1: start() does not return", {.min = 0, .max = 1}};
 
-    hal::Argument takes_ms{*this, "takes", 0, "stop() announces 5 s, and returns after this time in ms; 0: it does not return", {.min = 0}};
+    hal::Argument takes_ms{
+        *this,
+        "takes",
+        0,
+        "stop() announces 5 s, and returns after this time in ms; 0: it does not return",
+        {.min = 0}};
 
     hal::Out<bool> out{*this, "out", "TRUE", {.safe = false}};
     hal::Function run{*this, "", &Stuck::step, "sets the output"};
 
     void start() {
         setup_time_.start();
-        while (hangs_at_start == 1) ::pause();
+        while (hangs_at_start == 1) {
+            ::pause();
+        }
     }
     void stop() noexcept {
         if (takes_ms > 0) {
@@ -27,7 +35,9 @@ struct Stuck : hal::Component {
             ::usleep(static_cast<useconds_t>(takes_ms) * 1000);
             return;
         }
-        while (true) ::pause();
+        while (true) {
+            ::pause();
+        }
     }
     void step(hal::Cycle) noexcept { out = true; }
 

@@ -17,12 +17,16 @@ struct Witness : hal::Component {
     hal::Function run{*this, "", &Witness::step, "counts"};
     hal::Emergency emergency{*this, &Witness::make_safe, "writes it down"};
 
-    void start(const hal_host&) { descriptor_ = ::open(file.get().c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0600); }
+    void start(const hal_host&) {
+        descriptor_ = ::open(file.get().c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0600);
+    }
     void stop() noexcept {
         char line[64];
         const int n = std::snprintf(line, sizeof line, "stop out=%g\n", out.get());
         write(line, static_cast<std::size_t>(n));
-        if (descriptor_ >= 0) ::close(descriptor_);
+        if (descriptor_ >= 0) {
+            ::close(descriptor_);
+        }
     }
     void step(hal::Cycle) noexcept {
         out = 5.0;
@@ -35,8 +39,9 @@ struct Witness : hal::Component {
 
 private:
     void write(const char* text, std::size_t size) const noexcept {
-        if (descriptor_ >= 0) [[maybe_unused]]
+        if (descriptor_ >= 0) [[maybe_unused]] {
             const ssize_t n = ::write(descriptor_, text, size);
+        }
     }
     int descriptor_ = -1;
 };

@@ -18,18 +18,20 @@ static struct gauge {
     hal_u32_t runs;
     hal_float_t gain;
     hal_real_t peak;
-} *gauge;
+}* gauge;
 static int component;
 
-static void update(void *arg, long period) {
-    struct gauge *const g = arg;
+static void update(void* arg, long period) {
+    struct gauge* const g = arg;
     (void)period;
     *g->out = *g->in * g->gain * FACTOR;
-    if (*g->out > hal_get_real(g->peak)) hal_set_real(g->peak, *g->out);
+    if (*g->out > hal_get_real(g->peak)) {
+        hal_set_real(g->peak, *g->out);
+    }
     ++g->runs;
 }
-static void count(void *arg, long period) {
-    struct gauge *const g = arg;
+static void count(void* arg, long period) {
+    struct gauge* const g = arg;
     (void)period;
     hal_set_si32(g->cycles, hal_get_si32(g->cycles) + 1);
 }

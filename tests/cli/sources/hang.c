@@ -5,15 +5,16 @@
 #include "hal.h"
 
 static struct hang {
-    hal_float_t *out;
-    hal_bit_t *loop;
-} *hang;
+    hal_float_t* out;
+    hal_bit_t* loop;
+}* hang;
 
 int main(void) {
     const int component = hal_init("hang");
     if (component < 0) return 1;
     hang = hal_malloc(sizeof *hang);
-    if (!hang || hal_pin_float_newf(HAL_OUT, &hang->out, component, "hang.out") || hal_pin_bit_newf(HAL_IN, &hang->loop, component, "hang.loop") ||
+    if (!hang || hal_pin_float_newf(HAL_OUT, &hang->out, component, "hang.out") ||
+        hal_pin_bit_newf(HAL_IN, &hang->loop, component, "hang.loop") ||
         halcyon_safe(component, "hang.out", -2) || halcyon_every(component, 100, 100)) {
         hal_exit(component);
         return 1;
@@ -22,7 +23,9 @@ int main(void) {
     for (;;) {
         halcyon_alive(component);
         *hang->out = 5;
-        while (*hang->loop) *hang->out = *hang->out + 1;
+        while (*hang->loop) {
+            *hang->out = *hang->out + 1;
+        }
         usleep(1000);
     }
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Runs a fuzz target over its corpus without libFuzzer: every file as it is, cut short at each of up to 64 places, and
-// with single bytes changed, so that any compiler and any sanitizer can repeat what a fuzzer once found.
+// Runs a fuzz target over its corpus without libFuzzer: every file as it is, cut short at each of
+// up to 64 places, and with single bytes changed, so that any compiler and any sanitizer can repeat
+// what a fuzzer once found.
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
@@ -43,7 +44,8 @@ void replay(const std::filesystem::path& file) {
 int main(int argc, char** argv) {
     std::size_t files = 0;
     for (int i = 1; i < argc; ++i) {
-        if (argv[i][0] == '-') continue;  // an option of libFuzzer: the same command line starts either program
+        // an option of libFuzzer: the same command line starts either program
+        if (argv[i][0] == '-') continue;
         if (std::filesystem::is_directory(argv[i])) {
             for (const auto& entry : std::filesystem::recursive_directory_iterator(argv[i])) {
                 if (!entry.is_regular_file()) continue;

@@ -7,7 +7,8 @@
 namespace hal::can_timing {
 namespace {
 
-constexpr std::int64_t us = 1000, ms = 1'000'000;
+constexpr std::int64_t us = 1000;
+constexpr std::int64_t ms = 1'000'000;
 
 can::Frame at(std::int64_t time, std::uint32_t id, std::initializer_list<std::uint8_t> bytes) {
     can::Frame f(id, bytes);
@@ -17,7 +18,10 @@ can::Frame at(std::int64_t time, std::uint32_t id, std::initializer_list<std::ui
 
 TEST(CanRecorded, Periodic_message_has_its_period_and_its_jitter) {
     std::vector<can::Frame> frames;
-    for (int i = 0; i < 100; ++i) frames.push_back(at(5000 * ms + i * 10 * ms + (i % 4 == 3 ? 400 * us : 0), 0x181, {1, 2, 3}));
+    for (int i = 0; i < 100; ++i) {
+        frames.push_back(
+            at(5000 * ms + i * 10 * ms + (i % 4 == 3 ? 400 * us : 0), 0x181, {1, 2, 3}));
+    }
     frames[7].length = 8;
     const auto found = recorded(frames);
     ASSERT_EQ(found.size(), 1U);
@@ -30,7 +34,9 @@ TEST(CanRecorded, Periodic_message_has_its_period_and_its_jitter) {
 
 TEST(CanRecorded, Irregular_message_has_its_shortest_distance) {
     std::vector<can::Frame> frames;
-    for (const std::int64_t time : {0, 3, 40, 41, 90, 200}) frames.push_back(at(time * ms, 0x80, {}));
+    for (const std::int64_t time : {0, 3, 40, 41, 90, 200}) {
+        frames.push_back(at(time * ms, 0x80, {}));
+    }
     const auto found = recorded(frames);
     ASSERT_EQ(found.size(), 1U);
     EXPECT_FALSE(found[0].periodic);
@@ -43,7 +49,8 @@ TEST(CanRecorded, Formats_are_separate_and_in_order_of_priority) {
     error.error = true;
     can::Frame extended = at(ms, 0x100, {});
     extended.extended = true;
-    const auto found = recorded(std::vector{error, at(2 * ms, 0x701, {5}), extended, at(3 * ms, 0x100, {}), can::Frame::request(0x100, 8)});
+    const auto found = recorded(std::vector{error, at(2 * ms, 0x701, {5}), extended,
+                                            at(3 * ms, 0x100, {}), can::Frame::request(0x100, 8)});
     ASSERT_EQ(found.size(), 4U);
     EXPECT_TRUE(found[0].message.extended);  // 100h in 29 bits begins with eleven zeros
     EXPECT_FALSE(found[1].message.remote);

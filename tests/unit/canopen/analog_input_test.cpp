@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The analogue-input block of CiA 404: scaling, views of one value in four families, zero, tare, deltas and limits.
+// The analogue-input block of CiA 404: scaling, views of one value in four families, zero, tare,
+// deltas and limits.
 #include "canopen/device/sensor/analog_input.hpp"
 #include "canopen/device/sensor/jr3.hpp"
 #include "device_bench.hpp"
@@ -15,7 +16,8 @@ struct Transmitter final : Program {
     Time stepped = 0;
 
     Description description() const override {
-        Description d = basic_device({.device_type = 0x00020194, .vendor = 1, .product = 2, .name = "transmitter"});
+        Description d = basic_device(
+            {.device_type = 0x00020194, .vendor = 1, .product = 2, .name = "transmitter"});
         const AnalogChannel channels[] = {{"Pressure", 40, 0x004e0000, 1}, {"Spare"}};
         add_analog_inputs(d, channels);
         PdoDescription p;
@@ -24,13 +26,23 @@ struct Transmitter final : Program {
         add_tpdo(d, 1, p);
         return d;
     }
-    void attach(Device& d) override { Program::attach(d), inputs.attach(d, 2); }
+    void attach(Device& d) override {
+        Program::attach(d);
+        inputs.attach(d, 2);
+    }
     void on_reset(bool application) noexcept override {
-        if (application) inputs.reset();
+        if (application) {
+            inputs.reset();
+        }
     }
     void step(Time now) noexcept override {
-        for (unsigned n = 0; n < 2; ++n) inputs.sample(n, field[n], counts, 0, now);
-        if (inputs.changed(0)) inputs.mark_sent(0), device_->pdos().trigger(1);
+        for (unsigned n = 0; n < 2; ++n) {
+            inputs.sample(n, field[n], counts, 0, now);
+        }
+        if (inputs.changed(0)) {
+            inputs.mark_sent(0);
+            device_->pdos().trigger(1);
+        }
     }
 };
 
@@ -38,15 +50,26 @@ struct AnalogInput : testing::Test {
     Transmitter program;
     Bench bench{program, {.node_id = 5, .pdo = {.send_at_start = false}}};
 
-    void SetUp() override { bench.start(), bench.run(5 * millisecond); }
-    void field(double value) { program.field[0] = value, bench.run(3 * millisecond); }
+    void SetUp() override {
+        bench.start();
+        bench.run(5 * millisecond);
+    }
+    void field(double value) {
+        program.field[0] = value;
+        bench.run(3 * millisecond);
+    }
     template <class T>
     void put(std::uint16_t index, T value, std::uint8_t sub = 1) {
         EXPECT_EQ(bench.write<T>(index, sub, value), Abort::none) << std::hex << index;
         bench.run(2 * millisecond);
     }
     float process() { return bench.read<float>(0x6130, 1); }
-    void two_points() { put(0x6120, 4.0F), put(0x6121, 0.0F), put(0x6122, 20.0F), put(0x6123, 400.0F); }
+    void two_points() {
+        put(0x6120, 4.0F);
+        put(0x6121, 0.0F);
+        put(0x6122, 20.0F);
+        put(0x6123, 400.0F);
+    }
     std::size_t sent() {
         const auto count = bench.sent(0x185).size();
         bench.forget();
@@ -65,7 +88,8 @@ TEST_F(AnalogInput, Starts_with_the_process_value_being_the_field_value) {
 
 TEST_F(AnalogInput, Two_points_make_the_line_through_them) {
     two_points();
-    for (const auto& [in, out] : {std::pair(4.0, 0.0F), {12.0, 200.0F}, {20.0, 400.0F}, {22.0, 450.0F}}) {
+    for (const auto& [in, out] :
+         {std::pair(4.0, 0.0F), {12.0, 200.0F}, {20.0, 400.0F}, {22.0, 450.0F}}) {
         field(in);
         EXPECT_NEAR(process(), out, 1e-3F);
     }
@@ -74,7 +98,8 @@ TEST_F(AnalogInput, Two_points_make_the_line_through_them) {
 }
 
 TEST_F(AnalogInput, Factor_and_scaling_offset_are_the_same_line) {
-    put(0x6126, 2.0F), put(0x6127, 5.0F);
+    put(0x6126, 2.0F);
+    put(0x6127, 5.0F);
     field(3);
     EXPECT_FLOAT_EQ(process(), 11.0F);
     EXPECT_FLOAT_EQ(bench.read<float>(0x6121, 1), 5.0F);
@@ -110,9 +135,14 @@ TEST_F(AnalogInput, What_is_written_by_one_family_is_seen_by_all) {
     const std::uint8_t minus_70[] = {0xba, 0xff, 0xff};
     EXPECT_EQ(bench.write(0x8124, 1, minus_70), Abort::none);
     EXPECT_FLOAT_EQ(bench.read<float>(0x6124, 1), -7.0F);
-    put(0x9120, std::int32_t{40}), put(0x9121, std::int32_t{0}), put(0x9122, std::int32_t{200}), put(0x9123, std::int32_t{4000});
+    put(0x9120, std::int32_t{40});
+    put(0x9121, std::int32_t{0});
+    put(0x9122, std::int32_t{200});
+
+    put(0x9123, std::int32_t{4000});
     EXPECT_NEAR(bench.read<float>(0x6126, 1), 25.0F, 1e-5F);
-    program.counts = -1234, field(1);
+    program.counts = -1234;
+    field(1);
     EXPECT_EQ(bench.read<std::int16_t>(0x7100, 1), -1234) << "the converter's own";
 }
 
@@ -146,22 +176,27 @@ TEST_F(AnalogInput, Channel_that_is_off_keeps_its_value_and_says_that_it_is_not_
 TEST_F(AnalogInput, Sample_rate_is_how_often_it_looks) {
     field(3);
     put(0x6114, std::uint32_t{50'000});
-    field(3), bench.run(60 * millisecond);
+    field(3);
+    bench.run(60 * millisecond);
     program.field[0] = 8;
     int taken = 0;
-    for (; taken < 100 && program.inputs.field(0) != 8; ++taken) bench.run(millisecond);
+    for (; taken < 100 && program.inputs.field(0) != 8; ++taken) {
+        bench.run(millisecond);
+    }
     EXPECT_GT(taken, 10);
     EXPECT_LE(taken, 51);
 }
 
 TEST_F(AnalogInput, Change_beyond_the_delta_sends_the_PDO_and_nothing_else_does) {
     put(0x6133, 2.0F);
-    field(0), sent();
+    field(0);
+    sent();
     field(1.9);
     EXPECT_EQ(sent(), 0U);
     field(2.1);
     EXPECT_EQ(sent(), 1U);
-    field(2.1), bench.run(100 * millisecond);
+    field(2.1);
+    bench.run(100 * millisecond);
     EXPECT_EQ(sent(), 0U);
     field(0.2);
     EXPECT_EQ(sent(), 0U);
@@ -172,8 +207,11 @@ TEST_F(AnalogInput, Change_beyond_the_delta_sends_the_PDO_and_nothing_else_does)
 }
 
 TEST_F(AnalogInput, Passing_a_limit_sends_the_PDO_once_each_way) {
-    put(0x6133, 1000.0F), put(0x6134, -5.0F), put(0x6135, 5.0F);
-    field(0), sent();
+    put(0x6133, 1000.0F);
+    put(0x6134, -5.0F);
+    put(0x6135, 5.0F);
+    field(0);
+    sent();
     field(4.9);
     EXPECT_EQ(sent(), 0U);
     field(5.1);
@@ -187,14 +225,18 @@ TEST_F(AnalogInput, Passing_a_limit_sends_the_PDO_once_each_way) {
 }
 
 TEST_F(AnalogInput, Numbers_that_are_none_are_refused) {
-    for (const std::uint16_t index : std::initializer_list<std::uint16_t>{0x6120, 0x6121, 0x6124, 0x6126, 0x6133, 0x6134, 0x6138}) {
-        EXPECT_EQ(bench.write<float>(index, 1, std::numeric_limits<float>::quiet_NaN()), Abort::value);
-        EXPECT_EQ(bench.write<float>(index, 1, std::numeric_limits<float>::infinity()), Abort::value);
+    for (const std::uint16_t index : std::initializer_list<std::uint16_t>{
+             0x6120, 0x6121, 0x6124, 0x6126, 0x6133, 0x6134, 0x6138}) {
+        EXPECT_EQ(bench.write<float>(index, 1, std::numeric_limits<float>::quiet_NaN()),
+                  Abort::value);
+        EXPECT_EQ(bench.write<float>(index, 1, std::numeric_limits<float>::infinity()),
+                  Abort::value);
     }
 }
 
 TEST_F(AnalogInput, Reset_of_the_node_brings_its_first_parameters_back) {
-    two_points(), put(0x6124, 7.0F);
+    two_points();
+    put(0x6124, 7.0F);
     bench.command(NmtCommand::reset_node);
     bench.command(NmtCommand::start);
     field(3);

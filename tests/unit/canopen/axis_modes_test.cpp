@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The axis of a master in its modes: targets, set-points, homing, velocity, and the sentences of its failures.
+// The axis of a master in its modes: targets, set-points, homing, velocity, and the sentences of
+// its failures.
 #include <gtest/gtest.h>
 
 #include "tests/unit/canopen/axis_stand_in.hpp"
@@ -11,7 +12,8 @@ TEST(Axis, Mode_is_followed_when_the_drive_shows_it) {
     Pair p;
     p.rules.max_step = 1;
     ASSERT_TRUE(p.enable());
-    p.command.mode = Mode::cyclic_velocity, p.command.velocity = 500;
+    p.command.mode = Mode::cyclic_velocity;
+    p.command.velocity = 500;
     p.cycle();
     EXPECT_FALSE(p.axis.active());
     EXPECT_EQ(0, p.last.target_velocity);
@@ -19,18 +21,22 @@ TEST(Axis, Mode_is_followed_when_the_drive_shows_it) {
     EXPECT_TRUE(p.axis.active());
     EXPECT_EQ(500, p.last.target_velocity);
     p.drive.answers_mode = false;
-    p.command.mode = Mode::cyclic_torque, p.command.torque = 100;
+    p.command.mode = Mode::cyclic_torque;
+    p.command.torque = 100;
     p.cycle(400);
     EXPECT_TRUE(p.axis.enabled());
     EXPECT_EQ(0, p.last.target_torque);
     p.cycle(110);
-    EXPECT_EQ("mode: drive does not accept mode cst, displays csv for 0.50 s (statusword 0x0237)", p.why());
+    EXPECT_EQ("mode: drive does not accept mode cst, displays csv for 0.50 s (statusword 0x0237)",
+              p.why());
 }
 
 TEST(Axis, Each_mode_has_its_target_and_its_bits) {
     const auto at = [](Mode mode) {
         Pair p;
-        p.command.mode = mode, p.command.velocity = 30, p.command.torque = 50;
+        p.command.mode = mode;
+        p.command.velocity = 30;
+        p.command.torque = 50;
         EXPECT_TRUE(p.enable()) << p.why();
         p.cycle(1000);
         p.command.halt = true;
@@ -62,17 +68,21 @@ TEST(Axis, Set_points_shake_hands) {
     p.command.go = true;
     p.cycle();
     EXPECT_EQ("go: the axis is not enabled", p.why());
-    p.command.go = false, p.command.reset = true;
+    p.command.go = false;
+    p.command.reset = true;
     p.cycle();
     ASSERT_TRUE(p.enable()) << p.why();
     p.cycle(2);
     p.words.clear();
-    p.command.position = 77, p.command.go = true;
+    p.command.position = 77;
+    p.command.go = true;
     p.cycle(3);
     EXPECT_EQ(77, p.last.target_position);
     EXPECT_FALSE(p.axis.target_reached());
-    p.command.go = false, p.cycle();
-    p.command.position = -5, p.command.relative = p.command.immediate = p.command.go = true;
+    p.command.go = false;
+    p.cycle();
+    p.command.position = -5;
+    p.command.relative = p.command.immediate = p.command.go = true;
     p.cycle(10);
     EXPECT_EQ(-5, p.last.target_position);
     EXPECT_EQ((std::vector<std::uint16_t>{0x0f, 0x1f, 0x0f, 0x6f, 0x7f, 0x0f}), p.words);
@@ -81,19 +91,28 @@ TEST(Axis, Set_points_shake_hands) {
     p.cycle(3);
     EXPECT_TRUE(p.axis.target_reached());
     p.drive.acknowledges = false;
-    p.command.go = false, p.cycle(), p.command.go = true;
+    p.command.go = false;
+    p.cycle();
+    p.command.go = true;
     p.cycle(600);
-    EXPECT_EQ("go: drive does not acknowledge the set-point for 0.50 s (statusword 0x0637)", p.why());
+    EXPECT_EQ("go: drive does not acknowledge the set-point for 0.50 s (statusword 0x0637)",
+              p.why());
 }
 
 TEST(Axis, Set_points_wait_while_the_drive_has_no_room) {
     SetPoints s;
     std::int32_t target = 0;
     Time now = 0;
-    const std::uint16_t busy = 0x0237, full = busy | status::set_point_acknowledge;
-    for (int i = 0; i < 16; ++i) EXPECT_TRUE(s.push({.target = i}));
+    const std::uint16_t busy = 0x0237;
+    const std::uint16_t full = busy | status::set_point_acknowledge;
+    for (int i = 0; i < 16; ++i) {
+        EXPECT_TRUE(s.push({.target = i}));
+    }
     EXPECT_FALSE(s.push({.target = 16}));
-    for (int i = 0; i < 10; ++i) EXPECT_EQ(0, s.step(full, now += second, second, target)) << "the set-point buffer of the drive is full: no failure";
+    for (int i = 0; i < 10; ++i) {
+        EXPECT_EQ(0, s.step(full, now += second, second, target))
+            << "the set-point buffer of the drive is full: no failure";
+    }
     EXPECT_FALSE(s.failure());
     EXPECT_EQ(0, s.step(busy, now += millisecond, second, target));
     EXPECT_EQ(control::new_set_point, s.step(busy, now += millisecond, second, target));
@@ -101,8 +120,11 @@ TEST(Axis, Set_points_wait_while_the_drive_has_no_room) {
     EXPECT_EQ(0, s.step(full, now += millisecond, second, target));
     EXPECT_TRUE(s.push({.target = 99, .immediate = true}));
     EXPECT_EQ(1u, s.waiting());
-    for (int i = 0; i < 8; ++i) s.step(full | status::target_reached, now += second, 2 * second, target);
-    EXPECT_EQ("go: drive does not clear its acknowledge for 2.00 s (statusword 0x1637)", text(s.failure()));
+    for (int i = 0; i < 8; ++i) {
+        s.step(full | status::target_reached, now += second, 2 * second, target);
+    }
+    EXPECT_EQ("go: drive does not clear its acknowledge for 2.00 s (statusword 0x1637)",
+              text(s.failure()));
 }
 
 struct HomingPair : Pair {
@@ -148,7 +170,9 @@ TEST(Axis, Homing_does_not_take_an_old_result_for_its_own) {
     p.drive.extra = status::homing_attained | status::target_reached;
     p.cycle(5);
     EXPECT_TRUE(p.axis.homed());
-    p.command.home = false, p.cycle(20), p.command.home = true;
+    p.command.home = false;
+    p.cycle(20);
+    p.command.home = true;
     p.cycle(520);  // method 37: done within the cycle, the result never left
     EXPECT_TRUE(p.axis.homed());
 }
@@ -189,7 +213,8 @@ TEST(Axis, Velocity_comes_from_the_position_when_the_drive_does_not_send_it) {
     p.drive.out.position += 5;
     p.cycle();
     EXPECT_DOUBLE_EQ(5.0, p.axis.velocity());
-    p.drive.out.has_velocity = true, p.drive.out.velocity = 70;
+    p.drive.out.has_velocity = true;
+    p.drive.out.velocity = 70;
     p.rules.velocity = {10, 1};
     p.cycle();
     EXPECT_DOUBLE_EQ(7.0, p.axis.velocity());
@@ -204,23 +229,34 @@ TEST(AxisFailure, Every_sentence_of_the_cycle_is_there_beforehand) {
     Pair p;
     p.drive.stuck_in = State::switched_on;
     p.enable();
-    EXPECT_STREQ(R"(enable: drive stays in "switched on" after "enable operation" for {} s; axis off)", sentences.find(p.axis.failure()));
+    EXPECT_STREQ(
+        R"(enable: drive stays in "switched on" after "enable operation" for {} s; axis off)",
+        sentences.find(p.axis.failure()));
     EXPECT_DOUBLE_EQ(0.5, Sentences::number(p.axis.failure()));
     Failure odd;
-    odd.cause = Cause::mode_rejected, odd.request = Request::mode, odd.mode = Mode::cyclic_position, odd.shown = static_cast<Mode>(-3);
-    EXPECT_STREQ("mode: drive does not accept mode csp, displays another for {} s; axis off", sentences.find(odd));
+    odd.cause = Cause::mode_rejected;
+    odd.request = Request::mode;
+    odd.mode = Mode::cyclic_position;
+
+    odd.shown = static_cast<Mode>(-3);
+    EXPECT_STREQ("mode: drive does not accept mode csp, displays another for {} s; axis off",
+                 sentences.find(odd));
     EXPECT_EQ("mode: drive does not accept mode csp, displays -3", sentence(odd));
     odd.shown = Mode::none;
-    EXPECT_STREQ("mode: drive does not accept mode csp, displays none for {} s; axis off", sentences.find(odd));
+    EXPECT_STREQ("mode: drive does not accept mode csp, displays none for {} s; axis off",
+                 sentences.find(odd));
     for (unsigned cause = 1; cause < causes; ++cause) {
         Failure f;
         f.cause = static_cast<Cause>(cause);
         f.request = f.cause == Cause::left || f.cause == Cause::step_rejected ? Request::run
-                    : f.cause == Cause::mode_rejected                          ? Request::mode
+                    : f.cause == Cause::mode_rejected                         ? Request::mode
                     : f.cause == Cause::homing_error                          ? Request::home
                     : f.cause == Cause::set_point                             ? Request::go
                                                                               : Request::enable;
-        f.before = State::operation_enabled, f.mode = Mode::cyclic_position, f.statusword = status::homing_error;
+        f.before = State::operation_enabled;
+        f.mode = Mode::cyclic_position;
+
+        f.statusword = status::homing_error;
         EXPECT_STRNE("the axis failed", sentences.find(f)) << cause;
     }
 }

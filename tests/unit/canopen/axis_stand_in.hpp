@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Simulates a drive with the CiA 402 state machine, one transition per cycle, and rejects the transitions that a test selects.
+// Simulates a drive with the CiA 402 state machine, one transition per cycle, and rejects the
+// transitions that a test selects.
 #pragma once
 
 #include <deque>
@@ -26,8 +27,12 @@ struct StandIn {
     std::vector<State> way;               ///< states since, without repetition
 
     void go(State next) {
-        if (state == stuck_in && next != State::fault && next != State::fault_reaction_active) return;
-        if (next != state) way.push_back(next);
+        if (state == stuck_in && next != State::fault && next != State::fault_reaction_active) {
+            return;
+        }
+        if (next != state) {
+            way.push_back(next);
+        }
         state = next;
     }
     void fail(std::uint16_t code) {
@@ -40,50 +45,89 @@ struct StandIn {
         const bool reset = (c & 0x80) != 0 && (last_ & 0x80) == 0;
         last_ = c;
         const unsigned low = c & 0x0f;
-        const bool disable = (low & 2) == 0, quick = (low & 6) == 2, shut = (low & 7) == 6, on = low == 7, enable = low == 15;
+        const bool disable = (low & 2) == 0;
+        const bool quick = (low & 6) == 2;
+        const bool shut = (low & 7) == 6;
+
+        const bool on = low == 7;
+        const bool enable = low == 15;
         using enum State;
         switch (state) {
         case not_ready_to_switch_on: go(switch_on_disabled); break;
         case switch_on_disabled:
-            if (shut) go(ready_to_switch_on);
+            if (shut) {
+                go(ready_to_switch_on);
+            }
             break;
         case ready_to_switch_on:
-            if (disable || quick) go(switch_on_disabled);
-            else if (on) go(switched_on);
+            if (disable || quick) {
+                go(switch_on_disabled);
+            } else if (on) {
+                go(switched_on);
+            }
             break;
         case switched_on:
-            if (disable || quick) go(switch_on_disabled);
-            else if (shut) go(ready_to_switch_on);
-            else if (enable) go(operation_enabled);
+            if (disable || quick) {
+                go(switch_on_disabled);
+            } else if (shut) {
+                go(ready_to_switch_on);
+            } else if (enable) {
+                go(operation_enabled);
+            }
             break;
         case operation_enabled:
-            if (disable) go(switch_on_disabled);
-            else if (quick) go(quick_stop_active);
-            else if (shut) go(ready_to_switch_on);
-            else if (on) go(switched_on);
+            if (disable) {
+                go(switch_on_disabled);
+            } else if (quick) {
+                go(quick_stop_active);
+            } else if (shut) {
+                go(ready_to_switch_on);
+            } else if (on) {
+                go(switched_on);
+            }
             break;
         case quick_stop_active:
-            if (disable || !stays_in_quick_stop) go(switch_on_disabled);
+            if (disable || !stays_in_quick_stop) {
+                go(switch_on_disabled);
+            }
             break;
         case fault_reaction_active: go(fault); break;
         case fault:
-            if (reset && error_code != 0xffff) error_code = 0, go(switch_on_disabled);
+            if (reset && error_code != 0xffff) {
+                error_code = 0;
+                go(switch_on_disabled);
+            }
             break;
         case unknown: break;
         }
-        if (answers_mode) out.mode = in.mode;
-        if (state == operation_enabled && follows && out.mode == Mode::cyclic_position) out.position = in.target_position;
-        if (acknowledges) acknowledge_ = (c & 0x10) != 0 && out.mode == Mode::profile_position;
+        if (answers_mode) {
+            out.mode = in.mode;
+        }
+        if (state == operation_enabled && follows && out.mode == Mode::cyclic_position) {
+            out.position = in.target_position;
+        }
+        if (acknowledges) {
+            acknowledge_ = (c & 0x10) != 0 && out.mode == Mode::profile_position;
+        }
         tell();
     }
     void tell() {
         std::uint16_t word = extra;
-        for (const auto& row : states)
-            if (row.state == state) word = static_cast<std::uint16_t>(word | row.value);
-        if (state != State::quick_stop_active && state != State::not_ready_to_switch_on) word |= status::not_quick_stop;
-        if (state != State::switch_on_disabled) word |= status::voltage_enabled;
+        for (const auto& row : states) {
+            if (row.state == state) {
+                word = static_cast<std::uint16_t>(word | row.value);
+            }
+        }
+        if (state != State::quick_stop_active && state != State::not_ready_to_switch_on) {
+            word |= status::not_quick_stop;
+        }
+        if (state != State::switch_on_disabled) {
+            word |= status::voltage_enabled;
+        }
         word |= status::remote;
-        if (acknowledge_) word |= status::set_point_acknowledge;
+        if (acknowledge_) {
+            word |= status::set_point_acknowledge;
+        }
         out.statusword = static_cast<std::uint16_t>(word & ~cleared);
         out.error_code = error_code;
     }
@@ -102,7 +146,7 @@ struct Pair {
     AxisRules rules;
     Time now = 0;
     std::vector<std::uint16_t> words;  ///< controlwords, without repetition
-    std::size_t delay = 0;             ///< cycles that orders and answers are on their way together
+    std::size_t delay = 0;  ///< cycles that orders and answers are on their way together
 
     Pair() {
         rules.limits = {500 * millisecond, second};
@@ -113,10 +157,15 @@ struct Pair {
         for (unsigned i = 0; i < count; ++i) {
             now += millisecond;
             const AxisOrders& orders = axis.step(drive.out, command, rules, now);
-            if (words.empty() || words.back() != orders.controlword) words.push_back(orders.controlword);
+            if (words.empty() || words.back() != orders.controlword) {
+                words.push_back(orders.controlword);
+            }
             last = orders;
             under_way_.push_back(orders);
-            if (under_way_.size() > delay) drive.step(under_way_.front()), under_way_.pop_front();
+            if (under_way_.size() > delay) {
+                drive.step(under_way_.front());
+                under_way_.pop_front();
+            }
         }
     }
     /// Cycles until `ready`, at most 20 000. False: never.

@@ -47,7 +47,8 @@ TEST(Axis, Enables_without_a_jump_and_joins_the_command_softly) {
     EXPECT_FALSE(p.axis.active());
     ASSERT_TRUE(p.enable()) << p.why();
     EXPECT_EQ(250'000, p.last.target_position);
-    std::int32_t before = p.last.target_position, farthest = 0;
+    std::int32_t before = p.last.target_position;
+    std::int32_t farthest = 0;
     while (p.last.target_position < 260'000) {
         p.cycle();
         farthest = std::max(farthest, p.last.target_position - before);
@@ -67,7 +68,10 @@ TEST(Axis, Position_is_endless_and_targets_wrap_as_the_drives_counter) {
     p.drive.out.position = std::numeric_limits<std::int32_t>::max() - 5;
     p.command.position = p.drive.out.position;
     ASSERT_TRUE(p.enable());
-    for (int i = 0; i < 10; ++i) p.command.position += 10, p.cycle(2);
+    for (int i = 0; i < 10; ++i) {
+        p.command.position += 10;
+        p.cycle(2);
+    }
     EXPECT_EQ(std::numeric_limits<std::int32_t>::min() + 94, p.last.target_position);
     EXPECT_DOUBLE_EQ(2147483742.0, p.axis.position());
     EXPECT_FALSE(p.axis.failure()) << p.why();
@@ -84,7 +88,8 @@ TEST(Axis, Refuses_a_command_elsewhere_at_enabling_and_one_that_steps) {
     p.rules.max_step = 0.5;
     p.command.position = 3;
     EXPECT_FALSE(p.enable());
-    EXPECT_EQ("enable: position-cmd is farther from position-fb than max-step (3, limit 0.5)", p.why());
+    EXPECT_EQ("enable: position-cmd is farther from position-fb than max-step (3, limit 0.5)",
+              p.why());
     EXPECT_EQ(0, p.last.target_position);
     p.command = {.reset = true, .mode = Mode::cyclic_position};
     p.cycle(20);
@@ -135,7 +140,8 @@ TEST(Axis, Refuses_what_is_no_number) {
     EXPECT_FALSE(r.enable());
     EXPECT_EQ("enable: a scale is 0 or not a number (0)", r.why());
     Pair s;
-    s.drive.out.position = 1000, s.command.position = 1000;
+    s.drive.out.position = 1000;
+    s.command.position = 1000;
     ASSERT_TRUE(s.enable()) << s.why();
     s.cycle(5);
     s.rules.position = {0, 1};
@@ -148,7 +154,9 @@ TEST(Axis, Names_the_failing_step_and_switches_off) {
     Pair p;
     p.drive.stuck_in = State::switched_on;
     EXPECT_FALSE(p.enable());
-    EXPECT_EQ(R"(enable: drive stays in "switched on" after "enable operation" for 0.50 s (statusword 0x0233))", p.why());
+    EXPECT_EQ(
+        R"(enable: drive stays in "switched on" after "enable operation" for 0.50 s (statusword 0x0233))",
+        p.why());
     p.drive.stuck_in = State::unknown;
     p.cycle(10);
     EXPECT_EQ(State::switch_on_disabled, p.drive.state);
@@ -169,7 +177,9 @@ TEST(Axis, Sees_that_the_drive_left_by_itself_or_failed) {
     p.drive.state = State::switched_on;
     p.drive.tell();
     p.cycle();
-    EXPECT_EQ(R"(run: drive left "operation enabled" for "switched on" without a command (statusword 0x0233))", p.why());
+    EXPECT_EQ(
+        R"(run: drive left "operation enabled" for "switched on" without a command (statusword 0x0233))",
+        p.why());
     Pair q;
     ASSERT_TRUE(q.enable());
     q.drive.state = State::fault_reaction_active;
@@ -178,7 +188,8 @@ TEST(Axis, Sees_that_the_drive_left_by_itself_or_failed) {
     q.drive.fail(error::following_error);
     q.drive.tell();
     q.cycle(2);
-    EXPECT_EQ("run: drive went into fault (statusword 0x023F, error 0x8611: following error)", q.why());
+    EXPECT_EQ("run: drive went into fault (statusword 0x023F, error 0x8611: following error)",
+              q.why());
     q.cycle(100);
     EXPECT_EQ(State::fault, q.drive.state);
     q.command.enable = false;
@@ -188,13 +199,15 @@ TEST(Axis, Sees_that_the_drive_left_by_itself_or_failed) {
     q.drive.fail(error::over_voltage);  // off, and all the same
     q.drive.tell();
     q.cycle();
-    EXPECT_EQ("enable: drive is in fault (statusword 0x0238, error 0x3210: DC link over-voltage)", q.why());
+    EXPECT_EQ("enable: drive is in fault (statusword 0x0238, error 0x3210: DC link over-voltage)",
+              q.why());
     q.rules.auto_reset = true;
     EXPECT_TRUE(q.enable()) << q.why();
 }
 
 TEST(Axis, Off_and_on_again_while_the_drive_is_slow_to_obey_is_no_failure) {
-    for (const unsigned off : {1U, 2U, 3U, 5U, 8U, 13U, 21U}) {  // cycles; statusword and controlword are each delayed by five
+    // cycles; statusword and controlword are each delayed by five
+    for (const unsigned off : {1U, 2U, 3U, 5U, 8U, 13U, 21U}) {
         Pair p;
         p.delay = 5;
         ASSERT_TRUE(p.enable()) << p.why();
@@ -205,9 +218,14 @@ TEST(Axis, Off_and_on_again_while_the_drive_is_slow_to_obey_is_no_failure) {
         p.cycle(100);
         EXPECT_TRUE(p.axis.enabled()) << off << ": " << p.why();
         EXPECT_EQ(State::operation_enabled, p.drive.state) << off;
-        p.drive.state = State::switched_on, p.drive.tell();  // the order from before is not taken for the cause twice
+        // the order from before is not taken for the cause twice
+        p.drive.state = State::switched_on;
+        p.drive.tell();
         p.cycle(10);
-        EXPECT_EQ(R"(run: drive left "operation enabled" for "switched on" without a command (statusword 0x0233))", p.why()) << off;
+        EXPECT_EQ(
+            R"(run: drive left "operation enabled" for "switched on" without a command (statusword 0x0233))",
+            p.why())
+            << off;
     }
     Pair q;  // nor for that of a fault
     q.delay = 5;
@@ -218,7 +236,8 @@ TEST(Axis, Off_and_on_again_while_the_drive_is_slow_to_obey_is_no_failure) {
     q.cycle(2);
     q.drive.fail(error::over_voltage);
     q.cycle(10);
-    EXPECT_EQ("run: drive went into fault (statusword 0x0238, error 0x3210: DC link over-voltage)", q.why());
+    EXPECT_EQ("run: drive went into fault (statusword 0x0238, error 0x3210: DC link over-voltage)",
+              q.why());
 }
 
 TEST(Axis, Reset_that_does_not_help_is_a_failure) {
@@ -227,8 +246,9 @@ TEST(Axis, Reset_that_does_not_help_is_a_failure) {
     p.cycle(2);
     p.command.reset = true;
     p.cycle(600);
-    EXPECT_EQ(R"(reset: drive stays in "fault" after "fault reset" for 0.50 s (statusword 0x0238, error 0xFFFF: device specific))",
-              p.why());
+    EXPECT_EQ(
+        R"(reset: drive stays in "fault" after "fault reset" for 0.50 s (statusword 0x0238, error 0xFFFF: device specific))",
+        p.why());
 }
 
 TEST(Axis, Node_lost_is_a_failure_and_takes_another_edge) {
@@ -247,7 +267,8 @@ TEST(Axis, Node_lost_is_a_failure_and_takes_another_edge) {
     p.drive.out.operational = true;
     p.cycle(100);
     EXPECT_FALSE(p.axis.enabled());
-    p.command.enable = false, p.command.reset = true;
+    p.command.enable = false;
+    p.command.reset = true;
     p.cycle();
     EXPECT_TRUE(p.enable()) << p.why();
 }

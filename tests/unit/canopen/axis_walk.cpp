@@ -25,10 +25,15 @@ Ride walk(StandIn& drive, State wanted, Request request = Request::enable, int c
     walk.want(wanted, request);
     AxisOrders orders;
     for (Time now = 0; now < cycles * millisecond; now += millisecond) {
-        orders.controlword = walk.step(drive.out.statusword, drive.out.error_code, now, {500 * millisecond, second});
-        if (ride.words.empty() || ride.words.back() != orders.controlword) ride.words.push_back(orders.controlword);
+        orders.controlword =
+            walk.step(drive.out.statusword, drive.out.error_code, now, {500 * millisecond, second});
+        if (ride.words.empty() || ride.words.back() != orders.controlword) {
+            ride.words.push_back(orders.controlword);
+        }
         ride.reached = walk.reached();
-        if (!ride.failure) ride.failure = walk.failure();
+        if (!ride.failure) {
+            ride.failure = walk.failure();
+        }
         drive.step(orders);
     }
     ride.way = drive.way;
@@ -46,21 +51,33 @@ TEST(AxisWalk, Goes_from_every_state_to_every_wanted_one) {
         States way;
         Words words;
     } rows[] = {
-        {not_ready_to_switch_on, operation_enabled, {switch_on_disabled, ready_to_switch_on, switched_on, operation_enabled}, {0, 6, 7, 15}},
+        {not_ready_to_switch_on,
+         operation_enabled,
+         {switch_on_disabled, ready_to_switch_on, switched_on, operation_enabled},
+         {0, 6, 7, 15}},
         {switch_on_disabled, ready_to_switch_on, {ready_to_switch_on}, {6}},
         {switch_on_disabled, switched_on, {ready_to_switch_on, switched_on}, {6, 7}},
-        {switch_on_disabled, operation_enabled, {ready_to_switch_on, switched_on, operation_enabled}, {6, 7, 15}},
+        {switch_on_disabled,
+         operation_enabled,
+         {ready_to_switch_on, switched_on, operation_enabled},
+         {6, 7, 15}},
         {ready_to_switch_on, switch_on_disabled, {switch_on_disabled}, {0}},
         {ready_to_switch_on, operation_enabled, {switched_on, operation_enabled}, {7, 15}},
         {switched_on, switch_on_disabled, {ready_to_switch_on, switch_on_disabled}, {6, 0}},
         {switched_on, ready_to_switch_on, {ready_to_switch_on}, {6}},
         {switched_on, operation_enabled, {operation_enabled}, {15}},
-        {operation_enabled, switch_on_disabled, {switched_on, ready_to_switch_on, switch_on_disabled}, {7, 6, 0}},
+        {operation_enabled,
+         switch_on_disabled,
+         {switched_on, ready_to_switch_on, switch_on_disabled},
+         {7, 6, 0}},
         {operation_enabled, ready_to_switch_on, {switched_on, ready_to_switch_on}, {7, 6}},
         {operation_enabled, switched_on, {switched_on}, {7}},
         {operation_enabled, quick_stop_active, {quick_stop_active, switch_on_disabled}, {2}},
         {quick_stop_active, switch_on_disabled, {switch_on_disabled}, {2, 0}},
-        {quick_stop_active, operation_enabled, {switch_on_disabled, ready_to_switch_on, switched_on, operation_enabled}, {15, 6, 7, 15}},
+        {quick_stop_active,
+         operation_enabled,
+         {switch_on_disabled, ready_to_switch_on, switched_on, operation_enabled},
+         {15, 6, 7, 15}},
         {switch_on_disabled, quick_stop_active, {}, {2}},
         {fault, switch_on_disabled, {}, {0}},
     };
@@ -106,18 +123,21 @@ TEST(AxisWalk, Says_what_the_other_bits_hint_at) {
     StandIn drive;
     drive.state = drive.stuck_in = switched_on;
     drive.cleared = status::remote;
-    EXPECT_EQ(R"(enable: drive stays in "switched on" after "enable operation" for 0.50 s (statusword 0x0033); remote is 0: the drive is under local control)",
-              text(walk(drive, operation_enabled).failure));
+    EXPECT_EQ(
+        R"(enable: drive stays in "switched on" after "enable operation" for 0.50 s (statusword 0x0033); remote is 0: the drive is under local control)",
+        text(walk(drive, operation_enabled).failure));
     StandIn silent;
     silent.state = silent.stuck_in = not_ready_to_switch_on;
     silent.cleared = 0xffff;
-    EXPECT_EQ(R"(enable: drive stays in "not ready to switch on" for 0.50 s (statusword 0x0000); check that the statusword is received)",
-              text(walk(silent, operation_enabled).failure));
+    EXPECT_EQ(
+        R"(enable: drive stays in "not ready to switch on" for 0.50 s (statusword 0x0000); check that the statusword is received)",
+        text(walk(silent, operation_enabled).failure));
     StandIn odd;
     odd.state = unknown;
     odd.extra = 0x0001;
     odd.cleared = 0x0030;
-    EXPECT_EQ(R"(enable: drive shows an undefined state for 0.50 s (statusword 0x0201))", text(walk(odd, operation_enabled).failure));
+    EXPECT_EQ(R"(enable: drive shows an undefined state for 0.50 s (statusword 0x0201))",
+              text(walk(odd, operation_enabled).failure));
 }
 
 TEST(AxisWalk, Disables_the_voltage_when_the_ramp_takes_too_long) {
@@ -128,9 +148,12 @@ TEST(AxisWalk, Disables_the_voltage_when_the_ramp_takes_too_long) {
     walk.want(switch_on_disabled, Request::disable);
     Words words;
     drive.tell();
-    for (Time now = 0; now < 1100 * millisecond; now += millisecond)  // it brakes for ever
-        if (const auto w = walk.step(drive.out.statusword, 0, now, {500 * millisecond,
-            second}); words.empty() || words.back() != w) words.push_back(w);
+    for (Time now = 0; now < 1100 * millisecond; now += millisecond) {  // it brakes for ever
+        if (const auto w = walk.step(drive.out.statusword, 0, now, {500 * millisecond, second});
+            words.empty() || words.back() != w) {
+            words.push_back(w);
+        }
+    }
     EXPECT_EQ((Words{7, 0}), words);
     EXPECT_EQ(Cause::stays, walk.failure().cause);
     drive.step({.controlword = 0});
@@ -162,8 +185,9 @@ TEST(AxisWalk, Stops_at_a_fault_and_says_which_step_led_there) {
     drive.fail(error::position_sensor);
     drive.tell();
     EXPECT_EQ(0, walk.step(drive.out.statusword, drive.out.error_code, millisecond, {}));
-    EXPECT_EQ(R"(enable: drive went into fault after "enable operation" (statusword 0x0238, error 0x7305: incremental sensor 1))",
-              text(walk.failure()));
+    EXPECT_EQ(
+        R"(enable: drive went into fault after "enable operation" (statusword 0x0238, error 0x7305: incremental sensor 1))",
+        text(walk.failure()));
     walk.want(switch_on_disabled, Request::disable);
     walk.step(drive.out.statusword, drive.out.error_code, 2 * millisecond, {});
     EXPECT_TRUE(walk.reached());
@@ -179,8 +203,11 @@ TEST(AxisWalk, Resets_a_fault_by_an_edge) {
     Time now = 0;
     const auto run = [&](int cycles) {
         for (int i = 0; i < cycles; ++i) {
-            const auto w = walk.step(drive.out.statusword, drive.out.error_code, now += millisecond, {500 * millisecond, second});
-            if (words.empty() || words.back() != w) words.push_back(w);
+            const auto w = walk.step(drive.out.statusword, drive.out.error_code, now += millisecond,
+                                     {500 * millisecond, second});
+            if (words.empty() || words.back() != w) {
+                words.push_back(w);
+            }
             drive.step({.controlword = w});
         }
     };
@@ -192,8 +219,9 @@ TEST(AxisWalk, Resets_a_fault_by_an_edge) {
     drive.tell();
     walk.reset_fault();
     run(600);
-    EXPECT_EQ(R"(reset: drive stays in "fault" after "fault reset" for 0.50 s (statusword 0x0238, error 0xFFFF: device specific))",
-              text(walk.failure()));
+    EXPECT_EQ(
+        R"(reset: drive stays in "fault" after "fault reset" for 0.50 s (statusword 0x0238, error 0xFFFF: device specific))",
+        text(walk.failure()));
     EXPECT_FALSE(walk.resetting());
 }
 

@@ -8,7 +8,9 @@ namespace {
 
 TEST(BootNetwork, Stops_all_nodes_on_stop_all_and_leaves_them_stopped) {
     Three b([](std::uint8_t id, NodeSetup& n) {
-        if (id == 6) n.on_loss = Reaction::stop_all;
+        if (id == 6) {
+            n.on_loss = Reaction::stop_all;
+        }
     });
     b.power();
     b.start();
@@ -20,12 +22,14 @@ TEST(BootNetwork, Stops_all_nodes_on_stop_all_and_leaves_them_stopped) {
     EXPECT_EQ(b.state(2), NmtState::stopped);
     EXPECT_EQ(b.own->state(), NmtState::pre_operational);
     EXPECT_EQ(b.master->sentence(),
-              "the network is failed: node 6 sent no heartbeat within its timeout: check its power and cable; all nodes were stopped");
+              "the network is failed: node 6 sent no heartbeat within its timeout: check its power "
+              "and cable; all nodes were stopped");
     EXPECT_EQ(b.master->sentence(5), "node 5 was stopped because of another node");
     b.stations[1]->plug(true, b.now);
     b.run(2 * second);
     EXPECT_EQ(b.state(1), NmtState::pre_operational);
-    b.stations[0]->device.command(NmtCommand::start, b.now);  // who starts by himself is stopped again
+    // who starts by himself is stopped again
+    b.stations[0]->device.command(NmtCommand::start, b.now);
     b.run(200 * millisecond);
     EXPECT_EQ(b.state(0), NmtState::stopped);
     b.master->start(b.now);
@@ -34,7 +38,10 @@ TEST(BootNetwork, Stops_all_nodes_on_stop_all_and_leaves_them_stopped) {
 
 TEST(BootNetwork, Resets_all_nodes_up_to_the_limit_and_then_stops_them) {
     Three b([](std::uint8_t id, NodeSetup& n) {
-        if (id == 6) n.on_failure = Reaction::reset_all, n.product = 99;
+        if (id == 6) {
+            n.on_failure = Reaction::reset_all;
+            n.product = 99;
+        }
     });
     b.power();
     b.start();
@@ -83,13 +90,17 @@ TEST(BootNetwork, Carries_out_commands) {
 
     EXPECT_TRUE(b.master->command(NmtCommand::enter_pre_operational, 0, b.now));
     b.run(500 * millisecond);
-    for (std::size_t n = 0; n < 3; ++n) EXPECT_EQ(b.state(n), NmtState::pre_operational);
+    for (std::size_t n = 0; n < 3; ++n) {
+        EXPECT_EQ(b.state(n), NmtState::pre_operational);
+    }
     EXPECT_TRUE(b.master->command(NmtCommand::start, 0, b.now));
     ASSERT_TRUE(b.operational(second));
 
     b.master->stop(b.now);
     b.run(500 * millisecond);
-    for (std::size_t n = 0; n < 3; ++n) EXPECT_EQ(b.state(n), NmtState::stopped);
+    for (std::size_t n = 0; n < 3; ++n) {
+        EXPECT_EQ(b.state(n), NmtState::stopped);
+    }
     EXPECT_EQ(b.master->sentence(), "the network is stopped: by command; 'start' boots it");
     b.master->start(b.now);
     EXPECT_TRUE(b.operational(second));
@@ -115,20 +126,29 @@ TEST(BootNetwork, Does_not_configure_nodes_that_are_only_supervised) {
     Three b([](std::uint8_t id, NodeSetup& n) {
         n.configure = false;
         n.writes = {object_write(0x2000, 0, std::uint32_t{9})};
-        if (id == 6) n.heartbeat_limit = -1;
-        if (id == 7) n.heartbeat_limit = 300 * millisecond, n.on_failure = Reaction::nothing;
+        if (id == 6) {
+            n.heartbeat_limit = -1;
+        }
+        if (id == 7) {
+            n.heartbeat_limit = 300 * millisecond;
+            n.on_failure = Reaction::nothing;
+        }
     });
-    b.stations[0]->device.dictionary().set<std::uint16_t>(0x1017, 0, 30);  // sends a heartbeat of its own
+    // sends a heartbeat of its own
+    b.stations[0]->device.dictionary().set<std::uint16_t>(0x1017, 0, 30);
     b.stations[0]->device.dictionary().keep(0x1000, 0x1fff, false);
     b.power();
     b.start();
     ASSERT_TRUE(b.until([&] { return b.status(7).step == Step::failed; }));
-    for (std::size_t n = 0; n < 3; ++n) EXPECT_EQ(b.value(n, 0x2000, 0), 0x12345678U);
+    for (std::size_t n = 0; n < 3; ++n) {
+        EXPECT_EQ(b.value(n, 0x2000, 0), 0x12345678U);
+    }
     EXPECT_EQ(b.value(1, 0x1017, 0), 0U);
     EXPECT_TRUE(b.status(5).operational);
     EXPECT_EQ(b.status(5).notes, 0);
     EXPECT_TRUE(b.status(6).operational);  // as far as can be known
-    EXPECT_EQ(note_sentences(b.setup.nodes[1], b.status(6))[0], "node 6 is not supervised: its loss will not be detected");
+    EXPECT_EQ(note_sentences(b.setup.nodes[1], b.status(6))[0],
+              "node 6 is not supervised: its loss will not be detected");
     EXPECT_EQ(b.state(1), NmtState::operational);
     EXPECT_EQ(b.status(7).result, BootResult::watching);
     b.stations[0]->plug(false, b.now);
@@ -136,8 +156,10 @@ TEST(BootNetwork, Does_not_configure_nodes_that_are_only_supervised) {
 }
 
 TEST(MasterObjects, Show_the_setup_and_accept_commands) {
-    Three b([](std::uint8_t id, NodeSetup& n) { n.mandatory = id != 7, n.guard_ms = id == 7 ? 100 : 0; },
-            [](MasterSetup& s) { s.nmt_inhibit = millisecond; });
+    Three b([](std::uint8_t id, NodeSetup& n) {
+        n.mandatory = id != 7;
+        n.guard_ms = id == 7 ? 100 : 0;
+    }, [](MasterSetup& s) { s.nmt_inhibit = millisecond; });
     Description d;
     add_master_objects(d, b.setup);
     Dictionary dictionary(d);
@@ -160,7 +182,9 @@ TEST(MasterObjects, Show_the_setup_and_accept_commands) {
         EXPECT_EQ(dictionary.read(0x1f82, id, room, size), Abort::none);
         return room[0];
     };
-    const auto request = [&](std::uint8_t id, std::uint8_t what) { return dictionary.write(0x1f82, id, std::span(&what, 1)); };
+    const auto request = [&](std::uint8_t id, std::uint8_t what) {
+        return dictionary.write(0x1f82, id, std::span(&what, 1));
+    };
     EXPECT_EQ(state(6), 1);  // missing
     b.power();
     b.start();
@@ -181,7 +205,9 @@ TEST(MasterObjects, Show_the_setup_and_accept_commands) {
     EXPECT_EQ(b.stations[1]->resets.size(), 3U);
     EXPECT_EQ(request(128, 127), Abort::none);
     b.run(second);
-    for (std::size_t n = 0; n < 3; ++n) EXPECT_EQ(b.state(n), NmtState::pre_operational);
+    for (std::size_t n = 0; n < 3; ++n) {
+        EXPECT_EQ(b.state(n), NmtState::pre_operational);
+    }
     EXPECT_EQ(request(6, 3), Abort::value);
     EXPECT_EQ(request(9, 5), Abort::no_sub);
 }

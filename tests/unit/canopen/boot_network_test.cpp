@@ -28,7 +28,8 @@ TEST(BootNetwork, Starts_nodes_in_their_start_order) {
 
 TEST(BootNetwork, Starts_all_nodes_with_one_command_once_all_mandatory_nodes_are_ready) {
     Three b({}, [](MasterSetup& s) { s.start_all_at_once = true; });
-    b.stations[0]->plug(true, b.now), b.stations[1]->plug(true, b.now);
+    b.stations[0]->plug(true, b.now);
+    b.stations[1]->plug(true, b.now);
     b.start();
     b.run(2 * second);
     EXPECT_TRUE(b.started().empty());
@@ -40,7 +41,11 @@ TEST(BootNetwork, Starts_all_nodes_with_one_command_once_all_mandatory_nodes_are
 
 TEST(BootNetwork, Does_not_start_nodes_that_are_not_ready_or_removed) {
     Three b([](std::uint8_t id, NodeSetup& n) {
-        if (id == 6) n.vendor = 99, n.mandatory = false, n.on_failure = Reaction::nothing;
+        if (id == 6) {
+            n.vendor = 99;
+            n.mandatory = false;
+            n.on_failure = Reaction::nothing;
+        }
     }, [](MasterSetup& s) { s.start_all_at_once = true; });
     b.power();
     b.start();
@@ -64,20 +69,24 @@ TEST(BootNetwork, Leaves_the_start_to_others_when_so_configured) {
 
 TEST(BootNetwork, Does_not_wait_for_an_optional_node) {
     Three b([](std::uint8_t id, NodeSetup& n) { n.mandatory = id != 6; });
-    b.stations[0]->plug(true, b.now), b.stations[2]->plug(true, b.now);
+    b.stations[0]->plug(true, b.now);
+    b.stations[2]->plug(true, b.now);
     b.start();
     ASSERT_TRUE(b.operational(second));
     EXPECT_FALSE(b.status(6).operational);
     b.run(20 * second);
     EXPECT_EQ(b.status(6).result, BootResult::no_answer);
     b.stations[1]->plug(true, b.now);
-    ASSERT_TRUE(b.until([&] { return b.status(6).operational; }, second));  // its boot-up message is enough
+    // its boot-up message is enough
+    ASSERT_TRUE(b.until([&] { return b.status(6).operational; }, second));
     EXPECT_EQ(b.networks, (std::vector{NetworkState::booting, NetworkState::operational}));
 }
 
 TEST(BootNetwork, Does_not_reset_a_mismatching_device_and_keeps_looking_for_the_right_one) {
     Three b([](std::uint8_t id, NodeSetup& n) {
-        if (id == 6) n.product = 99;
+        if (id == 6) {
+            n.product = 99;
+        }
     });
     b.power();
     b.start();
@@ -85,20 +94,24 @@ TEST(BootNetwork, Does_not_reset_a_mismatching_device_and_keeps_looking_for_the_
     EXPECT_EQ(b.stations[1]->resets.size(), 1U);  // that at the start
     EXPECT_GT(b.status(6).attempts, 3U);
     EXPECT_EQ(b.status(6).result, BootResult::product);
-    store(b.stations[1]->device.dictionary().find(0x1018, 2)->data, std::uint32_t{99});  // the right one is fitted
+    // the right one is fitted
+    store(b.stations[1]->device.dictionary().find(0x1018, 2)->data, std::uint32_t{99});
     EXPECT_TRUE(b.operational(5 * second));
 }
 
 TEST(BootNetwork, Waits_for_a_mandatory_node_and_names_it) {
     Three b;
-    b.stations[0]->plug(true, b.now), b.stations[2]->plug(true, b.now);
+    b.stations[0]->plug(true, b.now);
+    b.stations[2]->plug(true, b.now);
     b.start();
     b.run(30 * second);
     EXPECT_EQ(b.master->status().state, NetworkState::booting);
     EXPECT_EQ(b.master->status().node, 6);
-    EXPECT_EQ(progress(b.master->status()), "booting: 2 of 3 nodes operational, 1 failed or waiting");
+    EXPECT_EQ(progress(b.master->status()),
+              "booting: 2 of 3 nodes operational, 1 failed or waiting");
     EXPECT_EQ(b.master->sentence(),
-              "the network is booting: node 6 does not respond (1000:0): check its power, cable, bit rate and node ID; 'hal can scan' "
+              "the network is booting: node 6 does not respond (1000:0): check its power, cable, "
+              "bit rate and node ID; 'hal can scan' "
               "lists the nodes that respond [result B, no response]; retrying");
     b.stations[1]->plug(true, b.now);
     EXPECT_TRUE(b.operational(second));
@@ -110,7 +123,8 @@ TEST(BootNetwork, Limits_the_number_of_nodes_booted_at_a_time) {
     b.start();
     unsigned most = 0;
     ASSERT_TRUE(b.until([&] {
-        most = std::max<unsigned>(most, static_cast<unsigned>(std::ranges::count_if(b.setup.nodes, [&](const NodeSetup& n) {
+        most = std::max<unsigned>(most, static_cast<unsigned>(std::ranges::count_if(
+                                            b.setup.nodes, [&](const NodeSetup& n) {
             const auto step = b.status(n.id).step;
             return step >= Step::resetting && step <= Step::watching;
         })));
@@ -127,10 +141,14 @@ TEST(BootNetwork, Keeps_the_NMT_inhibit_time_between_commands) {
     std::size_t seen = 0;
     while (b.master->status().state != NetworkState::operational && b.now < 5 * second) {
         b.step();
-        for (; seen < b.bus.sent(0).size(); ++seen) at.push_back(b.now);
+        for (; seen < b.bus.sent(0).size(); ++seen) {
+            at.push_back(b.now);
+        }
     }
     ASSERT_EQ(at.size(), 4U);
-    for (std::size_t n = 1; n < at.size(); ++n) EXPECT_GE(at[n] - at[n - 1] + b.dt, 5 * millisecond);
+    for (std::size_t n = 1; n < at.size(); ++n) {
+        EXPECT_GE(at[n] - at[n - 1] + b.dt, 5 * millisecond);
+    }
 }
 
 TEST(BootNetwork, Reports_emergencies_and_keeps_the_newest) {

@@ -6,7 +6,8 @@ namespace hal::canopen::test {
 namespace {
 
 TEST(BootNetwork, Reboots_a_power_cycled_node_while_the_others_run) {
-    Three b([](std::uint8_t, NodeSetup& n) { n.writes = {object_write(0x2000, 0, std::uint32_t{9})}; });
+    Three b(
+        [](std::uint8_t, NodeSetup& n) { n.writes = {object_write(0x2000, 0, std::uint32_t{9})}; });
     b.power();
     b.start();
     ASSERT_TRUE(b.operational());
@@ -27,7 +28,8 @@ TEST(BootNetwork, Reboots_a_power_cycled_node_while_the_others_run) {
     ASSERT_TRUE(b.until([&] { return !b.status(6).online; }));
     EXPECT_LE(b.now - off, 125 * millisecond + 2 * b.dt);
     EXPECT_EQ(b.master->sentence(),
-              "the network is degraded: node 6 sent no heartbeat within its timeout: check its power and cable; retrying");
+              "the network is degraded: node 6 sent no heartbeat within its timeout: check its "
+              "power and cable; retrying");
     b.run(20 * second);
     b.stations[1]->plug(true, b.now);
     ASSERT_TRUE(b.operational(second));
@@ -46,8 +48,10 @@ TEST(BootNetwork, Reboots_a_node_that_left_operational_or_was_unplugged) {
     b.stations[0]->device.command(NmtCommand::enter_pre_operational, b.now);
     ASSERT_TRUE(b.until([&] { return b.status(5).losses == 1; }, second));
     EXPECT_EQ(b.status(5).cause, Cause::left_operational);
-    EXPECT_EQ(b.master->sentence(5), "node 5 left the operational state without a command from this master and is pre-operational: check "
-                                     "the node, and the bus for another NMT master");
+    EXPECT_EQ(b.master->sentence(5),
+              "node 5 left the operational state without a command from this master and is "
+              "pre-operational: check "
+              "the node, and the bus for another NMT master");
     ASSERT_TRUE(b.until([&] { return b.status(5).operational; }, second));
     // The cable: the device goes on as if nothing were.
     auto& s = *b.stations[2];
@@ -67,7 +71,10 @@ TEST(BootNetwork, Backs_off_from_a_node_that_reboots_repeatedly) {
     const auto attempts = b.status(6).attempts;
     const auto questions = b.bus.sent(0x606).size();
     b.stations[1]->delay = 4 * millisecond;  // no boot is over before the next of them
-    for (int n = 0; n < 3000; ++n) b.bus.inject(boot_up, b.now), b.run(10 * millisecond);
+    for (int n = 0; n < 3000; ++n) {
+        b.bus.inject(boot_up, b.now);
+        b.run(10 * millisecond);
+    }
     EXPECT_LE(b.status(6).attempts - attempts, 40U);
     EXPECT_LE(b.bus.sent(0x606).size() - questions, 40U * 9 * 6);
     EXPECT_EQ(b.status(6).cause, Cause::restarting);
@@ -79,7 +86,10 @@ TEST(BootNetwork, Backs_off_from_a_node_that_reboots_repeatedly) {
 TEST(BootNetwork, Boots_despite_repeated_and_missing_boot_up_messages) {
     Three b;
     b.stations[0]->tamper = [&](const Frame& f) {
-        if (f.id == 0x705 && f.data[0] == 0) b.stations[0]->wire.push(f), b.stations[0]->wire.push(f);
+        if (f.id == 0x705 && f.data[0] == 0) {
+            b.stations[0]->wire.push(f);
+            b.stations[0]->wire.push(f);
+        }
         return true;
     };
     b.stations[1]->tamper = [](const Frame& f) { return f.id != 0x706 || f.data[0] != 0; };
@@ -93,10 +103,14 @@ TEST(BootNetwork, Boots_despite_repeated_and_missing_boot_up_messages) {
 TEST(BootNetwork, Boots_despite_power_cycles_at_any_moment_of_the_boot) {
     for (int moment = 1; moment < 40; ++moment) {
         Three b([](std::uint8_t, NodeSetup& n) {
-            for (std::uint8_t sub = 1; sub <= 4; ++sub) n.writes.push_back(object_write(0x2008, sub, std::uint8_t{9}));
+            for (std::uint8_t sub = 1; sub <= 4; ++sub) {
+                n.writes.push_back(object_write(0x2008, sub, std::uint8_t{9}));
+            }
             n.writes[0] = object_write(0x2000, 0, std::uint32_t{9});
         });
-        for (std::uint8_t sub = 1; sub <= 4; ++sub) b.stations[1]->device.dictionary().find(0x2008, sub)->access = Access::read_write;
+        for (std::uint8_t sub = 1; sub <= 4; ++sub) {
+            b.stations[1]->device.dictionary().find(0x2008, sub)->access = Access::read_write;
+        }
         b.bus.logging = false;
         b.power();
         auto& s = *b.stations[1];
@@ -106,7 +120,8 @@ TEST(BootNetwork, Boots_despite_power_cycles_at_any_moment_of_the_boot) {
         s.plug(false, b.now);
         b.run(moment % 3 == 0 ? 700 * millisecond : 30 * millisecond);
         s.plug(true, b.now);
-        ASSERT_TRUE(b.operational(20 * second)) << "moment " << moment << ": " << b.master->sentence() << " " << b.way(6);
+        ASSERT_TRUE(b.operational(20 * second))
+            << "moment " << moment << ": " << b.master->sentence() << " " << b.way(6);
         EXPECT_EQ(b.value(1, 0x2000, 0), 9U);
     }
 }
@@ -116,8 +131,12 @@ TEST(BootNetwork, Boots_a_node_that_stays_in_initialising) {
     bool told = false;
     b.stations[1]->tamper = [&](Frame& f) {
         if (f.id != 0x706) return true;
-        told = told || std::ranges::any_of(b.bus.sent(0), [](const Frame& c) { return c.data[0] == 0x80 && c.data[1] == 6; });
-        if (!told && f.data[0] == 0x7f) f.data[0] = 0;
+        told = told || std::ranges::any_of(b.bus.sent(0), [](const Frame& c) {
+            return c.data[0] == 0x80 && c.data[1] == 6;
+        });
+        if (!told && f.data[0] == 0x7f) {
+            f.data[0] = 0;
+        }
         return true;
     };
     b.power();
@@ -129,10 +148,14 @@ TEST(BootNetwork, Boots_a_node_that_stays_in_initialising) {
 TEST(BootNetwork, Boots_despite_late_responses_and_stale_aborts) {
     Three b;
     b.stations[0]->delay = 45 * millisecond;  // just in time
-    b.stations[1]->delay = 70 * millisecond;  // each answer comes after the question was asked again
+    // each answer comes after the question was asked again
+    b.stations[1]->delay = 70 * millisecond;
     int aborts = 0;
-    b.stations[2]->tamper = [&](const Frame& f) {  // an abort of an earlier transfer goes ahead of every answer
-        if (f.id == 0x587 && ++aborts > 1) b.stations[2]->wire.push({0x587, {0x80, 0x06, 0x20, 0, 1, 0, 4, 5}});
+    // an abort of an earlier transfer goes ahead of every answer
+    b.stations[2]->tamper = [&](const Frame& f) {
+        if (f.id == 0x587 && ++aborts > 1) {
+            b.stations[2]->wire.push({0x587, {0x80, 0x06, 0x20, 0, 1, 0, 4, 5}});
+        }
         return true;
     };
     b.power();
@@ -144,31 +167,43 @@ TEST(BootNetwork, Boots_despite_late_responses_and_stale_aborts) {
 
 TEST(BootNetwork, Reports_a_node_that_repeats_its_toggle_bit) {
     Three b([](std::uint8_t id, NodeSetup& n) {
-        if (id == 5) n.guard_ms = 20, n.guard_factor = 4;
+        if (id == 5) {
+            n.guard_ms = 20;
+            n.guard_factor = 4;
+        }
         n.writes = {ObjectWrite{{0x2005, 0, std::vector<std::uint8_t>(30, 'x')}}};
     });
     int answers = 0;
     b.stations[0]->tamper = [&](Frame& f) {  // now and then an answer does not toggle
-        if (f.id == 0x705 && ++answers % 9 == 0) f.data[0] ^= 0x80;
+        if (f.id == 0x705 && ++answers % 9 == 0) {
+            f.data[0] ^= 0x80;
+        }
         return true;
     };
     int segments = 0;
     b.stations[1]->tamper = [&](Frame& f) {  // one answer to a segment in nine has the wrong one
-        if (f.id == 0x586 && f.data[0] >> 5 <= 1 && ++segments % 9 == 0) f.data[0] ^= 0x10;
+        if (f.id == 0x586 && f.data[0] >> 5 <= 1 && ++segments % 9 == 0) {
+            f.data[0] ^= 0x10;
+        }
         return true;
     };
     b.stations[2]->tamper = [](Frame& f) {  // and all of this node's
-        if (f.id == 0x587 && f.data[0] >> 5 <= 1) f.data[0] ^= 0x10;
+        if (f.id == 0x587 && f.data[0] >> 5 <= 1) {
+            f.data[0] ^= 0x10;
+        }
         return true;
     };
     b.power();
     b.start();
-    ASSERT_TRUE(b.until([&] { return b.status(5).operational && b.status(7).result != BootResult::none; }));
+    ASSERT_TRUE(
+        b.until([&] { return b.status(5).operational && b.status(7).result != BootResult::none; }));
     EXPECT_GT(b.status(5).wrong_toggles, 0U);
     EXPECT_EQ(b.status(7).result, BootResult::configuration);
     EXPECT_EQ(b.master->sentence(7),
-              "node 7 failed the SDO transfer of object 2005:0 while it was configured: toggle bit not alternated (05030000h); another "
-              "device disturbs the transfer, or the node's SDO server is defective [result J, configuration failed]");
+              "node 7 failed the SDO transfer of object 2005:0 while it was configured: toggle bit "
+              "not alternated (05030000h); another "
+              "device disturbs the transfer, or the node's SDO server is defective [result J, "
+              "configuration failed]");
     ASSERT_TRUE(b.until([&] { return b.status(6).operational; }));
     EXPECT_GT(b.status(6).sdo_retries, 0U);
     b.run(20 * second);
@@ -180,37 +215,51 @@ TEST(BootNetwork, Reports_a_node_that_repeats_its_toggle_bit) {
 TEST(BootNetwork, Repeats_the_start_of_a_node_that_did_not_start) {
     Three b;
     int lost = 0;
-    b.stations[0]->tamper = [&](const Frame& f) { return f.id != 0x705 || f.data[0] != 5 || ++lost > 6; };
+    b.stations[0]->tamper = [&](const Frame& f) {
+        return f.id != 0x705 || f.data[0] != 5 || ++lost > 6;
+    };
     b.power();
     b.start();
     EXPECT_TRUE(b.operational());
     EXPECT_GT(std::ranges::count(b.started(), 5), 1);
 
     Three never([](std::uint8_t id, NodeSetup& n) {
-        if (id == 6) n.on_failure = Reaction::nothing;
+        if (id == 6) {
+            n.on_failure = Reaction::nothing;
+        }
     });
     never.stations[1]->tamper = [](Frame& f) {
-        if (f.id == 0x706 && f.data[0] == 5) f.data[0] = 0x7f;
+        if (f.id == 0x706 && f.data[0] == 5) {
+            f.data[0] = 0x7f;
+        }
         return true;
     };
     never.power();
     never.start();
     ASSERT_TRUE(never.until([&] { return never.status(6).step == Step::failed; }));
-    EXPECT_EQ(never.master->sentence(6), "node 6 did not become operational after NMT start and is pre-operational; its error register "
-                                         "is 00h");
+    EXPECT_EQ(never.master->sentence(6),
+              "node 6 did not become operational after NMT start and is pre-operational; its error "
+              "register "
+              "is 00h");
 }
 
 TEST(BootNetwork, Reports_a_bus_that_accepts_no_frames_and_boots_once_it_does) {
     Three b;
     b.power();
     b.master->start(b.now);
-    while (b.own->out().push(make_frame(0x7f0, 0))) {}  // the cable is out: what is queued stays
+    while (b.own->out().push(make_frame(0x7f0, 0))) {
+    }  // the cable is out: what is queued stays
     const Time out = b.now;
-    while (b.status(6).result == BootResult::none && b.now < out + 10 * second) b.now += b.dt, b.master->poll(b.now);
+    while (b.status(6).result == BootResult::none && b.now < out + 10 * second) {
+        b.now += b.dt;
+        b.master->poll(b.now);
+    }
     EXPECT_EQ(b.status(6).cause, Cause::not_sent);
-    EXPECT_EQ(b.master->sentence(6),
-              "node 6 could not be asked for 1000:0 while it was identified: the bus accepts no frames from the master; check the "
-              "master's cable, the bit rate, and that another node is connected [result B, no response]");
+    EXPECT_EQ(
+        b.master->sentence(6),
+        "node 6 could not be asked for 1000:0 while it was identified: the bus accepts no frames "
+        "from the master; check the "
+        "master's cable, the bit rate, and that another node is connected [result B, no response]");
     b.own->out().clear();
     EXPECT_TRUE(b.operational());
 }
@@ -226,7 +275,8 @@ struct Foreign : Three {
     }
     void command(NmtCommand command, std::uint8_t id) {
         Frame f = make_frame(0, 2);
-        f.data[0] = static_cast<std::uint8_t>(command), f.data[1] = id;
+        f.data[0] = static_cast<std::uint8_t>(command);
+        f.data[1] = id;
         other.push(f);
     }
 };
@@ -238,7 +288,8 @@ TEST(BootNetwork, Names_the_NMT_command_of_another_device_that_preceded_a_state_
     EXPECT_EQ(b.status(6).cause, Cause::left_operational);
     EXPECT_EQ(b.status(6).foreign_command, 0x02);
     EXPECT_EQ(b.master->sentence(6),
-              "node 6 left the operational state after another device sent NMT stop and is stopped: remove the second NMT master");
+              "node 6 left the operational state after another device sent NMT stop and is "
+              "stopped: remove the second NMT master");
     EXPECT_EQ(b.master->status().foreign_commands, 1U);
     ASSERT_TRUE(b.operational());
 }
@@ -246,9 +297,12 @@ TEST(BootNetwork, Names_the_NMT_command_of_another_device_that_preceded_a_state_
 TEST(BootNetwork, Names_the_NMT_reset_of_another_device_that_preceded_a_reboot) {
     Foreign b;
     b.command(NmtCommand::reset_node, 0);
-    ASSERT_TRUE(b.until([&] { return b.status(5).losses + b.status(6).losses + b.status(7).losses == 3; }, second));
+    ASSERT_TRUE(b.until(
+        [&] { return b.status(5).losses + b.status(6).losses + b.status(7).losses == 3; }, second));
     EXPECT_EQ(b.status(7).cause, Cause::boot_up);
-    EXPECT_EQ(b.master->sentence(7), "node 7 rebooted after another device sent NMT reset node: remove the second NMT master");
+    EXPECT_EQ(
+        b.master->sentence(7),
+        "node 7 rebooted after another device sent NMT reset node: remove the second NMT master");
 }
 
 TEST(BootNetwork, Does_not_blame_a_foreign_command_that_had_no_effect) {
@@ -262,7 +316,8 @@ TEST(BootNetwork, Does_not_blame_a_foreign_command_that_had_no_effect) {
     ASSERT_TRUE(b.until([&] { return b.status(6).losses == 1; }, second));
     EXPECT_EQ(b.status(6).foreign_command, 0);
     EXPECT_EQ(b.master->sentence(6),
-              "node 6 left the operational state without a command from this master and is pre-operational: check the node, and the bus "
+              "node 6 left the operational state without a command from this master and is "
+              "pre-operational: check the node, and the bus "
               "for another NMT master");
 }
 

@@ -12,7 +12,9 @@ struct One : Bed {
               auto n = example_node();
               n.name = "arm";
               n.on_failure = Reaction::nothing;
-              if (change) change(n);
+              if (change) {
+                  change(n);
+              }
               return network_of({n});
           }()),
           station(add(5, d)) {}
@@ -45,12 +47,19 @@ struct Loader {
             const auto command = Dictionary::value<std::uint8_t>(e);
             commands.push_back(command);
             auto& d = station.device.dictionary();
-            if (command == 3) d.set<std::uint32_t>(0x1f57, 1, 2), busy = 3;
-            if (command == 1) d.set<std::uint32_t>(0x1f56, 1, good ? 7 : 6), d.keep(0x1f56, 0x1f56, false);
+            if (command == 3) {
+                d.set<std::uint32_t>(0x1f57, 1, 2), busy = 3;
+            }
+            if (command == 1) {
+                d.set<std::uint32_t>(0x1f56, 1, good ? 7 : 6), d.keep(0x1f56, 0x1f56, false);
+            }
         };
         status.read = [this](Entry& e) {
             auto value = commands.empty() || commands.back() != 3 ? 0U : error << 1;
-            if (busy > 0) --busy, value |= 1;
+            if (busy > 0) {
+                --busy;
+                value |= 1;
+            }
             store(e.data, std::uint32_t{value});
             return Abort::none;
         };
@@ -77,7 +86,9 @@ TEST(BootResult, Is_good_for_the_expected_device) {
     ASSERT_TRUE(b.operational());
     EXPECT_EQ(b.state(0), NmtState::operational);
     EXPECT_EQ(b.own->state(), NmtState::operational);
-    EXPECT_EQ(b.way(5), "queued, resetting, identifying, configuring, waiting for its heartbeat, ready, starting, running");
+    EXPECT_EQ(b.way(5),
+              "queued, resetting, identifying, configuring, waiting for its heartbeat, ready, "
+              "starting, running");
     EXPECT_EQ(b.value(0, 0x1017, 0), 50U);
     EXPECT_EQ(b.text(), "");
     EXPECT_EQ(b.master->sentence(), "the network is operational");
@@ -101,13 +112,16 @@ TEST(BootResult, B_for_a_node_that_does_not_answer) {
     ASSERT_TRUE(b.ended(5));
     EXPECT_EQ(b.status(5).result, BootResult::no_answer);
     EXPECT_EQ(b.text(),
-              "node 5 (arm) does not respond (1000:0): check its power, cable, bit rate and node ID; 'hal can scan' lists the nodes that "
+              "node 5 (arm) does not respond (1000:0): check its power, cable, bit rate and node "
+              "ID; 'hal can scan' lists the nodes that "
               "respond [result B, no response]");
     EXPECT_EQ(b.master->sentence(), "the network is booting: " + b.text() + "; retrying");
     EXPECT_EQ(b.status(5).step, Step::waiting);
     EXPECT_FALSE(b.status(5).online);
-    ASSERT_TRUE(b.until([&] { return b.status(5).step == Step::failed; }));  // the boot limit is over
-    b.power();                                                               // its boot-up message brings it in
+    // the boot limit is over
+    ASSERT_TRUE(b.until([&] { return b.status(5).step == Step::failed; }));
+    // its boot-up message brings it in
+    b.power();
     EXPECT_TRUE(b.operational());
 }
 
@@ -129,19 +143,24 @@ TEST_P(BootResultOfIdentity, Tells_what_differs) {
 INSTANTIATE_TEST_SUITE_P(
     Each, BootResultOfIdentity,
     testing::Values(Wrong{&NodeSetup::device_type, BootResult::device_type,
-                          "device type (1000:0) is 0191h where 00012345h is expected; connect the right device or correct its "
+                          "device type (1000:0) is 0191h where 00012345h is expected; connect the "
+                          "right device or correct its "
                           "configuration [result C, wrong device type]"},
                     Wrong{&NodeSetup::vendor, BootResult::vendor,
-                          "vendor ID (1018:1) is 0001h where 00012345h is expected; connect the right device or correct its "
+                          "vendor ID (1018:1) is 0001h where 00012345h is expected; connect the "
+                          "right device or correct its "
                           "configuration [result D, wrong vendor]"},
                     Wrong{&NodeSetup::product, BootResult::product,
-                          "product code (1018:2) is 0002h where 00012345h is expected; connect the right device or correct its "
+                          "product code (1018:2) is 0002h where 00012345h is expected; connect the "
+                          "right device or correct its "
                           "configuration [result M, wrong product]"},
                     Wrong{&NodeSetup::revision, BootResult::revision,
-                          "revision number (1018:3) is 0003h where 00012345h is expected; connect the right device or correct its "
+                          "revision number (1018:3) is 0003h where 00012345h is expected; connect "
+                          "the right device or correct its "
                           "configuration [result N, wrong revision]"},
                     Wrong{&NodeSetup::serial, BootResult::serial,
-                          "serial number (1018:4) is 0004h where 00012345h is expected; connect the right device or correct its "
+                          "serial number (1018:4) is 0004h where 00012345h is expected; connect "
+                          "the right device or correct its "
                           "configuration [result O, wrong serial number]"}),
     [](const auto& with) { return std::string(1, static_cast<char>(with.param.letter)); });
 
@@ -152,7 +171,8 @@ TEST(BootResult, O_when_it_does_not_tell_its_serial_number) {
     b.station.device.dictionary().handle(0x1018, identity);
     EXPECT_EQ(b.boot(), BootResult::serial);
     EXPECT_EQ(b.text(),
-              "node 5 (arm) rejects the read of its serial number, 1018:4: sub-index does not exist (06090011h); connect the right "
+              "node 5 (arm) rejects the read of its serial number, 1018:4: sub-index does not "
+              "exist (06090011h); connect the right "
               "device, or remove this check [result O, wrong serial number]");
 }
 
@@ -162,9 +182,10 @@ TEST(BootResult, E_when_a_node_to_keep_alive_sends_no_heartbeat) {
     One b([](NodeSetup& n) { n.keep_alive = true; }, d);
     b.station.tamper = [](const Frame& f) { return f.id != 0x705; };
     EXPECT_EQ(b.boot(), BootResult::no_heartbeat);
-    EXPECT_EQ(b.text(),
-              "node 5 (arm) sent no heartbeat while its state was checked: check its power and cable "
-              "[result E, no heartbeat while its state was checked]");
+    EXPECT_EQ(
+        b.text(),
+        "node 5 (arm) sent no heartbeat while its state was checked: check its power and cable "
+        "[result E, no heartbeat while its state was checked]");
 }
 
 TEST(BootResult, F_when_a_node_does_not_answer_guarding) {
@@ -172,9 +193,13 @@ TEST(BootResult, F_when_a_node_does_not_answer_guarding) {
     b.station.tamper = [](const Frame& f) { return f.id != 0x705; };
     EXPECT_EQ(b.boot(), BootResult::no_guarding);
     EXPECT_EQ(b.text(),
-              "node 5 (arm) did not respond to node guarding at the start of error control: check its power and cable, and that it "
+              "node 5 (arm) did not respond to node guarding at the start of error control: check "
+              "its power and cable, and that it "
               "supports node guarding [result F, no response to node guarding]");
-    One kept([](NodeSetup& n) { n.guard_ms = 20, n.keep_alive = true; });
+    One kept([](NodeSetup& n) {
+        n.guard_ms = 20;
+        n.keep_alive = true;
+    });
     kept.station.tamper = b.station.tamper;
     EXPECT_EQ(kept.boot(), BootResult::no_guarding);
     EXPECT_EQ(kept.status(5).failed_in, Step::checking_state);
@@ -184,12 +209,17 @@ TEST(BootResult, G_when_the_objects_of_the_program_or_its_image_are_missing) {
     One without(wants_program_7);
     EXPECT_EQ(without.boot(), BootResult::no_program);
     EXPECT_EQ(without.text(),
-              "node 5 (arm) has no object 1F56:1, so its program cannot be checked or updated: remove the program from its configuration "
+              "node 5 (arm) has no object 1F56:1, so its program cannot be checked or updated: "
+              "remove the program from its configuration "
               "[result G, program or program objects missing]");
-    One no_image([](NodeSetup& n) { wants_program_7(n), n.program.image.clear(); }, with_program(6));
+    One no_image([](NodeSetup& n) {
+        wants_program_7(n);
+        n.program.image.clear();
+    }, with_program(6));
     EXPECT_EQ(no_image.boot(), BootResult::no_program);
     EXPECT_EQ(no_image.text(),
-              "node 5 (arm) runs program 0006h (1F56:1) where 0007h is expected, and no program file is configured: configure one "
+              "node 5 (arm) runs program 0006h (1F56:1) where 0007h is expected, and no program "
+              "file is configured: configure one "
               "[result G, program or program objects missing]");
 }
 
@@ -197,12 +227,14 @@ TEST(BootResult, H_when_an_update_is_needed_and_not_allowed) {
     One b([](NodeSetup& n) { n.program.id = 7; }, with_program(6));
     EXPECT_EQ(b.boot(), BootResult::no_update);
     EXPECT_EQ(b.text(),
-              "node 5 (arm) runs program 0006h (1F56:1) where 0007h is expected, and updates are not allowed: update it by hand or allow "
+              "node 5 (arm) runs program 0006h (1F56:1) where 0007h is expected, and updates are "
+              "not allowed: update it by hand or allow "
               "the update [result H, wrong program, update not allowed]");
     One version([](NodeSetup& n) { n.program.version = "V1.3"; }, with_program(6));
     EXPECT_EQ(version.boot(), BootResult::no_update);
     EXPECT_EQ(version.text(),
-              "node 5 (arm) runs program 'V1.2' (100A:0) where 'V1.3' is expected, and updates are not allowed: update it by hand or "
+              "node 5 (arm) runs program 'V1.2' (100A:0) where 'V1.3' is expected, and updates are "
+              "not allowed: update it by hand or "
               "allow the update [result H, wrong program, update not allowed]");
     One right([](NodeSetup& n) { n.program.version = "V1.2"; }, with_program(6));
     EXPECT_EQ(right.boot(), BootResult::good);
@@ -215,7 +247,8 @@ TEST(BootResult, Is_good_after_a_program_was_downloaded) {
     EXPECT_EQ(loader.commands, (std::vector{0U, 3U, 1U}));
     EXPECT_EQ(b.station.device.dictionary().find(0x1f50, 1)->size, 3000U);
     EXPECT_TRUE(b.operational());
-    EXPECT_EQ(note_sentences(*b.master->setup(5), b.status(5)), (std::vector<std::string>{"node 5 (arm) received a new program"}));
+    EXPECT_EQ(note_sentences(*b.master->setup(5), b.status(5)),
+              (std::vector<std::string>{"node 5 (arm) received a new program"}));
 }
 
 TEST(BootResult, I_when_the_download_fails) {
@@ -225,7 +258,8 @@ TEST(BootResult, I_when_the_download_fails) {
     refused.station.device.dictionary().handle(0x1f51, spoil);
     EXPECT_EQ(refused.boot(), BootResult::update);
     EXPECT_EQ(refused.text(),
-              "node 5 (arm) rejects object 1F51:1 while its program was updated: data cannot be transferred or stored because of the "
+              "node 5 (arm) rejects object 1F51:1 while its program was updated: data cannot be "
+              "transferred or stored because of the "
               "present device state (08000022h) [result I, program download failed]");
 
     One flash(wants_program_7, with_program(6));
@@ -233,21 +267,25 @@ TEST(BootResult, I_when_the_download_fails) {
     bad.error = 5;
     EXPECT_EQ(flash.boot(), BootResult::update);
     EXPECT_EQ(flash.text(),
-              "node 5 (arm) reports a flash error: flash write error (1F57:1 is 000Ah); check that the file is for this device [result "
+              "node 5 (arm) reports a flash error: flash write error (1F57:1 is 000Ah); check that "
+              "the file is for this device [result "
               "I, program download failed]");
 
     One busy(wants_program_7, with_program(6));
     Loader slow(busy.station);
     slow.busy = 1 << 30;
     EXPECT_EQ(busy.boot(), BootResult::update);
-    EXPECT_EQ(busy.text(), "node 5 (arm) reports its flash busy for more than 2.00 s (1F57:1) [result I, program download failed]");
+    EXPECT_EQ(busy.text(),
+              "node 5 (arm) reports its flash busy for more than 2.00 s (1F57:1) [result I, "
+              "program download failed]");
 
     One same(wants_program_7, with_program(6));
     Loader other(same.station);
     other.good = false;
     EXPECT_EQ(same.boot(), BootResult::update);
     EXPECT_EQ(same.text(),
-              "node 5 (arm) still runs program 0006h (1F56:1) where 0007h is expected after the download; check the file [result I, "
+              "node 5 (arm) still runs program 0006h (1F56:1) where 0007h is expected after the "
+              "download; check the file [result I, "
               "program download failed]");
 }
 
@@ -255,13 +293,16 @@ TEST(BootResult, J_when_an_object_cannot_be_configured) {
     const auto with = [](ObjectWrite w) { return [w](NodeSetup& n) { n.writes = {w}; }; };
     One missing(with(object_write(0x5000, 3, std::uint32_t{9}, "gain")));
     EXPECT_EQ(missing.boot(), BootResult::configuration);
-    EXPECT_EQ(missing.text(),
-              "node 5 (arm) rejects 0009h for object 5000:3 (gain): object does not exist in the object dictionary (06020000h); correct "
-              "the value in its configuration or remove the object [result J, configuration failed]");
+    EXPECT_EQ(
+        missing.text(),
+        "node 5 (arm) rejects 0009h for object 5000:3 (gain): object does not exist in the object "
+        "dictionary (06020000h); correct "
+        "the value in its configuration or remove the object [result J, configuration failed]");
     One high(with(object_write(0x2001, 0, std::int16_t{101})));
     EXPECT_EQ(high.boot(), BootResult::configuration);
     EXPECT_EQ(high.text(),
-              "node 5 (arm) rejects 0065h for object 2001:0: value of the parameter written too high (06090031h); correct the value in "
+              "node 5 (arm) rejects 0065h for object 2001:0: value of the parameter written too "
+              "high (06090031h); correct the value in "
               "its configuration or remove the object [result J, configuration failed]");
     One forgets(with(object_write(0x2000, 0, std::uint32_t{9})));
     Spoil spoil;
@@ -269,13 +310,17 @@ TEST(BootResult, J_when_an_object_cannot_be_configured) {
     forgets.station.device.dictionary().handle(0x2000, spoil);
     EXPECT_EQ(forgets.boot(), BootResult::configuration);
     EXPECT_EQ(forgets.text(),
-              "node 5 (arm) accepted 0009h for object 2000:0 but holds 0008h; write a value it can hold, or remove the object [result J, "
+              "node 5 (arm) accepted 0009h for object 2000:0 but holds 0008h; write a value it can "
+              "hold, or remove the object [result J, "
               "configuration failed]");
     One silent(with(object_write(0x2000, 0, std::uint32_t{9})));
-    silent.station.tamper = [](const Frame& f) { return f.id != 0x585 || f.data[1] != 0x00 || f.data[2] != 0x20; };
+    silent.station.tamper = [](const Frame& f) {
+        return f.id != 0x585 || f.data[1] != 0x00 || f.data[2] != 0x20;
+    };
     EXPECT_EQ(silent.boot(), BootResult::configuration);
     EXPECT_EQ(silent.text(),
-              "node 5 (arm) stopped responding at 2000:0 while it was configured: check its power and cable [result J, configuration "
+              "node 5 (arm) stopped responding at 2000:0 while it was configured: check its power "
+              "and cable [result J, configuration "
               "failed]");
 }
 
@@ -283,15 +328,19 @@ TEST(BootResult, K_when_the_heartbeat_does_not_come) {
     One b;
     b.station.tamper = [](const Frame& f) { return f.id != 0x705 || f.data[0] == 0; };
     EXPECT_EQ(b.boot(), BootResult::watching);
-    EXPECT_EQ(b.text(),
-              "node 5 (arm) sent no heartbeat at the start of error control: check its power and cable "
-              "[result K, no heartbeat at the start of error control]");
+    EXPECT_EQ(
+        b.text(),
+        "node 5 (arm) sent no heartbeat at the start of error control: check its power and cable "
+        "[result K, no heartbeat at the start of error control]");
 }
 
 TEST(BootResult, L_when_a_node_to_keep_alive_is_operational_already) {
     auto d = example();
     d.find(0x1017, 0)->value = {50, 0};
-    One b([](NodeSetup& n) { n.keep_alive = true, n.writes = {object_write(0x2000, 0, std::uint32_t{9})}; }, d);
+    One b([](NodeSetup& n) {
+        n.keep_alive = true;
+        n.writes = {object_write(0x2000, 0, std::uint32_t{9})};
+    }, d);
     b.power();
     b.station.device.command(NmtCommand::start, b.now);
     b.run(200 * millisecond);
@@ -321,9 +370,11 @@ TEST(BootResult, Names_two_devices_with_one_id) {
     EXPECT_EQ(b.boot(), BootResult::serial);
     EXPECT_EQ(b.status(5).cause, Cause::duplicate_id);
     const bool order = b.status(5).expected == 4;
-    EXPECT_EQ(b.text(), std::string("node 5 (arm) has a duplicate node ID: two devices respond, object 1018:4 is ") +
-                            (order ? "0004h and 004Dh" : "004Dh and 0004h") +
-                            "; change the node ID of one of them [result O, wrong serial number]");
+    EXPECT_EQ(b.text(),
+              std::string(
+                  "node 5 (arm) has a duplicate node ID: two devices respond, object 1018:4 is ") +
+                  (order ? "0004h and 004Dh" : "004Dh and 0004h") +
+                  "; change the node ID of one of them [result O, wrong serial number]");
 }
 
 TEST(BootResult, Notes_two_devices_with_one_id_by_their_heartbeats) {
@@ -332,7 +383,8 @@ TEST(BootResult, Notes_two_devices_with_one_id_by_their_heartbeats) {
     EXPECT_EQ(b.boot(), BootResult::good);
     ASSERT_TRUE(b.until([&] { return (b.status(5).notes & note_duplicate_id) != 0; }, 5 * second));
     EXPECT_EQ(note_sentences(*b.master->setup(5), b.status(5)),
-              (std::vector<std::string>{"node 5 (arm) sends too many heartbeats: two devices may have this node ID"}));
+              (std::vector<std::string>{
+                  "node 5 (arm) sends too many heartbeats: two devices may have this node ID"}));
 }
 
 }  // namespace

@@ -23,7 +23,10 @@ TEST(Supervision, Guards_a_node_without_heartbeat) {
 }
 
 TEST(Supervision, Guards_when_so_configured_and_the_node_monitors_the_master) {
-    Configured b([](NodeSetup& n) { n.guard_ms = 20, n.guard_factor = 3; });
+    Configured b([](NodeSetup& n) {
+        n.guard_ms = 20;
+        n.guard_factor = 3;
+    });
     b.start();
     ASSERT_TRUE(b.operational());
     EXPECT_EQ(b.station.device.dictionary().get<std::uint16_t>(0x1017, 0), 0);
@@ -35,11 +38,16 @@ TEST(Supervision, Guards_when_so_configured_and_the_node_monitors_the_master) {
 }
 
 TEST(Supervision, Reports_a_guarded_node_whose_toggle_bit_never_changes) {
-    Configured b([](NodeSetup& n) { n.guard_ms = 20, n.guard_factor = 3; });
+    Configured b([](NodeSetup& n) {
+        n.guard_ms = 20;
+        n.guard_factor = 3;
+    });
     b.start();
     ASSERT_TRUE(b.operational());
     b.station.tamper = [](Frame& f) {
-        if (f.id == 0x705) f.data[0] &= 0x7f;
+        if (f.id == 0x705) {
+            f.data[0] &= 0x7f;
+        }
         return true;
     };
     const Time stuck = b.now;
@@ -47,7 +55,8 @@ TEST(Supervision, Reports_a_guarded_node_whose_toggle_bit_never_changes) {
     EXPECT_LE(b.now - stuck, 80 * millisecond + b.dt);  // its life time and the answer before
     EXPECT_EQ(b.status(5).cause, Cause::guard_toggle);
     EXPECT_EQ(b.master->sentence(5),
-              "node 5 responded to node guarding with a toggle bit that did not alternate: supervise it by heartbeat, or look for a "
+              "node 5 responded to node guarding with a toggle bit that did not alternate: "
+              "supervise it by heartbeat, or look for a "
               "second device with this node ID");
     b.run(10 * second);
     EXPECT_NE(b.master->status().state, NetworkState::operational);
@@ -57,15 +66,19 @@ TEST(Supervision, Reports_a_guarded_node_whose_toggle_bit_never_changes) {
 
 TEST(Supervision, Lets_devices_enter_their_safe_state_when_the_master_stops) {
     auto d = example();
-    d.add(0x1016, 1, Type::unsigned32, Access::read_write, 0x00210100);  // watches another node already: the next entry is taken
+    // watches another node already: the next entry is taken
+    d.add(0x1016, 1, Type::unsigned32, Access::read_write, 0x00210100);
     Configured b([](NodeSetup& n) { n.master_limit_ms = 150; }, d);
     b.start();
     ASSERT_TRUE(b.operational());
     b.run(second);
     EXPECT_EQ(b.station.communication_errors, 0);
     std::size_t entries = 0;
-    for (std::uint8_t n = 1; n <= 4; ++n)
-        if (b.value(0, 0x1016, n) == (127U << 16 | 150)) ++entries;
+    for (std::uint8_t n = 1; n <= 4; ++n) {
+        if (b.value(0, 0x1016, n) == (127U << 16 | 150)) {
+            ++entries;
+        }
+    }
     EXPECT_EQ(entries, 1U);
     b.alive = false;
     b.own->out().clear();
@@ -103,7 +116,10 @@ TEST(Supervision, Accepts_the_nearest_heartbeat_period_the_node_supports) {
     spoil(b);
     EXPECT_TRUE(b.operational());
 
-    Configured late([](NodeSetup& n) { n.heartbeat_limit = 60 * millisecond, n.on_failure = Reaction::nothing; });
+    Configured late([](NodeSetup& n) {
+        n.heartbeat_limit = 60 * millisecond;
+        n.on_failure = Reaction::nothing;
+    });
     spoil(late);
     ASSERT_TRUE(late.ended(5));
     EXPECT_EQ(late.status(5).result, BootResult::configuration);
@@ -114,7 +130,9 @@ TEST(Supervision, Writes_the_heartbeat_period_again_when_no_heartbeat_arrived) {
     auto d = example();
     d.find(0x1017, 0)->value = {50, 0};
     Configured b({}, d);
-    b.station.tamper = [&](const Frame& f) { return f.id != 0x705 || f.data[0] == 0 || b.writes(0x1017) != 0; };
+    b.station.tamper = [&](const Frame& f) {
+        return f.id != 0x705 || f.data[0] == 0 || b.writes(0x1017) != 0;
+    };
     b.start();
     ASSERT_TRUE(b.operational());
     EXPECT_EQ(b.status(5).attempts, 2U);
@@ -123,8 +141,10 @@ TEST(Supervision, Writes_the_heartbeat_period_again_when_no_heartbeat_arrived) {
 
 TEST(Setup, Applies_1F80h_and_1F81h) {
     MasterSetup s = network_of({example_node(5), example_node(6)});
-    apply_assignment(s.nodes[0], 0x0064'0309 | 1U << 4 | 1U << 6 | 1U << 7);  // guarded at 100 ms, mandatory, not booted
-    EXPECT_TRUE(s.nodes[0].mandatory && s.nodes[0].keep_alive && s.nodes[0].program.update && s.nodes[0].restore);
+    // guarded at 100 ms, mandatory, not booted
+    apply_assignment(s.nodes[0], 0x0064'0309 | 1U << 4 | 1U << 6 | 1U << 7);
+    EXPECT_TRUE(s.nodes[0].mandatory && s.nodes[0].keep_alive && s.nodes[0].program.update &&
+                s.nodes[0].restore);
     EXPECT_FALSE(s.nodes[0].configure || s.nodes[0].start);
     EXPECT_EQ(s.nodes[0].guard_ms, 100);
     EXPECT_EQ(s.nodes[0].guard_factor, 3);
@@ -139,15 +159,18 @@ TEST(Setup, Applies_1F80h_and_1F81h) {
 TEST(Setup, Rejects_impossible_values) {
     auto s = network_of({example_node(5), example_node(5), example_node(127), example_node(0)});
     s.nodes[0].writes = {ObjectWrite{{0x6083, 0, {}}}};
-    s.nodes[0].guard_ms = 10, s.nodes[0].guard_factor = 0;
+    s.nodes[0].guard_ms = 10;
+    s.nodes[0].guard_factor = 0;
     s.nodes[0].heartbeat_limit = 50 * millisecond;
-    EXPECT_EQ(
-        problems_of(s),
-        (std::vector<std::string>{
-            "node 5 has no value for object 6083:0; enter one or remove the object", "node 5 has the life time factor 0; 3 is usual",
-            "node 5 has a heartbeat timeout of 50 ms, not longer than its heartbeat period of 50 ms; use a longer timeout",
-            "node 5 is configured twice: duplicate node ID; change one of them", "node 127 has the node ID of the master; change one of them",
-            "node 0 has an invalid node ID; use 1 to 127"}));
+    EXPECT_EQ(problems_of(s),
+              (std::vector<std::string>{
+                  "node 5 has no value for object 6083:0; enter one or remove the object",
+                  "node 5 has the life time factor 0; 3 is usual",
+                  "node 5 has a heartbeat timeout of 50 ms, not longer than its heartbeat period "
+                  "of 50 ms; use a longer timeout",
+                  "node 5 is configured twice: duplicate node ID; change one of them",
+                  "node 127 has the node ID of the master; change one of them",
+                  "node 0 has an invalid node ID; use 1 to 127"}));
     FrameQueue out(8);
     MasterEvents events;
     EXPECT_THROW(Master(s, out, events), std::invalid_argument);

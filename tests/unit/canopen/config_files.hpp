@@ -103,41 +103,76 @@ PDOMapping=1
 inline std::string dcf_text(const std::string& more = "") {
     std::string text = eds_text;
     const std::string list = "SupportedObjects=2\n1=0x2000\n2=0x2001\n";
-    text.replace(text.find(list), list.size(), "SupportedObjects=6\n1=0x2000\n2=0x2001\n3=0x2002\n4=0x2003\n5=0x2004\n6=0x2005\n");
-    text += "[2002]\nParameterName=Ramp\nDataType=0x0006\nAccessType=rw\nDefaultValue=1\nParameterValue=7\n";
+    text.replace(
+        text.find(list), list.size(),
+        "SupportedObjects=6\n1=0x2000\n2=0x2001\n3=0x2002\n4=0x2003\n5=0x2004\n6=0x2005\n");
+    text +=
+        "[2002]\nParameterName=Ramp\nDataType=0x0006\nAccessType=rw\nDefaultValue="
+        "1\nParameterValue=7\n";
     text += "[2003]\nParameterName=Limit\nDataType=0x0006\nAccessType=rw\nParameterValue=70000\n";
-    text += "[2004]\nParameterName=Cam\nObjectType=0x2\nDataType=0x000F\nAccessType=rw\nDownloadFile=cam.bin\n";
-    text += "[2005]\nParameterName=Gear\nObjectType=0x2\nDataType=0x000F\nAccessType=rw\nDownloadFile=empty.bin\n";
-    if (!more.empty()) text += "[2006]\nParameterName=More\nObjectType=0x2\nDataType=0x000F\nAccessType=rw\nDownloadFile=" + more + "\n";
+    text +=
+        "[2004]\nParameterName=Cam\nObjectType=0x2\nDataType=0x000F\nAccessType=rw\nDownloadFile="
+        "cam.bin\n";
+    text +=
+        "[2005]\nParameterName=Gear\nObjectType=0x2\nDataType=0x000F\nAccessType=rw\nDownloadFile="
+        "empty.bin\n";
+    if (!more.empty()) {
+        text +=
+            "[2006]\nParameterName=More\nObjectType=0x2\nDataType=0x000F\nAccessType="
+            "rw\nDownloadFile=" +
+            more + "\n";
+    }
     return text + "[DeviceComissioning]\nNodeID=5\nBaudrate=1000\n";
 }
 
 inline bool files(const std::string& path, std::string& bytes) {
-    if (path == "machine/drive.eds") return bytes = eds_text, true;
+    if (path == "machine/drive.eds") {
+        bytes = eds_text;
+        return true;
+    }
     if (path == "machine/mpdo.eds") {
         bytes = eds_text;
         const std::string count = "DefaultValue=1\n[1A00sub1]";
-        return bytes.replace(bytes.find(count), count.size(), "DefaultValue=0xFE\n[1A00sub1]"), true;
+        bytes.replace(bytes.find(count), count.size(), "DefaultValue=0xFE\n[1A00sub1]");
+
+        return true;
     }
-    if (path == "machine/unit/drive.dcf") return bytes = dcf_text(), true;
-    if (path == "machine/unit/lost.dcf") return bytes = dcf_text("lost.bin"), true;
+    if (path == "machine/unit/drive.dcf") {
+        bytes = dcf_text();
+        return true;
+    }
+    if (path == "machine/unit/lost.dcf") {
+        bytes = dcf_text("lost.bin");
+        return true;
+    }
     if (path == "machine/unit/program.dcf") {
         const std::string list = "[ManufacturerObjects]";
         bytes = dcf_text();
         bytes.replace(bytes.find("[OptionalObjects]\nSupportedObjects=2\n1=0x1800\n2=0x1A00\n"), 55,
                       "[OptionalObjects]\nSupportedObjects=3\n1=0x1800\n2=0x1A00\n3=0x1F50\n");
         bytes.insert(bytes.find(list),
-                     "[1F50]\nParameterName=Program\nObjectType=0x8\nSubNumber=2\n[1F50sub0]\nParameterName=n\nDataType=0x0005\n"
-                     "AccessType=const\nDefaultValue=1\n[1F50sub1]\nParameterName=Program\nObjectType=0x2\nDataType=0x000F\n"
+                     "[1F50]\nParameterName=Program\nObjectType=0x8\nSubNumber=2\n[1F50sub0]"
+                     "\nParameterName=n\nDataType=0x0005\n"
+                     "AccessType=const\nDefaultValue=1\n[1F50sub1]\nParameterName="
+                     "Program\nObjectType=0x2\nDataType=0x000F\n"
                      "AccessType=wo\nDownloadFile=new.bin\n");
         return true;
     }
-    if (path == "machine/unit/cam.bin") return bytes = std::string("\0\1\2", 3), true;
-    if (path == "machine/unit/empty.bin") return bytes.clear(), true;
-    return bytes = "No such file or directory", false;
+    if (path == "machine/unit/cam.bin") {
+        bytes = std::string("\0\1\2", 3);
+        return true;
+    }
+    if (path == "machine/unit/empty.bin") {
+        bytes.clear();
+        return true;
+    }
+    bytes = "No such file or directory";
+    return false;
 }
 
-inline Reading read_text(const std::string& text) { return read(text, "machine/arm.canopen", files); }
+inline Reading read_text(const std::string& text) {
+    return read(text, "machine/arm.canopen", files);
+}
 inline MasterConfig good(const std::string& text) {
     Reading r = read_text(text);
     EXPECT_EQ(to_string(r, "arm"), "");
@@ -145,8 +180,9 @@ inline MasterConfig good(const std::string& text) {
 }
 inline std::string said(const std::string& text) { return to_string(read_text(text), "arm"); }
 inline const Pdo* find(const Node& n, bool to_node, unsigned number) {
-    for (const Pdo& p : n.pdos)
+    for (const Pdo& p : n.pdos) {
         if (p.to_node == to_node && p.number == number) return &p;
+    }
     return nullptr;
 }
 

@@ -8,13 +8,17 @@ namespace hal::canopen::config {
 namespace {
 
 Reading read_bus(const std::string& lines) {
-    return read("[bus]\n" + lines + "[node 5 x]\ndevice = cia401\n", "test.canopen", [](const std::string&, std::string&) { return false; });
+    return read("[bus]\n" + lines + "[node 5 x]\ndevice = cia401\n", "test.canopen",
+                [](const std::string&, std::string&) { return false; });
 }
 
 std::vector<std::string> errors_of(const std::string& lines) {
     std::vector<std::string> found;
-    for (const Message& m : read_bus(lines).messages)
-        if (m.severity == Severity::error) found.push_back(std::to_string(m.at.line) + ": " + m.sentence);
+    for (const Message& m : read_bus(lines).messages) {
+        if (m.severity == Severity::error) {
+            found.push_back(std::to_string(m.at.line) + ": " + m.sentence);
+        }
+    }
     return found;
 }
 
@@ -31,7 +35,9 @@ TEST(ConfigMasters, One_that_follows_takes_its_phase_and_may_keep_its_own_clock)
 }
 
 TEST(ConfigMasters, A_flying_master_has_the_times_of_its_keys) {
-    const Reading r = read_bus("flying-master = low\nnode-id = 9\nheartbeat = 20ms\nflying-delay = 1s\nflying-detect = 2s\n");
+    const Reading r = read_bus(
+        "flying-master = low\nnode-id = 9\nheartbeat = 20ms\nflying-delay = 1s\nflying-detect = "
+        "2s\n");
     ASSERT_TRUE(r.good());
     const FlyingSetup& f = r.config.flying;
     EXPECT_TRUE(f.enabled);
@@ -41,14 +47,18 @@ TEST(ConfigMasters, A_flying_master_has_the_times_of_its_keys) {
     EXPECT_EQ(f.silence, 50 * millisecond);
     EXPECT_EQ(f.search_interval(), 2 * second);
     const Schedule schedule = schedule_of(r.config, millisecond);
-    EXPECT_TRUE(std::any_of(schedule.messages.begin(), schedule.messages.end(), [](const auto& m) { return m.id == 0x71; }));
+    EXPECT_TRUE(std::any_of(schedule.messages.begin(), schedule.messages.end(),
+                            [](const auto& m) { return m.id == 0x71; }));
 }
 
 TEST(ConfigMasters, What_cannot_be_of_several_masters_is_said_at_its_place) {
-    EXPECT_EQ(errors_of("flying-timeout = 5ms\n"), (Errors{"2: 'flying-timeout' applies to flying masters only"}));
-    EXPECT_EQ(errors_of("flying-master = best\nflying-timeout = 5ms\n"), (Errors{"2: invalid flying-master 'best'"}));
-    EXPECT_EQ(errors_of("flying-master = low\nheartbeat = none\n"),
-              (Errors{"2: a flying master needs a heartbeat: without one, its loss goes undetected"}));
+    EXPECT_EQ(errors_of("flying-timeout = 5ms\n"),
+              (Errors{"2: 'flying-timeout' applies to flying masters only"}));
+    EXPECT_EQ(errors_of("flying-master = best\nflying-timeout = 5ms\n"),
+              (Errors{"2: invalid flying-master 'best'"}));
+    EXPECT_EQ(
+        errors_of("flying-master = low\nheartbeat = none\n"),
+        (Errors{"2: a flying master needs a heartbeat: without one, its loss goes undetected"}));
     EXPECT_EQ(errors_of("flying-master = low\nflying-priority-slot = 1270ms\n").size(), 1u);
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Emergency 01 to 06 of the conformance test, against our device; an RPDO that is too short makes the emergency.
+// Emergency 01 to 06 of the conformance test, against our device; an RPDO that is too short makes
+// the emergency.
 #include "conformance.hpp"
 
 namespace hal::canopen::test {
@@ -15,8 +16,12 @@ struct ConformanceEmcy : Conformance {
     }
 };
 
-TEST_F(ConformanceEmcy, Emergency_01_1014h_holds_the_predefined_identifier) { EXPECT_EQ(get(0x1014, 0), 0x85U); }
-TEST_F(ConformanceEmcy, Emergency_02_error_register_is_clear_without_errors) { EXPECT_EQ(get(0x1001, 0), 0U); }
+TEST_F(ConformanceEmcy, Emergency_01_1014h_holds_the_predefined_identifier) {
+    EXPECT_EQ(get(0x1014, 0), 0x85U);
+}
+TEST_F(ConformanceEmcy, Emergency_02_error_register_is_clear_without_errors) {
+    EXPECT_EQ(get(0x1001, 0), 0U);
+}
 TEST_F(ConformanceEmcy, Emergency_03_history_is_empty_without_errors) {
     EXPECT_EQ(get(0x1003, 0), 0U);
     EXPECT_TRUE(one_of(read_abort(0x1003, 1), {Abort::none, Abort::no_data, Abort::no_sub}));

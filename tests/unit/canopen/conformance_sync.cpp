@@ -13,7 +13,9 @@ struct ConformanceSync : Conformance {
         bus.log.clear();
         run(ms);
         std::vector<int> all;
-        for (const auto& f : since(0x80)) all.push_back(f.length == 1 ? f.data[0] : -static_cast<int>(f.length));
+        for (const auto& f : since(0x80)) {
+            all.push_back(f.length == 1 ? f.data[0] : -static_cast<int>(f.length));
+        }
         return all;
     }
 };
@@ -25,7 +27,8 @@ TEST_F(ConformanceSync, Sync_02_as_many_as_the_period_says) {
     EXPECT_NEAR(static_cast<double>(counters(10'000).size()), 100, 1);
 }
 TEST_F(ConformanceSync, Sync_03_own_syncs_send_the_synchronous_pdos) {
-    put(0x1006, 0, 100'000), put(0x1005, 0, produce);
+    put(0x1006, 0, 100'000);
+    put(0x1005, 0, produce);
     operational();
     bus.log.clear();
     run(10'000);
@@ -40,29 +43,41 @@ TEST_F(ConformanceSync, Sync_04_consumer_with_a_period_of_zero_follows_whoever_s
     EXPECT_EQ(events.syncs_lost, 0);
 }
 TEST_F(ConformanceSync, Sync_05_overflow_of_one_and_above_240_is_invalid) {
-    for (const std::uint32_t value : {1U, 241U, 255U}) EXPECT_EQ(put(0x1019, 0, value), Abort::value) << value;
-    for (const std::uint32_t value : {2U, 240U, 0U}) EXPECT_EQ(put(0x1019, 0, value), Abort::none) << value;
+    for (const std::uint32_t value : {1U, 241U, 255U}) {
+        EXPECT_EQ(put(0x1019, 0, value), Abort::value) << value;
+    }
+    for (const std::uint32_t value : {2U, 240U, 0U}) {
+        EXPECT_EQ(put(0x1019, 0, value), Abort::none) << value;
+    }
 }
 TEST_F(ConformanceSync, Sync_06_without_a_counter_a_sync_is_empty) {
     EXPECT_EQ(put(0x1019, 0, 0), Abort::none);
-    put(0x1006, 0, 10'000), put(0x1005, 0, produce);
+    put(0x1006, 0, 10'000);
+    put(0x1005, 0, produce);
     const auto all = counters(100);
     EXPECT_NEAR(static_cast<double>(all.size()), 10, 1);
-    for (const int c : all) EXPECT_EQ(c, 0);
+    for (const int c : all) {
+        EXPECT_EQ(c, 0);
+    }
 }
 TEST_F(ConformanceSync, Sync_07_counter_runs_from_one_to_its_overflow) {
     EXPECT_EQ(put(0x1019, 0, 5), Abort::none);
-    put(0x1006, 0, 10'000), put(0x1005, 0, produce);
+    put(0x1006, 0, 10'000);
+    put(0x1005, 0, produce);
     const auto all = counters(140);
     ASSERT_GE(all.size(), 12U);
-    for (std::size_t n = 0; n < all.size(); ++n) EXPECT_EQ(all[n], static_cast<int>(n % 5 + 1));
+    for (std::size_t n = 0; n < all.size(); ++n) {
+        EXPECT_EQ(all[n], static_cast<int>(n % 5 + 1));
+    }
     nmt(stop);
     EXPECT_TRUE(counters(100).empty());
     nmt(enter_pre_operational);
     EXPECT_EQ(counters(10).at(0), 1) << "it begins anew";
 }
 TEST_F(ConformanceSync, Sync_08_counter_that_was_stored_is_there_after_a_reset) {
-    put(0x1019, 0, 5), put(0x1006, 0, 10'000), put(0x1005, 0, produce);
+    put(0x1019, 0, 5);
+    put(0x1006, 0, 10'000);
+    put(0x1005, 0, produce);
     EXPECT_EQ(write(0x1010, 1, 0x65766173, 4), Abort::none);
     nmt(reset_node);
     EXPECT_EQ(get(0x1019, 0), 5U);
@@ -77,7 +92,9 @@ TEST_F(ConformanceSync, Sync_09_counter_is_not_changed_while_there_is_a_period) 
     EXPECT_EQ(put(0x1019, 0, 5), Abort::none);
 }
 TEST_F(ConformanceSync, Sync_10_values_that_were_stored_outlast_the_reset_of_communication) {
-    put(0x1005, 0, 0x90), put(0x1006, 0, 0), put(0x1019, 0, 5);
+    put(0x1005, 0, 0x90);
+    put(0x1006, 0, 0);
+    put(0x1019, 0, 5);
     EXPECT_EQ(write(0x1010, 1, 0x65766173, 4), Abort::none);
     nmt(reset_communication);
     EXPECT_EQ(get(0x1005, 0), 0x90U);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A program on a bus in memory without timing, and a master's hands: SDO, NMT, frames seen. Time is a number.
+// A program on a bus in memory without timing, and a master's hands: SDO, NMT, frames seen. Time is
+// a number.
 #pragma once
 
 #include <string>
@@ -17,7 +18,9 @@ public:
           node(program, can::open(address_).link, settings),
           link_(can::open(address_).link),
           id_(settings.node_id) {
-        if (id_ <= 127) remote_ = &network.add(id_);
+        if (id_ <= 127) {
+            remote_ = &network.add(id_);
+        }
     }
 
     /// Time goes on in steps; everybody has a turn in each.
@@ -30,19 +33,32 @@ public:
     void turn() {
         flush();
         node.turn(now);
-        for (Frame f; link_->receive(f, now);) seen.push_back(f), network.handle(f, now);
+        for (Frame f; link_->receive(f, now);) {
+            seen.push_back(f);
+            network.handle(f, now);
+        }
         network.poll(now);
         flush();
     }
-    void send(const Frame& f) { link_->send(f, now), link_->flush(now); }
-    void sync() { send(Frame(0x80, {})), turn(); }
+    void send(const Frame& f) {
+        link_->send(f, now);
+        link_->flush(now);
+    }
+    void sync() {
+        send(Frame(0x80, {}));
+        turn();
+    }
     void command(NmtCommand c) {
         network.command(c, id_);
         run(2 * millisecond);
     }
-    void start() { run(2 * millisecond), command(NmtCommand::start); }
+    void start() {
+        run(2 * millisecond);
+        command(NmtCommand::start);
+    }
 
-    Abort write(std::uint16_t index, std::uint8_t sub, std::span<const std::uint8_t> data, SdoMode mode = SdoMode::automatic) {
+    Abort write(std::uint16_t index, std::uint8_t sub, std::span<const std::uint8_t> data,
+                SdoMode mode = SdoMode::automatic) {
         SdoRequest r{.index = index, .sub = sub, .mode = mode, .data = data};
         return finish(r);
     }
@@ -53,7 +69,8 @@ public:
         store(bytes.data(), value);
         return write(index, sub, std::span<const std::uint8_t>(bytes));
     }
-    Abort read(std::uint16_t index, std::uint8_t sub, std::vector<std::uint8_t>& data, SdoMode mode = SdoMode::segmented) {
+    Abort read(std::uint16_t index, std::uint8_t sub, std::vector<std::uint8_t>& data,
+               SdoMode mode = SdoMode::segmented) {
         data.assign(1 << 16, 0);
         SdoRequest r{.index = index, .sub = sub, .upload = true, .mode = mode, .buffer = data};
         const auto why = finish(r);
@@ -66,14 +83,19 @@ public:
         std::vector<std::uint8_t> data;
         last_abort = read(index, sub, data);
         T value{};
-        if (data.size() == sizeof(T)) value = load<T>(data.data());
+        if (data.size() == sizeof(T)) {
+            value = load<T>(data.data());
+        }
         return value;
     }
     /// Frames with that identifier since the last forget().
     std::vector<Frame> sent(std::uint32_t id) const {
         std::vector<Frame> found;
-        for (const auto& f : seen)
-            if (f.id == id && !f.remote) found.push_back(f);
+        for (const auto& f : seen) {
+            if (f.id == id && !f.remote) {
+                found.push_back(f);
+            }
+        }
         return found;
     }
     void forget() { seen.clear(); }
@@ -95,11 +117,16 @@ public:
 private:
     Abort finish(SdoRequest& r) {
         remote_->sdo().submit(r);
-        for (int n = 0; n < 200000 && !r.done(); ++n) now += 100 * microsecond, turn();
+        for (int n = 0; n < 200000 && !r.done(); ++n) {
+            now += 100 * microsecond;
+            turn();
+        }
         return r.done() ? r.abort : Abort::general;
     }
     void flush() {
-        for (Frame f; out.pop(f);) link_->send(f, now);
+        for (Frame f; out.pop(f);) {
+            link_->send(f, now);
+        }
         link_->flush(now);
     }
     std::unique_ptr<can::Link> link_;

@@ -8,7 +8,9 @@
 namespace hal::canopen::test {
 namespace {
 
-constexpr std::uint8_t stop = 0, start = 1, clear = 3;
+constexpr std::uint8_t stop = 0;
+constexpr std::uint8_t start = 1;
+constexpr std::uint8_t clear = 3;
 constexpr std::uint32_t busy = 1;  // bit 0 of 1F57h
 
 struct BootloaderDevice : testing::Test {
@@ -25,7 +27,9 @@ struct BootloaderDevice : testing::Test {
     void stop_and_clear() {
         ASSERT_EQ(control(stop), Abort::none);
         ASSERT_EQ(control(clear), Abort::none);
-        while ((bench.read<std::uint32_t>(0x1f57, 1) & 1) != 0) bench.run(5 * millisecond);
+        while ((bench.read<std::uint32_t>(0x1f57, 1) & 1) != 0) {
+            bench.run(5 * millisecond);
+        }
     }
     std::string software() {
         std::vector<std::uint8_t> text;
@@ -45,7 +49,8 @@ TEST_F(BootloaderDevice, runs_its_initial_program_after_power_on) {
 
 TEST_F(BootloaderDevice, accepts_a_new_program_by_block_and_by_segmented_transfer) {
     for (const auto mode : {SdoMode::block, SdoMode::segmented}) {
-        const auto image = program_image(0x302, mode == SdoMode::block ? 0x00020001 : 0x00030000, 5000);
+        const auto image =
+            program_image(0x302, mode == SdoMode::block ? 0x00020001 : 0x00030000, 5000);
         stop_and_clear();
         EXPECT_EQ(bench.read<std::uint32_t>(0x1018, 3), 0U);
         EXPECT_EQ(software(), "bootloader");
@@ -56,7 +61,8 @@ TEST_F(BootloaderDevice, accepts_a_new_program_by_block_and_by_segmented_transfe
         bench.forget();
         ASSERT_EQ(control(start), Abort::none);
         EXPECT_EQ(bench.sent(0x705).size(), 1U);  // boot-up
-        EXPECT_EQ(bench.read<std::uint32_t>(0x1018, 3), mode == SdoMode::block ? 0x00020001U : 0x00030000U);
+        EXPECT_EQ(bench.read<std::uint32_t>(0x1018, 3),
+                  mode == SdoMode::block ? 0x00020001U : 0x00030000U);
         EXPECT_EQ(software(), mode == SdoMode::block ? "2.1" : "3.0");
     }
 }
@@ -86,7 +92,9 @@ TEST_F(BootloaderDevice, does_not_start_a_damaged_program_or_one_of_another_prod
     const struct {
         std::vector<std::uint8_t> image;
         std::uint32_t error;
-    } cases[] = {{damaged, 3}, {program_image(0x303, 0x00020001, 100), 2}, {std::vector<std::uint8_t>(50, 7), 2}};
+    } cases[] = {{damaged, 3},
+                 {program_image(0x303, 0x00020001, 100), 2},
+                 {std::vector<std::uint8_t>(50, 7), 2}};
     for (const auto& c : cases) {
         stop_and_clear();
         EXPECT_EQ(bench.write(0x1f50, 1, c.image), Abort::cannot_store);
@@ -104,9 +112,11 @@ TEST_F(BootloaderDevice, does_not_start_a_damaged_program_or_one_of_another_prod
     EXPECT_EQ(bench.read<std::uint32_t>(0x1f57, 1), 6U << 1);
 }
 
-/// The device resets only after it has sent the response to the command; requests received before the reset see it busy.
+/// The device resets only after it has sent the response to the command; requests received before
+/// the reset see it busy.
 TEST_F(BootloaderDevice, reports_busy_in_1F57h_between_a_stop_command_and_its_reset) {
-    const Frame stop_program(0x605, {0x2f, 0x51, 0x1f, 1, stop, 0, 0, 0}), read_status(0x605, {0x40, 0x57, 0x1f, 1, 0, 0, 0, 0});
+    const Frame stop_program(0x605, {0x2f, 0x51, 0x1f, 1, stop, 0, 0, 0}),
+        read_status(0x605, {0x40, 0x57, 0x1f, 1, 0, 0, 0, 0});
     bench.forget();
     bench.send(stop_program);
     bench.send(read_status);
@@ -118,7 +128,8 @@ TEST_F(BootloaderDevice, reports_busy_in_1F57h_between_a_stop_command_and_its_re
     EXPECT_EQ(responses[0].data[0], 0x60);
     EXPECT_EQ(load<std::uint32_t>(responses[1].data.data() + 4), busy);  // no error
     EXPECT_EQ(responses[2].data[0], 0x80);
-    EXPECT_EQ(load<std::uint32_t>(responses[2].data.data() + 4), static_cast<std::uint32_t>(Abort::device_state));
+    EXPECT_EQ(load<std::uint32_t>(responses[2].data.data() + 4),
+              static_cast<std::uint32_t>(Abort::device_state));
     EXPECT_TRUE(device.running());
     EXPECT_TRUE(bench.sent(0x705).empty());
 
@@ -155,7 +166,8 @@ TEST(FlashFile, reads_back_what_was_written) {
     EXPECT_EQ(read_flash(path, 3, image), "");
     EXPECT_EQ(image, bytes);
     EXPECT_EQ(read_flash(path, 2, image), "'" + path + "' is longer than the flash of 2 bytes");
-    EXPECT_EQ(write_flash("/nowhere/flash", bytes), "cannot write '/nowhere/flash': No such file or directory");
+    EXPECT_EQ(write_flash("/nowhere/flash", bytes),
+              "cannot write '/nowhere/flash': No such file or directory");
     std::filesystem::remove(path);
     Bootloader empty(BootloaderSettings{.version = 0});
     EXPECT_FALSE(empty.running());

@@ -16,21 +16,27 @@ namespace {
 /// Returns all entries of a description by key; writing and reading the file must not change them.
 std::map<std::uint32_t, EntryDescription> all_of(const Description& d) {
     std::map<std::uint32_t, EntryDescription> entries;
-    for (const auto& e : d.entries) entries.emplace(std::uint32_t{e.index} << 8 | e.sub, e);
+    for (const auto& e : d.entries) {
+        entries.emplace(std::uint32_t{e.index} << 8 | e.sub, e);
+    }
     return entries;
 }
 
 void comes_back(const Program& program) {
     const auto ours = program.description();
     auto eds = eds_of(ours);
-    eds.file.file_name = "device.eds", eds.device.vendor_name = "Halcyon";
+    eds.file.file_name = "device.eds";
+    eds.device.vendor_name = "Halcyon";
     eds.file.creation_date = eds.file.modification_date = "01-31-2026";
     eds.file.creation_time = eds.file.modification_time = "10:00AM";
     const auto reading = eds::read_eds(eds::write_eds(eds));
     ASSERT_TRUE(reading.description);
-    for (const auto& message : reading.messages) ADD_FAILURE() << to_string(message);
+    for (const auto& message : reading.messages) {
+        ADD_FAILURE() << to_string(message);
+    }
     EXPECT_TRUE(*reading.description == eds);
-    const auto there = all_of(ours), back = all_of(eds::dictionary_of(*reading.description));
+    const auto there = all_of(ours);
+    const auto back = all_of(eds::dictionary_of(*reading.description));
     ASSERT_EQ(there.size(), back.size());
     for (const auto& [key, e] : there) {
         ASSERT_TRUE(back.contains(key)) << std::hex << key;
@@ -51,7 +57,9 @@ void comes_back(const Program& program) {
 
 TEST(DeviceEds, of_an_IO_node_reads_back_as_the_device) { comes_back(Io(IoSettings{})); }
 TEST(DeviceEds, of_a_force_torque_node_reads_back_as_the_device) { comes_back(Jr3(Jr3Settings{})); }
-TEST(DeviceEds, of_a_bootloader_reads_back_as_the_device) { comes_back(Bootloader(BootloaderSettings{})); }
+TEST(DeviceEds, of_a_bootloader_reads_back_as_the_device) {
+    comes_back(Bootloader(BootloaderSettings{}));
+}
 TEST(DeviceEds, of_drives_reads_back_as_the_device) {
     for (const unsigned axes : {1U, 8U}) {
         cia402::DriveSettings settings;

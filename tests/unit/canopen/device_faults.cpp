@@ -9,7 +9,10 @@ namespace {
 struct FaultyDevice : testing::Test {
     Io io{IoSettings{}};
     Bench bench{io};
-    void SetUp() override { bench.start(), bench.forget(); }
+    void SetUp() override {
+        bench.start();
+        bench.forget();
+    }
     void set(const std::string& text) {
         Fault fault{};
         FaultSetting setting;
@@ -34,7 +37,9 @@ TEST_F(FaultyDevice, is_mute_for_a_time) {
 
 TEST_F(FaultyDevice, loses_every_third_frame_and_the_client_gets_through) {
     set("mute:every=3");
-    for (int n = 0; n < 10; ++n) EXPECT_EQ(type(), 0xf0191U);
+    for (int n = 0; n < 10; ++n) {
+        EXPECT_EQ(type(), 0xf0191U);
+    }
     EXPECT_GT(bench.remote().sdo().retries(), 2U);
 }
 
@@ -77,7 +82,10 @@ TEST_F(FaultyDevice, sends_PDOs_of_wrong_length_or_late) {
 }
 
 TEST_F(FaultyDevice, tells_a_wrong_identity) {
-    for (const char* fault : {"wrong-type", "wrong-vendor", "wrong-product", "wrong-revision", "wrong-serial"}) set(fault);
+    for (const char* fault :
+         {"wrong-type", "wrong-vendor", "wrong-product", "wrong-revision", "wrong-serial"}) {
+        set(fault);
+    }
     EXPECT_EQ(type(), 0xf0191U ^ 0xff);
     EXPECT_EQ(bench.read<std::uint32_t>(0x1018, 1), example_vendor ^ 0xff);
     EXPECT_EQ(bench.read<std::uint32_t>(0x1018, 2), 0x401U ^ 0xff);
@@ -126,11 +134,15 @@ TEST(FaultyTransfers, end_as_the_protocol_wants) {
         FaultSetting setting;
         std::string problem;
         ASSERT_TRUE(parse_fault(text, fault, setting, problem)) << problem;
-        for (const auto& row : fault_rows()) bench.node.faults().set(row.fault, {});
+        for (const auto& row : fault_rows()) {
+            bench.node.faults().set(row.fault, {});
+        }
         bench.node.faults().set(fault, setting);
     };
     std::vector<std::uint8_t> data(900), back;
-    for (std::size_t n = 0; n < data.size(); ++n) data[n] = static_cast<std::uint8_t>(n * 7);
+    for (std::size_t n = 0; n < data.size(); ++n) {
+        data[n] = static_cast<std::uint8_t>(n * 7);
+    }
     ASSERT_EQ(bench.write(0x2000, 0, data, SdoMode::block), Abort::none);
     set("toggle");
     EXPECT_EQ(bench.read(0x2000, 0, back), Abort::toggle);
@@ -144,7 +156,8 @@ TEST(FaultyTransfers, end_as_the_protocol_wants) {
     set("block-crc");
     EXPECT_EQ(bench.read(0x2000, 0, back, SdoMode::block), Abort::crc);
     EXPECT_EQ(bench.write(0x2000, 0, data, SdoMode::block), Abort::crc);
-    std::vector<std::uint8_t> many(1000, 0x5a);  // block transfer by default, segmented transfer when blocks fail
+    // block transfer by default, segmented transfer when blocks fail
+    std::vector<std::uint8_t> many(1000, 0x5a);
     EXPECT_EQ(bench.write(0x2000, 0, many), Abort::none);
     EXPECT_EQ(bench.read(0x2000, 0, back), Abort::none);
     EXPECT_EQ(back, many);
@@ -188,7 +201,8 @@ TEST_F(FaultyDevice, guards_with_a_wrong_toggle_bit) {
     end(Fault::guard_toggle);
     bench.run(100 * millisecond);
     const auto wrong = bench.remote().wrong_toggles();
-    set("no-heartbeat:every=8");  // an answer is lost: the next one has the toggle bit of the last that came
+    // an answer is lost: the next one has the toggle bit of the last that came
+    set("no-heartbeat:every=8");
     bench.run(400 * millisecond);
     EXPECT_EQ(bench.remote().wrong_toggles(), wrong);
     EXPECT_FALSE(bench.remote().lost());
@@ -222,7 +236,8 @@ TEST_F(FaultyDevice, loses_its_power_again_and_again) {
 }
 
 TEST_F(FaultyDevice, babbles_and_cries) {
-    set("babble:time=500us"), set("emcy-storm:time=10ms");
+    set("babble:time=500us");
+    set("emcy-storm:time=10ms");
     bench.run(100 * millisecond);
     EXPECT_NEAR(static_cast<double>(bench.sent(0x001).size()), 200, 4);
     EXPECT_NEAR(static_cast<double>(bench.remote().emergencies()), 10, 1);
@@ -254,17 +269,26 @@ TEST(BusOff, is_told_by_every_device_when_the_bus_is_back) {
     const auto run = [&](Time time) {
         for (const Time end = now + time; now < end;) {
             node.turn(now += millisecond);
-            for (Frame f; master->receive(f, now);)
-                if (f.id == 0x85 && !f.error) told.push_back(f);
+            for (Frame f; master->receive(f, now);) {
+                if (f.id == 0x85 && !f.error) {
+                    told.push_back(f);
+                }
+            }
         }
     };
     run(5 * millisecond);
-    master->send({0, {1, 5}}, now), master->flush(now);
+    master->send({0, {1, 5}}, now);
+    master->flush(now);
     run(5 * millisecond);
     ASSERT_EQ(node.device().state(), NmtState::operational);
     auto* wire = node.link().simulation();
     can::Disturbance broken;
-    broken.fault = can::Fault::error, broken.every = 1, broken.node = wire->node(), broken.count = 32;  // 32 errors of 8 are 256
+    // 32 errors of 8 are 256
+    broken.fault = can::Fault::error;
+    broken.every = 1;
+    broken.node = wire->node();
+
+    broken.count = 32;
     wire->disturb(broken);
     run(30 * millisecond);
     ASSERT_EQ(node.link().state(), can::State::bus_off);
@@ -292,10 +316,15 @@ TEST(Faults, are_read_and_refused_with_what_to_type) {
     EXPECT_EQ(s.from, 2 * second);
     EXPECT_EQ(s.until, 2 * second + 500 * microsecond);
     const std::pair<const char*, const char*> wrong[] = {
-        {"mute:every=0", "invalid property 'every=0' of fault mute; write every=3, from=5s or for=1s"},
-        {"mute:time=1ms", "invalid property 'time=1ms' of fault mute; write every=3, from=5s or for=1s"},
-        {"late-sdo:time=1", "invalid property 'time=1' of fault late-sdo; write every=3, time=20ms, from=5s or for=1s"},
-        {"late-sdo:late", "invalid property 'late' of fault late-sdo; write every=3, time=20ms, from=5s or for=1s"},
+        {"mute:every=0",
+         "invalid property 'every=0' of fault mute; write every=3, from=5s or for=1s"},
+        {"mute:time=1ms",
+         "invalid property 'time=1ms' of fault mute; write every=3, from=5s or for=1s"},
+        {"late-sdo:time=1",
+         "invalid property 'time=1' of fault late-sdo; write every=3, time=20ms, from=5s or "
+         "for=1s"},
+        {"late-sdo:late",
+         "invalid property 'late' of fault late-sdo; write every=3, time=20ms, from=5s or for=1s"},
     };
     for (const auto& [text, said] : wrong) {
         EXPECT_FALSE(parse_fault(text, fault, s, problem));
@@ -303,9 +332,12 @@ TEST(Faults, are_read_and_refused_with_what_to_type) {
     }
     EXPECT_FALSE(parse_fault("", fault, s, problem));
     EXPECT_EQ(problem,
-              "unknown fault ''; use one of: mute, deaf, twice, late-sdo, late-pdo, no-boot-up, boot-storm, reboot, no-heartbeat, "
-              "wrong-state, guard-toggle, no-sdo, abort, stale-abort, toggle, block-gap, block-crc, short-pdo, long-pdo, wrong-type, "
-              "wrong-vendor, wrong-product, wrong-revision, wrong-serial, wrong-software, babble, emcy-storm, "
+              "unknown fault ''; use one of: mute, deaf, twice, late-sdo, late-pdo, no-boot-up, "
+              "boot-storm, reboot, no-heartbeat, "
+              "wrong-state, guard-toggle, no-sdo, abort, stale-abort, toggle, block-gap, "
+              "block-crc, short-pdo, long-pdo, wrong-type, "
+              "wrong-vendor, wrong-product, wrong-revision, wrong-serial, wrong-software, babble, "
+              "emcy-storm, "
               "no-srdo, srdo-half, srdo-wrong, srdo-order, late-srdo");
 }
 

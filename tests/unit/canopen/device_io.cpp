@@ -14,7 +14,9 @@ struct IoDevice : testing::Test {
 };
 
 TEST_F(IoDevice, shows_its_inputs_in_all_widths) {
-    for (const unsigned n : {0U, 9U, 17U, 63U}) io.set_input(n, true);
+    for (const unsigned n : {0U, 9U, 17U, 63U}) {
+        io.set_input(n, true);
+    }
     bench.run(2 * millisecond);
     EXPECT_EQ(bench.read<std::uint8_t>(0x6000, 1), 0x01);
     EXPECT_EQ(bench.read<std::uint8_t>(0x6000, 8), 0x80);
@@ -54,7 +56,8 @@ TEST_F(IoDevice, turns_inputs_round_and_filters_them) {
     bench.run(2 * millisecond);
     EXPECT_EQ(bench.read<std::uint8_t>(0x6000, 2), 0xff);
     ASSERT_EQ(bench.write<std::uint8_t>(0x6003, 1, 0x01), Abort::none);
-    io.set_input(0, true), io.set_input(1, true);
+    io.set_input(0, true);
+    io.set_input(1, true);
     bench.run(5 * millisecond);
     EXPECT_EQ(bench.read<std::uint8_t>(0x6000, 1), 0x02);  // bit 0 waits for its 10 ms
     io.set_input(0, false);
@@ -85,7 +88,8 @@ TEST_F(IoDevice, drives_outputs_from_PDO_and_from_every_object) {
 }
 
 TEST_F(IoDevice, has_analogue_values_left_justified) {
-    io.set_analog_input(0, 0.5), io.set_analog_input(11, -1.0);
+    io.set_analog_input(0, 0.5);
+    io.set_analog_input(11, -1.0);
     bench.run(2 * millisecond);
     EXPECT_EQ(bench.read<std::int16_t>(0x6401, 1), 16384);
     EXPECT_EQ(bench.read<std::int16_t>(0x6401, 12), -32767);
@@ -116,11 +120,13 @@ TEST_F(IoDevice, sends_analogue_inputs_by_limits_and_deltas) {
     EXPECT_EQ(sent_at(0.2), 1U);  // by default at any change
     EXPECT_EQ(sent_at(0.2), 0U);
     ASSERT_EQ(bench.write<std::uint8_t>(0x6421, 1, 4), Abort::none);
-    ASSERT_EQ(bench.write<std::uint32_t>(0x6426, 1, 3277U << 16), Abort::none);  // a tenth of the range
+    // a tenth of the range
+    ASSERT_EQ(bench.write<std::uint32_t>(0x6426, 1, 3277U << 16), Abort::none);
     EXPECT_EQ(sent_at(0.25), 0U);
     EXPECT_EQ(sent_at(0.31), 1U);
     EXPECT_EQ(sent_at(0.20), 1U);
-    ASSERT_EQ(bench.write<std::uint8_t>(0x6421, 1, 1 | 16), Abort::none);  // above a limit, and risen
+    // above a limit, and risen
+    ASSERT_EQ(bench.write<std::uint8_t>(0x6421, 1, 1 | 16), Abort::none);
     ASSERT_EQ(bench.write<std::int32_t>(0x6424, 1, 16384 * 65536), Abort::none);
     EXPECT_EQ(sent_at(0.4), 0U);
     EXPECT_EQ(sent_at(0.6), 1U);
@@ -132,7 +138,8 @@ TEST_F(IoDevice, sends_analogue_inputs_by_limits_and_deltas) {
 
 TEST_F(IoDevice, takes_its_error_values_when_the_master_falls_silent) {
     ASSERT_EQ(bench.write<std::uint32_t>(0x1016, 1, 0x00010064), Abort::none);  // node 1, 100 ms
-    ASSERT_EQ(bench.write<std::uint8_t>(0x6206, 1, 0x0f), Abort::none);         // 0–3 take a value, 4–7 stay
+    // 0–3 take a value, 4–7 stay
+    ASSERT_EQ(bench.write<std::uint8_t>(0x6206, 1, 0x0f), Abort::none);
     ASSERT_EQ(bench.write<std::uint8_t>(0x6207, 1, 0x05), Abort::none);
     ASSERT_EQ(bench.write<std::int32_t>(0x6444, 1, -16384 * 65536), Abort::none);
     ASSERT_EQ(bench.write<std::uint8_t>(0x6443, 2, 0), Abort::none);
@@ -177,7 +184,8 @@ TEST_F(IoDevice, begins_anew_after_a_reset_with_what_was_stored) {
 }
 
 TEST(IoDevices, are_as_large_as_was_said) {
-    Io io(IoSettings{.digital_inputs = 3, .digital_outputs = 0, .analog_inputs = 5, .analog_outputs = 0});
+    Io io(IoSettings{
+        .digital_inputs = 3, .digital_outputs = 0, .analog_inputs = 5, .analog_outputs = 0});
     Bench bench(io);
     bench.start();
     EXPECT_EQ(bench.read<std::uint8_t>(0x6000, 0), 1);
@@ -186,7 +194,9 @@ TEST(IoDevices, are_as_large_as_was_said) {
     EXPECT_EQ(bench.last_abort, Abort::no_object);
     EXPECT_EQ(bench.read<std::uint32_t>(0x1400, 1) >> 31, 1U);
     EXPECT_EQ(bench.read<std::uint8_t>(0x1a02, 0), 1);
-    io.set_input(3, true), io.set_input(64, true), io.set_analog_input(5, 1.0);
+    io.set_input(3, true);
+    io.set_input(64, true);
+    io.set_analog_input(5, 1.0);
     bench.run(2 * millisecond);
     EXPECT_EQ(bench.read<std::uint8_t>(0x6000, 1), 0);
     EXPECT_THROW(Io(IoSettings{.digital_inputs = 65}).description(), std::invalid_argument);

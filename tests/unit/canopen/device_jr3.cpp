@@ -13,9 +13,13 @@ using namespace jr3;
 
 std::vector<Packet> decoded(Decoder& decoder, std::span<const std::uint8_t> bytes) {
     std::vector<Packet> packets;
-    for (const auto byte : bytes)
-        for (int bit = 7; bit >= 0; --bit)
-            if (decoder.take((byte >> bit & 1) != 0)) packets.push_back(decoder.packet());
+    for (const auto byte : bytes) {
+        for (int bit = 7; bit >= 0; --bit) {
+            if (decoder.take((byte >> bit & 1) != 0)) {
+                packets.push_back(decoder.packet());
+            }
+        }
+    }
     return packets;
 }
 
@@ -28,7 +32,9 @@ std::vector<std::uint8_t> line(Generator& generator, std::size_t bytes) {
 TEST(Jr3Stream, gives_back_what_went_in) {
     Generator generator;
     const std::int16_t values[] = {24576, -1, 0, 32767, -32768, 0x0ff8, 0x7fe0};
-    for (unsigned n = 0; n < 7; ++n) generator.set(n, values[n]);
+    for (unsigned n = 0; n < 7; ++n) {
+        generator.set(n, values[n]);
+    }
     Decoder decoder;
     const auto packets = decoded(decoder, line(generator, packet_clocks * addresses * 10 / 8));
     ASSERT_EQ(packets.size(), 159U);  // the first one only shows where packets begin
@@ -44,34 +50,49 @@ TEST(Jr3Stream, gives_back_what_went_in) {
 
 TEST(Jr3Stream, is_found_from_wherever_it_is_heard) {
     Generator generator;
-    for (unsigned n = 0; n < addresses; ++n) generator.set(n, static_cast<std::int16_t>(0xffe7 << (n % 3)));  // pulses in the data
+    // pulses in the data
+    for (unsigned n = 0; n < addresses; ++n) {
+        generator.set(n, static_cast<std::int16_t>(0xffe7 << (n % 3)));
+    }
     const auto bytes = line(generator, 4000);
     for (std::size_t from = 0; from < 200; ++from) {
         Decoder decoder;
         const auto packets = decoded(decoder, std::span(bytes).subspan(from));
         ASSERT_GT(packets.size(), 880U) << from;
-        for (std::size_t n = 1; n < packets.size(); ++n) ASSERT_EQ(packets[n].address, (packets[n - 1].address + 1) % addresses) << from;
+        for (std::size_t n = 1; n < packets.size(); ++n) {
+            ASSERT_EQ(packets[n].address, (packets[n - 1].address + 1) % addresses) << from;
+        }
     }
 }
 
 TEST(Jr3Stream, loses_little_to_a_disturbed_bit) {
     Generator generator;
-    for (unsigned n = 0; n < 7; ++n) generator.set(n, static_cast<std::int16_t>(1000 * static_cast<int>(n)));
+    for (unsigned n = 0; n < 7; ++n) {
+        generator.set(n, static_cast<std::int16_t>(1000 * static_cast<int>(n)));
+    }
     auto bytes = line(generator, 10000);
     const auto all = bytes.size() * 8 / packet_clocks;
-    for (std::size_t at = 500; at < bytes.size(); at += 500) bytes[at] ^= 0x10;
+    for (std::size_t at = 500; at < bytes.size(); at += 500) {
+        bytes[at] ^= 0x10;
+    }
     Decoder decoder;
     const auto packets = decoded(decoder, bytes);
     EXPECT_GT(packets.size(), all - 19 * 4);
     std::size_t wrong = 0;
-    for (const auto& p : packets) wrong += p.address < 7 && p.value != 1000 * p.address;
+    for (const auto& p : packets) {
+        wrong += p.address < 7 && p.value != 1000 * p.address;
+    }
     EXPECT_LE(wrong, 19U);
 }
 
 TEST(Jr3Stream, that_stands_still_gives_nothing) {
     Decoder decoder;
-    for (int n = 0; n < 1000; ++n) EXPECT_FALSE(decoder.take(true));
-    for (int n = 0; n < 1000; ++n) EXPECT_FALSE(decoder.take(false));
+    for (int n = 0; n < 1000; ++n) {
+        EXPECT_FALSE(decoder.take(true));
+    }
+    for (int n = 0; n < 1000; ++n) {
+        EXPECT_FALSE(decoder.take(false));
+    }
     EXPECT_EQ(decoder.packets(), 0U);
 }
 
@@ -89,11 +110,12 @@ TEST(Jr3Calibration, comes_through_the_stream_whole) {
     read.matrix[2][3] = 9;
     std::size_t found = 0;
     const auto bytes = line(generator, packet_clocks * addresses * memory_size * 2 / 8);
-    for (const auto& p : decoded(decoder, bytes))
+    for (const auto& p : decoded(decoder, bytes)) {
         if (p.address == calibration_address && reader.take(static_cast<std::uint16_t>(p.value))) {
             ++found;
             EXPECT_TRUE(read.read(reader.memory()));
         }
+    }
     EXPECT_EQ(found, 1U);
     EXPECT_EQ(read.serial, 77U);
     EXPECT_NEAR(read.matrix[2][3], calibration.matrix[2][3], 1e-6);
@@ -109,7 +131,9 @@ TEST(Jr3Calibration, decouples_what_was_coupled) {
         Six wrench{};
         wrench[axis] = 0.7 * calibration.full_scale[axis];
         const auto back = calibration.wrench(calibration.raw(wrench, inverse));
-        for (unsigned n = 0; n < 6; ++n) EXPECT_NEAR(back[n], wrench[n], calibration.full_scale[n] / 4000) << axis << n;
+        for (unsigned n = 0; n < 6; ++n) {
+            EXPECT_NEAR(back[n], wrench[n], calibration.full_scale[n] / 4000) << axis << n;
+        }
     }
     Calibration singular;
     singular.matrix[1] = singular.matrix[0];
@@ -122,7 +146,9 @@ TEST(Jr3Calibration, decouples_what_was_coupled) {
 struct Jr3Node : testing::Test {
     Jr3 jr3{Jr3Settings{}};
     Bench bench{jr3, {.node_id = 0x50}};
-    static int value(const Frame& f, unsigned n) { return load<std::int16_t>(f.data.data() + 2 * n); }
+    static int value(const Frame& f, unsigned n) {
+        return load<std::int16_t>(f.data.data() + 2 * n);
+    }
 };
 
 TEST_F(Jr3Node, sends_forces_and_torques_of_one_sample_at_each_SYNC) {
@@ -130,8 +156,12 @@ TEST_F(Jr3Node, sends_forces_and_torques_of_one_sample_at_each_SYNC) {
     bench.start();
     bench.run(20 * millisecond);
     bench.forget();
-    for (int n = 0; n < 5; ++n) bench.run(millisecond), bench.sync();
-    const auto forces = bench.sent(0x2d0), torques = bench.sent(0x4d0);
+    for (int n = 0; n < 5; ++n) {
+        bench.run(millisecond);
+        bench.sync();
+    }
+    const auto forces = bench.sent(0x2d0);
+    const auto torques = bench.sent(0x4d0);
     ASSERT_EQ(forces.size(), 5U);
     ASSERT_EQ(torques.size(), 5U);
     EXPECT_NEAR(value(forces[4], 0), 1000, 3);
@@ -140,7 +170,9 @@ TEST_F(Jr3Node, sends_forces_and_torques_of_one_sample_at_each_SYNC) {
     EXPECT_NEAR(value(torques[4], 0), 500, 2);
     EXPECT_NEAR(value(torques[4], 1), -1000, 2);
     EXPECT_NEAR(value(torques[4], 2), 2000, 2);
-    for (unsigned n = 0; n < 5; ++n) EXPECT_EQ(forces[n].data[7], torques[n].data[7]);
+    for (unsigned n = 0; n < 5; ++n) {
+        EXPECT_EQ(forces[n].data[7], torques[n].data[7]);
+    }
     EXPECT_NE(forces[0].data[7], forces[1].data[7]);
     EXPECT_TRUE(bench.sent(0x1d0).empty() && bench.sent(0x3d0).empty());  // closed
 }
@@ -177,14 +209,21 @@ TEST_F(Jr3Node, sends_at_SYNC_what_changed_with_type_0) {
     bench.start();
     bench.run(20 * millisecond);
     ASSERT_EQ(bench.write<std::uint8_t>(0x1801, 2, 0), Abort::none);
-    bench.sync(), bench.run(2 * millisecond);
+    bench.sync();
+    bench.run(2 * millisecond);
     bench.forget();
-    for (int n = 0; n < 3; ++n) bench.sync(), bench.run(2 * millisecond);
+    for (int n = 0; n < 3; ++n) {
+        bench.sync();
+        bench.run(2 * millisecond);
+    }
     EXPECT_TRUE(bench.sent(0x2d0).empty());
     jr3.set_wrench({0, 30, 0, 0, 0, 0});
     bench.run(5 * millisecond);
     EXPECT_TRUE(bench.sent(0x2d0).empty());
-    for (int n = 0; n < 3; ++n) bench.sync(), bench.run(2 * millisecond);
+    for (int n = 0; n < 3; ++n) {
+        bench.sync();
+        bench.run(2 * millisecond);
+    }
     ASSERT_EQ(bench.sent(0x2d0).size(), 1U);
     EXPECT_NEAR(value(bench.sent(0x2d0)[0], 1), 3000, 3);
 }
@@ -274,7 +313,9 @@ TEST(Jr3Recording, is_decoded_over_and_over) {
     std::array<Six, 6> inverse;
     ASSERT_TRUE(calibration.invert(inverse));
     const auto raw = calibration.raw({1, 2, 3, 0.1, 0.2, 0.3}, inverse);
-    for (unsigned n = 0; n < 6; ++n) generator.set(n + 1, raw[n]);
+    for (unsigned n = 0; n < 6; ++n) {
+        generator.set(n + 1, raw[n]);
+    }
     generator.set(supply_address, 24576);
     Jr3Settings settings;
     settings.recording = line(generator, packet_clocks * addresses / 8 * 4);
@@ -282,7 +323,9 @@ TEST(Jr3Recording, is_decoded_over_and_over) {
     Bench bench(jr3, {.node_id = 0x50});
     bench.start();
     bench.run(100 * millisecond);
-    for (unsigned n = 0; n < 3; ++n) EXPECT_NEAR(jr3.wrench()[n], 1.0 + n, 0.02);
+    for (unsigned n = 0; n < 3; ++n) {
+        EXPECT_NEAR(jr3.wrench()[n], 1.0 + n, 0.02);
+    }
     EXPECT_NEAR(static_cast<double>(jr3.decoder().packets()), 0.1 * clock_hz / packet_clocks, 400);
     EXPECT_EQ(jr3.decoder().errors(), 0U);
 }

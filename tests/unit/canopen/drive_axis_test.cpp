@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The master's axis and the simulated drive against each other in every mode, with one cycle of delay each way as on a bus.
+// The master's axis and the simulated drive against each other in every mode, with one cycle of
+// delay each way as on a bus.
 #include "cia402/axis.hpp"
 #include "drive_bench.hpp"
 
@@ -20,7 +21,10 @@ struct AxisAndDrive : DriveBench {
         rules.position = rules.velocity = rules.acceleration = {4096, 1};
         rules.torque = {1000, 0.3};
         rules.vl = {60, 1};
-        command.profile_velocity = 8, command.profile_acceleration = 40, command.profile_deceleration = 40;
+        command.profile_velocity = 8;
+        command.profile_acceleration = 40;
+
+        command.profile_deceleration = 40;
     }
     AxisFeedback read() {
         return {.operational = true,
@@ -33,9 +37,14 @@ struct AxisAndDrive : DriveBench {
                 .torque = get<std::int16_t>(object::torque_actual)};
     }
     void tell(const AxisOrders& o) {
-        if (o.mode != Mode::none) set_mode(o.mode);
+        if (o.mode != Mode::none) {
+            set_mode(o.mode);
+        }
         set(object::target_position, o.target_position);
-        if (o.mode == Mode::interpolated_position) write(object::interpolation_data, 1, o.interpolation);  // it may be full
+        // it may be full
+        if (o.mode == Mode::interpolated_position) {
+            write(object::interpolation_data, 1, o.interpolation);
+        }
         set(object::target_velocity, o.target_velocity);
         set(object::vl_target_velocity, o.vl_target_velocity);
         set(object::target_torque, o.target_torque);
@@ -54,7 +63,9 @@ struct AxisAndDrive : DriveBench {
         feedback = seen;
     }
     void cycles(int n) {
-        while (n-- > 0) cycle();
+        while (n-- > 0) {
+            cycle();
+        }
     }
     template <class F>
     bool wait(F&& so, int most = 5000) {
@@ -124,7 +135,9 @@ TEST_F(AxisAndDrive, Profile_position_one_and_many) {
     EXPECT_FALSE(axis.target_reached());
     EXPECT_TRUE(wait([&] { return axis.target_reached(); }));
     EXPECT_NEAR(axis.position(), 5, 0.01);
-    for (int n = 1; n <= 10; ++n) go(n % 2 == 0 ? n / 10.0 : -n / 10.0);
+    for (int n = 1; n <= 10; ++n) {
+        go(n % 2 == 0 ? n / 10.0 : -n / 10.0);
+    }
     EXPECT_TRUE(wait([&] { return axis.target_reached(); }, 20000));
     EXPECT_NEAR(axis.position(), 1, 0.01);
     EXPECT_FALSE(axis.failure());

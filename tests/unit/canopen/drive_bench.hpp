@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A drive on a test bench: objects are written as an SDO writes them, time is a number, one step is 1 ms.
+// A drive on a test bench: objects are written as an SDO writes them, time is a number, one step is
+// 1 ms.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -32,7 +33,9 @@ struct DriveBench : testing::Test {
             now += millisecond;
             drive->step(now);
             device().poll(now);
-            for (Frame f; device().out().pop(f);) sent.push_back(f);
+            for (Frame f; device().out().pop(f);) {
+                sent.push_back(f);
+            }
         }
     }
     /// Steps until it is so; false when it is not within the time.
@@ -63,13 +66,19 @@ struct DriveBench : testing::Test {
     std::uint16_t word(unsigned axis = 0) { return get<std::uint16_t>(object::statusword, axis); }
     State state(unsigned axis = 0) { return state_of(word(axis)); }
     bool bit(std::uint16_t mask, unsigned axis = 0) { return (word(axis) & mask) != 0; }
-    std::int32_t position(unsigned axis = 0) { return get<std::int32_t>(object::position_actual, axis); }
-    std::int32_t velocity(unsigned axis = 0) { return get<std::int32_t>(object::velocity_actual, axis); }
+    std::int32_t position(unsigned axis = 0) {
+        return get<std::int32_t>(object::position_actual, axis);
+    }
+    std::int32_t velocity(unsigned axis = 0) {
+        return get<std::int32_t>(object::velocity_actual, axis);
+    }
     void control(std::uint16_t value, unsigned axis = 0) {
         set(object::controlword, value, axis);
         run(1);
     }
-    void set_mode(Mode mode, unsigned axis = 0) { set(object::modes_of_operation, static_cast<int>(mode), axis); }
+    void set_mode(Mode mode, unsigned axis = 0) {
+        set(object::modes_of_operation, static_cast<int>(mode), axis);
+    }
     void enable(Mode mode, unsigned axis = 0) {
         set_mode(mode, axis);
         control(command::shutdown, axis);
@@ -79,17 +88,24 @@ struct DriveBench : testing::Test {
     }
     std::vector<Emergency> emergencies() {
         std::vector<Emergency> result;
-        for (const auto& f : sent)
-            if (f.id == 0x85) result.push_back(EmcyConsumer::read(f, 0));
+        for (const auto& f : sent) {
+            if (f.id == 0x85) {
+                result.push_back(EmcyConsumer::read(f, 0));
+            }
+        }
         return result;
     }
 };
 
-inline std::ostream& operator<<(std::ostream& out, Abort abort) { return out << canopen::to_string(abort); }
+inline std::ostream& operator<<(std::ostream& out, Abort abort) {
+    return out << canopen::to_string(abort);
+}
 
 }  // namespace hal::canopen::test
 
 namespace hal::canopen::cia402 {
 inline std::ostream& operator<<(std::ostream& out, State state) { return out << to_string(state); }
-inline std::ostream& operator<<(std::ostream& out, Homing homing) { return out << to_string(homing); }
+inline std::ostream& operator<<(std::ostream& out, Homing homing) {
+    return out << to_string(homing);
+}
 }  // namespace hal::canopen::cia402

@@ -107,8 +107,8 @@ TEST_F(DriveCyclic, Position_crosses_the_end_of_32_bits) {
 TEST_F(DriveCyclic, Limit_switch_holds_it_until_the_set_point_goes_back) {
     settings.axis[0].motor.positive_limit = 5000;
     settings.axis[0].motor.positive_stop = 9000;
-    for (const auto mode : {Mode::cyclic_position, Mode::cyclic_velocity, Mode::cyclic_torque, Mode::profile_velocity,
-                            Mode::profile_torque}) {
+    for (const auto mode : {Mode::cyclic_position, Mode::cyclic_velocity, Mode::cyclic_torque,
+                            Mode::profile_velocity, Mode::profile_torque}) {
         make();
         enable(mode);
         const auto drive_to = [&](int sign) {
@@ -120,7 +120,10 @@ TEST_F(DriveCyclic, Limit_switch_holds_it_until_the_set_point_goes_back) {
             }
         };
         if (mode == Mode::cyclic_position) {
-            for (int n = 0; n <= 8000; n += 20) set(object::target_position, n), run(1);
+            for (int n = 0; n <= 8000; n += 20) {
+                set(object::target_position, n);
+                run(1);
+            }
             run(300);
         } else {
             drive_to(1);
@@ -131,7 +134,10 @@ TEST_F(DriveCyclic, Limit_switch_holds_it_until_the_set_point_goes_back) {
         EXPECT_TRUE(bit(status::internal_limit)) << cia402::to_string(mode);
         EXPECT_EQ(state(), State::operation_enabled) << cia402::to_string(mode);
         if (mode == Mode::cyclic_position) {
-            for (int n = 8000; n >= 3000; n -= 20) set(object::target_position, n), run(1);
+            for (int n = 8000; n >= 3000; n -= 20) {
+                set(object::target_position, n);
+                run(1);
+            }
             run(300);
             EXPECT_NEAR(position(), 3000, 5);
         } else {
@@ -196,7 +202,9 @@ TEST_F(DriveCyclic, Halt_is_for_the_master_to_do) {
 TEST_F(DriveCyclic, Interpolation_takes_one_record_per_period) {
     ready(Mode::interpolated_position, 10);
     EXPECT_FALSE(bit(status::interpolation_active));
-    for (int n = 1; n <= 20; ++n) set(object::interpolation_data, n * 100, 0, 1);
+    for (int n = 1; n <= 20; ++n) {
+        set(object::interpolation_data, n * 100, 0, 1);
+    }
     run(20);
     EXPECT_EQ(demand(), 0);
     set(object::controlword, 0x1f);
@@ -222,7 +230,9 @@ TEST_F(DriveCyclic, Interpolation_period_has_an_exponent) {
 TEST_F(DriveCyclic, Interpolation_buffer_refuses_what_it_has_no_room_for) {
     ready(Mode::interpolated_position);
     set(object::interpolation_configuration, 4, 0, 2);
-    for (int n = 0; n < 4; ++n) set(object::interpolation_data, n, 0, 1);
+    for (int n = 0; n < 4; ++n) {
+        set(object::interpolation_data, n, 0, 1);
+    }
     EXPECT_EQ(write(object::interpolation_data, 1, 5), Abort::no_resource);
     run(1);
     EXPECT_EQ(get<std::uint16_t>(object::interpolation_configuration, 0, 4), 4);
@@ -233,7 +243,9 @@ TEST_F(DriveCyclic, Interpolation_buffer_refuses_what_it_has_no_room_for) {
 }
 TEST_F(DriveCyclic, Interpolation_halts_and_goes_on) {
     ready(Mode::interpolated_position, 10);
-    for (int n = 1; n <= 20; ++n) set(object::interpolation_data, n * 100, 0, 1);
+    for (int n = 1; n <= 20; ++n) {
+        set(object::interpolation_data, n * 100, 0, 1);
+    }
     control(0x1f);
     run(50);
     control(0x11f);

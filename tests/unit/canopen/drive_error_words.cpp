@@ -32,7 +32,9 @@ TEST(DriveErrorWords, Master_says_them_of_drives_only) {
         config::Node n;
         n.setup.id = id;
         n.name = "n" + std::to_string(id);
-        if (id == 5) n.setup.device_type = 0x00020192;
+        if (id == 5) {
+            n.setup.device_type = 0x00020192;
+        }
         if (id == 6) {  // no device type, but a mapped statusword of its second axis
             config::Pdo pdo;
             config::Object word;
@@ -45,7 +47,8 @@ TEST(DriveErrorWords, Master_says_them_of_drives_only) {
     EXPECT_STREQ(emergency_text(config, 5, 0x7305), "incremental sensor 1");
     EXPECT_STREQ(emergency_text(config, 6, 0x7305), "incremental sensor 1");
     EXPECT_STREQ(emergency_text(config, 7, 0x7305), "additional modules");
-    EXPECT_STREQ(emergency_text(config, 8, 0x7305), "additional modules") << "nobody knows that node";
+    EXPECT_STREQ(emergency_text(config, 8, 0x7305), "additional modules")
+        << "nobody knows that node";
 }
 
 }  // namespace

@@ -15,7 +15,8 @@ struct DriveFault : DriveBench {
         run(300);
         sent.clear();
     }
-    /// One fault: reaction, code, EMCY with the axis, and after the cause is gone the reset and its EMCY.
+    /// One fault: reaction, code, EMCY with the axis, and after the cause is gone the reset and its
+    /// EMCY.
     void expect_fault(std::uint16_t code, std::uint8_t register_bit, unsigned axis = 0) {
         ASSERT_TRUE(until([&] { return state(axis) == State::fault; }, 2000)) << state(axis);
         EXPECT_EQ(get<std::uint16_t>(object::error_code, axis), code);

@@ -67,7 +67,9 @@ TEST_F(DriveFault, Rated_torque_is_not_too_much) {
     make();
     enable(Mode::profile_torque);
     set(object::target_torque, 1000);
-    for (int n = 0; n < 60; ++n) run(1000);
+    for (int n = 0; n < 60; ++n) {
+        run(1000);
+    }
     EXPECT_EQ(state(), State::operation_enabled);
 }
 TEST_F(DriveFault, Voltages) {
@@ -119,8 +121,9 @@ TEST_F(DriveFault, Each_simulated_fault_over_2011h) {
         std::uint16_t code;
         std::uint8_t register_bit;
     };
-    for (const auto& row : {Row{1, 0x7305, error_profile}, Row{2, 0x3210, error_voltage}, Row{4, 0x3220, error_voltage},
-                            Row{8, 0x4310, error_temperature}, Row{16, 0x2310, error_current}}) {
+    for (const auto& row : {Row{1, 0x7305, error_profile}, Row{2, 0x3210, error_voltage},
+                            Row{4, 0x3220, error_voltage}, Row{8, 0x4310, error_temperature},
+                            Row{16, 0x2310, error_current}}) {
         moving();
         set(0x2011, row.bit);
         expect_fault(row.code, row.register_bit);
@@ -136,7 +139,8 @@ TEST_F(DriveFault, A_second_fault_is_told_too_and_both_must_go) {
     run(1);
     EXPECT_EQ(get<std::uint16_t>(object::error_code), 0x3210);
     EXPECT_EQ(emergencies().size(), 2U);
-    EXPECT_EQ(device().dictionary().get<std::uint8_t>(0x1001, 0), error_generic | error_temperature | error_voltage);
+    EXPECT_EQ(device().dictionary().get<std::uint8_t>(0x1001, 0),
+              error_generic | error_temperature | error_voltage);
     set(0x2011, 8);
     control(command::fault_reset);
     EXPECT_EQ(state(), State::fault);
@@ -157,7 +161,8 @@ struct Lost {
 struct DriveLost : DriveFault, testing::WithParamInterface<Lost> {
     void lose_heartbeat() {
         device().command(NmtCommand::start, now);
-        EXPECT_EQ(device().dictionary().write(0x1016, 1, std::array<std::uint8_t, 4>{100, 0, 1, 0}), Abort::none);
+        EXPECT_EQ(device().dictionary().write(0x1016, 1, std::array<std::uint8_t, 4>{100, 0, 1, 0}),
+                  Abort::none);
         device().handle({0x701, {5}}, now);
         run(50);
         EXPECT_EQ(state(), State::operation_enabled);
@@ -188,8 +193,10 @@ TEST_P(DriveLost, Does_what_6007h_says) {
     EXPECT_EQ(device().dictionary().get<std::uint8_t>(0x1001, 0), 0);
 }
 INSTANTIATE_TEST_SUITE_P(, DriveLost,
-                         testing::Values(Lost{0, State::operation_enabled, 0}, Lost{1, State::fault, 0x8130},
-                                         Lost{2, State::switch_on_disabled, 0}, Lost{3, State::switch_on_disabled, 0}),
+                         testing::Values(Lost{0, State::operation_enabled, 0},
+                                         Lost{1, State::fault, 0x8130},
+                                         Lost{2, State::switch_on_disabled, 0},
+                                         Lost{3, State::switch_on_disabled, 0}),
                          [](const auto& p) { return "Option" + std::to_string(p.param.option); });
 
 TEST_F(DriveFault, Bus_off_nmt_stop_and_reset_communication_are_a_lost_master_too) {
@@ -197,9 +204,15 @@ TEST_F(DriveFault, Bus_off_nmt_stop_and_reset_communication_are_a_lost_master_to
         moving();
         device().command(NmtCommand::start, now);
         run(1);
-        if (way == 0) device().bus_off(now);
-        if (way == 1) device().command(NmtCommand::stop, now);
-        if (way == 2) device().command(NmtCommand::reset_communication, now);
+        if (way == 0) {
+            device().bus_off(now);
+        }
+        if (way == 1) {
+            device().command(NmtCommand::stop, now);
+        }
+        if (way == 2) {
+            device().command(NmtCommand::reset_communication, now);
+        }
         run(500);
         EXPECT_EQ(state(), State::fault) << way;
         EXPECT_NEAR(velocity(), 0, 10) << way;

@@ -11,7 +11,9 @@ namespace {
 struct DriveAxes : DriveFault {
     void eight() {
         settings.axes = 8;
-        for (auto& a : settings.axis) a.motor.endless();
+        for (auto& a : settings.axis) {
+            a.motor.endless();
+        }
         make();
     }
 };
@@ -28,13 +30,19 @@ TEST_F(DriveAxes, Eight_axes_do_eight_things) {
     run(2000);
     for (unsigned n = 0; n < 8; ++n) {
         EXPECT_EQ(state(n), State::operation_enabled);
-        if (n % 2 == 0) EXPECT_NEAR(position(n), 1000 * static_cast<int>(n + 1), 10) << n;
-        else EXPECT_NEAR(velocity(n), -1000 * static_cast<int>(n + 1), 30) << n;
+        if (n % 2 == 0) {
+            EXPECT_NEAR(position(n), 1000 * static_cast<int>(n + 1), 10) << n;
+        } else {
+            EXPECT_NEAR(velocity(n), -1000 * static_cast<int>(n + 1), 30) << n;
+        }
     }
 }
 TEST_F(DriveAxes, A_fault_of_one_leaves_the_others_alone) {
     eight();
-    for (unsigned n = 0; n < 8; ++n) enable(Mode::profile_velocity, n), set(object::target_velocity, 5000, n);
+    for (unsigned n = 0; n < 8; ++n) {
+        enable(Mode::profile_velocity, n);
+        set(object::target_velocity, 5000, n);
+    }
     run(500);
     sent.clear();
     set(0x2011, 8, 3);
@@ -52,23 +60,30 @@ TEST_F(DriveAxes, A_fault_of_one_leaves_the_others_alone) {
     control(command::fault_reset, 3);
     EXPECT_EQ(state(3), State::switch_on_disabled);
     EXPECT_EQ(state(5), State::fault);
-    EXPECT_EQ(device().dictionary().get<std::uint8_t>(0x1001, 0), error_generic | error_temperature);
+    EXPECT_EQ(device().dictionary().get<std::uint8_t>(0x1001, 0),
+              error_generic | error_temperature);
     expect_reset(5);
 }
 TEST_F(DriveAxes, Default_pdos_carry_what_they_should) {
     eight();
     EXPECT_TRUE(device().dictionary().problems().empty());
-    const auto mapped = [&](std::uint16_t index, std::uint8_t sub) { return device().dictionary().get<std::uint32_t>(index, sub); };
+    const auto mapped = [&](std::uint16_t index, std::uint8_t sub) {
+        return device().dictionary().get<std::uint32_t>(index, sub);
+    };
     for (unsigned axis = 0; axis < 8; ++axis) {
         const auto up = static_cast<std::uint16_t>(64 * axis);
         const std::uint32_t objects = axis * 0x08000000;
-        const std::uint32_t received[] = {0, 0x60600008, 0x607a0020, 0x60ff0020, 0x60710010, 0x60420010, 0x60fe0120};
-        const std::uint32_t transmitted[] = {0, 0x60610008, 0x60640020, 0x606c0020, 0x60770010, 0x60440010, 0x60fd0020};
+        const std::uint32_t received[] = {0,          0x60600008, 0x607a0020, 0x60ff0020,
+                                          0x60710010, 0x60420010, 0x60fe0120};
+        const std::uint32_t transmitted[] = {0,          0x60610008, 0x60640020, 0x606c0020,
+                                             0x60770010, 0x60440010, 0x60fd0020};
         for (std::uint16_t n = 0; n < 7; ++n) {
             EXPECT_EQ(mapped(static_cast<std::uint16_t>(0x1600 + up + n), 1), 0x60400010 + objects);
             EXPECT_EQ(mapped(static_cast<std::uint16_t>(0x1a00 + up + n), 1), 0x60410010 + objects);
-            EXPECT_EQ(mapped(static_cast<std::uint16_t>(0x1600 + up + n), 2), n == 0 ? 0 : received[n] + objects);
-            EXPECT_EQ(mapped(static_cast<std::uint16_t>(0x1a00 + up + n), 2), n == 0 ? 0 : transmitted[n] + objects);
+            EXPECT_EQ(mapped(static_cast<std::uint16_t>(0x1600 + up + n), 2),
+                      n == 0 ? 0 : received[n] + objects);
+            EXPECT_EQ(mapped(static_cast<std::uint16_t>(0x1a00 + up + n), 2),
+                      n == 0 ? 0 : transmitted[n] + objects);
             EXPECT_EQ(device().pdos().rpdo(up + n + 1U).valid, axis == 0 && n < 4);
         }
     }
@@ -90,9 +105,13 @@ TEST_F(DriveAxes, Pdos_move_it) {
     EXPECT_EQ(get<std::int8_t>(object::modes_of_operation_display), 8);
     // Each state change sends its own statusword.
     std::vector<State> told;
-    for (const auto& f : sent)
-        if (f.id == 0x185) told.push_back(state_of(load<std::uint16_t>(f.data.data())));
-    EXPECT_EQ(told, (std::vector{State::switch_on_disabled, State::ready_to_switch_on, State::switched_on, State::operation_enabled}));
+    for (const auto& f : sent) {
+        if (f.id == 0x185) {
+            told.push_back(state_of(load<std::uint16_t>(f.data.data())));
+        }
+    }
+    EXPECT_EQ(told, (std::vector{State::switch_on_disabled, State::ready_to_switch_on,
+                                 State::switched_on, State::operation_enabled}));
     for (int n = 1; n <= 100; ++n) {
         Frame f{0x405, {0x0f, 0, 0, 0, 0, 0}};
         store(f.data.data() + 2, n * 10);
@@ -102,7 +121,8 @@ TEST_F(DriveAxes, Pdos_move_it) {
     sent.clear();
     device().handle({0x80, {}}, now);
     run(1);
-    const auto position_frame = std::find_if(sent.begin(), sent.end(), [](const Frame& f) { return f.id == 0x385; });
+    const auto position_frame =
+        std::find_if(sent.begin(), sent.end(), [](const Frame& f) { return f.id == 0x385; });
     ASSERT_NE(position_frame, sent.end());
     EXPECT_NEAR(load<std::int32_t>(position_frame->data.data() + 2), 1000, 20);
 }
@@ -116,7 +136,10 @@ TEST_F(DriveAxes, Mode_that_does_not_exist_is_not_heard_in_a_pdo) {
 }
 TEST_F(DriveAxes, Any_value_in_any_object_leaves_it_a_drive) {
     std::uint64_t seed = 1;
-    const auto random = [&] { return seed = seed * 6364136223846793005U + 1442695040888963407U, seed >> 33; };
+    const auto random = [&] {
+        seed = seed * 6364136223846793005U + 1442695040888963407U;
+        return seed >> 33;
+    };
     for (int round = 0; round < 40; ++round) {
         settings.axes = 2;
         make();
@@ -125,7 +148,12 @@ TEST_F(DriveAxes, Any_value_in_any_object_leaves_it_a_drive) {
             auto& e = entries[random() % entries.size()];
             if (e.index >= 0x2000 && e.size <= 8) {
                 // Small, large and any; as an SDO, and past all checks as a PDO.
-                const std::int64_t extreme[] = {0, 1, -1, 0x7fffffff, -0x80000000LL, static_cast<std::int64_t>(random()),
+                const std::int64_t extreme[] = {0,
+                                                1,
+                                                -1,
+                                                0x7fffffff,
+                                                -0x80000000LL,
+                                                static_cast<std::int64_t>(random()),
                                                 static_cast<std::int64_t>(random() % 1000)};
                 std::uint8_t bytes[8];
                 store(bytes, extreme[random() % 7]);
@@ -137,20 +165,24 @@ TEST_F(DriveAxes, Any_value_in_any_object_leaves_it_a_drive) {
                 }
             }
             if (n % 10 == 0) {
-                const std::uint16_t words[] = {0x00, 0x80, 0x06, 0x07, 0x0f, 0x1f, 0x7f, 0x3f, 0x02};
+                const std::uint16_t words[] = {0x00, 0x80, 0x06, 0x07, 0x0f,
+                                               0x1f, 0x7f, 0x3f, 0x02};
                 set(object::controlword, words[random() % 9], static_cast<unsigned>(random() % 2));
             }
             run(1);
             for (unsigned axis = 0; axis < 2; ++axis) {
                 ASSERT_NE(state(axis), State::unknown) << round << ' ' << n;
-                ASSERT_TRUE(std::isfinite(drive->status(axis).place) && std::isfinite(drive->status(axis).torque)) << round << ' ' << n;
+                ASSERT_TRUE(std::isfinite(drive->status(axis).place) &&
+                            std::isfinite(drive->status(axis).torque))
+                    << round << ' ' << n;
             }
         }
     }
 }
 TEST_F(DriveAxes, Motor_that_cannot_be_is_made_possible) {
     auto& m = settings.axis[0].motor;
-    m.inertia = m.rated_torque = m.peak_torque = m.rated_current = m.rated_voltage = m.highest_speed = 0;
+    m.inertia = m.rated_torque = m.peak_torque = m.rated_current = m.rated_voltage =
+        m.highest_speed = 0;
     m.viscous_friction = m.coulomb_friction = std::numeric_limits<double>::quiet_NaN();
     m.resolution = 0;
     make();
@@ -171,18 +203,23 @@ TEST_F(DriveAxes, A_pause_of_the_caller_is_no_leap) {
 }
 TEST_F(DriveAxes, Steps_of_any_length_do_the_same) {
     std::vector<std::int32_t> ends;
-    for (const Time step : {100 * microsecond, 250 * microsecond, 1 * millisecond, 10 * millisecond}) {
+    for (const Time step :
+         {100 * microsecond, 250 * microsecond, 1 * millisecond, 10 * millisecond}) {
         settings.axis[0].motor.endless();
         make();
         enable(Mode::profile_position);
         set(object::target_position, 50000);
         set(object::controlword, 0x1f);
         const Time end = now + 800 * millisecond;
-        while (now < end) drive->step(now += step);
+        while (now < end) {
+            drive->step(now += step);
+        }
         ends.push_back(position());
         EXPECT_EQ(state(), State::operation_enabled);
     }
-    for (const auto e : ends) EXPECT_NEAR(e, ends[0], 400);
+    for (const auto e : ends) {
+        EXPECT_NEAR(e, ends[0], 400);
+    }
 }
 
 }  // namespace

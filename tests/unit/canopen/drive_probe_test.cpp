@@ -13,7 +13,9 @@ struct DriveProbe : DriveFault {
         enable(Mode::profile_velocity);
     }
     std::uint16_t probes() { return get<std::uint16_t>(object::touch_probe_status); }
-    std::int32_t found(unsigned n) { return get<std::int32_t>(static_cast<std::uint16_t>(object::touch_probe_1_positive + n)); }
+    std::int32_t found(unsigned n) {
+        return get<std::int32_t>(static_cast<std::uint16_t>(object::touch_probe_1_positive + n));
+    }
     void pass(int velocity) {
         set(object::target_velocity, velocity);
         run(1000);
@@ -64,7 +66,8 @@ TEST_F(DriveProbe, Inputs_from_outside_trigger_probe_2) {
     make();
     enable(Mode::profile_velocity);
     set(object::target_velocity, 10000);
-    set(object::touch_probe_function, (probe::enable | probe::positive_edge | probe::negative_edge) << 8);
+    set(object::touch_probe_function, (probe::enable | probe::positive_edge | probe::negative_edge)
+                                          << 8);
     run(500);
     drive->set_inputs(0, input::probe_2);
     run(1);

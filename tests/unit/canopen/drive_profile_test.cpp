@@ -26,7 +26,10 @@ TEST_F(DriveProfile, Position_without_cruising_peaks_where_the_ramps_meet) {
     ready(Mode::profile_position);
     go(-3000);  // the peak is sqrt(2·3000 / (1/1e5 + 1/2e5)) = 20 000
     std::int32_t peak = 0;
-    ASSERT_TRUE(until([&] { return peak = std::min(peak, demanded_velocity()), reached(); }, 1000));
+    ASSERT_TRUE(until([&] {
+        peak = std::min(peak, demanded_velocity());
+        return reached();
+    }, 1000));
     EXPECT_NEAR(peak, -20000, 300);
     EXPECT_NEAR(position(), -3000, 10);
 }
@@ -50,7 +53,9 @@ TEST_F(DriveProfile, Handshake_answers_each_edge_of_bit_4_once) {
 TEST_F(DriveProfile, Set_of_set_points_goes_to_one_after_the_other_and_stops_at_each) {
     ready(Mode::profile_position);
     const std::int32_t targets[] = {8000, 2000, 12000};
-    for (const auto t : targets) go(t);
+    for (const auto t : targets) {
+        go(t);
+    }
     for (const auto t : targets) {
         ASSERT_TRUE(until([&] { return demand() == t && demanded_velocity() == 0; }));
         run(2);
@@ -63,7 +68,9 @@ TEST_F(DriveProfile, Set_of_set_points_goes_to_one_after_the_other_and_stops_at_
 }
 TEST_F(DriveProfile, Full_buffer_keeps_the_acknowledge_until_there_is_room) {
     ready(Mode::profile_position);
-    for (int n = 1; n <= 4; ++n) go(1000 * n);
+    for (int n = 1; n <= 4; ++n) {
+        go(1000 * n);
+    }
     set(object::target_position, 5000);
     control(0x1f);
     control(0x0f);  // one under way, four behind it
@@ -109,11 +116,15 @@ TEST_F(DriveProfile, Change_on_set_point_passes_it_without_a_stop) {
 TEST_F(DriveProfile, Change_on_set_point_slows_down_for_a_near_next_one) {
     ready(Mode::profile_position);
     go(16000);
-    go(17000, control::change_on_set_point);  // 1000 at 200 000 per s²: at most 20 000 per s at the first
+    // 1000 at 200 000 per s²: at most 20 000 per s at the first
+    go(17000, control::change_on_set_point);
     ASSERT_TRUE(until([&] { return demand() >= 16000; }));
     EXPECT_NEAR(demanded_velocity(), 20000, 600);
     std::int32_t highest = 0;
-    ASSERT_TRUE(until([&] { return highest = std::max(highest, demand()), reached(); }));
+    ASSERT_TRUE(until([&] {
+        highest = std::max(highest, demand());
+        return reached();
+    }));
     EXPECT_EQ(highest, 17000);
 }
 TEST_F(DriveProfile, End_velocity_is_kept_beyond_the_target) {
@@ -196,7 +207,8 @@ TEST_F(DriveProfile, Limit_switch_stops_it_and_lets_it_back) {
     set(object::target_position, 40000);
     control(0x1f);
     control(0x0f);
-    ASSERT_TRUE(until([&] { return (get<std::uint32_t>(object::digital_inputs) & input::positive_limit) != 0; }));
+    ASSERT_TRUE(until(
+        [&] { return (get<std::uint32_t>(object::digital_inputs) & input::positive_limit) != 0; }));
     run(300);
     EXPECT_NEAR(velocity(), 0, 10);
     EXPECT_LT(position(), 23000);

@@ -7,10 +7,11 @@ namespace hal::canopen::eds::test {
 namespace {
 
 TEST(EdsDictionary, Entries_have_type_right_value_and_limits) {
-    const std::string text = motor(variable("2000", "0x3", "LowLimit=-5\nHighLimit=5\nDefaultValue=-1\nParameterValue=3\n") +
-                                       variable("2001", "7", "DefaultValue=$NODEID+0x180\n") + variable("2002", "0x99", "") +
-                                       "[2003]\nParameterName=in\nDataType=0x8\nAccessType=rwr\nPDOMapping=1\nHighLimit=1.5\n",
-                                   "", "2000 2001 2002 2003");
+    const std::string text = motor(
+        variable("2000", "0x3", "LowLimit=-5\nHighLimit=5\nDefaultValue=-1\nParameterValue=3\n") +
+            variable("2001", "7", "DefaultValue=$NODEID+0x180\n") + variable("2002", "0x99", "") +
+            "[2003]\nParameterName=in\nDataType=0x8\nAccessType=rwr\nPDOMapping=1\nHighLimit=1.5\n",
+        "", "2000 2001 2002 2003");
     const DeviceDescription d = *read_eds(text).description;
     Description made = dictionary_of(d);
     const EntryDescription& value = *made.find(0x2000, 0);

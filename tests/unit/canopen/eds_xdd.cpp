@@ -9,39 +9,55 @@ namespace {
 std::string xdd(const std::string& objects, const std::string& more = "") {
     return "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n<ISO15745ProfileContainer "
            "xmlns=\"http://www.canopen.org/xml/1.0\">\n<ISO15745Profile>\n"
-           "<ProfileBody fileName=\"motor.xdd\" fileCreator=\"us\" fileCreationDate=\"2024-03-14\" fileVersion=\"2\">\n"
-           "<DeviceIdentity><vendorName>Halcyon</vendorName><vendorID>0x360</vendorID><productName>Motor</productName><productID>0x7</"
+           "<ProfileBody fileName=\"motor.xdd\" fileCreator=\"us\" fileCreationDate=\"2024-03-14\" "
+           "fileVersion=\"2\">\n"
+           "<DeviceIdentity><vendorName>Halcyon</vendorName><vendorID>0x360</"
+           "vendorID><productName>Motor</productName><productID>0x7</"
            "productID></DeviceIdentity>\n"
-           "<ApplicationProcess><parameterList><parameter uniqueID=\"P1\" access=\"readWrite\"><label lang=\"en\">Target "
+           "<ApplicationProcess><parameterList><parameter uniqueID=\"P1\" "
+           "access=\"readWrite\"><label lang=\"en\">Target "
            "speed</label><INT/>"
            "<defaultValue value=\"-3\"/><allowedValues><range><minValue value=\"-10\"/><maxValue "
-           "value=\"10\"/></range></allowedValues></parameter></parameterList></ApplicationProcess>\n"
-           "</ProfileBody></ISO15745Profile>\n<ISO15745Profile><ProfileBody>\n<ApplicationLayers><CANopenObjectList>\n"
-           "<CANopenObject index=\"1000\" name=\"Device type\" objectType=\"7\" dataType=\"0007\" accessType=\"const\" "
+           "value=\"10\"/></range></allowedValues></parameter></parameterList></"
+           "ApplicationProcess>\n"
+           "</ProfileBody></"
+           "ISO15745Profile>\n<ISO15745Profile><ProfileBody>\n<ApplicationLayers><"
+           "CANopenObjectList>\n"
+           "<CANopenObject index=\"1000\" name=\"Device type\" objectType=\"7\" dataType=\"0007\" "
+           "accessType=\"const\" "
            "defaultValue=\"0x20192\" PDOmapping=\"no\"/>\n" +
            objects +
-           "</CANopenObjectList><dummyUsage><dummy entry=\"Dummy0005=1\"/></dummyUsage></ApplicationLayers>\n"
-           "<TransportLayers><PhysicalLayer><baudRate><supportedBaudRate value=\"125 Kbps\"/><supportedBaudRate value=\"1000 "
+           "</CANopenObjectList><dummyUsage><dummy "
+           "entry=\"Dummy0005=1\"/></dummyUsage></ApplicationLayers>\n"
+           "<TransportLayers><PhysicalLayer><baudRate><supportedBaudRate value=\"125 "
+           "Kbps\"/><supportedBaudRate value=\"1000 "
            "Kbps\"/></baudRate></PhysicalLayer></TransportLayers>\n"
-           "<NetworkManagement><CANopenGeneralFeatures granularity=\"8\" nrOfRxPDO=\"0\" nrOfTxPDO=\"0\" bootUpSlave=\"true\" "
+           "<NetworkManagement><CANopenGeneralFeatures granularity=\"8\" nrOfRxPDO=\"0\" "
+           "nrOfTxPDO=\"0\" bootUpSlave=\"true\" "
            "layerSettingServiceSlave=\"true\"/>" +
-           more + "</NetworkManagement>\n</ProfileBody></ISO15745Profile>\n</ISO15745ProfileContainer>\n";
+           more +
+           "</NetworkManagement>\n</ProfileBody></ISO15745Profile>\n</ISO15745ProfileContainer>\n";
 }
 
 class Xdd : public testing::Test {
 protected:
     void SetUp() override {
-        if (complaints(read_xdd("<a/>"), Severity::error).find("not read by this build") != std::string::npos)
+        if (complaints(read_xdd("<a/>"), Severity::error).find("not read by this build") !=
+            std::string::npos) {
             GTEST_SKIP() << "built without pugixml";
+        }
     }
 };
 
 TEST_F(Xdd, Is_read_into_the_same_structures_as_an_eds) {
     const Reading reading = read_description(
-        xdd("<CANopenObject index=\"2000\" objectType=\"7\" uniqueIDRef=\"P1\" PDOmapping=\"optional\"/>\n"
+        xdd("<CANopenObject index=\"2000\" objectType=\"7\" uniqueIDRef=\"P1\" "
+            "PDOmapping=\"optional\"/>\n"
             "<CANopenObject index=\"1018\" name=\"Identity\" objectType=\"9\" subNumber=\"2\">"
-            "<CANopenSubObject subIndex=\"00\" name=\"n\" objectType=\"7\" dataType=\"0005\" accessType=\"ro\" defaultValue=\"1\"/>"
-            "<CANopenSubObject subIndex=\"01\" name=\"Vendor\" objectType=\"7\" dataType=\"0007\" accessType=\"ro\" "
+            "<CANopenSubObject subIndex=\"00\" name=\"n\" objectType=\"7\" dataType=\"0005\" "
+            "accessType=\"ro\" defaultValue=\"1\"/>"
+            "<CANopenSubObject subIndex=\"01\" name=\"Vendor\" objectType=\"7\" dataType=\"0007\" "
+            "accessType=\"ro\" "
             "defaultValue=\"0x360\"/></CANopenObject>\n"));
     ASSERT_TRUE(reading.description) << complaints(reading);
     EXPECT_EQ(complaints(reading, Severity::note), "");
@@ -49,7 +65,8 @@ TEST_F(Xdd, Is_read_into_the_same_structures_as_an_eds) {
     EXPECT_EQ(d.device.vendor_number, 0x360u);
     EXPECT_EQ(d.device.product_name, "Motor");
     EXPECT_EQ(d.file.creation_date, "03-14-2024");
-    EXPECT_TRUE(d.device.supports[4] && d.device.supports[8] && d.device.lss && d.device.boot_up_slave);
+    EXPECT_TRUE(d.device.supports[4] && d.device.supports[8] && d.device.lss &&
+                d.device.boot_up_slave);
     EXPECT_EQ(d.dummies.size(), 1u);
     ASSERT_EQ(d.objects.size(), 3u);
     EXPECT_EQ(d.find(0x1018, 1)->default_value, "0x360");
@@ -64,9 +81,11 @@ TEST_F(Xdd, Is_read_into_the_same_structures_as_an_eds) {
 }
 
 TEST_F(Xdd, A_parameter_without_access_can_be_read_as_the_schema_says) {
-    std::string text = xdd("<CANopenObject index=\"2000\" objectType=\"7\" uniqueIDRef=\"P1\"/>\n"
-                           "<CANopenObject index=\"2001\" objectType=\"7\" uniqueIDRef=\"P1\" accessType=\"wo\"/>\n");
-    text.replace(text.find(" access=\"readWrite\""), std::string(" access=\"readWrite\"").size(), "");
+    std::string text = xdd(
+        "<CANopenObject index=\"2000\" objectType=\"7\" uniqueIDRef=\"P1\"/>\n"
+        "<CANopenObject index=\"2001\" objectType=\"7\" uniqueIDRef=\"P1\" accessType=\"wo\"/>\n");
+    text.replace(text.find(" access=\"readWrite\""), std::string(" access=\"readWrite\"").size(),
+                 "");
     const Reading reading = read_xdd(text);
     ASSERT_TRUE(reading.description) << complaints(reading);
     EXPECT_EQ(complaints(reading, Severity::note), "");
@@ -76,9 +95,11 @@ TEST_F(Xdd, A_parameter_without_access_can_be_read_as_the_schema_says) {
 
 TEST_F(Xdd, A_configuration_has_node_id_and_values) {
     const Reading reading =
-        read_xdd(xdd("<CANopenObject index=\"2000\" name=\"x\" objectType=\"7\" dataType=\"0006\" accessType=\"rw\" defaultValue=\"1\" "
+        read_xdd(xdd("<CANopenObject index=\"2000\" name=\"x\" objectType=\"7\" dataType=\"0006\" "
+                     "accessType=\"rw\" defaultValue=\"1\" "
                      "actualValue=\"2\"/>\n",
-                     "<deviceCommissioning nodeID=\"5\" nodeName=\"left\" actualBaudRate=\"500 Kbps\" networkNumber=\"1\" "
+                     "<deviceCommissioning nodeID=\"5\" nodeName=\"left\" actualBaudRate=\"500 "
+                     "Kbps\" networkNumber=\"1\" "
                      "networkName=\"n\" CANopenManager=\"false\"/>"));
     ASSERT_TRUE(reading.description && reading.description->commissioning);
     EXPECT_EQ(reading.description->node_id(), 5u);
@@ -88,17 +109,22 @@ TEST_F(Xdd, A_configuration_has_node_id_and_values) {
 
 TEST_F(Xdd, Defects_are_named_with_their_line) {
     const std::string text =
-        xdd("<CANopenObject index=\"2000\" name=\"x\" objectType=\"7\" dataType=\"0005\" accessType=\"rw\" defaultValue=\"300\"/>\n"
-            "<CANopenObject index=\"2001\" name=\"y\" objectType=\"7\" dataType=\"0005\" accessType=\"readable\"/>\n"
-            "<CANopenObject index=\"2001\" name=\"z\" objectType=\"7\" dataType=\"0005\" accessType=\"rw\"/>\n<CANopenObject name=\"q\"/>\n"
-            "<CANopenObject index=\"2002\" name=\"r\" objectType=\"7\" uniqueIDRef=\"P9\" dataType=\"0005\" accessType=\"rw\"/>\n");
+        xdd("<CANopenObject index=\"2000\" name=\"x\" objectType=\"7\" dataType=\"0005\" "
+            "accessType=\"rw\" defaultValue=\"300\"/>\n"
+            "<CANopenObject index=\"2001\" name=\"y\" objectType=\"7\" dataType=\"0005\" "
+            "accessType=\"readable\"/>\n"
+            "<CANopenObject index=\"2001\" name=\"z\" objectType=\"7\" dataType=\"0005\" "
+            "accessType=\"rw\"/>\n<CANopenObject name=\"q\"/>\n"
+            "<CANopenObject index=\"2002\" name=\"r\" objectType=\"7\" uniqueIDRef=\"P9\" "
+            "dataType=\"0005\" accessType=\"rw\"/>\n");
     const Reading reading = read_xdd(text);
     const std::string all = complaints(reading);
-    for (const auto& [at, message] : {std::pair{"index=\"2000\"", "'300' does not fit into UNSIGNED8"},
-                                      {"readable", "unknown access type 'readable'"},
-                                      {"name=\"z\"", "object 2001 is described twice"},
-                                      {"name=\"q\"", "without an index"},
-                                      {"P9", "parameter 'P9', which is not described"}}) {
+    for (const auto& [at, message] :
+         {std::pair{"index=\"2000\"", "'300' does not fit into UNSIGNED8"},
+          {"readable", "unknown access type 'readable'"},
+          {"name=\"z\"", "object 2001 is described twice"},
+          {"name=\"q\"", "without an index"},
+          {"P9", "parameter 'P9', which is not described"}}) {
         const std::size_t found = all.find(message);
         ASSERT_NE(found, std::string::npos) << message << "\n" << all;
         const std::size_t start = all.rfind('\n', found) + 1;

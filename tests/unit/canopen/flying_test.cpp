@@ -13,44 +13,64 @@ using State = FlyingMaster::State;
 
 struct Flyer {
     explicit Flyer(const FlyingSetup& s) : setup(s) {}
-    FlyingSetup  setup;
-    FrameQueue   out{64};
+    FlyingSetup setup;
+    FrameQueue out{64};
     FlyingMaster master{setup, out};
-    bool         alive = true, connected = true;
+    bool alive = true;
+    bool connected = true;
     std::vector<std::uint32_t> sent;
 };
 
 struct Wire : testing::Test {
     Flyer& add(std::uint8_t id, std::uint8_t priority) {
         FlyingSetup s{.enabled = true, .id = id, .priority = priority};
-        s.timeout = 50 * millisecond, s.delay = 100 * millisecond, s.priority_slot = 300 * millisecond, s.device_slot = millisecond;
-        s.detect_cycle = 500 * millisecond, s.silence = 50 * millisecond;
+        s.timeout = 50 * millisecond;
+        s.delay = 100 * millisecond;
+
+        s.priority_slot = 300 * millisecond;
+        s.device_slot = millisecond;
+        s.detect_cycle = 500 * millisecond;
+        s.silence = 50 * millisecond;
         return flyers.emplace_back(s);
     }
     void start() {
-        for (auto& f : flyers) f.master.start(now);
+        for (auto& f : flyers) {
+            f.master.start(now);
+        }
     }
     void say(Flyer& from, const Frame& frame) {
-        if (frame.id < 0x700) from.sent.push_back(frame.id);
-        for (auto& to : flyers)
-            if (&to != &from && to.alive && to.connected && from.connected) to.master.handle(frame, now);
+        if (frame.id < 0x700) {
+            from.sent.push_back(frame.id);
+        }
+        for (auto& to : flyers) {
+            if (&to != &from && to.alive && to.connected && from.connected) {
+                to.master.handle(frame, now);
+            }
+        }
     }
     void run(Time time) {
-        for (const Time end = now + time; now < end; now += millisecond)
+        for (const Time end = now + time; now < end; now += millisecond) {
             for (auto& f : flyers) {
                 if (!f.alive) continue;
                 f.master.poll(now);
-                for (Frame frame; f.out.pop(frame);) say(f, frame);
-                if (f.master.active() && now % (20 * millisecond) == 0) say(f, make_frame(0x700U + f.setup.id, 1));
+                for (Frame frame; f.out.pop(frame);) {
+                    say(f, frame);
+                }
+                if (f.master.active() && now % (20 * millisecond) == 0) {
+                    say(f, make_frame(0x700U + f.setup.id, 1));
+                }
             }
+        }
     }
     int active() const {
         int count = 0;
-        for (const auto& f : flyers) count += f.alive && f.master.active() ? 1 : 0;
+        for (const auto& f : flyers) {
+            count += f.alive && f.master.active() ? 1 : 0;
+        }
         return count;
     }
     std::deque<Flyer> flyers;
-    Time              now = second;
+    Time now = second;
 };
 
 TEST_F(Wire, One_alone_leads_when_its_slot_has_come) {
@@ -64,19 +84,27 @@ TEST_F(Wire, One_alone_leads_when_its_slot_has_come) {
 }
 
 TEST_F(Wire, Priority_counts_before_the_node_id) {
-    add(1, 2), add(5, 1), add(90, 0);
+    add(1, 2);
+    add(5, 1);
+    add(90, 0);
     start();
     run(2 * second);
     EXPECT_EQ(active(), 1);
-    for (auto& f : flyers) EXPECT_EQ(f.master.master(), 90);
+    for (auto& f : flyers) {
+        EXPECT_EQ(f.master.master(), 90);
+    }
 }
 
 TEST_F(Wire, Of_one_priority_the_lower_node_id_leads) {
-    add(20, 1), add(7, 1), add(30, 1);
+    add(20, 1);
+    add(7, 1);
+    add(30, 1);
     start();
     run(2 * second);
     EXPECT_EQ(active(), 1);
-    for (auto& f : flyers) EXPECT_EQ(f.master.master(), 7);
+    for (auto& f : flyers) {
+        EXPECT_EQ(f.master.master(), 7);
+    }
 }
 
 TEST_F(Wire, The_next_one_takes_over_within_the_time_that_is_said) {
@@ -118,7 +146,8 @@ TEST_F(Wire, A_lower_node_id_alone_does_not_disturb_a_master_that_leads) {
 }
 
 TEST_F(Wire, Two_active_masters_that_meet_negotiate) {
-    add(5, 1), add(6, 1);
+    add(5, 1);
+    add(6, 1);
     flyers[1].connected = false;
     start();
     run(second);
@@ -162,21 +191,28 @@ TEST_F(Wire, What_is_no_service_of_it_or_cut_is_left_alone) {
     ASSERT_TRUE(a.master.active());
     EXPECT_FALSE(a.master.handle(make_frame(0x70, 0), now));
     EXPECT_FALSE(a.master.handle(make_frame(0x77, 0), now));
-    for (std::uint8_t length = 0; length < 3; ++length) a.master.handle(make_frame(0x71, length), now);  // the last from node 0
+    // the last from node 0
+    for (std::uint8_t length = 0; length < 3; ++length) {
+        a.master.handle(make_frame(0x71, length), now);
+    }
     EXPECT_TRUE(a.master.active());
     EXPECT_FALSE(a.master.handle(Frame::request(0x76, 0), now));
     EXPECT_TRUE(a.master.active());
 }
 
 TEST_F(Wire, Is_negotiated_again_and_again_by_hostile_frames_and_leads_in_the_end) {
-    add(5, 0), add(6, 1);
+    add(5, 0);
+    add(6, 1);
     start();
     std::uint32_t random = 1;
     for (int i = 0; i < 3000; ++i) {
         random = random * 1664525 + 1013904223;
-        Frame f = make_frame(0x71 + (random >> 28) % 6, static_cast<std::uint8_t>(random >> 24 & 3));
+        Frame f =
+            make_frame(0x71 + (random >> 28) % 6, static_cast<std::uint8_t>(random >> 24 & 3));
         store(f.data.data(), random);
-        for (auto& flyer : flyers) flyer.master.handle(f, now);
+        for (auto& flyer : flyers) {
+            flyer.master.handle(f, now);
+        }
         run(millisecond);
     }
     run(5 * second);
@@ -190,7 +226,8 @@ TEST(FlyingSetupTest, Names_what_cannot_be) {
     s.priority_slot = 1270 * millisecond;
     ASSERT_EQ(problems_of(s).size(), 1u);
     EXPECT_NE(problems_of(s)[0].find("127 of its device slots"), std::string::npos);
-    s.priority = 3, s.id = 0;
+    s.priority = 3;
+    s.id = 0;
     EXPECT_EQ(problems_of(s).size(), 3u);
     s.enabled = false;
     EXPECT_TRUE(problems_of(s).empty());

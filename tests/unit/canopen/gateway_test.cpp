@@ -19,7 +19,8 @@ struct Gate : testing::Test {
     int client = gate.connect();
 
     void make(std::uint8_t id) {
-        device = std::make_unique<Device>(example(), DeviceSettings{.node_id = id, .pdo = {.send_at_start = false}}, events);
+        device = std::make_unique<Device>(
+            example(), DeviceSettings{.node_id = id, .pdo = {.send_at_start = false}}, events);
         bus.attach(*device);
         bus.attach(gate.out(1), [this](const Frame& f, Time t) { gate.handle(1, f, t); });
         device->start(now);
@@ -33,7 +34,9 @@ struct Gate : testing::Test {
             device->poll(now);
             bus.exchange(now);
             gate.poll(now);
-            if (n != ms) now += millisecond;
+            if (n != ms) {
+                now += millisecond;
+            }
         }
     }
     std::string taken() {
@@ -45,10 +48,16 @@ struct Gate : testing::Test {
     std::string ask(const std::string& line, Time most_ms = 3000) {
         taken();
         gate.receive(client, line + "\r\n", now);
-        for (Time n = 0; n == 0 || (n < most_ms && !gate.idle()); ++n) run(1);
+        for (Time n = 0; n == 0 || (n < most_ms && !gate.idle()); ++n) {
+            run(1);
+        }
         std::string text = taken();
-        for (std::size_t at; (at = text.find("\r\n")) != text.npos;) text.replace(at, 2, "|");
-        if (text.ends_with('|')) text.pop_back();
+        for (std::size_t at; (at = text.find("\r\n")) != text.npos;) {
+            text.replace(at, 2, "|");
+        }
+        if (text.ends_with('|')) {
+            text.pop_back();
+        }
         return text;
     }
 };
@@ -73,7 +82,9 @@ TEST_F(Gate, Reads_and_writes_in_all_types) {
 }
 TEST_F(Gate, Long_values_go_both_ways_by_segments_and_by_blocks) {
     std::vector<std::uint8_t> data(20'000);
-    for (std::size_t n = 0; n < data.size(); ++n) data[n] = static_cast<std::uint8_t>(n * 7);
+    for (std::size_t n = 0; n < data.size(); ++n) {
+        data[n] = static_cast<std::uint8_t>(n * 7);
+    }
     for (const char* block : {"0", "1"}) {
         EXPECT_EQ(ask(std::string("[1] set sdo_block ") + block), "[1] OK");
         EXPECT_EQ(ask("[2] 5 w 0x2006 0 d " + gateway::base64(data), 60'000), "[2] OK");
@@ -82,7 +93,9 @@ TEST_F(Gate, Long_values_go_both_ways_by_segments_and_by_blocks) {
     }
 }
 TEST_F(Gate, Own_node_answers_without_the_bus) {
-    EXPECT_EQ(ask("[1] 126 r 0x1000 0 u32", 10'000), "[1] ERROR:0x05040000 #SDO protocol timed out");  // no own node yet
+    // no own node yet
+    EXPECT_EQ(ask("[1] 126 r 0x1000 0 u32", 10'000),
+              "[1] ERROR:0x05040000 #SDO protocol timed out");
     EXPECT_EQ(ask("[2] set id 126"), "[2] OK");
     EXPECT_EQ(ask("[3] 126 r 0x1000 0 u32", 0), "[3] 0");
     EXPECT_EQ(ask("[4] 126 r 0x1001 0 u8", 0), "[4] 0");
@@ -90,28 +103,37 @@ TEST_F(Gate, Own_node_answers_without_the_bus) {
     EXPECT_EQ(ask("[5] 126 r 0x2000 1 vs", 0), "[5] \"Halcyon\"");
     EXPECT_EQ(ask("[5] 126 r 0x2000 3 vs", 0), "[5] \"\"");
     EXPECT_EQ(ask("[6] 126 r 0x1018 0 u8", 0), "[6] 4");
-    EXPECT_EQ(ask("[7] 126 w 0x1018 1 u32 1", 0), "[7] ERROR:0x06010002 #attempt to write a read-only object");
+    EXPECT_EQ(ask("[7] 126 w 0x1018 1 u32 1", 0),
+              "[7] ERROR:0x06010002 #attempt to write a read-only object");
     EXPECT_EQ(ask("[8] 126 r 0x1018 9 u32", 0), "[8] ERROR:0x06090011 #sub-index does not exist");
     EXPECT_EQ(ask("[9] set heartbeat 250"), "[9] OK");
     EXPECT_EQ(ask("[10] 126 r 0x1017 0 u16", 0), "[10] 250");
     EXPECT_EQ(ask("[11] 126 w 0x1017 0 u16 0", 0), "[11] OK");
-    EXPECT_EQ(ask("[12] 126 stop", 0), "[12] ERROR:102 #request not processed due to internal state: node 126 is the gateway itself, always operational");
+    EXPECT_EQ(ask("[12] 126 stop", 0),
+              "[12] ERROR:102 #request not processed due to internal state: node 126 is the "
+              "gateway itself, always operational");
     EXPECT_EQ(ask("[13] 5 r 0x1000 0 hex").substr(0, 5), "[13] ");
 }
 TEST_F(Gate, Aborts_and_errors_have_their_numbers) {
-    EXPECT_EQ(ask("[1] 5 r 0x2fff 0 u8"), "[1] ERROR:0x06020000 #object does not exist in the object dictionary");
-    EXPECT_EQ(ask("[2] 5 w 0x2002 0 u8 1"), "[2] ERROR:0x06010002 #attempt to write a read-only object");
+    EXPECT_EQ(ask("[1] 5 r 0x2fff 0 u8"),
+              "[1] ERROR:0x06020000 #object does not exist in the object dictionary");
+    EXPECT_EQ(ask("[2] 5 w 0x2002 0 u8 1"),
+              "[2] ERROR:0x06010002 #attempt to write a read-only object");
     EXPECT_EQ(ask("[3] 9 r 0x1000 0", 10'000), "[3] ERROR:0x05040000 #SDO protocol timed out");
     EXPECT_EQ(ask("[4] r 0x1000 0"), "[4] ERROR:105 #no default node set");
     EXPECT_EQ(ask("[5] 2 5 r 0x1000 0"), "[5] ERROR:106 #unsupported net");
     EXPECT_EQ(ask("[6] 200 r 0x1000 0"), "[6] ERROR:107 #unsupported node");
     EXPECT_EQ(ask("[7] 5 r 0x1000"), "[7] ERROR:101 #syntax error: the sub-index is missing");
-    EXPECT_EQ(ask("[8] 5 w 0x2000 0 u8 256"), "[8] ERROR:101 #syntax error: invalid value for type u8");
-    EXPECT_EQ(ask("[9] fly"), "[9] ERROR:100 #request not supported: unknown command 'fly'; see: help");
-    EXPECT_EQ(ask("[10] set speed 5"), "[10] ERROR:100 #request not supported: what to set is not 'speed'; see: help");
+    EXPECT_EQ(ask("[8] 5 w 0x2000 0 u8 256"),
+              "[8] ERROR:101 #syntax error: invalid value for type u8");
+    EXPECT_EQ(ask("[9] fly"),
+              "[9] ERROR:100 #request not supported: unknown command 'fly'; see: help");
+    EXPECT_EQ(ask("[10] set speed 5"),
+              "[10] ERROR:100 #request not supported: what to set is not 'speed'; see: help");
     EXPECT_EQ(ask("[x] start"), "[0] ERROR:101 #syntax error: a line begins with [NUMBER]");
     EXPECT_EQ(ask("[11] set network 7"), "[11] ERROR:106 #unsupported net");
-    EXPECT_EQ(ask("[12] 5 w 0x2005 0 vs \"open"), "[12] ERROR:101 #syntax error: a quotation mark is not closed");
+    EXPECT_EQ(ask("[12] 5 w 0x2005 0 vs \"open"),
+              "[12] ERROR:101 #syntax error: a quotation mark is not closed");
     EXPECT_EQ(ask("[13] set command_timeout 20"), "[13] OK");
     EXPECT_EQ(ask("[14] 9 r 0x1000 0"), "[14] ERROR:103 #timeout");
     EXPECT_EQ(ask(""), "");
@@ -167,7 +189,9 @@ TEST_F(Gate, Loss_of_heartbeat_and_of_guarding_is_told_and_emergencies_are) {
 }
 TEST_F(Gate, Pdos_are_sent_received_and_asked_for) {
     device->command(NmtCommand::start, now);
-    EXPECT_EQ(ask("[1] r p 1"), "[1] ERROR:102 #request not processed due to internal state: nothing has come yet, or set rpdo is missing");
+    EXPECT_EQ(ask("[1] r p 1"),
+              "[1] ERROR:102 #request not processed due to internal state: nothing has come yet, "
+              "or set rpdo is missing");
     EXPECT_EQ(ask("[2] set rpdo 1 0x185 event 1 x32"), "[2] OK");
     device->pdos().trigger(1);
     run(3);
@@ -197,7 +221,10 @@ TEST_F(Gate, Pdos_are_sent_received_and_asked_for) {
 }
 TEST_F(Gate, Own_node_beats_and_settings_are_kept) {
     std::string kept;
-    gate.keep = [&](const std::string& text) { return kept = text, true; };
+    gate.keep = [&](const std::string& text) {
+        kept = text;
+        return true;
+    };
     EXPECT_EQ(ask("[1] set id 100"), "[1] OK");
     EXPECT_EQ(ask("[2] set heartbeat 20"), "[2] OK");
     ask("[3] set sdo_block 1");
@@ -211,7 +238,8 @@ TEST_F(Gate, Own_node_beats_and_settings_are_kept) {
     EXPECT_EQ(other.out(1).size(), 1U);
     EXPECT_EQ(ask("[5] init 4"), "[5] OK");
     gate.initialise = [](unsigned, std::uint32_t) { return false; };
-    EXPECT_EQ(ask("[6] init 4"), "[6] ERROR:304 #CAN could not be initialised: the bus runs at another bit rate");
+    EXPECT_EQ(ask("[6] init 4"),
+              "[6] ERROR:304 #CAN could not be initialised: the bus runs at another bit rate");
     EXPECT_EQ(ask("[7] restore"), "[7] OK");
     EXPECT_EQ(kept, "");
     EXPECT_TRUE(ask("[8] info version").starts_with("[8] 0 0 "));
@@ -220,7 +248,9 @@ TEST_F(Gate, Own_node_beats_and_settings_are_kept) {
 TEST_F(Gate, Init_ends_what_waits_and_so_does_a_client_that_goes) {
     taken();
     gate.receive(client, "[1] 9 r 0x1000 0\n[2] init 4\n", now);
-    EXPECT_EQ(taken(), "[1] ERROR:102 #request not processed due to internal state: ended by init\r\n[2] OK\r\n");
+    EXPECT_EQ(
+        taken(),
+        "[1] ERROR:102 #request not processed due to internal state: ended by init\r\n[2] OK\r\n");
     EXPECT_TRUE(gate.idle());
     gate.receive(client, "[3] 9 r 0x1000 0\n", now);
     EXPECT_FALSE(gate.idle());
@@ -231,11 +261,16 @@ TEST_F(Gate, Init_ends_what_waits_and_so_does_a_client_that_goes) {
 TEST_F(Gate, Lines_that_are_too_long_and_commands_that_are_too_many_are_refused) {
     gate.receive(client, std::string(Gateway::most_line + 10, 'x'), now);
     gate.receive(client, "still the same\n[1] 5 start\n", now);
-    EXPECT_EQ(taken(), "[0] ERROR:101 #syntax error: the line is longer than 4194304 bytes\r\n[1] OK\r\n");
+    EXPECT_EQ(taken(),
+              "[0] ERROR:101 #syntax error: the line is longer than 4194304 bytes\r\n[1] OK\r\n");
     std::string many;
-    for (unsigned n = 0; n < Gateway::most_pending + 1; ++n) many += "[" + std::to_string(n) + "] 9 r 0x1000 0\n";
+    for (unsigned n = 0; n < Gateway::most_pending + 1; ++n) {
+        many += "[" + std::to_string(n) + "] 9 r 0x1000 0\n";
+    }
     gate.receive(client, many, now);
-    EXPECT_EQ(taken(), "[64] ERROR:600 #running out of memory: too many commands wait for their answers\r\n");
+    EXPECT_EQ(
+        taken(),
+        "[64] ERROR:600 #running out of memory: too many commands wait for their answers\r\n");
 }
 
 struct LssGate : Gate {
@@ -243,7 +278,8 @@ struct LssGate : Gate {
 };
 TEST_F(LssGate, Node_without_id_is_found_gets_one_and_talks) {
     EXPECT_EQ(ask("[1] lss_ident_nonconf"), "[1] OK");
-    EXPECT_EQ(ask("[2] _lss_fastscan 5", 60'000), "[2] 0x00000001 0x00000002 0x00000003 0x00000004");
+    EXPECT_EQ(ask("[2] _lss_fastscan 5", 60'000),
+              "[2] 0x00000001 0x00000002 0x00000003 0x00000004");
     EXPECT_EQ(ask("[3] lss_inquire_addr"), "[3] 0x00000001 0x00000002 0x00000003 0x00000004");
     EXPECT_EQ(ask("[4] lss_inquire_addr 3"), "[4] 0x00000004");
     EXPECT_EQ(ask("[5] lss_get_node"), "[5] 255");
@@ -263,15 +299,23 @@ TEST_F(LssGate, Node_without_id_is_found_gets_one_and_talks) {
 }
 
 TEST(GatewayValues, Base64_is_read_and_written) {
-    const auto bytes = [](std::string_view text) { return std::vector<std::uint8_t>(text.begin(), text.end()); };
-    for (const auto& [plain, coded] : {std::pair{"", ""}, {"f", "Zg=="}, {"fo", "Zm8="}, {"foo", "Zm9v"}, {"foob", "Zm9vYg=="}}) {
+    const auto bytes = [](std::string_view text) {
+        return std::vector<std::uint8_t>(text.begin(), text.end());
+    };
+    for (const auto& [plain, coded] : {std::pair{"", ""},
+                                       {"f", "Zg=="},
+                                       {"fo", "Zm8="},
+                                       {"foo", "Zm9v"},
+                                       {"foob", "Zm9vYg=="}}) {
         EXPECT_EQ(gateway::base64(bytes(plain)), coded);
         std::vector<std::uint8_t> back;
         EXPECT_TRUE(gateway::base64(coded, back));
         EXPECT_EQ(back, bytes(plain));
     }
     std::vector<std::uint8_t> back;
-    for (const char* wrong : {"Zg", "Zg=", "=g==", "Z===", "Zg=?", "Zm 9"}) EXPECT_FALSE(gateway::base64(wrong, back)) << wrong;
+    for (const char* wrong : {"Zg", "Zg=", "=g==", "Z===", "Zg=?", "Zm 9"}) {
+        EXPECT_FALSE(gateway::base64(wrong, back)) << wrong;
+    }
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Layer setting services between our master and our devices, and what a master sees of nodes on the bus.
+// Layer setting services between our master and our devices, and what a master sees of nodes on the
+// bus.
 #include <gtest/gtest.h>
 
 #include "bus.hpp"
@@ -12,34 +13,45 @@ struct Lss : testing::Test {
     Bus bus;
     std::vector<std::unique_ptr<Device>> devices;
     FrameQueue out{256};
-    LssMaster master{out, {.timeout = 20 * millisecond, .scan_timeout = 5 * millisecond, .repeats = 20}};
+    LssMaster master{out,
+                     {.timeout = 20 * millisecond, .scan_timeout = 5 * millisecond, .repeats = 20}};
     Network network{out, master_events};
     Time now = 0;
 
     void SetUp() override {
         bus.attach(out, [this](const Frame& f, Time t) {
-            if (master.listens_to(f)) master.handle(f, t);
-            else network.handle(f, t);
+            if (master.listens_to(f)) {
+                master.handle(f, t);
+            } else {
+                network.handle(f, t);
+            }
         });
     }
     Device& add(std::uint32_t serial, std::uint8_t id = unconfigured) {
-        devices.push_back(std::make_unique<Device>(example(serial), DeviceSettings{.node_id = id}, events));
+        devices.push_back(
+            std::make_unique<Device>(example(serial), DeviceSettings{.node_id = id}, events));
         bus.attach(*devices.back());
         devices.back()->start(now);
         return *devices.back();
     }
     void run(Time ms) {
-        for (Time n = 0; n < ms; ++n) step();
+        for (Time n = 0; n < ms; ++n) {
+            step();
+        }
     }
     void step() {
         master.poll(now);
         network.poll(now);
-        for (auto& d : devices) d->poll(now);
+        for (auto& d : devices) {
+            d->poll(now);
+        }
         bus.exchange(now);
         now += millisecond;
     }
     const LssMaster::Result& finish() {
-        for (int n = 0; n < 100'000 && master.busy(); ++n) step();
+        for (int n = 0; n < 100'000 && master.busy(); ++n) {
+            step();
+        }
         EXPECT_FALSE(master.busy());
         return master.result();
     }
@@ -109,7 +121,9 @@ TEST_F(Lss, New_id_of_a_configured_node_holds_from_the_next_reset_on) {
 }
 TEST_F(Lss, Fastscan_finds_one_after_the_other) {
     const std::vector<std::uint32_t> serials = {0xdeadbeef, 1, 0x80000000, 0xffffffff, 0};
-    for (const auto s : serials) add(s);
+    for (const auto s : serials) {
+        add(s);
+    }
     std::vector<std::uint32_t> found;
     for (std::uint8_t id = 10; id < 20; ++id) {
         ASSERT_TRUE(master.scan(now));

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// PDOs of one device: every transmission type, timers, mapping to the bit, re-mapping, supervision, many of them.
+// PDOs of one device: every transmission type, timers, mapping to the bit, re-mapping, supervision,
+// many of them.
 #include <gtest/gtest.h>
 
 #include "bus.hpp"
@@ -14,7 +15,8 @@ struct Pdo : testing::Test {
     Time now = 0;
 
     void make(const Description& d) {
-        device = std::make_unique<Device>(d, DeviceSettings{.node_id = 5, .pdo = {.send_at_start = false}}, events);
+        device = std::make_unique<Device>(
+            d, DeviceSettings{.node_id = 5, .pdo = {.send_at_start = false}}, events);
         bus.attach(*device);
         device->start(now);
         device->command(NmtCommand::start, now);
@@ -23,7 +25,9 @@ struct Pdo : testing::Test {
     }
     void run(Time ms) {
         for (Time n = 0; n <= ms; ++n) {
-            if (n != 0) now += millisecond;
+            if (n != 0) {
+                now += millisecond;
+            }
             device->poll(now);
             bus.exchange(now);
         }
@@ -35,12 +39,17 @@ struct Pdo : testing::Test {
     }
     void sync(int counter = -1) {
         now += millisecond;
-        if (counter < 0) send({0x80, {}});
-        else send({0x80, {static_cast<std::uint8_t>(counter)}});
+        if (counter < 0) {
+            send({0x80, {}});
+        } else {
+            send({0x80, {static_cast<std::uint8_t>(counter)}});
+        }
     }
     std::size_t count(std::uint32_t id) {
         std::size_t n = 0;
-        for (const auto& f : bus.sent(id)) n += f.remote ? 0 : 1;
+        for (const auto& f : bus.sent(id)) {
+            n += f.remote ? 0 : 1;
+        }
         return n;
     }
     Abort write(std::uint16_t index, std::uint8_t sub, std::uint32_t value) {
@@ -50,8 +59,11 @@ struct Pdo : testing::Test {
         return device->dictionary().write(index, sub, {bytes, e != nullptr ? e->size : 1});
     }
     template <class T>
-    T get(std::uint16_t index, std::uint8_t sub = 0) { return device->dictionary().get<T>(index, sub); }
-    static Description with_tpdo(std::uint8_t transmission, std::uint16_t inhibit = 0, std::uint16_t event = 0, std::uint8_t start = 0) {
+    T get(std::uint16_t index, std::uint8_t sub = 0) {
+        return device->dictionary().get<T>(index, sub);
+    }
+    static Description with_tpdo(std::uint8_t transmission, std::uint16_t inhibit = 0,
+                                 std::uint16_t event = 0, std::uint8_t start = 0) {
         Description d = basic_device({.vendor = 1});
         d.add(0x2000, 0, Type::unsigned16, Access::read_write, 0x1234).mappable();
         add_tpdo(d, 1,
@@ -79,7 +91,9 @@ TEST_F(Pdo, Types_1_to_240_are_sent_every_nth_sync) {
     for (const unsigned n : {1U, 2U, 3U, 240U}) {
         bus = {};
         make(with_tpdo(static_cast<std::uint8_t>(n)));
-        for (unsigned s = 0; s < 480; ++s) sync();
+        for (unsigned s = 0; s < 480; ++s) {
+            sync();
+        }
         EXPECT_EQ(count(0x185), 480 / n) << n;
     }
 }
@@ -87,7 +101,9 @@ TEST_F(Pdo, Sync_start_value_waits_for_its_counter) {
     auto d = with_tpdo(2, 0, 0, 3);
     *d.find(0x1019, 0)->value.data() = 4;
     make(d);
-    for (int n = 0; n < 2; ++n) sync(n + 1);
+    for (int n = 0; n < 2; ++n) {
+        sync(n + 1);
+    }
     EXPECT_EQ(count(0x185), 0U);
     sync(3);
     EXPECT_EQ(count(0x185), 1U);
@@ -121,7 +137,8 @@ TEST_F(Pdo, Event_timer_of_a_cycle_is_over_in_every_cycle_though_cycles_are_move
     for (const std::uint16_t inhibit : {std::uint16_t{0}, std::uint16_t{10}}) {
         bus = {};
         make(with_tpdo(254, inhibit, 1));
-        for (int n = 0; n < 400; ++n) {  // an external clock reference moves them by some microseconds
+        // an external clock reference moves them by some microseconds
+        for (int n = 0; n < 400; ++n) {
             now += millisecond + (n * 7919 % 13 - 6) * microsecond;
             device->poll(now);
             bus.exchange(now);
@@ -258,14 +275,17 @@ TEST_F(Pdo, Is_mapped_anew_in_the_order_of_the_standard_only) {
 }
 TEST_F(Pdo, Carries_single_bits_parts_and_dummies) {
     Description d = basic_device({.vendor = 1});
-    for (std::uint8_t n = 1; n <= 3; ++n) d.add(0x2100, n, Type::boolean, Access::read_write).mappable();
+    for (std::uint8_t n = 1; n <= 3; ++n) {
+        d.add(0x2100, n, Type::boolean, Access::read_write).mappable();
+    }
     d.add(0x2101, 0, Type::integer8, Access::read_write).mappable();
     d.add(0x2102, 0, Type::integer24, Access::read_write).mappable();
-    const std::vector<std::uint32_t> there = {map_entry(0x2100, 1, 1), map_entry(0x0001, 0, 1), map_entry(0x2100, 2, 1),
-                                              map_entry(0x2101, 0, 4), map_entry(0x2100, 3, 1), map_entry(0x0005, 0, 8),
+    const std::vector<std::uint32_t> there = {map_entry(0x2100, 1, 1), map_entry(0x0001, 0, 1),
+                                              map_entry(0x2100, 2, 1), map_entry(0x2101, 0, 4),
+                                              map_entry(0x2100, 3, 1), map_entry(0x0005, 0, 8),
                                               map_entry(0x2102, 0, 24)};
-    const std::vector<std::uint32_t> back = {map_entry(0x2100, 1, 1), map_entry(0x2100, 2, 1), map_entry(0x2101, 0, 8),
-                                             map_entry(0x2102, 0, 24)};
+    const std::vector<std::uint32_t> back = {map_entry(0x2100, 1, 1), map_entry(0x2100, 2, 1),
+                                             map_entry(0x2101, 0, 8), map_entry(0x2102, 0, 24)};
     add_rpdo(d, 1, {.mapping = there});
     add_tpdo(d, 1, {.mapping = back});
     make(d);
@@ -280,7 +300,8 @@ TEST_F(Pdo, Carries_single_bits_parts_and_dummies) {
     run(1);
     ASSERT_EQ(count(0x185), 1U);
     EXPECT_EQ(bus.log.back().length, 5);
-    EXPECT_EQ(load<std::uint64_t>(bus.log.back().data.data()), (0x800001ULL << 10 | 0xfdULL << 2 | 3));
+    EXPECT_EQ(load<std::uint64_t>(bus.log.back().data.data()),
+              (0x800001ULL << 10 | 0xfdULL << 2 | 3));
 }
 TEST_F(Pdo, Callbacks_see_all_values_of_the_frame) {
     struct Watch : Handler {
@@ -317,10 +338,16 @@ TEST_F(Pdo, Remote_frame_asks_the_producer) {
 TEST_F(Pdo, There_can_be_512_each_way) {
     Description d = basic_device({.vendor = 1});
     for (unsigned n = 0; n < 512; ++n) {
-        d.add(static_cast<std::uint16_t>(0x3000 + n), 0, Type::unsigned16, Access::read_write, n).mappable();
+        d.add(static_cast<std::uint16_t>(0x3000 + n), 0, Type::unsigned16, Access::read_write, n)
+            .mappable();
         const auto entry = map_entry(static_cast<std::uint16_t>(0x3000 + n), 0, 16);
-        add_rpdo(d, n + 1, {.cob = n % 2 != 0 ? 0x20010000U + n : 0x181U + n % 0x7f, .transmission = 1, .mapping = {entry}, .max_mapped = 1});
-        add_tpdo(d, n + 1, {.cob = 0x20000000U + n, .transmission = 1, .mapping = {entry}, .max_mapped = 1});
+        add_rpdo(d, n + 1,
+                 {.cob = n % 2 != 0 ? 0x20010000U + n : 0x181U + n % 0x7f,
+                  .transmission = 1,
+                  .mapping = {entry},
+                  .max_mapped = 1});
+        add_tpdo(d, n + 1,
+                 {.cob = 0x20000000U + n, .transmission = 1, .mapping = {entry}, .max_mapped = 1});
     }
     make(d);
     for (unsigned n = 0; n < 512; ++n) {
@@ -331,17 +358,23 @@ TEST_F(Pdo, There_can_be_512_each_way) {
     bus.log.clear();
     sync();
     std::size_t sent = 0;
-    for (const auto& f : bus.log) sent += f.extended && f.id < 0x10000 ? 1 : 0;
+    for (const auto& f : bus.log) {
+        sent += f.extended && f.id < 0x10000 ? 1 : 0;
+    }
     EXPECT_EQ(sent, 512U);
     EXPECT_EQ(get<std::uint16_t>(0x3000 + 511), 0x0101);
     EXPECT_EQ(get<std::uint16_t>(0x3000 + 256), 0x0101);
 }
 TEST_F(Pdo, Full_queue_loses_no_event) {
-    device = std::make_unique<Device>(with_tpdo(255), DeviceSettings{.node_id = 5, .queue = 8, .pdo = {.send_at_start = false}}, events);
+    device = std::make_unique<Device>(
+        with_tpdo(255), DeviceSettings{.node_id = 5, .queue = 8, .pdo = {.send_at_start = false}},
+        events);
     bus.attach(*device);
     device->start(0);
     device->command(NmtCommand::start, 0);
-    while (device->out().space() != 0) device->out().push({0x1, {}});
+    while (device->out().space() != 0) {
+        device->out().push({0x1, {}});
+    }
     device->pdos().trigger(1);
     device->poll(now);
     bus.exchange(now);

@@ -22,27 +22,42 @@ const std::string one_axis =
 /// A link that may take no frames, as one that another thread uses at the moment.
 struct BusyLink final : can::Link {
     explicit BusyLink(can::Link& behind_) : behind(behind_) {}
-    can::Sent send(const Frame& f, std::int64_t now) noexcept override { return busy ? can::Sent::full : behind.send(f, now); }
+    can::Sent send(const Frame& f, std::int64_t now) noexcept override {
+        return busy ? can::Sent::full : behind.send(f, now);
+    }
     void flush(std::int64_t now) noexcept override { behind.flush(now); }
-    std::size_t receive(std::span<Frame> frames, std::int64_t now) noexcept override { return busy ? 0 : behind.receive(frames, now); }
+    std::size_t receive(std::span<Frame> frames, std::int64_t now) noexcept override {
+        return busy ? 0 : behind.receive(frames, now);
+    }
     can::Statistics statistics() const noexcept override { return behind.statistics(); }
     can::State state() const noexcept override { return behind.state(); }
-    bool set_filters(std::span<const can::Filter> filters) override { return behind.set_filters(filters); }
+    bool set_filters(std::span<const can::Filter> filters) override {
+        return behind.set_filters(filters);
+    }
     const can::Description& description() const noexcept override { return behind.description(); }
     bool wait(std::int64_t at_most) override { return behind.wait(at_most); }
 
     can::Link& behind;
-    bool       busy = false;
+    bool busy = false;
 };
 
 struct Wire : RunnerEvents {
-    explicit Wire(const std::string& more = "", bool starts_itself = false, const std::string& axis = one_axis)
-        : reading(config::read(axis + more, "x.canopen")), runner(reading.config, *this), link(open()), ear(open()), drive(settings()) {
+    explicit Wire(const std::string& more = "", bool starts_itself = false,
+                  const std::string& axis = one_axis)
+        : reading(config::read(axis + more, "x.canopen")),
+          runner(reading.config, *this),
+          link(open()),
+          ear(open()),
+          drive(settings()) {
         EXPECT_TRUE(reading.good());
-        node = std::make_unique<Node>(drive, open(), DeviceSettings{.node_id = 2, .auto_start = starts_itself});
+        node = std::make_unique<Node>(drive, open(),
+                                      DeviceSettings{.node_id = 2, .auto_start = starts_itself});
         runner.open(*link);
-        for (Slot& s : runner.slots())
-            if (s.to_node && s.object->bits == 32) target = &s;
+        for (Slot& s : runner.slots()) {
+            if (s.to_node && s.object->bits == 32) {
+                target = &s;
+            }
+        }
     }
     static std::unique_ptr<can::Link> open() {
         auto opened = can::open("sim:runner-wire", {.bit_rate = 1'000'000, .send_capacity = 4096});
@@ -57,94 +72,140 @@ struct Wire : RunnerEvents {
     /// A cycle, whose set-point is its number; what others hear of it is kept.
     void step() {
         now += millisecond;
-        if (!number_stands) ++number;
+        if (!number_stands) {
+            ++number;
+        }
         runner.receive(now);
-        if (target != nullptr) target->wish = static_cast<std::uint64_t>(number);
+        if (target != nullptr) {
+            target->wish = static_cast<std::uint64_t>(number);
+        }
         runner.transmit(now, millisecond);
         node->turn(now);
         for (Frame f; ear->receive(f, now);) {
-            if (f.id == 0x282) ++(f.remote ? asked : answered);
-            if (f.id == 0x080) ++syncs;
-            if (f.id == 0x202) ++rpdos;
+            if (f.id == 0x282) {
+                ++(f.remote ? asked : answered);
+            }
+            if (f.id == 0x080) {
+                ++syncs;
+            }
+            if (f.id == 0x202) {
+                ++rpdos;
+            }
             if (f.id != 0x202 || f.length != 6) continue;
             std::int32_t value = 0;
             std::memcpy(&value, f.data.data() + 2, sizeof value);
-            if (value != 0) heard.push_back(value);
+            if (value != 0) {
+                heard.push_back(value);
+            }
         }
     }
-    /// Others keep the bus for `cycles`: twelve frames of eight bytes take longer than a millisecond.
+    /// Others keep the bus for `cycles`: twelve frames of eight bytes take longer than a
+    /// millisecond.
     void flood(int cycles) {
         for (; cycles > 0; --cycles, step()) {
-            for (int n = 0; n < 12; ++n) ear->send({0x001, {1, 2, 3, 4, 5, 6, 7, 8}}, now);
+            for (int n = 0; n < 12; ++n) {
+                ear->send({0x001, {1, 2, 3, 4, 5, 6, 7, 8}}, now);
+            }
             ear->flush(now);
         }
     }
     void on_sync_overrun() noexcept override { ++overruns; }
     void on_own_id_collision() noexcept override { ++own_id_taken; }
-    void on_short(std::size_t place, unsigned bytes) noexcept override { cut.emplace_back(place, bytes); }
+    void on_short(std::size_t place, unsigned bytes) noexcept override {
+        cut.emplace_back(place, bytes);
+    }
 
     void on_foreign(const Foreign& f) noexcept override { foreign.push_back(f); }
 
-    unsigned                                      overruns = 0, own_id_taken = 0, asked = 0, answered = 0, syncs = 0, rpdos = 0;
-    std::vector<Foreign>                          foreign;
+    unsigned overruns = 0;
+    unsigned own_id_taken = 0;
+    unsigned asked = 0;
+    unsigned answered = 0;
+    unsigned syncs = 0;
+    unsigned rpdos = 0;
+    std::vector<Foreign> foreign;
     std::vector<std::pair<std::size_t, unsigned>> cut;
-    config::Reading            reading;
-    Runner                     runner;
+    config::Reading reading;
+    Runner runner;
     std::unique_ptr<can::Link> link, ear;
-    DriveProgram               drive;
-    std::unique_ptr<Node>      node;
-    Slot*                      target = nullptr;
-    Time                       now = second;
-    std::int32_t               number = 0;
-    bool                       number_stands = false;
-    std::vector<std::int32_t>  heard;
+    DriveProgram drive;
+    std::unique_ptr<Node> node;
+    Slot* target = nullptr;
+    Time now = second;
+    std::int32_t number = 0;
+    bool number_stands = false;
+    std::vector<std::int32_t> heard;
 };
 
 TEST(Runner, Counts_the_syncs_that_are_due_before_what_belongs_to_the_last_is_sent) {
     Wire w;
-    for (int n = 0; n < 5000 && !w.runner.operational(0); ++n) w.step();
+    for (int n = 0; n < 5000 && !w.runner.operational(0); ++n) {
+        w.step();
+    }
     ASSERT_TRUE(w.runner.operational(0));
-    for (int n = 0; n < 100; ++n) w.step();
+    for (int n = 0; n < 100; ++n) {
+        w.step();
+    }
     EXPECT_EQ(w.runner.sync_overruns(), 0U);
     w.flood(5);
     EXPECT_GE(w.runner.sync_overruns(), 3U);
-    for (int n = 0; n < 20; ++n) w.step();
+    for (int n = 0; n < 20; ++n) {
+        w.step();
+    }
     const auto overruns = w.runner.sync_overruns();
     EXPECT_EQ(w.overruns, overruns);
-    for (int n = 0; n < 100; ++n) w.step();
+    for (int n = 0; n < 100; ++n) {
+        w.step();
+    }
     EXPECT_EQ(w.runner.sync_overruns(), overruns);
     EXPECT_TRUE(w.runner.operational(0));
 }
 
 TEST(Runner, Tells_a_PDO_that_is_too_short_once_until_a_whole_one_comes) {
     Wire w;
-    for (int n = 0; n < 5000 && !w.runner.operational(0); ++n) w.step();
+    for (int n = 0; n < 5000 && !w.runner.operational(0); ++n) {
+        w.step();
+    }
     ASSERT_TRUE(w.runner.operational(0));
-    for (int n = 0; n < 10; ++n) w.step();
+    for (int n = 0; n < 10; ++n) {
+        w.step();
+    }
     const auto value = [&] {
-        for (const Slot& s : w.runner.slots())
+        for (const Slot& s : w.runner.slots()) {
             if (!s.to_node) return Dictionary::value<std::uint64_t>(*s.entry);
+        }
         return std::uint64_t{0};
     };
     const std::uint64_t before = value();
     EXPECT_NE(before, 0U);
     w.node->faults().set(Fault::short_pdo, {.every = 1});
-    for (int n = 0; n < 10; ++n) w.step();
+    for (int n = 0; n < 10; ++n) {
+        w.step();
+    }
     EXPECT_EQ(w.cut, (std::vector<std::pair<std::size_t, unsigned>>{{0, 1}}));
     EXPECT_EQ(value(), before);
     w.node->faults().set(Fault::short_pdo, {});
-    for (int n = 0; n < 10; ++n) w.step();
+    for (int n = 0; n < 10; ++n) {
+        w.step();
+    }
     w.node->faults().set(Fault::short_pdo, {.every = 1});
-    for (int n = 0; n < 10; ++n) w.step();
+    for (int n = 0; n < 10; ++n) {
+        w.step();
+    }
     EXPECT_EQ(w.cut.size(), 2U);
 }
 
 TEST(Runner, Notices_another_device_with_the_master_s_node_id) {
     Wire w;
-    for (int n = 0; n < 300; ++n) w.step();
+    for (int n = 0; n < 300; ++n) {
+        w.step();
+    }
     EXPECT_EQ(w.own_id_taken, 0U);
-    w.ear->send({0x77f, {0x05}}, w.now), w.ear->flush(w.now);
-    for (int n = 0; n < 3; ++n) w.step();
+    w.ear->send({0x77f, {0x05}}, w.now);
+    w.ear->flush(w.now);
+    for (int n = 0; n < 3; ++n) {
+        w.step();
+    }
     EXPECT_EQ(w.own_id_taken, 1U);
 }
 
@@ -152,33 +213,52 @@ TEST(Runner, Notices_another_device_with_the_master_s_node_id) {
 TEST(Runner, Sends_and_takes_no_process_data_before_a_node_is_configured) {
     for (const bool at_boot : {false, true}) {
         std::string bus = one_axis;
-        if (at_boot) bus.insert(bus.find("[node"), "sync-at-boot = yes\n");
-        Wire w("tpdo1 = statusword, modes-of-operation-display\n", true, bus.substr(0, bus.find("tpdo1")) + bus.substr(bus.find("rpdo1")));
+        if (at_boot) {
+            bus.insert(bus.find("[node"), "sync-at-boot = yes\n");
+        }
+        Wire w("tpdo1 = statusword, modes-of-operation-display\n", true,
+               bus.substr(0, bus.find("tpdo1")) + bus.substr(bus.find("rpdo1")));
         for (int n = 0; n < 5000 && w.runner.status(0).step < Step::watching; ++n) {
             w.step();
             if (w.runner.status(0).step >= Step::watching) break;
             ASSERT_EQ(w.rpdos, 0U);
-            if (!at_boot) ASSERT_EQ(w.syncs, 0U);
+            if (!at_boot) {
+                ASSERT_EQ(w.syncs, 0U);
+            }
         }
         EXPECT_EQ(w.syncs > 0, at_boot);
-        for (int n = 0; n < 5000 && !w.runner.operational(0); ++n) w.step();
-        for (int n = 0; n < 20; ++n) w.step();
+        for (int n = 0; n < 5000 && !w.runner.operational(0); ++n) {
+            w.step();
+        }
+        for (int n = 0; n < 20; ++n) {
+            w.step();
+        }
         EXPECT_TRUE(w.runner.operational(0));
         EXPECT_GE(w.rpdos, 18U);
         EXPECT_GE(w.syncs, 18U);
-        EXPECT_TRUE(w.cut.empty()) << "a different PDO mapping before the configuration does not count as a fault";
+        EXPECT_TRUE(w.cut.empty())
+            << "a different PDO mapping before the configuration does not count as a fault";
 
         // The node loses power and restarts with its default mapping.
         w.node->power(false);
-        for (int n = 0; n < 10; ++n) w.step();
+        for (int n = 0; n < 10; ++n) {
+            w.step();
+        }
         w.node->power(true);
-        for (int n = 0; n < 5000 && w.runner.operational(0); ++n) w.step();
+        for (int n = 0; n < 5000 && w.runner.operational(0); ++n) {
+            w.step();
+        }
         bool booting = false;
         for (int n = 0; n < 5000 && !w.runner.operational(0); ++n) {
             w.step();
             const Step step = w.runner.status(0).step;
-            if (!booting && step < Step::watching) booting = true, w.rpdos = 0;
-            if (booting && step < Step::watching) ASSERT_LE(w.rpdos, 1U) << "one was on its way";
+            if (!booting && step < Step::watching) {
+                booting = true;
+                w.rpdos = 0;
+            }
+            if (booting && step < Step::watching) {
+                ASSERT_LE(w.rpdos, 1U) << "one was on its way";
+            }
         }
         EXPECT_TRUE(booting);
         EXPECT_TRUE(w.cut.empty());
@@ -187,24 +267,43 @@ TEST(Runner, Sends_and_takes_no_process_data_before_a_node_is_configured) {
 
 TEST(Runner, Names_what_others_send_in_its_place_once_a_second) {
     Wire w;
-    for (int n = 0; n < 5000 && !w.runner.operational(0); ++n) w.step();
+    for (int n = 0; n < 5000 && !w.runner.operational(0); ++n) {
+        w.step();
+    }
     ASSERT_TRUE(w.runner.operational(0));
     EXPECT_TRUE(w.foreign.empty());
-    const auto send = [&](const Frame& f) { w.ear->send(f, w.now + millisecond / 2), w.ear->flush(w.now + millisecond / 2); };
-    for (int n = 0; n < 2500; ++n) send({0x080, {}}), w.step();
+    const auto send = [&](const Frame& f) {
+        w.ear->send(f, w.now + millisecond / 2);
+        w.ear->flush(w.now + millisecond / 2);
+    };
+    for (int n = 0; n < 2500; ++n) {
+        send({0x080, {}});
+        w.step();
+    }
     ASSERT_EQ(w.foreign.size(), 3U);
     EXPECT_TRUE(w.foreign[0].begins && w.foreign[0].sync);
     EXPECT_EQ(w.foreign[0].frames, 1U);
     EXPECT_FALSE(w.foreign[1].begins);
     EXPECT_NEAR(w.foreign[1].frames, 1000, 2);
-    for (int n = 0; n < 1100; ++n) w.step();
+    for (int n = 0; n < 1100; ++n) {
+        w.step();
+    }
     w.foreign.clear();
-    send({0x080, {}}), send({0x202, {1, 2, 3, 4, 5, 6}}), send({0x602, {0x40, 0, 0x10, 0, 0, 0, 0, 0}});
-    send({0x000, {0x80, 7}}), send({0x201, {1}}), send({0x182, {1, 2}});
-    for (int n = 0; n < 3; ++n) w.step();
+    send({0x080, {}});
+    send({0x202, {1, 2, 3, 4, 5, 6}});
+
+    send({0x602, {0x40, 0, 0x10, 0, 0, 0, 0, 0}});
+    send({0x000, {0x80, 7}});
+    send({0x201, {1}});
+    send({0x182, {1, 2}});
+    for (int n = 0; n < 3; ++n) {
+        w.step();
+    }
     ASSERT_EQ(w.foreign.size(), 4U);
-    EXPECT_TRUE(std::all_of(w.foreign.begin(), w.foreign.end(), [](const auto& f) { return f.begins && f.frames == 1; }));
-    std::sort(w.foreign.begin(), w.foreign.end(), [](const auto& a, const auto& b) { return a.id < b.id; });
+    EXPECT_TRUE(std::all_of(w.foreign.begin(), w.foreign.end(),
+                            [](const auto& f) { return f.begins && f.frames == 1; }));
+    std::sort(w.foreign.begin(), w.foreign.end(),
+              [](const auto& a, const auto& b) { return a.id < b.id; });
     EXPECT_EQ(w.foreign[0].id, 0x000);
     EXPECT_EQ(w.foreign[0].data, (std::array<std::uint8_t, 2>{0x80, 7}));
     EXPECT_TRUE(w.foreign[1].sync && w.foreign[1].id == 0x080);
@@ -215,22 +314,31 @@ TEST(Runner, Names_what_others_send_in_its_place_once_a_second) {
 TEST(Runner, Set_points_that_a_dead_wire_kept_back_are_not_sent_when_it_is_back) {
     Wire w;
     ASSERT_NE(w.target, nullptr);
-    for (int n = 0; n < 5000 && !w.runner.operational(0); ++n) w.step();
+    for (int n = 0; n < 5000 && !w.runner.operational(0); ++n) {
+        w.step();
+    }
     ASSERT_TRUE(w.runner.operational(0));
-    for (int n = 0; n < 100; ++n) w.step();
+    for (int n = 0; n < 100; ++n) {
+        w.step();
+    }
     ASSERT_GE(w.heard.size(), 90U);
     EXPECT_LE(w.number - w.heard.back(), 2);
 
     auto* simulation = w.link->simulation();
     simulation->cut(simulation->node(), true);  // the master's own plug
-    for (int n = 0; n < 100; ++n) w.step();  // too short for the node to count as lost
+    for (int n = 0; n < 100; ++n) {
+        w.step();  // too short for the node to count as lost
+    }
     EXPECT_GT(w.runner.withheld(), 140U);    // SYNC and set-point of 80 cycles, but for a few
 
     w.heard.clear();
     const auto last_of_before = w.number;
     simulation->cut(simulation->node(), false);
-    for (int n = 0; n < 100; ++n) w.step();
-    const auto old = std::count_if(w.heard.begin(), w.heard.end(), [&](std::int32_t value) { return value <= last_of_before; });
+    for (int n = 0; n < 100; ++n) {
+        w.step();
+    }
+    const auto old = std::count_if(w.heard.begin(), w.heard.end(),
+                                   [&](std::int32_t value) { return value <= last_of_before; });
     EXPECT_LE(old, 22);  // what was on its way when it was noticed: 20 ms
     EXPECT_GE(w.heard.size(), 90U);
     EXPECT_LE(w.number - w.heard.back(), 2);
@@ -238,45 +346,68 @@ TEST(Runner, Set_points_that_a_dead_wire_kept_back_are_not_sent_when_it_is_back)
 
 TEST(Runner, Asks_for_what_a_node_sends_on_request_as_often_as_it_is_told_to) {
     Wire w("tpdo2 = modes-of-operation-display\ntpdo2.request = 10ms\n");
-    for (int n = 0; n < 5000 && !w.runner.operational(0); ++n) w.step();
+    for (int n = 0; n < 5000 && !w.runner.operational(0); ++n) {
+        w.step();
+    }
     ASSERT_TRUE(w.runner.operational(0));
-    for (int n = 0; n < 10; ++n) w.step();
+    for (int n = 0; n < 10; ++n) {
+        w.step();
+    }
     w.asked = w.answered = 0;
-    for (int n = 0; n < 200; ++n) w.step();
+    for (int n = 0; n < 200; ++n) {
+        w.step();
+    }
     EXPECT_EQ(w.asked, 20U);
     EXPECT_EQ(w.answered, 20U);
     w.node->power(false);
-    for (int n = 0; n < 1000; ++n) w.step();
+    for (int n = 0; n < 1000; ++n) {
+        w.step();
+    }
     w.asked = 0;
-    for (int n = 0; n < 100; ++n) w.step();
+    for (int n = 0; n < 100; ++n) {
+        w.step();
+    }
     EXPECT_EQ(w.asked, 0U);
 }
 
 TEST(Runner, What_is_sent_on_a_change_is_sent_again_when_a_dead_wire_is_back) {
     Wire w("rpdo1.transmission = event\n");
-    for (int n = 0; n < 5000 && !w.runner.operational(0); ++n) w.step();
+    for (int n = 0; n < 5000 && !w.runner.operational(0); ++n) {
+        w.step();
+    }
     ASSERT_TRUE(w.runner.operational(0));
-    for (int n = 0; n < 20; ++n) w.step();
+    for (int n = 0; n < 20; ++n) {
+        w.step();
+    }
     auto* simulation = w.link->simulation();
     simulation->cut(simulation->node(), true);
-    for (int n = 0; n < 80; ++n) w.step();
+    for (int n = 0; n < 80; ++n) {
+        w.step();
+    }
     const std::int32_t last = w.number;
     w.number_stands = true;  // it changes no more: nothing else would send it
-    for (int n = 0; n < 20; ++n) w.step();
+    for (int n = 0; n < 20; ++n) {
+        w.step();
+    }
     w.heard.clear();
     simulation->cut(simulation->node(), false);
-    for (int n = 0; n < 50; ++n) w.step();
+    for (int n = 0; n < 50; ++n) {
+        w.step();
+    }
     ASSERT_FALSE(w.heard.empty());
     EXPECT_EQ(w.heard.back(), last);
 }
 
 TEST(Runner, Safe_values_that_the_link_did_not_take_are_sent_with_the_next_call) {
-    Wire     w;
+    Wire w;
     BusyLink busy(*w.link);
     w.runner.open(busy);
-    for (int n = 0; n < 5000 && !w.runner.operational(0); ++n) w.step();
+    for (int n = 0; n < 5000 && !w.runner.operational(0); ++n) {
+        w.step();
+    }
     ASSERT_TRUE(w.runner.operational(0));
-    unsigned   farewells = 0, set_points = 0;
+    unsigned farewells = 0;
+    unsigned set_points = 0;
     const auto listen = [&] {
         w.now += millisecond;
         w.link->flush(w.now);
@@ -297,25 +428,34 @@ TEST(Runner, Safe_values_that_the_link_did_not_take_are_sent_with_the_next_call)
     listen();
     EXPECT_EQ(farewells, 1U);
     EXPECT_EQ(set_points, 1U);
-    for (int n = 0; n < 5000 && !w.runner.operational(0); ++n) w.step();
+    for (int n = 0; n < 5000 && !w.runner.operational(0); ++n) {
+        w.step();
+    }
     EXPECT_TRUE(w.runner.operational(0)) << "it boots the network again";
 }
 
 TEST(Runner, What_came_while_no_cycles_ran_is_dropped) {
     Wire w;
-    for (int n = 0; n < 5000 && !w.runner.operational(0); ++n) w.step();
+    for (int n = 0; n < 5000 && !w.runner.operational(0); ++n) {
+        w.step();
+    }
     ASSERT_TRUE(w.runner.operational(0));
     w.runner.make_safe();
     w.now += second;
-    for (int n = 0; n < 200; ++n) w.ear->send({0x182, {0x37, 0x02}}, w.now);  // old statusword
+    for (int n = 0; n < 200; ++n) {
+        w.ear->send({0x182, {0x37, 0x02}}, w.now);  // old statusword
+    }
     w.now += second;
     w.node->turn(w.now);
     w.runner.receive(w.now);
-    for (const Slot& s : w.runner.slots())
+    for (const Slot& s : w.runner.slots()) {
         if (!s.to_node) {
             EXPECT_NE(Dictionary::value<std::uint64_t>(*s.entry), 0x0237U);
         }
-    for (int n = 0; n < 5000 && !w.runner.operational(0); ++n) w.step();
+    }
+    for (int n = 0; n < 5000 && !w.runner.operational(0); ++n) {
+        w.step();
+    }
     EXPECT_TRUE(w.runner.operational(0));
 }
 

@@ -15,7 +15,10 @@ namespace hal::canopen::test {
 inline std::vector<std::uint8_t> pattern(std::size_t size, unsigned seed) {
     std::vector<std::uint8_t> data(size);
     unsigned x = seed * 2654435761U + 1;
-    for (auto& b : data) x = x * 1664525U + 1013904223U, b = static_cast<std::uint8_t>(x >> 24);
+    for (auto& b : data) {
+        x = x * 1664525U + 1013904223U;
+        b = static_cast<std::uint8_t>(x >> 24);
+    }
     return data;
 }
 
@@ -28,15 +31,23 @@ struct SdoBed {
     SdoClient client;
     Time now = 0;
 
-    explicit SdoBed(bool tolerant = false, const SdoClientSettings& settings = {.timeout = 50 * millisecond, .resends = 5, .restarts = 20})
+    explicit SdoBed(bool tolerant = false,
+                    const SdoClientSettings& settings = {.timeout = 50 * millisecond,
+                                                         .resends = 5,
+                                                         .restarts = 20})
         : device(example(),
-                 {.node_id = 5, .sdo = {.timeout = 1 * second, .acknowledge_after = 10 * millisecond, .tolerate_repeats = tolerant}},
+                 {.node_id = 5,
+                  .sdo = {.timeout = 1 * second,
+                          .acknowledge_after = 10 * millisecond,
+                          .tolerate_repeats = tolerant}},
                  events),
           client(out, settings) {
         bus.logging = false;
         bus.attach(device);
         bus.attach(out, [this](const Frame& f, Time t) {
-            if (client.listens_to(f)) client.handle(f, t);
+            if (client.listens_to(f)) {
+                client.handle(f, t);
+            }
         });
         client.configure(5);
         device.start(now);
@@ -47,7 +58,9 @@ struct SdoBed {
         for (int n = 0; n < steps && !r.done(); ++n) {
             client.poll(now);
             device.poll(now);
-            if (!bus.exchange(now)) now += millisecond;
+            if (!bus.exchange(now)) {
+                now += millisecond;
+            }
         }
         return r.done();
     }

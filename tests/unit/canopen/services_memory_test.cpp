@@ -20,12 +20,16 @@ int taken = 0;
 #endif
 
 void* operator new(std::size_t size) {
-    if (counting) ++taken;
+    if (counting) {
+        ++taken;
+    }
     if (void* memory = std::malloc(size != 0 ? size : 1)) return memory;
     throw std::bad_alloc();
 }
 void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
-    if (counting) ++taken;
+    if (counting) {
+        ++taken;
+    }
     return std::malloc(size != 0 ? size : 1);
 }
 void operator delete(void* memory) noexcept { std::free(memory); }
@@ -51,8 +55,12 @@ TEST(Memory, Is_not_taken_after_setup) {
     int failed = 0;
     const auto turn = [&] {
         for (int n = 0; n < 300; ++n) {
-            for (Frame f; out.pop(f);) device.handle(f, now);
-            for (Frame f; device.out().pop(f);) network.handle(f, now);
+            for (Frame f; out.pop(f);) {
+                device.handle(f, now);
+            }
+            for (Frame f; device.out().pop(f);) {
+                network.handle(f, now);
+            }
             device.poll(now);
             network.poll(now);
         }
@@ -60,10 +68,13 @@ TEST(Memory, Is_not_taken_after_setup) {
     };
     const auto serve = [&](SdoRequest& r) {
         node.sdo().submit(r);
-        for (int n = 0; n < 50 && !r.done(); ++n) turn();
+        for (int n = 0; n < 50 && !r.done(); ++n) {
+            turn();
+        }
         failed += r.ok() ? 0 : 1;
     };
-    const auto write = [&](std::uint16_t index, std::uint8_t sub, std::uint32_t value, std::size_t size) {
+    const auto write = [&](std::uint16_t index, std::uint8_t sub, std::uint32_t value,
+                           std::size_t size) {
         std::uint8_t bytes[4];
         store(bytes, value);
         SdoRequest r{.index = index, .sub = sub, .data = {bytes, size}};
@@ -112,7 +123,8 @@ TEST(Memory, Is_not_taken_while_a_master_boots_loses_and_restarts_nodes) {
         return d;
     };
     Events events;
-    Device good(with_program(), {.node_id = 5}, events), wrong(with_program(), {.node_id = 6}, events);
+    Device good(with_program(), {.node_id = 5}, events),
+        wrong(with_program(), {.node_id = 6}, events);
     NodeSetup n;
     n.id = 5;
     n.vendor = 1;
@@ -120,12 +132,17 @@ TEST(Memory, Is_not_taken_while_a_master_boots_loses_and_restarts_nodes) {
     n.restore = n.save = true;
     n.heartbeat_ms = 20;
     n.master_limit_ms = 500;
-    n.retry = 50 * millisecond, n.retry_most = 100 * millisecond;
+    n.retry = 50 * millisecond;
+    n.retry_most = 100 * millisecond;
     MasterSetup setup;
     setup.sdo.timeout = 20 * millisecond;
     setup.nodes = {n, n, n};
-    setup.nodes[1].id = 6, setup.nodes[2].id = 7;
-    setup.nodes[1].program = {.id = 7, .update = true, .image = std::vector<std::uint8_t>(3000), .limit = 100 * millisecond};
+    setup.nodes[1].id = 6;
+    setup.nodes[2].id = 7;
+    setup.nodes[1].program = {.id = 7,
+                              .update = true,
+                              .image = std::vector<std::uint8_t>(3000),
+                              .limit = 100 * millisecond};
     setup.nodes[2].mandatory = false;
     FrameQueue out(1024);
     MasterEvents told;
@@ -135,20 +152,32 @@ TEST(Memory, Is_not_taken_while_a_master_boots_loses_and_restarts_nodes) {
     const auto run = [&](Time time) {
         for (const Time end = now + time; now < end; now += millisecond) {
             for (int turn = 0; turn < 20; ++turn) {
-                for (Frame f; out.pop(f);)
-                    for (auto* d : {&good, &wrong})
-                        if (plugged || d == &wrong) d->handle(f, now);
-                for (auto* d : {&good, &wrong})
-                    for (Frame f; d->out().pop(f);)
-                        if (plugged || d == &wrong) master.handle(f, now);
+                for (Frame f; out.pop(f);) {
+                    for (auto* d : {&good, &wrong}) {
+                        if (plugged || d == &wrong) {
+                            d->handle(f, now);
+                        }
+                    }
+                }
+                for (auto* d : {&good, &wrong}) {
+                    for (Frame f; d->out().pop(f);) {
+                        if (plugged || d == &wrong) {
+                            master.handle(f, now);
+                        }
+                    }
+                }
             }
-            good.poll(now), wrong.poll(now), master.poll(now);
+            good.poll(now);
+            wrong.poll(now);
+            master.poll(now);
         }
     };
 
     taken = 0;
     counting = true;
-    good.start(now), wrong.start(now), master.start(now);
+    good.start(now);
+    wrong.start(now);
+    master.start(now);
     run(3 * second);
     const bool was_operational = master.status(5).operational;
     plugged = false;
@@ -187,7 +216,9 @@ TEST(Memory, Is_not_taken_by_a_drive_at_work) {
         while (ms-- > 0) {
             drive.step(now += millisecond);
             drive.device().poll(now);
-            for (Frame f; drive.device().out().pop(f);) continue;
+            for (Frame f; drive.device().out().pop(f);) {
+                continue;
+            }
         }
     };
     counting = true;

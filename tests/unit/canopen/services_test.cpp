@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A device on a bus: what each CiA 301 service sends, accepts and rejects. Names follow the public list of conformance cases.
+// A device on a bus: what each CiA 301 service sends, accepts and rejects. Names follow the public
+// list of conformance cases.
 #include "node.hpp"
 
 namespace hal::canopen::test {
@@ -26,26 +27,42 @@ TEST_F(Sdo, Aborts_name_what_is_wrong) {
     EXPECT_EQ(write(0x2001, 0, 101, 2), Abort::too_high);
     EXPECT_EQ(write(0x2001, 0, static_cast<std::uint16_t>(-101), 2), Abort::too_low);
     EXPECT_EQ(write(0x2001, 0, static_cast<std::uint16_t>(-100), 2), Abort::none);
-    EXPECT_EQ(static_cast<Abort>(load<std::uint32_t>(sdo({0xe0, 0, 0x20, 0, 0, 0, 0, 0}).data.data() + 4)), Abort::command);
-    EXPECT_EQ(static_cast<Abort>(load<std::uint32_t>(sdo({0xa0, 6, 0x20, 0, 0, 0, 0, 0}).data.data() + 4)), Abort::block_size);
-    EXPECT_EQ(static_cast<Abort>(load<std::uint32_t>(sdo({0x60, 0, 0, 0, 0, 0, 0, 0}).data.data() + 4)), Abort::command);
+    EXPECT_EQ(static_cast<Abort>(
+                  load<std::uint32_t>(sdo({0xe0, 0, 0x20, 0, 0, 0, 0, 0}).data.data() + 4)),
+              Abort::command);
+    EXPECT_EQ(static_cast<Abort>(
+                  load<std::uint32_t>(sdo({0xa0, 6, 0x20, 0, 0, 0, 0, 0}).data.data() + 4)),
+              Abort::block_size);
+    EXPECT_EQ(
+        static_cast<Abort>(load<std::uint32_t>(sdo({0x60, 0, 0, 0, 0, 0, 0, 0}).data.data() + 4)),
+        Abort::command);
 }
 TEST_F(Sdo, Toggle_bit_not_alternated_aborts) {
     EXPECT_EQ(sdo({0x40, 0x05, 0x20, 0, 0, 0, 0, 0}).data[0], 0x41);
     EXPECT_EQ(sdo({0x60, 0, 0, 0, 0, 0, 0, 0}).data[0], 0x00);
-    EXPECT_EQ(static_cast<Abort>(load<std::uint32_t>(sdo({0x60, 0, 0, 0, 0, 0, 0, 0}).data.data() + 4)), Abort::toggle);
+    EXPECT_EQ(
+        static_cast<Abort>(load<std::uint32_t>(sdo({0x60, 0, 0, 0, 0, 0, 0, 0}).data.data() + 4)),
+        Abort::toggle);
     EXPECT_EQ(sdo({0x21, 0x05, 0x20, 0, 9, 0, 0, 0}).data[0], 0x60);
-    EXPECT_EQ(static_cast<Abort>(load<std::uint32_t>(sdo({0x10, 1, 2, 3, 4, 5, 6, 7}).data.data() + 4)), Abort::toggle);
+    EXPECT_EQ(
+        static_cast<Abort>(load<std::uint32_t>(sdo({0x10, 1, 2, 3, 4, 5, 6, 7}).data.data() + 4)),
+        Abort::toggle);
 }
 TEST_F(Sdo, Size_that_does_not_hold_aborts) {
     EXPECT_EQ(sdo({0x21, 0x05, 0x20, 0, 9, 0, 0, 0}).data[0], 0x60);
-    EXPECT_EQ(static_cast<Abort>(load<std::uint32_t>(sdo({0x01, 1, 2, 3, 4, 5, 6, 7}).data.data() + 4)), Abort::too_short);
-    EXPECT_EQ(static_cast<Abort>(load<std::uint32_t>(sdo({0x21, 0x05, 0x20, 0, 41, 0, 0, 0}).data.data() + 4)), Abort::too_long);
+    EXPECT_EQ(
+        static_cast<Abort>(load<std::uint32_t>(sdo({0x01, 1, 2, 3, 4, 5, 6, 7}).data.data() + 4)),
+        Abort::too_short);
+    EXPECT_EQ(static_cast<Abort>(
+                  load<std::uint32_t>(sdo({0x21, 0x05, 0x20, 0, 41, 0, 0, 0}).data.data() + 4)),
+              Abort::too_long);
 }
 TEST_F(Sdo, Wrong_crc_of_a_block_aborts) {
     EXPECT_EQ(sdo({0xc6, 0x06, 0x20, 0, 3, 0, 0, 0}).data[0], 0xa4);
     EXPECT_EQ(sdo({0x81, 1, 2, 3, 0, 0, 0, 0}).data[0], 0xa2);
-    EXPECT_EQ(static_cast<Abort>(load<std::uint32_t>(sdo({0xd1, 0xff, 0xff, 0, 0, 0, 0, 0}).data.data() + 4)), Abort::crc);
+    EXPECT_EQ(static_cast<Abort>(
+                  load<std::uint32_t>(sdo({0xd1, 0xff, 0xff, 0, 0, 0, 0, 0}).data.data() + 4)),
+              Abort::crc);
 }
 TEST_F(Sdo, Client_that_falls_silent_is_told_the_time_out) {
     EXPECT_EQ(sdo({0x40, 0x05, 0x20, 0, 0, 0, 0, 0}).data[0], 0x41);
@@ -118,7 +135,9 @@ TEST_F(Heartbeat, Producer_keeps_its_period_and_tells_the_state) {
     run(100);
     const auto beats = since(0x705);
     EXPECT_NEAR(static_cast<double>(beats.size()), 10, 1);
-    for (const auto& b : beats) EXPECT_EQ(b.data[0], 5);
+    for (const auto& b : beats) {
+        EXPECT_EQ(b.data[0], 5);
+    }
     write(0x1017, 0, 0, 2);
     bus.log.clear();
     run(50);
@@ -147,7 +166,9 @@ TEST_F(Heartbeat, Consumer_watches_from_the_first_beat_and_reports_loss_once) {
     EXPECT_EQ(load<std::uint16_t>(since(0x085).back().data.data()), 0);
 }
 TEST_F(Heartbeat, Error_behaviour_decides_the_state) {
-    for (const auto& [value, state] : {std::pair{1U, NmtState::operational}, {2U, NmtState::stopped}, {0U, NmtState::pre_operational}}) {
+    for (const auto& [value, state] : {std::pair{1U, NmtState::operational},
+                                       {2U, NmtState::stopped},
+                                       {0U, NmtState::pre_operational}}) {
         nmt(reset_node);
         write(0x1029, 1, value, 1);
         write(0x1016, 1, 9 << 16 | 50, 4);
@@ -180,8 +201,11 @@ TEST_F(Guarding, Answer_toggles_from_zero_and_life_guarding_notices_a_silent_mas
         run(10);
     }
     std::vector<int> seen;
-    for (const auto& f : since(0x705))
-        if (!f.remote) seen.push_back(f.data[0]);
+    for (const auto& f : since(0x705)) {
+        if (!f.remote) {
+            seen.push_back(f.data[0]);
+        }
+    }
     EXPECT_EQ(seen, (std::vector<int>{0x7f, 0xff, 0x7f}));
     EXPECT_TRUE(events.life.empty());
     run(40);
@@ -203,7 +227,9 @@ TEST_F(SyncService, Producer_keeps_the_grid_and_counts) {
     bus.log.clear();
     run(9);
     std::vector<int> counters;
-    for (const auto& f : since(0x80)) counters.push_back(f.length == 1 ? f.data[0] : -1);
+    for (const auto& f : since(0x80)) {
+        counters.push_back(f.length == 1 ? f.data[0] : -1);
+    }
     EXPECT_EQ(counters, (std::vector<int>{1, 2, 3, 1, 2}));
     nmt(stop);
     bus.log.clear();

@@ -13,27 +13,39 @@ struct Heard : SafetyEvents {
     std::vector<std::pair<unsigned, SrdoFault>> faults;
     int fail_safes = 0;
     void on_srdo(unsigned n, Time) noexcept override { good.push_back(n); }
-    void on_srdo_fault(unsigned n, SrdoFault f, Time) noexcept override { faults.emplace_back(n, f); }
+    void on_srdo_fault(unsigned n, SrdoFault f, Time) noexcept override {
+        faults.emplace_back(n, f);
+    }
     void on_fail_safe(Time) noexcept override { ++fail_safes; }
 };
 
 /// SRDO 1 sends 2300h, SRDO 2 receives 2310h; refresh time 20 ms, SCT 50 ms, SRVT 10 ms.
 struct Srdo : Node {
     Heard heard;
-    static constexpr std::uint32_t sent_id = 0x109, received_id = 0x10b;
+    static constexpr std::uint32_t sent_id = 0x109;
+    static constexpr std::uint32_t received_id = 0x10b;
 
     static SrdoDescription sends() {
-        return {.direction = SrdoDirection::sends, .cycle_ms = 20, .validation_ms = 10, .cob = sent_id,
+        return {.direction = SrdoDirection::sends,
+                .cycle_ms = 20,
+                .validation_ms = 10,
+                .cob = sent_id,
                 .mapping = {map_entry(0x2300, 0, 8), map_entry(0x2301, 0, 8)}};
     }
     static SrdoDescription receives() {
-        return {.direction = SrdoDirection::receives, .cycle_ms = 50, .validation_ms = 10, .cob = received_id,
+        return {.direction = SrdoDirection::receives,
+                .cycle_ms = 50,
+                .validation_ms = 10,
+                .cob = received_id,
                 .mapping = {map_entry(0x2310, 0, 8), map_entry(0x2311, 0, 8)}};
     }
     static Description with_srdos() {
         Description d = example();
-        for (const std::uint16_t index : std::initializer_list<std::uint16_t>{0x2300, 0x2301, 0x2310, 0x2311})
-            d.add(index, 0, Type::unsigned8, Access::read_write, (index & 1) != 0 ? 0xff : 0).mappable();
+        for (const std::uint16_t index :
+             std::initializer_list<std::uint16_t>{0x2300, 0x2301, 0x2310, 0x2311}) {
+            d.add(index, 0, Type::unsigned8, Access::read_write, (index & 1) != 0 ? 0xff : 0)
+                .mappable();
+        }
         const SrdoDescription both[] = {sends(), receives()};
         add_srdos(d, both);
         return d;
@@ -51,7 +63,10 @@ struct Srdo : Node {
         bus.log.clear();
     }
     void frame(std::uint32_t id, std::uint8_t value) { send({id, {value}}); }
-    void good(std::uint8_t value) { frame(received_id, value), frame(received_id + 1, static_cast<std::uint8_t>(~value)); }
+    void good(std::uint8_t value) {
+        frame(received_id, value);
+        frame(received_id + 1, static_cast<std::uint8_t>(~value));
+    }
     std::uint8_t value() { return device->dictionary().get<std::uint8_t>(0x2310, 0); }
     Srdos::Status status(unsigned n = 2) { return device->srdos().status(n); }
     void expect_fault(SrdoFault fault) {
@@ -65,7 +80,10 @@ struct Srdo : Node {
 
 TEST_F(Srdo, Signature_is_the_one_of_a_makers_worked_example) {
     // SICK scanGrid2 CANopen, operating instructions 8025990, table 42: 4370h.
-    const SrdoDescription s{.direction = SrdoDirection::receives, .cycle_ms = 0x32, .validation_ms = 0x14, .cob = 0x111,
+    const SrdoDescription s{.direction = SrdoDirection::receives,
+                            .cycle_ms = 0x32,
+                            .validation_ms = 0x14,
+                            .cob = 0x111,
                             .mapping = {0x60100108, 0x60110108, 0x60100208, 0x60110208}};
     EXPECT_EQ(srdo_signature(s), 0x4370);
 }
@@ -78,7 +96,9 @@ TEST_F(Srdo, Signature_of_the_objects_is_that_of_the_description) {
 TEST_F(Srdo, Sender_sends_both_frames_once_per_refresh_time_and_only_when_operational) {
     run(100);
     EXPECT_TRUE(since(sent_id).empty());
-    device->dictionary().set(0x2300, 0, std::uint8_t{0x5a}), device->dictionary().set(0x2301, 0, std::uint8_t{0xa5});
+    device->dictionary().set(0x2300, 0, std::uint8_t{0x5a});
+
+    device->dictionary().set(0x2301, 0, std::uint8_t{0xa5});
     operational();
     run(100);
     EXPECT_EQ(since(sent_id).size(), 6U);
@@ -151,7 +171,8 @@ TEST_F(Srdo, Receiver_waits_for_the_first_one_without_a_fault_unless_it_is_expec
 TEST_F(Srdo, Receiver_that_is_told_not_to_listen_hears_nothing) {
     operational();
     device->srdos().expect(2, false, now);
-    good(1), frame(received_id + 1, 0);
+    good(1);
+    frame(received_id + 1, 0);
     run(100);
     EXPECT_TRUE(heard.faults.empty());
     EXPECT_TRUE(heard.good.empty());
@@ -202,7 +223,8 @@ TEST_F(Srdo, Second_frame_first_is_a_fault) {
 
 TEST_F(Srdo, First_frame_twice_is_a_fault) {
     operational();
-    frame(received_id, 1), frame(received_id, 1);
+    frame(received_id, 1);
+    frame(received_id, 1);
     expect_fault(SrdoFault::order);
 }
 
@@ -211,7 +233,9 @@ TEST_F(Srdo, Each_single_wrong_bit_is_a_fault) {
         heard.faults.clear();
         nmt(enter_pre_operational);
         operational();
-        frame(received_id, 0x35), frame(received_id + 1, static_cast<std::uint8_t>(~0x35 ^ 1 << bit));
+        frame(received_id, 0x35);
+
+        frame(received_id + 1, static_cast<std::uint8_t>(~0x35 ^ 1 << bit));
         EXPECT_NE(value(), 0x35);
         expect_fault(SrdoFault::complement);
     }
@@ -295,7 +319,9 @@ TEST_F(Srdo, Whoever_changes_a_parameter_has_to_say_anew_that_all_are_valid) {
 
 TEST_F(Srdo, Parameters_cannot_be_written_while_operational) {
     operational();
-    for (const std::uint8_t sub : std::initializer_list<std::uint8_t>{1, 3}) EXPECT_EQ(write(0x1301, sub, 1, 1), Abort::device_state);
+    for (const std::uint8_t sub : std::initializer_list<std::uint8_t>{1, 3}) {
+        EXPECT_EQ(write(0x1301, sub, 1, 1), Abort::device_state);
+    }
     EXPECT_EQ(write(0x1381, 1, 0x23000008, 4), Abort::device_state);
     EXPECT_EQ(write(0x13fe, 0, 0, 1), Abort::device_state);
     EXPECT_EQ(write(0x13ff, 1, 0, 2), Abort::device_state);
@@ -304,22 +330,29 @@ TEST_F(Srdo, Parameters_cannot_be_written_while_operational) {
 TEST_F(Srdo, Parameters_that_cannot_be_are_refused) {
     EXPECT_EQ(write(0x1301, 1, 3, 1), Abort::value);
     EXPECT_EQ(write(0x1301, 2, 0, 2), Abort::value);
-    for (const std::uint32_t cob : {0x0ffU, 0x102U, 0x181U, 0x80000109U}) EXPECT_EQ(write(0x1301, 5, cob, 4), Abort::value) << cob;
-    for (const std::uint32_t cob : {0x109U, 0x182U}) EXPECT_EQ(write(0x1301, 6, cob, 4), Abort::value) << cob;
+    for (const std::uint32_t cob : {0x0ffU, 0x102U, 0x181U, 0x80000109U}) {
+        EXPECT_EQ(write(0x1301, 5, cob, 4), Abort::value) << cob;
+    }
+    for (const std::uint32_t cob : {0x109U, 0x182U}) {
+        EXPECT_EQ(write(0x1301, 6, cob, 4), Abort::value) << cob;
+    }
     EXPECT_EQ(write(0x13fe, 0, 0x5a, 1), Abort::value);
 }
 
 TEST_F(Srdo, What_does_not_hold_together_cannot_be_made_valid) {
-    const auto tried = [&](std::uint16_t index, std::uint8_t sub, std::uint32_t value, unsigned size) {
+    const auto tried = [&](std::uint16_t index, std::uint8_t sub, std::uint32_t value,
+                           unsigned size) {
         make_anew(with_srdos());
         EXPECT_EQ(write(index, sub, value, size), Abort::none);
         EXPECT_EQ(write(0x13ff, 2, device->srdos().signature(2), 2), Abort::none);
         return write(0x13fe, 0, 0xa5, 1);
     };
-    EXPECT_EQ(tried(0x1302, 5, 0x10d, 4), Abort::value) << "the second frame has not the next identifier";
+    EXPECT_EQ(tried(0x1302, 5, 0x10d, 4), Abort::value)
+        << "the second frame has not the next identifier";
     EXPECT_EQ(tried(0x1302, 3, 0, 1), Abort::value) << "no SRVT";
     EXPECT_EQ(tried(0x1382, 0, 1, 1), Abort::pdo_length) << "an odd number of objects";
-    EXPECT_EQ(tried(0x1382, 2, map_entry(0x2001, 0, 16), 4), Abort::pdo_length) << "a pair of two lengths";
+    EXPECT_EQ(tried(0x1382, 2, map_entry(0x2001, 0, 16), 4), Abort::pdo_length)
+        << "a pair of two lengths";
     EXPECT_EQ(tried(0x1382, 1, map_entry(0x200a, 0, 8), 4), Abort::not_mappable);
     EXPECT_EQ(tried(0x1382, 1, map_entry(0x5555, 0, 8), 4), Abort::no_object);
 }
@@ -351,34 +384,49 @@ TEST_F(Srdo, Reset_of_communication_brings_the_valid_configuration_of_power_on_b
 }
 
 TEST_F(Srdo, Every_lost_doubled_or_overtaken_frame_ends_belief_or_changes_nothing) {
-    // The sender of one node is the receiver of another: with every n-th frame disturbed no value is accepted that was not sent.
+    // The sender of one node is the receiver of another: with every n-th frame disturbed no value
+    // is accepted that was not sent.
     for (const unsigned every : {2U, 3U, 5U, 7U}) {
         for (int kind = 0; kind < 3; ++kind) {
             Bus wire;
             wire.logging = false;
             Recorder a_events, b_events;
-            Description da = with_srdos(), db = with_srdos();
+            Description da = with_srdos();
+            Description db = with_srdos();
             auto there = sends();
             there.cob = received_id;
             const SrdoDescription of_a[] = {there}, of_b[] = {receives()};
-            std::erase_if(da.entries, [](const auto& e) { return e.index >= 0x1300 && e.index < 0x1400; });
-            std::erase_if(db.entries, [](const auto& e) { return e.index >= 0x1300 && e.index < 0x1400; });
-            add_srdos(da, of_a), add_srdos(db, of_b);
-            Device a(da, {.node_id = 5, .auto_start = true}, a_events), b(db, {.node_id = 6, .auto_start = true}, b_events);
-            wire.attach(a), wire.attach(b);
+            std::erase_if(da.entries,
+                          [](const auto& e) { return e.index >= 0x1300 && e.index < 0x1400; });
+            std::erase_if(db.entries,
+                          [](const auto& e) { return e.index >= 0x1300 && e.index < 0x1400; });
+            add_srdos(da, of_a);
+            add_srdos(db, of_b);
+            Device a(da, {.node_id = 5, .auto_start = true}, a_events),
+                b(db, {.node_id = 6, .auto_start = true}, b_events);
+            wire.attach(a);
+            wire.attach(b);
             a.srdos().derive_inverted(1);
             Heard told;
             b.srdos().listen(told);
             Time t = 0;
-            a.start(t), b.start(t);
+            a.start(t);
+            b.start(t);
             wire.exchange(t);
-            (kind == 0 ? wire.faults.lose : kind == 1 ? wire.faults.repeat : wire.faults.delay) = every;
+            (kind == 0   ? wire.faults.lose
+             : kind == 1 ? wire.faults.repeat
+                         : wire.faults.delay) = every;
             for (unsigned n = 0; n < 2000; ++n) {
                 t += millisecond;
                 a.dictionary().set(0x2300, 0, static_cast<std::uint8_t>(n & 0x7f));
                 const auto before = told.good.size();
-                a.poll(t), wire.exchange(t), b.poll(t), wire.exchange(t);
-                if (told.good.size() != before) { EXPECT_EQ(b.dictionary().get<std::uint8_t>(0x2310, 0), n & 0x7f); }
+                a.poll(t);
+                wire.exchange(t);
+                b.poll(t);
+                wire.exchange(t);
+                if (told.good.size() != before) {
+                    EXPECT_EQ(b.dictionary().get<std::uint8_t>(0x2310, 0), n & 0x7f);
+                }
             }
             EXPECT_FALSE(told.faults.empty()) << "kind " << kind << ", every " << every;
         }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The smaller components: NaN values and rejected load arguments, which netlist tests cannot express.
+// The smaller components: NaN values and rejected load arguments, which netlist tests cannot
+// express.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -14,7 +15,8 @@ using hal::test::Instance;
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-void expect_refused(const std::string& component, const char* argument, const char* value, const char* reason) {
+void expect_refused(const std::string& component, const char* argument, const char* value,
+                    const char* reason) {
     try {
         Instance refused(component, {{argument, value}});
         ADD_FAILURE() << component << " " << argument << "=" << value << " is taken";
@@ -28,8 +30,12 @@ TEST(Catalogue, Refuses_load_arguments_that_make_no_sense) {
     expect_refused("logic", "personality", "0x111", "inputs in its low byte; expected 1 to 16");
     expect_refused("bitslice", "personality", "33", "outside 1..32");
     expect_refused("lincurve", "personality", "0", "outside 1..16");
-    for (const char* config : {"", "f", "ff", "8", "fx8", "ffb8", "ff0", "ff1025", "ff99999"}) expect_refused("mux_generic", "config", config, "config=");
-    for (const char* enums : {"", "D", "X;a", "D;", "D;;;"}) expect_refused("enum", "enums", enums, "enums=");
+    for (const char* config : {"", "f", "ff", "8", "fx8", "ffb8", "ff0", "ff1025", "ff99999"}) {
+        expect_refused("mux_generic", "config", config, "config=");
+    }
+    for (const char* enums : {"", "D", "X;a", "D;", "D;;;"}) {
+        expect_refused("enum", "enums", enums, "enums=");
+    }
 }
 
 TEST(Catalogue, Names_ways_and_labels_as_the_arguments_say) {
@@ -50,10 +56,15 @@ TEST(Catalogue, Filters_survive_what_is_not_a_number) {
     struct Filter {
         const char *name, *in, *out;
     };
-    for (const Filter f : {Filter{"ilowpass", "", "out"}, Filter{"biquad", "in", "out"}, Filter{"filter_kalman", "zk", "xk-out"}, Filter{"lincurve", "in", "out"},
+    for (const Filter f : {Filter{"ilowpass", "", "out"}, Filter{"biquad", "in", "out"},
+                           Filter{"filter_kalman", "zk", "xk-out"}, Filter{"lincurve", "in", "out"},
                            Filter{"joyhandle", "in", "out"}}) {
         Instance filter(f.name);
-        if (std::string(f.name) == "biquad") filter.set("type", 1), filter.set("f0", 100.0), filter.set("enable", true);
+        if (std::string(f.name) == "biquad") {
+            filter.set("type", 1);
+            filter.set("f0", 100.0);
+            filter.set("enable", true);
+        }
         if (*f.in == '\0') {
             filter.set("in", 3);
             filter.set("gain", nan);

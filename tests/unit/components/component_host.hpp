@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// A host of the component interface for unit tests: loads a plugin, creates one instance, and lets a test play the
-// netlist and the thread. Everything that goes wrong throws std::runtime_error with a sentence. One thread only.
+// A host of the component interface for unit tests: loads a plugin, creates one instance, and lets
+// a test play the netlist and the thread. Everything that goes wrong throws std::runtime_error with
+// a sentence. One thread only.
 #pragma once
 
 #include <concepts>
@@ -43,48 +44,63 @@ public:
 
     enum class Life { created, started };
 
-    /// Creates and starts an instance of `component`, found in HALCYON_PLUGIN_PATH or the build tree; with
-    /// Life::created it is left for start(). Throws the component's own reason when it rejects its arguments.
-    explicit Instance(const std::string& component, Arguments arguments = {}, Extensions extensions = {}, Life life = Life::started);
+    /// Creates and starts an instance of `component`, found in HALCYON_PLUGIN_PATH or the build
+    /// tree; with Life::created it is left for start(). Throws the component's own reason when it
+    /// rejects its arguments.
+    explicit Instance(const std::string& component, Arguments arguments = {},
+                      Extensions extensions = {}, Life life = Life::started);
     ~Instance();
     Instance(const Instance&) = delete;
     Instance& operator=(const Instance&) = delete;
 
-    /// Value of a pin; `T` must be its exact type (bool, double, int32_t, uint32_t, int64_t, uint64_t).
+    /// Value of a pin; `T` must be its exact type (bool, double, int32_t, uint32_t, int64_t,
+    /// uint64_t).
     template <class T>
     T get(std::string_view pin) const {
         return *reinterpret_cast<const T*>(of_type(pin, type_of<T>()).memory->slot);
     }
-    /// Sets a pin of any direction, linked or not. Any number goes into a float pin; other types must match exactly,
-    /// except that a non-negative or in-range int literal goes into any integer pin.
+    /// Sets a pin of any direction, linked or not. Any number goes into a float pin; other types
+    /// must match exactly, except that a non-negative or in-range int literal goes into any integer
+    /// pin.
     template <class T>
     void set(std::string_view pin, T value) {
         const Pin& to = this->pin(pin);
         hal_value& slot = *to.memory->slot;
-        if constexpr (std::same_as<T, bool>) of_type(pin, HAL_TYPE_BIT).memory->slot->bit = value;
-        else if (to.type == HAL_TYPE_FLOAT) slot.real = static_cast<double>(value);
-        else if constexpr (std::floating_point<T>) of_type(pin, HAL_TYPE_FLOAT);
-        else if (to.type == HAL_TYPE_S32) slot.s32 = in_range<std::int32_t>(pin, value);
-        else if (to.type == HAL_TYPE_U32) slot.u32 = in_range<std::uint32_t>(pin, value);
-        else if (to.type == HAL_TYPE_S64) slot.s64 = in_range<std::int64_t>(pin, value);
-        else if (to.type == HAL_TYPE_U64) slot.u64 = in_range<std::uint64_t>(pin, value);
-        else throw std::runtime_error("pin '" + std::string(pin) + "' does not take a number");
+        if constexpr (std::same_as<T, bool>) {
+            of_type(pin, HAL_TYPE_BIT).memory->slot->bit = value;
+        } else if (to.type == HAL_TYPE_FLOAT) {
+            slot.real = static_cast<double>(value);
+        } else if constexpr (std::floating_point<T>) {
+            of_type(pin, HAL_TYPE_FLOAT);
+        } else if (to.type == HAL_TYPE_S32) {
+            slot.s32 = in_range<std::int32_t>(pin, value);
+        } else if (to.type == HAL_TYPE_U32) {
+            slot.u32 = in_range<std::uint32_t>(pin, value);
+        } else if (to.type == HAL_TYPE_S64) {
+            slot.s64 = in_range<std::int64_t>(pin, value);
+        } else if (to.type == HAL_TYPE_U64) {
+            slot.u64 = in_range<std::uint64_t>(pin, value);
+        } else {
+            throw std::runtime_error("pin '" + std::string(pin) + "' does not take a number");
+        }
     }
 
-    /// Runs `cycles` cycles of a function ("" is the one named like the instance). The cycle number goes on from call
-    /// to call; the start time is the sum of the periods.
-    void run(std::string_view function = "", std::int64_t period_ns = 1'000'000, std::uint64_t cycles = 1);
+    /// Runs `cycles` cycles of a function ("" is the one named like the instance). The cycle number
+    /// goes on from call to call; the start time is the sum of the periods.
+    void run(std::string_view function = "", std::int64_t period_ns = 1'000'000,
+             std::uint64_t cycles = 1);
     /// The same for the function named like the instance.
     void run(int cycles) { run("", 1'000'000, static_cast<std::uint64_t>(cycles)); }
 
-    /// Gives `pin` a signal of its own, with the value it has; `linked()` is then true inside the component.
+    /// Gives `pin` a signal of its own, with the value it has; `linked()` is then true inside the
+    /// component.
     void link(std::string_view pin);
     /// Puts `pin` and `other_pin` on one signal, which takes the value of `pin`.
     void link(std::string_view pin, Instance& other, std::string_view other_pin);
     /// Takes `pin` off its signal; it keeps the value.
     void unlink(std::string_view pin);
 
-    void stop();   ///< calls the component's stop(), once
+    void stop();  ///< calls the component's stop(), once
     void start();  ///< starts an instance that was only created, or again after stop()
 
     const hal_component& component() const { return *component_; }
@@ -98,19 +114,26 @@ private:
     void release();
     template <class T>
     static constexpr hal_type type_of() {
-        if constexpr (std::same_as<T, bool>) return HAL_TYPE_BIT;
-        else if constexpr (std::same_as<T, double>) return HAL_TYPE_FLOAT;
-        else if constexpr (std::same_as<T, std::int32_t>) return HAL_TYPE_S32;
-        else if constexpr (std::same_as<T, std::uint32_t>) return HAL_TYPE_U32;
-        else if constexpr (std::same_as<T, std::int64_t>) return HAL_TYPE_S64;
-        else {
+        if constexpr (std::same_as<T, bool>) {
+            return HAL_TYPE_BIT;
+        } else if constexpr (std::same_as<T, double>) {
+            return HAL_TYPE_FLOAT;
+        } else if constexpr (std::same_as<T, std::int32_t>) {
+            return HAL_TYPE_S32;
+        } else if constexpr (std::same_as<T, std::uint32_t>) {
+            return HAL_TYPE_U32;
+        } else if constexpr (std::same_as<T, std::int64_t>) {
+            return HAL_TYPE_S64;
+        } else {
             static_assert(std::same_as<T, std::uint64_t>, "not a type of pins");
             return HAL_TYPE_U64;
         }
     }
     template <class To, class From>
     static To in_range(std::string_view pin, From value) {
-        if (!std::in_range<To>(value)) throw std::runtime_error("value out of range for pin '" + std::string(pin) + "'");
+        if (!std::in_range<To>(value)) {
+            throw std::runtime_error("value out of range for pin '" + std::string(pin) + "'");
+        }
         return static_cast<To>(value);
     }
     const Pin& of_type(std::string_view pin, hal_type type) const;

@@ -33,12 +33,16 @@ void check(const std::string& component, std::initializer_list<Case<From, To>> c
         converter.set("clamp", true);
         converter.run();  // clears out-of-range
         converter.set("in", c.in);
-        const bool has_fraction = std::same_as<From, double> && std::trunc(static_cast<double>(c.in)) != static_cast<double>(c.in);
+        const bool has_fraction =
+            std::same_as<From, double> &&
+            std::trunc(static_cast<double>(c.in)) != static_cast<double>(c.in);
         for (const bool clamp : {false, true}) {
             converter.set("clamp", clamp);
             converter.run();
-            EXPECT_EQ(converter.get<To>("out"), clamp ? c.clamped : c.wrapped) << component << " of " << c.in << (clamp ? " clamped" : "");
-            EXPECT_EQ(converter.get<bool>("out-of-range"), !c.fits || (has_fraction && !clamp)) << component << " of " << c.in;
+            EXPECT_EQ(converter.get<To>("out"), clamp ? c.clamped : c.wrapped)
+                << component << " of " << c.in << (clamp ? " clamped" : "");
+            EXPECT_EQ(converter.get<bool>("out-of-range"), !c.fits || (has_fraction && !clamp))
+                << component << " of " << c.in;
         }
     }
 }
@@ -74,21 +78,46 @@ TEST(Conv, To_float_and_to_a_wider_integer_is_exact) {
 }
 
 TEST(Conv, To_a_bit_is_true_for_all_but_zero_and_reports_what_is_neither_0_nor_1) {
-    check<i32, bool>("conv_s32_bit", {{0, false, false, true}, {1, true, true, true}, {2, true, true, false}, {-1, true, false, false}});
-    check<u32, bool>("conv_u32_bit", {{0, false, false, true}, {1, true, true, true}, {UINT32_MAX, true, true, false}});
-    check<i64, bool>("conv_s64_bit", {{i64{1} << 40, true, true, false}, {-1, true, false, false}, {0, false, false, true}});
+    check<i32, bool>("conv_s32_bit", {{0, false, false, true},
+                                      {1, true, true, true},
+                                      {2, true, true, false},
+                                      {-1, true, false, false}});
+    check<u32, bool>(
+        "conv_u32_bit",
+        {{0, false, false, true}, {1, true, true, true}, {UINT32_MAX, true, true, false}});
+    check<i64, bool>(
+        "conv_s64_bit",
+        {{i64{1} << 40, true, true, false}, {-1, true, false, false}, {0, false, false, true}});
     check<u64, bool>("conv_u64_bit", {{u64{1} << 63, true, true, false}, {1, true, true, true}});
 }
 
 TEST(Conv, Of_a_float_cuts_the_fraction_and_wraps_or_clamps) {
-    check<double, i32>("conv_float_s32", {{1.9, 1, 1, true}, {-1.9, -1, -1, true}, {2147483647.0, INT32_MAX, INT32_MAX, true}, {-2147483648.0, INT32_MIN, INT32_MIN, true},
-                                          {2147483648.0, INT32_MIN, INT32_MAX, false}, {4294967301.0, 5, INT32_MAX, false}, {-2147483649.0, INT32_MAX, INT32_MIN, false},
-                                          {1e300, 0, INT32_MAX, false}, {infinity, 0, INT32_MAX, false}, {-infinity, 0, INT32_MIN, false}, {nan, 0, 0, false}});
-    check<double, u32>("conv_float_u32", {{4294967295.0, UINT32_MAX, UINT32_MAX, true}, {4294967296.0, 0, UINT32_MAX, false}, {-1.0, UINT32_MAX, 0, false}, {nan, 0, 0, false}});
-    check<double, i64>("conv_float_s64", {{-9223372036854775808.0, INT64_MIN, INT64_MIN, true}, {9223372036854774784.0, 9223372036854774784, 9223372036854774784, true},
-                                          {9223372036854775808.0, INT64_MIN, INT64_MAX, false}, {18446744073709551616.0, 0, INT64_MAX, false}, {nan, 0, 0, false}});
-    check<double, u64>("conv_float_u64", {{18446744073709549568.0, 18446744073709549568u, 18446744073709549568u, true}, {18446744073709551616.0, 0, UINT64_MAX, false},
-                                          {-2.5, UINT64_MAX - 1, 0, false}, {infinity, 0, UINT64_MAX, false}});
+    check<double, i32>("conv_float_s32", {{1.9, 1, 1, true},
+                                          {-1.9, -1, -1, true},
+                                          {2147483647.0, INT32_MAX, INT32_MAX, true},
+                                          {-2147483648.0, INT32_MIN, INT32_MIN, true},
+                                          {2147483648.0, INT32_MIN, INT32_MAX, false},
+                                          {4294967301.0, 5, INT32_MAX, false},
+                                          {-2147483649.0, INT32_MAX, INT32_MIN, false},
+                                          {1e300, 0, INT32_MAX, false},
+                                          {infinity, 0, INT32_MAX, false},
+                                          {-infinity, 0, INT32_MIN, false},
+                                          {nan, 0, 0, false}});
+    check<double, u32>("conv_float_u32", {{4294967295.0, UINT32_MAX, UINT32_MAX, true},
+                                          {4294967296.0, 0, UINT32_MAX, false},
+                                          {-1.0, UINT32_MAX, 0, false},
+                                          {nan, 0, 0, false}});
+    check<double, i64>("conv_float_s64",
+                       {{-9223372036854775808.0, INT64_MIN, INT64_MIN, true},
+                        {9223372036854774784.0, 9223372036854774784, 9223372036854774784, true},
+                        {9223372036854775808.0, INT64_MIN, INT64_MAX, false},
+                        {18446744073709551616.0, 0, INT64_MAX, false},
+                        {nan, 0, 0, false}});
+    check<double, u64>("conv_float_u64", {{18446744073709549568.0, 18446744073709549568u,
+                                           18446744073709549568u, true},
+                                          {18446744073709551616.0, 0, UINT64_MAX, false},
+                                          {-2.5, UINT64_MAX - 1, 0, false},
+                                          {infinity, 0, UINT64_MAX, false}});
 }
 
 TEST(Conv, Without_clamp_out_of_range_remains_set) {
@@ -111,13 +140,21 @@ TEST(Conv, Without_clamp_out_of_range_remains_set) {
 TEST(Conv, Between_integers_wraps_or_clamps) {
     check<i32, u32>("conv_s32_u32", {{5, 5, 5, true}, {-1, UINT32_MAX, 0, false}});
     check<i32, u64>("conv_s32_u64", {{5, 5, 5, true}, {-1, UINT64_MAX, 0, false}});
-    check<u32, i32>("conv_u32_s32", {{INT32_MAX, INT32_MAX, INT32_MAX, true}, {UINT32_MAX, -1, INT32_MAX, false}});
-    check<i64, i32>("conv_s64_s32", {{-7, -7, -7, true}, {(i64{1} << 32) + 3, 3, INT32_MAX, false}, {INT64_MIN, 0, INT32_MIN, false}});
-    check<i64, u32>("conv_s64_u32", {{UINT32_MAX, UINT32_MAX, UINT32_MAX, true}, {-1, UINT32_MAX, 0, false}, {i64{1} << 32, 0, UINT32_MAX, false}});
-    check<i64, u64>("conv_s64_u64", {{INT64_MAX, INT64_MAX, INT64_MAX, true}, {-1, UINT64_MAX, 0, false}});
+    check<u32, i32>("conv_u32_s32",
+                    {{INT32_MAX, INT32_MAX, INT32_MAX, true}, {UINT32_MAX, -1, INT32_MAX, false}});
+    check<i64, i32>("conv_s64_s32", {{-7, -7, -7, true},
+                                     {(i64{1} << 32) + 3, 3, INT32_MAX, false},
+                                     {INT64_MIN, 0, INT32_MIN, false}});
+    check<i64, u32>("conv_s64_u32", {{UINT32_MAX, UINT32_MAX, UINT32_MAX, true},
+                                     {-1, UINT32_MAX, 0, false},
+                                     {i64{1} << 32, 0, UINT32_MAX, false}});
+    check<i64, u64>("conv_s64_u64",
+                    {{INT64_MAX, INT64_MAX, INT64_MAX, true}, {-1, UINT64_MAX, 0, false}});
     check<u64, i32>("conv_u64_s32", {{9, 9, 9, true}, {UINT64_MAX, -1, INT32_MAX, false}});
-    check<u64, u32>("conv_u64_u32", {{UINT32_MAX, UINT32_MAX, UINT32_MAX, true}, {(u64{1} << 32) + 8, 8, UINT32_MAX, false}});
-    check<u64, i64>("conv_u64_s64", {{INT64_MAX, INT64_MAX, INT64_MAX, true}, {UINT64_MAX, -1, INT64_MAX, false}});
+    check<u64, u32>("conv_u64_u32", {{UINT32_MAX, UINT32_MAX, UINT32_MAX, true},
+                                     {(u64{1} << 32) + 8, 8, UINT32_MAX, false}});
+    check<u64, i64>("conv_u64_s64",
+                    {{INT64_MAX, INT64_MAX, INT64_MAX, true}, {UINT64_MAX, -1, INT64_MAX, false}});
 }
 
 }  // namespace

@@ -13,7 +13,8 @@ namespace {
 
 using hal::test::Instance;
 
-constexpr std::int64_t base_ns = 50'000, servo_ns = 1'000'000;
+constexpr std::int64_t base_ns = 50'000;
+constexpr std::int64_t servo_ns = 1'000'000;
 
 struct Encoder : Instance {
     Encoder() : Instance("encoder") { show(0); }
@@ -28,7 +29,9 @@ struct Encoder : Instance {
     void turn(std::int64_t from, std::int64_t to, int cycles = 1) {
         for (std::int64_t at = from; at != to;) {
             at += to > from ? 1 : -1;
-            for (int i = 0; i < cycles; ++i) show(at);
+            for (int i = 0; i < cycles; ++i) {
+                show(at);
+            }
         }
     }
     std::int32_t counts() {
@@ -63,7 +66,10 @@ TEST(Encoder, Without_x4_counts_once_a_cycle_and_comes_back_to_the_same_place) {
     EXPECT_EQ(e.counts(), 10);
     e.turn(40, 0);
     EXPECT_EQ(e.counts(), 0);
-    for (int i = 0; i < 10; ++i) e.turn(0, 1), e.turn(1, 0);  // trembling over the counting edge
+    for (int i = 0; i < 10; ++i) {
+        e.turn(0, 1);
+        e.turn(1, 0);  // trembling over the counting edge
+    }
     EXPECT_EQ(e.counts(), 0);
 }
 
@@ -166,8 +172,12 @@ TEST(Encoder, Reset_holds_zero) {
 }
 
 TEST(Encoder, Latches_at_the_chosen_edges) {
-    struct Case { bool rising, falling; std::int32_t after_rise, after_fall; };
-    for (const Case c : {Case{true, true, 4, 9}, Case{true, false, 4, 4}, Case{false, true, 0, 9}, Case{false, false, 0, 0}}) {
+    struct Case {
+        bool rising, falling;
+        std::int32_t after_rise, after_fall;
+    };
+    for (const Case c : {Case{true, true, 4, 9}, Case{true, false, 4, 4}, Case{false, true, 0, 9},
+                         Case{false, false, 0, 0}}) {
         Encoder e;
         e.set("position-scale", 2.0);
         e.set("latch-rising", c.rising);
@@ -191,16 +201,21 @@ TEST(Encoder, Velocity_and_interpolation_at_constant_speed) {
     e.set("min-speed-estimate", 0.1);
     std::int64_t at = 0;
     double largest = 0.0;
-    for (int cycle = 1; cycle <= 20'000; ++cycle) {  // 137 cycles of 50 us per count: 145.985 counts/s
-        if (cycle % 137 == 0) ++at;
+    // 137 cycles of 50 us per count: 145.985 counts/s
+    for (int cycle = 1; cycle <= 20'000; ++cycle) {
+        if (cycle % 137 == 0) {
+            ++at;
+        }
         e.show(at);
         if (cycle % 20 != 0) continue;
         e.capture();
         if (cycle < 1000) continue;
         ASSERT_NEAR(e.get<double>("velocity"), 1e9 / (137.0 * base_ns) / 100.0, 1e-9);
-        largest = std::max(largest, std::abs(e.get<double>("position-interpolated") - cycle / 137.0 / 100.0));
+        largest = std::max(
+            largest, std::abs(e.get<double>("position-interpolated") - cycle / 137.0 / 100.0));
     }
-    EXPECT_LT(largest, 0.5e-3);  // an edge is seen up to a fast cycle late: 1/137 of a count; not the count of 1e-2
+    // an edge is seen up to a fast cycle late: 1/137 of a count; not the count of 1e-2
+    EXPECT_LT(largest, 0.5e-3);
     EXPECT_DOUBLE_EQ(e.get<double>("velocity-rpm"), e.get<double>("velocity") * 60.0);
 }
 
@@ -212,10 +227,14 @@ TEST(Encoder, Velocity_falls_when_edges_stop_coming_and_is_zero_below_the_minimu
     e.turn(20, 40, 4);
     e.capture();
     EXPECT_NEAR(e.get<double>("velocity"), 5000.0, 1e-6);
-    for (int i = 0; i < 200; ++i) e.show(40);  // 10 ms: at most 100 counts/s
+    for (int i = 0; i < 200; ++i) {
+        e.show(40);  // 10 ms: at most 100 counts/s
+    }
     e.capture();
     EXPECT_NEAR(e.get<double>("velocity"), 100.0, 2.0);
-    for (int i = 0; i < 2000; ++i) e.show(40);
+    for (int i = 0; i < 2000; ++i) {
+        e.show(40);
+    }
     e.capture();
     EXPECT_EQ(e.get<double>("velocity"), 0.0);
     EXPECT_EQ(e.get<double>("position-interpolated"), 40.0);
@@ -223,13 +242,16 @@ TEST(Encoder, Velocity_falls_when_edges_stop_coming_and_is_zero_below_the_minimu
 
 TEST(Encoder, Velocity_begins_with_the_second_edge_and_falls_as_the_next_edge_would_say) {
     Encoder e;
-    for (int i = 0; i < 10; ++i) e.show(0);
+    for (int i = 0; i < 10; ++i) {
+        e.show(0);
+    }
     e.turn(0, 1, 4);
     e.capture();
     EXPECT_EQ(e.get<double>("velocity"), 0.0) << "one edge gives no velocity";
     e.turn(1, 2, 4);
     e.capture();
-    EXPECT_NEAR(e.get<double>("velocity"), 5000.0, 1e-6) << "the next edge may still come in time, in the next cycle";
+    EXPECT_NEAR(e.get<double>("velocity"), 5000.0, 1e-6)
+        << "the next edge may still come in time, in the next cycle";
     e.show(2);
     e.capture();
     EXPECT_NEAR(e.get<double>("velocity"), 4000.0, 1e-6);
@@ -262,7 +284,8 @@ TEST(Encoder, Counts_are_coherent_when_the_functions_run_on_two_processors) {
     // capture-position has its own cycle record in a real host; here its step is called as one
     hal_cycle cycle{sizeof(hal_cycle), 0, servo_ns, 1e-3, 0, 0};
     const auto& step = e.function("capture-position");
-    std::int32_t lowest = 0, highest = 0;
+    std::int32_t lowest = 0;
+    std::int32_t highest = 0;
     while (!done) {
         step.step(step.self, &cycle);
         lowest = std::min(lowest, e.get<std::int32_t>("counts"));
@@ -293,7 +316,8 @@ TEST(SimEncoder, Turns_at_the_commanded_speed) {
         before = s.get<bool>("phase-Z");
     }
     EXPECT_EQ(s.get<std::int32_t>("rawcounts"), -5000);
-    EXPECT_EQ(e.counts(), -4999);  // the first edge comes in the first cycle, in which the encoder starts
+    // the first edge comes in the first cycle, in which the encoder starts
+    EXPECT_EQ(e.counts(), -4999);
     EXPECT_EQ(indexes, 5);
     s.set("speed", 1e9);  // no faster than an edge per period
     s.run("update-speed", servo_ns);

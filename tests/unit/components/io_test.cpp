@@ -18,16 +18,21 @@ using hal::test::Instance;
 
 hal_stream* published = nullptr;  // by the newest instance that started
 std::string published_as;
-const hal_stream_host stream_host{sizeof stream_host, [](const hal_host*, const char* name, hal_stream* stream) {
-                                      published = stream;
-                                      published_as = name;
-                                      return true;
-                                  }};
+const hal_stream_host stream_host{sizeof stream_host,
+                                  [](const hal_host*, const char* name, hal_stream* stream) {
+    published = stream;
+    published_as = name;
+    return true;
+}};
 
 struct Streaming : Instance {
-    Streaming(const char* component, Arguments arguments) : Instance(component, std::move(arguments), {{"hal.stream/1", &stream_host}}), fifo(*published) {}
+    Streaming(const char* component, Arguments arguments)
+        : Instance(component, std::move(arguments), {{"hal.stream/1", &stream_host}}),
+          fifo(*published) {}
     hal_stream& fifo;
-    hal_value& value(std::uint64_t record, std::uint32_t column) { return fifo.data[record % fifo.depth * (fifo.columns + 1) + column]; }
+    hal_value& value(std::uint64_t record, std::uint32_t column) {
+        return fifo.data[record % fifo.depth * (fifo.columns + 1) + column];
+    }
 };
 
 TEST(Sampler, Records_every_type_with_its_number) {
@@ -100,7 +105,8 @@ TEST(Sampler, Takes_many_pins_and_refuses_bad_arguments) {
     EXPECT_THROW(Instance("sampler", {{"cfg", "fx"}}), std::runtime_error);
     EXPECT_THROW(Instance("sampler", {{"cfg", ""}}), std::runtime_error);
     EXPECT_THROW(Instance("sampler", {{"depth", "0"}}), std::runtime_error);
-    EXPECT_THROW(Instance("sampler", {{"cfg", "ffffffff"}, {"depth", "60000000"}}), std::runtime_error);
+    EXPECT_THROW(Instance("sampler", {{"cfg", "ffffffff"}, {"depth", "60000000"}}),
+                 std::runtime_error);
     Instance without("sampler");  // a host without streams
     without.run(1);
     EXPECT_EQ(without.get<std::int32_t>("curr-depth"), 1);
@@ -115,7 +121,9 @@ TEST(Sampler, A_reader_on_another_processor_sees_whole_records_in_order) {
             s.set("pin.0", i);
             s.set("pin.1", i);
             s.run(1);
-            if (s.get<bool>("full")) std::this_thread::yield();
+            if (s.get<bool>("full")) {
+                std::this_thread::yield();
+            }
         }
     });
     std::int64_t last = -1;
@@ -125,7 +133,8 @@ TEST(Sampler, A_reader_on_another_processor_sees_whole_records_in_order) {
             std::this_thread::yield();
             continue;
         }
-        whole = whole && s.value(tail, 0).s32 == s.value(tail, 1).s32 && s.value(tail, 0).s32 > last && s.value(tail, 2).u64 == tail;
+        whole = whole && s.value(tail, 0).s32 == s.value(tail, 1).s32 &&
+                s.value(tail, 0).s32 > last && s.value(tail, 2).u64 == tail;
         last = s.value(tail, 0).s32;
         __atomic_store_n(&s.fifo.tail, ++tail, __ATOMIC_RELEASE);
     }
@@ -147,7 +156,9 @@ struct Player : Streaming {
 TEST(Streamer, Plays_a_record_per_cycle_then_keeps_the_last) {
     Player p;
     EXPECT_EQ(p.fifo.to_machine, 1u);
-    for (int i = 1; i <= 3; ++i) p.feed(i, i == 2);
+    for (int i = 1; i <= 3; ++i) {
+        p.feed(i, i == 2);
+    }
     for (int i = 1; i <= 3; ++i) {
         p.run(1);
         EXPECT_EQ(p.get<double>("pin.0"), i);
@@ -164,10 +175,16 @@ TEST(Streamer, Plays_a_record_per_cycle_then_keeps_the_last) {
 }
 
 TEST(Streamer, Clock_mode_chooses_the_edges) {
-    struct Case { int mode; double after_rise, after_fall; };
-    for (const Case c : {Case{0, 2, 3}, Case{1, 0, 1}, Case{2, 1, 1}, Case{3, 1, 2}, Case{7, 2, 3}}) {
+    struct Case {
+        int mode;
+        double after_rise, after_fall;
+    };
+    for (const Case c :
+         {Case{0, 2, 3}, Case{1, 0, 1}, Case{2, 1, 1}, Case{3, 1, 2}, Case{7, 2, 3}}) {
         Player p;
-        for (int i = 1; i <= 4; ++i) p.feed(i, false);
+        for (int i = 1; i <= 4; ++i) {
+            p.feed(i, false);
+        }
         p.set("clock-mode", c.mode);
         p.run(1);  // low, no edge
         p.set("clock", true);

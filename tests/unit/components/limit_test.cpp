@@ -33,7 +33,9 @@ std::vector<double> positions(Instance& instance, int cycles) {
 
 void expect_near(const std::vector<double>& found, const std::vector<double>& expected) {
     ASSERT_EQ(found.size(), expected.size());
-    for (std::size_t i = 0; i < found.size(); ++i) EXPECT_NEAR(found[i], expected[i], 1e-12) << "cycle " << i;
+    for (std::size_t i = 0; i < found.size(); ++i) {
+        EXPECT_NEAR(found[i], expected[i], 1e-12) << "cycle " << i;
+    }
 }
 
 TEST(Limit1, Keeps_its_input_between_min_and_max) {
@@ -52,7 +54,9 @@ TEST(Limit1, Max_wins_over_min) {
     Instance limit("limit1");
     limit.set("min", 3.0);
     limit.set("max", 1.0);
-    for (const double in : {0.0, 2.0, 5.0}) EXPECT_EQ(after(limit, in), 1.0);
+    for (const double in : {0.0, 2.0, 5.0}) {
+        EXPECT_EQ(after(limit, in), 1.0);
+    }
 }
 
 TEST(Limit2, Moves_by_at_most_maxv_per_second_and_arrives_exactly) {
@@ -99,7 +103,8 @@ TEST(Limit3, Cruises_at_maxv) {
     expect_near(positions(limit, 8), {1, 3, 5, 7, 9, 10, 10, 10});
 }
 
-// With m = smooth-steps - 1 = 3 and A = 1 the last displacements are 1, 1/3 (see the source), before them A more each.
+// With m = smooth-steps - 1 = 3 and A = 1 the last displacements are 1, 1/3 (see the source),
+// before them A more each.
 TEST(Limit3, Smooth_steps_fades_the_braking_out) {
     Instance limit("limit3");
     limit.set("smooth-steps", 4);
@@ -108,28 +113,35 @@ TEST(Limit3, Smooth_steps_fades_the_braking_out) {
     expect_near(positions(limit, 6), {1, 3, 4, 13.0 / 3.0, 13.0 / 3.0, 13.0 / 3.0});
 }
 
-// From rest to rest in n moves the most that can be covered is A k^2 for n = 2k - 1 and A k (k + 1) for n = 2k.
-// Full acceleration in every cycle but the last ones makes up to two cycles more of it.
+// From rest to rest in n moves the most that can be covered is A k^2 for n = 2k - 1 and A k (k + 1)
+// for n = 2k. Full acceleration in every cycle but the last ones makes up to two cycles more of it.
 TEST(Limit3, Is_at_most_two_cycles_slower_than_the_fastest_way) {
     std::mt19937 random(7);
     std::uniform_real_distribution<double> distances(0.01, 400.0);
     for (int trial = 0; trial < 200; ++trial) {
         const double distance = distances(random);
         int moves = 1;
-        const auto reach = [](int n) { return n % 2 ? (n + 1) / 2 * ((n + 1) / 2) : n / 2 * (n / 2 + 1); };
-        while (reach(moves) < distance) ++moves;
+        const auto reach = [](int n) {
+            return n % 2 ? (n + 1) / 2 * ((n + 1) / 2) : n / 2 * (n / 2 + 1);
+        };
+        while (reach(moves) < distance) {
+            ++moves;
+        }
 
         Instance limit("limit3");
-            limit.set("maxa", 1.0);
+        limit.set("maxa", 1.0);
         int needed = 0;
-        while (needed < 100 && after(limit, distance, second) != distance) ++needed;
+        while (needed < 100 && after(limit, distance, second) != distance) {
+            ++needed;
+        }
         EXPECT_GE(needed + 1, moves) << distance;
         EXPECT_LE(needed + 1, moves + 2) << distance;
         EXPECT_EQ(after(limit, distance, second), distance) << "must stay";
     }
 }
 
-// With A = 1, until the last three ways (1 + 2 + 3 = 6 from the target) every displacement differs from the last by 1.
+// With A = 1, until the last three ways (1 + 2 + 3 = 6 from the target) every displacement differs
+// from the last by 1.
 TEST(Limit3, Accelerates_and_brakes_fully_until_it_is_nearly_there) {
     std::mt19937 random(11);
     std::uniform_real_distribution<double> distances(-400.0, 400.0);
@@ -137,11 +149,13 @@ TEST(Limit3, Accelerates_and_brakes_fully_until_it_is_nearly_there) {
         const double distance = distances(random);
         Instance limit("limit3");
         limit.set("maxa", 1.0);
-        double before = 0.0, moved = 0.0;
+        double before = 0.0;
+        double moved = 0.0;
         for (int cycle = 0; cycle < 100; ++cycle) {
             const double out = after(limit, distance, second);
             if (std::fabs(distance - out) > 6.0) {
-                EXPECT_NEAR(std::fabs(out - before - moved), 1.0, 1e-9) << distance << " cycle " << cycle;
+                EXPECT_NEAR(std::fabs(out - before - moved), 1.0, 1e-9)
+                    << distance << " cycle " << cycle;
             }
             moved = out - before;
             before = out;
@@ -153,7 +167,8 @@ TEST(Limit3, Accelerates_and_brakes_fully_until_it_is_nearly_there) {
 /// What must hold of every path, whatever the input does.
 struct Watch {
     double min, max, step, change;  // step = maxv * period, change = maxa * period^2
-    double before = 0.0, last_step = 0.0;
+    double before = 0.0;
+    double last_step = 0.0;
     void see(double out) {
         const double moved = out - before;
         const double rounding = 1e-13 * (1.0 + std::fabs(out));
@@ -177,14 +192,24 @@ TEST(Limit3, Keeps_every_limit_for_every_input) {
         limit.set("maxv", 20.0);
         limit.set("maxa", 300.0);
         Watch watch{-5.0, 7.0, 20.0 * 1e-3, 300.0 * 1e-6};
-        double base = 0.0, slope = 0.0, noise = 0.0;
+        double base = 0.0;
+        double slope = 0.0;
+        double noise = 0.0;
         for (int cycle = 0; cycle < 4000; ++cycle) {
-            if (cycle % 97 == 0) base = 9.0 * unit(random);
-            if (cycle % 31 == 0) slope = 0.03 * unit(random);
-            if (cycle % 211 == 0) noise = std::pow(10.0, 3.0 * unit(random) - 3.0);
+            if (cycle % 97 == 0) {
+                base = 9.0 * unit(random);
+            }
+            if (cycle % 31 == 0) {
+                slope = 0.03 * unit(random);
+            }
+            if (cycle % 211 == 0) {
+                noise = std::pow(10.0, 3.0 * unit(random) - 3.0);
+            }
             base += slope;
             watch.see(after(limit, base + noise * unit(random)));
-            if (testing::Test::HasFailure()) FAIL() << "seed " << seed << " cycle " << cycle;
+            if (testing::Test::HasFailure()) {
+                FAIL() << "seed " << seed << " cycle " << cycle;
+            }
         }
     }
 }
@@ -200,7 +225,9 @@ TEST(Limit3, Comes_to_rest_and_stays_at_rest_for_any_scale) {
                 const double slowest = 2.0 * std::sqrt(goal / maxa) / 1e-3 + 2.0 * smooth + 10.0;
                 if (slowest > 1e6) continue;
                 limit.run(static_cast<int>(slowest));
-                for (int i = 0; i < 10; ++i) EXPECT_EQ(after(limit, goal), goal) << maxa << " " << smooth;
+                for (int i = 0; i < 10; ++i) {
+                    EXPECT_EQ(after(limit, goal), goal) << maxa << " " << smooth;
+                }
             }
         }
     }
@@ -212,7 +239,8 @@ TEST(Limit3, Follows_an_input_that_keeps_the_limits_without_lag) {
         limit.set("maxv", 6.29);
         limit.set("maxa", 39.4785 * spare);
         double worst = 0.0;
-        for (int cycle = 0; cycle < 5000; ++cycle) {  // velocity 2 pi, acceleration 4 pi^2 = 39.4784
+        // velocity 2 pi, acceleration 4 pi^2 = 39.4784
+        for (int cycle = 0; cycle < 5000; ++cycle) {
             limit.set("load", cycle == 0);
             const double in = std::cos(6.2831853 * 1e-3 * cycle);
             worst = std::max(worst, std::fabs(after(limit, in) - in));
@@ -240,17 +268,23 @@ TEST(Limit3, Brakes_in_time_for_a_limit_while_following) {
     limit.set("max", 1.0);
     limit.set("maxa", 10.0);
     Watch watch{-1.0, 1.0, 1e9, 10.0 * 1e-6};
-    for (int cycle = 0; cycle < 3000; ++cycle) watch.see(after(limit, 1e-3 * cycle));
+    for (int cycle = 0; cycle < 3000; ++cycle) {
+        watch.see(after(limit, 1e-3 * cycle));
+    }
     EXPECT_EQ(limit.get<double>("out"), 1.0);
 }
 
-// Taken for motion, one of these jitters in the middle of the braking would lead about 0.02 beyond the target.
+// Taken for motion, one of these jitters in the middle of the braking would lead about 0.02 beyond
+// the target.
 TEST(Limit3, Jitter_of_the_target_is_not_taken_for_motion) {
-    for (const std::vector<double>& jitter : {std::vector{0.0, 1e-4}, {0.0, 1e-7, 1e-4}, {0.0, 0.0, 0.0, 1e-4, 1e-4}}) {
+    for (const std::vector<double>& jitter :
+         {std::vector{0.0, 1e-4}, {0.0, 1e-7, 1e-4}, {0.0, 0.0, 0.0, 1e-4, 1e-4}}) {
         Instance limit("limit3");
         limit.set("maxa", 100.0);
         double highest = 0.0;
-        for (std::size_t cycle = 0; cycle < 2000; ++cycle) highest = std::max(highest, after(limit, 5.0 + jitter[cycle % jitter.size()]));
+        for (std::size_t cycle = 0; cycle < 2000; ++cycle) {
+            highest = std::max(highest, after(limit, 5.0 + jitter[cycle % jitter.size()]));
+        }
         EXPECT_LT(highest, 5.0 + 2e-4);
     }
 }
@@ -259,9 +293,13 @@ TEST(Limit3, A_limit_moved_into_the_way_is_left_and_reached_within_maxa) {
     Instance limit("limit3");
     limit.set("maxa", 10.0);
     Watch watch{-infinity, infinity, infinity, 10.0 * 1e-6};
-    for (int cycle = 0; cycle < 300; ++cycle) watch.see(after(limit, 5.0));
+    for (int cycle = 0; cycle < 300; ++cycle) {
+        watch.see(after(limit, 5.0));
+    }
     limit.set("max", 0.1);
-    for (int cycle = 0; cycle < 3000; ++cycle) watch.see(after(limit, 5.0));
+    for (int cycle = 0; cycle < 3000; ++cycle) {
+        watch.see(after(limit, 5.0));
+    }
     EXPECT_EQ(limit.get<double>("out"), 0.1);
 }
 
@@ -281,16 +319,22 @@ TEST(Limit3, Load_jumps_within_min_and_max_and_comes_to_rest_there) {
     limit.set("load", true);
     EXPECT_EQ(after(limit, 50.0), 20.0);
     limit.set("load", false);
-    for (int i = 0; i < 5; ++i) EXPECT_EQ(after(limit, 50.0), 20.0);
+    for (int i = 0; i < 5; ++i) {
+        EXPECT_EQ(after(limit, 50.0), 20.0);
+    }
 }
 
 TEST(Limit3, Leaves_load_with_the_speed_at_which_it_was_carried) {
     Instance limit("limit3");
     limit.set("maxa", 1.0);
     limit.set("load", true);
-    for (int cycle = 0; cycle < 100; ++cycle) after(limit, 0.01 * cycle);
+    for (int cycle = 0; cycle < 100; ++cycle) {
+        after(limit, 0.01 * cycle);
+    }
     limit.set("load", false);
-    for (int cycle = 100; cycle < 200; ++cycle) EXPECT_NEAR(after(limit, 0.01 * cycle), 0.01 * cycle, 1e-12);
+    for (int cycle = 100; cycle < 200; ++cycle) {
+        EXPECT_NEAR(after(limit, 0.01 * cycle), 0.01 * cycle, 1e-12);
+    }
 }
 
 TEST(Limit3, Goes_on_to_the_last_good_target_while_the_input_is_not_a_number) {
@@ -316,7 +360,9 @@ TEST(Limit3, Stands_still_without_acceleration_and_without_speed) {
 
 TEST(Limit3, Passes_everything_by_default) {
     Instance limit("limit3");
-    for (const double in : {5.0, -1e6, 0.0, 1e12}) EXPECT_EQ(after(limit, in), in);
+    for (const double in : {5.0, -1e6, 0.0, 1e12}) {
+        EXPECT_EQ(after(limit, in), in);
+    }
 }
 
 }  // namespace

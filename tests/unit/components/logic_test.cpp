@@ -8,7 +8,8 @@ namespace {
 using hal::test::Instance;
 
 /// Feeds `in` a pattern of 0 and 1, a cycle each, and gives what `out` was after each cycle.
-std::string response(Instance& instance, const std::string& pattern, const std::string& in = "in", const std::string& out = "out") {
+std::string response(Instance& instance, const std::string& pattern, const std::string& in = "in",
+                     const std::string& out = "out") {
     std::string answer;
     for (const char c : pattern) {
         instance.set(in, c == '1');
@@ -69,7 +70,9 @@ TEST(Mux2, Passes_the_chosen_input) {
 
 TEST(Mux4, Counts_its_inputs_with_sel0_as_the_low_bit) {
     Instance mux("mux4");
-    for (int i = 0; i < 4; ++i) mux.set("in" + std::to_string(i), 10.0 + i);
+    for (int i = 0; i < 4; ++i) {
+        mux.set("in" + std::to_string(i), 10.0 + i);
+    }
     for (int i = 0; i < 4; ++i) {
         mux.set("sel0", (i & 1) != 0);
         mux.set("sel1", (i & 2) != 0);
@@ -81,7 +84,20 @@ TEST(Mux4, Counts_its_inputs_with_sel0_as_the_low_bit) {
 TEST(Debounce, Follows_after_delay_cycles_and_ignores_shorter_pulses) {
     Instance filter("debounce", {{"cfg", "1"}});
     filter.set("delay", 3);
-    EXPECT_EQ(response(filter, "0110" "111" "0" "11" "000" "0", "0.in", "0.out"), "0000" "001" "1" "11" "111" "0");
+    EXPECT_EQ(response(filter,
+                       "0110"
+                       "111"
+                       "0"
+                       "11"
+                       "000"
+                       "0",
+                       "0.in", "0.out"),
+              "0000"
+              "001"
+              "1"
+              "11"
+              "111"
+              "0");
 }
 
 TEST(Debounce, A_delay_of_zero_does_not_filter_and_a_negative_one_becomes_one) {
@@ -101,7 +117,12 @@ TEST(Debounce, Survives_a_delay_that_shrinks) {
     filter.set("delay", 100);
     EXPECT_EQ(response(filter, "1111", "0.in", "0.out"), "0000");
     filter.set("delay", 2);
-    EXPECT_EQ(response(filter, "1" "00000", "0.in", "0.out"), "1" "11110");
+    EXPECT_EQ(response(filter,
+                       "1"
+                       "00000",
+                       "0.in", "0.out"),
+              "1"
+              "11110");
 }
 
 TEST(Debounce, Makes_as_many_filters_as_cfg_says_each_on_its_own) {
@@ -276,12 +297,34 @@ TEST(Oneshot, A_width_that_is_no_length_gives_no_pulse_and_a_huge_one_a_long_pul
 
 TEST(Toggle, Turns_over_with_each_press_once_it_has_held_for_debounce_cycles) {
     Instance toggle("toggle");
-    EXPECT_EQ(response(toggle, "0" "1" "0" "111" "000" "11" "0"), "0" "0" "0" "011" "111" "10" "0");
+    EXPECT_EQ(response(toggle,
+                       "0"
+                       "1"
+                       "0"
+                       "111"
+                       "000"
+                       "11"
+                       "0"),
+              "0"
+              "0"
+              "0"
+              "011"
+              "111"
+              "10"
+              "0");
 }
 
 TEST(Toggle, A_bounce_at_the_release_is_no_press) {
     Instance toggle("toggle");
-    EXPECT_EQ(response(toggle, "11" "0101" "00" "11"), "01" "1111" "11" "10");
+    EXPECT_EQ(response(toggle,
+                       "11"
+                       "0101"
+                       "00"
+                       "11"),
+              "01"
+              "1111"
+              "11"
+              "10");
 }
 
 TEST(Toggle, An_invalid_debounce_becomes_two) {
@@ -300,7 +343,21 @@ TEST(Timedelay, Waits_on_both_edges) {
     Instance delay("timedelay");
     delay.set("on-delay", 0.003);
     delay.set("off-delay", 0.002);
-    EXPECT_EQ(response(delay, "0" "11" "0" "1111" "0" "1" "000"), "0" "00" "0" "0011" "1" "1" "100");
+    EXPECT_EQ(response(delay,
+                       "0"
+                       "11"
+                       "0"
+                       "1111"
+                       "0"
+                       "1"
+                       "000"),
+              "0"
+              "00"
+              "0"
+              "0011"
+              "1"
+              "1"
+              "100");
 }
 
 TEST(Timedelay, Shows_the_time_and_keeps_it) {

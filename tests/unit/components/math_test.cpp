@@ -59,7 +59,10 @@ TEST(Abs, Gives_the_magnitude_and_the_sign) {
     struct {
         double in, out;
         bool positive, negative;
-    } const cases[] = {{-2.5, 2.5, false, true}, {0.0, 0.0, false, false}, {7.0, 7.0, true, false}, {-0.0, 0.0, false, false}};
+    } const cases[] = {{-2.5, 2.5, false, true},
+                       {0.0, 0.0, false, false},
+                       {7.0, 7.0, true, false},
+                       {-0.0, 0.0, false, false}};
     Instance abs("abs");
     for (const auto& c : cases) {
         EXPECT_EQ(after(abs, c.in), c.out);
@@ -73,7 +76,11 @@ TEST(Abs, Gives_the_magnitude_and_the_sign) {
 TEST(Comp, Without_hysteresis_compares) {
     Instance comp("comp");
     comp.set("in0", 5.0);
-    for (const auto& [in1, out, equal] : {std::tuple{4.9, false, false}, {5.0, false, true}, {5.1, true, false}, {5.0, true, true}, {-5.0, false, false}}) {
+    for (const auto& [in1, out, equal] : {std::tuple{4.9, false, false},
+                                          {5.0, false, true},
+                                          {5.1, true, false},
+                                          {5.0, true, true},
+                                          {-5.0, false, false}}) {
         comp.set("in1", in1);
         comp.run();
         EXPECT_EQ(comp.get<bool>("out"), out) << in1;
@@ -85,7 +92,11 @@ TEST(Comp, Hysteresis_separates_the_switching_points) {
     Instance comp("comp");
     comp.set("in0", 80.0);
     comp.set("hyst", 4.0);
-    for (const auto& [in1, out, equal] : {std::tuple{81.9, false, true}, {82.1, true, false}, {78.1, true, true}, {77.9, false, false}, {nan, false, false}}) {
+    for (const auto& [in1, out, equal] : {std::tuple{81.9, false, true},
+                                          {82.1, true, false},
+                                          {78.1, true, true},
+                                          {77.9, false, false},
+                                          {nan, false, false}}) {
         comp.set("in1", in1);
         comp.run();
         EXPECT_EQ(comp.get<bool>("out"), out) << in1;
@@ -97,10 +108,17 @@ TEST(Wcomp, Says_on_which_side_of_the_window_the_input_is) {
     Instance window("wcomp");
     window.set("min", -1.0);
     window.set("max", 2.0);
-    for (const auto& [in, expected] : {std::pair{-2.0, "under"}, {-1.0, "under"}, {0.0, "out"}, {2.0, "over"}, {3.0, "over"}, {nan, ""}}) {
+    for (const auto& [in, expected] : {std::pair{-2.0, "under"},
+                                       {-1.0, "under"},
+                                       {0.0, "out"},
+                                       {2.0, "over"},
+                                       {3.0, "over"},
+                                       {nan, ""}}) {
         window.set("in", in);
         window.run();
-        for (const char* pin : {"under", "out", "over"}) EXPECT_EQ(window.get<bool>(pin), std::string(pin) == expected) << in << " " << pin;
+        for (const char* pin : {"under", "out", "over"}) {
+            EXPECT_EQ(window.get<bool>(pin), std::string(pin) == expected) << in << " " << pin;
+        }
     }
 }
 
@@ -152,7 +170,9 @@ TEST(Integ, Leaves_out_what_is_not_a_number) {
 TEST(Lowpass, Answers_a_step_exponentially) {
     Instance lowpass("lowpass");
     lowpass.set("gain", 0.25);
-    for (int n = 1; n <= 20; ++n) EXPECT_NEAR(after(lowpass, 8.0), 8.0 * (1.0 - std::pow(0.75, n)), 1e-12) << n;
+    for (int n = 1; n <= 20; ++n) {
+        EXPECT_NEAR(after(lowpass, 8.0), 8.0 * (1.0 - std::pow(0.75, n)), 1e-12) << n;
+    }
 }
 
 TEST(Lowpass, Load_copies_the_input_and_nothing_poisons_it) {
@@ -196,16 +216,24 @@ TEST(Minmax, Keeps_the_extremes_since_the_start_or_the_reset) {
 TEST(Deadzone, Subtracts_half_of_the_threshold_outside_of_the_zone) {
     Instance zone("deadzone");
     zone.set("center", 2.0);
-    for (const auto& [in, out] : {std::pair{2.25, 2.0}, {2.5, 2.0}, {3.0, 2.5}, {1.5, 2.0}, {1.0, 1.5}, {nan, 2.0}}) EXPECT_EQ(after(zone, in), out) << in;
+    for (const auto& [in, out] :
+         {std::pair{2.25, 2.0}, {2.5, 2.0}, {3.0, 2.5}, {1.5, 2.0}, {1.0, 1.5}, {nan, 2.0}}) {
+        EXPECT_EQ(after(zone, in), out) << in;
+    }
 }
 
 TEST(Blend, Interpolates_and_limits_unless_open) {
     Instance blend("blend");
     blend.set("in2", 10.0);
     blend.set("in1", 20.0);
-    for (const auto& [select, out] : {std::pair{0.0, 10.0}, {0.25, 12.5}, {1.0, 20.0}, {1.5, 20.0}, {-1.0, 10.0}}) EXPECT_EQ(after(blend, select, "select"), out);
+    for (const auto& [select, out] :
+         {std::pair{0.0, 10.0}, {0.25, 12.5}, {1.0, 20.0}, {1.5, 20.0}, {-1.0, 10.0}}) {
+        EXPECT_EQ(after(blend, select, "select"), out);
+    }
     blend.set("open", true);
-    for (const auto& [select, out] : {std::pair{1.5, 25.0}, {-1.0, 0.0}}) EXPECT_EQ(after(blend, select, "select"), out);
+    for (const auto& [select, out] : {std::pair{1.5, 25.0}, {-1.0, 0.0}}) {
+        EXPECT_EQ(after(blend, select, "select"), out);
+    }
 }
 
 TEST(Invert, Is_limited_near_zero) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Mobile robots: triangulation with its degenerate geometry, simulated sensors against values computed by hand, the files they read.
+// Mobile robots: triangulation with its degenerate geometry, simulated sensors against values
+// computed by hand, the files they read.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -21,15 +22,18 @@ using std::numbers::pi;
 
 constexpr std::array<Place, 3> field{{{3.062, 1.05}, {-0.062, 2.162}, {-0.062, -0.062}}};
 
-std::array<double, 3> bearings_at(const std::array<Place, 3>& beacons, double x, double y, double heading) {
+std::array<double, 3> bearings_at(const std::array<Place, 3>& beacons, double x, double y,
+                                  double heading) {
     std::array<double, 3> b{};
-    for (std::size_t i = 0; i < 3; ++i) b[i] = std::atan2(beacons[i].y - y, beacons[i].x - x) - heading;
+    for (std::size_t i = 0; i < 3; ++i) {
+        b[i] = std::atan2(beacons[i].y - y, beacons[i].x - x) - heading;
+    }
     return b;
 }
 
 TEST(Triangulation, is_exact_over_the_field_in_any_heading) {
-    for (double x = 0.1; x < 3.0; x += 0.1)
-        for (double y = 0.1; y < 2.1; y += 0.1)
+    for (double x = 0.1; x < 3.0; x += 0.1) {
+        for (double y = 0.1; y < 2.1; y += 0.1) {
             for (const double heading : {-3.0, -1.0, 0.0, 0.5, 2.5}) {
                 const Fix fix = triangulate(field, bearings_at(field, x, y, heading), 1e-6);
                 ASSERT_TRUE(fix.valid) << x << ' ' << y;
@@ -37,14 +41,20 @@ TEST(Triangulation, is_exact_over_the_field_in_any_heading) {
                 EXPECT_NEAR(fix.y, y, 1e-11);
                 EXPECT_NEAR(std::remainder(fix.heading - heading, 2 * pi), 0.0, 1e-11);
             }
+        }
+    }
 }
 
 TEST(Triangulation, has_no_position_on_the_circle_through_the_beacons) {
-    const std::array<Place, 3> unit{{{1, 0}, {std::cos(2.0), std::sin(2.0)}, {std::cos(4.0), std::sin(4.0)}}};
+    const std::array<Place, 3> unit{
+        {{1, 0}, {std::cos(2.0), std::sin(2.0)}, {std::cos(4.0), std::sin(4.0)}}};
     for (const double at : {0.5, 3.0, 5.0}) {
-        EXPECT_FALSE(triangulate(unit, bearings_at(unit, std::cos(at), std::sin(at), 0.3), 1e-6).valid) << at;
+        EXPECT_FALSE(
+            triangulate(unit, bearings_at(unit, std::cos(at), std::sin(at), 0.3), 1e-6).valid)
+            << at;
         // 5 cm beside it there is one, with a small D
-        const Fix near = triangulate(unit, bearings_at(unit, 0.95 * std::cos(at), 0.95 * std::sin(at), 0.3), 1e-6);
+        const Fix near = triangulate(
+            unit, bearings_at(unit, 0.95 * std::cos(at), 0.95 * std::sin(at), 0.3), 1e-6);
         EXPECT_TRUE(near.valid) << at;
         EXPECT_NEAR(near.x, 0.95 * std::cos(at), 1e-9);
         EXPECT_LT(near.d, 10.0);
@@ -72,15 +82,20 @@ TEST(Triangulation, survives_bearings_without_a_cotangent) {
 }
 
 TEST(Triangulation, with_a_12_bit_head_is_a_few_millimetres_off_where_D_is_large) {
-    std::mt19937                     random(1);
+    std::mt19937 random(1);
     std::uniform_real_distribution<> xs(0.2, 2.8), ys(0.2, 1.9);
-    std::vector<double>              errors;
+    std::vector<double> errors;
     for (int i = 0; i < 2000; ++i) {
-        const double x = xs(random), y = ys(random);
-        auto         b = bearings_at(field, x, y, 0.0);
-        for (double& one : b) one = (std::floor(one / (2 * pi) * 4096) + 0.5) / 4096 * 2 * pi;
+        const double x = xs(random);
+        const double y = ys(random);
+        auto b = bearings_at(field, x, y, 0.0);
+        for (double& one : b) {
+            one = (std::floor(one / (2 * pi) * 4096) + 0.5) / 4096 * 2 * pi;
+        }
         const Fix fix = triangulate(field, b, 0.5);
-        if (fix.valid) errors.push_back(std::hypot(fix.x - x, fix.y - y));
+        if (fix.valid) {
+            errors.push_back(std::hypot(fix.x - x, fix.y - y));
+        }
     }
     std::sort(errors.begin(), errors.end());
     ASSERT_GT(errors.size(), 1900u);
@@ -90,14 +105,16 @@ TEST(Triangulation, with_a_12_bit_head_is_a_few_millimetres_off_where_D_is_large
 
 /// A file that exists as long as the test.
 struct File {
-    explicit File(const char* text) : path(testing::TempDir() + "mobile_test_file") { std::ofstream(path) << text; }
+    explicit File(const char* text) : path(testing::TempDir() + "mobile_test_file") {
+        std::ofstream(path) << text;
+    }
     ~File() { std::remove(path.c_str()); }
     std::string path;
 };
 
 TEST(SimInfrared, reads_what_the_law_gives_and_nothing_beyond_its_range) {
     const File file("wall 1 -5 1 5\ncircle 0 -0.82 0.1\n");
-    Instance   ring("sim_infrared", {{"floor", file.path}});
+    Instance ring("sim_infrared", {{"floor", file.path}});
     ring.set("x", 0.5);
     ring.run("update", 500'000, 20);
     EXPECT_EQ(ring.get<std::uint32_t>("rings"), 1u);
@@ -106,7 +123,8 @@ TEST(SimInfrared, reads_what_the_law_gives_and_nothing_beyond_its_range) {
     EXPECT_EQ(ring.get<std::uint32_t>("value-01"), ring.get<std::uint32_t>("value-00"));
     EXPECT_EQ(ring.get<std::uint32_t>("value-08"), 0u);  // backwards: nothing
     // side 2, 45 degrees to the left: sensor 3 stands 0.045 m to the left of its middle
-    const double sx = 0.5 + (0.22 - 0.045) * std::sqrt(0.5), d = (1.0 - sx) * std::sqrt(2.0) + 0.05;
+    const double sx = 0.5 + (0.22 - 0.045) * std::sqrt(0.5);
+    const double d = (1.0 - sx) * std::sqrt(2.0) + 0.05;
     EXPECT_EQ(ring.get<std::uint32_t>("value-03"), std::lround(40 * std::sqrt(0.5) / (d * d)));
     ring.set("x", -0.1);  // 0.88 m from the wall
     ring.run("update", 500'000, 20);
@@ -119,10 +137,14 @@ TEST(SimInfrared, reads_what_the_law_gives_and_nothing_beyond_its_range) {
 
 TEST(SimUltrasound, gives_a_burst_of_32_messages_with_the_echo_at_its_distance) {
     const File file("wall 2 -5 2 5\n");
-    Instance   head("sim_ultrasound", {{"floor", file.path}}), echo("echo_range");
-    for (const char* pin : {"begins", "step", "id-offset"}) head.link(pin, echo, pin);
+    Instance head("sim_ultrasound", {{"floor", file.path}}), echo("echo_range");
+    for (const char* pin : {"begins", "step", "id-offset"}) {
+        head.link(pin, echo, pin);
+    }
     head.link("message", echo, "new");
-    for (int i = 0; i < 8; ++i) head.link("sample-" + std::to_string(i), echo, "sample-" + std::to_string(i));
+    for (int i = 0; i < 8; ++i) {
+        head.link("sample-" + std::to_string(i), echo, "sample-" + std::to_string(i));
+    }
     int messages = 0;
     for (int i = 0; i < 100; ++i) {
         head.run("update", 500'000);
@@ -137,7 +159,7 @@ TEST(SimUltrasound, gives_a_burst_of_32_messages_with_the_echo_at_its_distance) 
 
 TEST(SimDiffBase, stops_at_a_wall_and_its_wheels_slip) {
     const File file("wall 1 -5 1 5\n");
-    Instance   body("sim_diff_base", {{"floor", file.path}});
+    Instance body("sim_diff_base", {{"floor", file.path}});
     for (int i = 0; i <= 1000; ++i) {
         body.set("left-angle", i * 0.05);
         body.set("right-angle", i * 0.05);
@@ -158,7 +180,8 @@ TEST(SimDiffBase, stops_at_a_wall_and_its_wheels_slip) {
 
 struct Motor : Instance {
     Motor() : Instance("sim_hctl1100") { set("on", true); }
-    /// Runs `ms` milliseconds; returns the counts moved per sample of 1.024 ms, averaged over the last 102.4 ms.
+    /// Runs `ms` milliseconds; returns the counts moved per sample of 1.024 ms, averaged over the
+    /// last 102.4 ms.
     double speed_after(int ms) {
         run("update", 1'024'000, static_cast<std::uint64_t>(ms));
         const auto before = get<std::int32_t>("counts");
@@ -171,7 +194,9 @@ TEST(SimHctl1100, keeps_the_speed_exactly_in_integral_mode_and_not_in_proportion
     Motor integral, proportional;
     integral.set("mode", 3);
     proportional.set("mode", 2);
-    for (Motor* motor : {&integral, &proportional}) motor->set("velocity-cmd", 20 * 16 + 8);
+    for (Motor* motor : {&integral, &proportional}) {
+        motor->set("velocity-cmd", 20 * 16 + 8);
+    }
     EXPECT_NEAR(integral.speed_after(3000), 20.0, 0.1);  // the fraction is lost
     const double slow = proportional.speed_after(3000);
     EXPECT_GT(slow, 10.0);
@@ -183,14 +208,18 @@ TEST(SimHctl1100, goes_to_a_target_with_and_without_a_profile) {
     profile.set("mode", 4);
     profile.set("velocity-cmd", 20 * 16);
     jump.set("mode", 1);
-    for (Motor* motor : {&profile, &jump}) motor->set("target", 5000);
+    for (Motor* motor : {&profile, &jump}) {
+        motor->set("target", 5000);
+    }
     profile.run("update", 1'024'000, 100);
     EXPECT_FALSE(profile.get<bool>("profile-done"));
     EXPECT_LE(profile.get<double>("speed") * 20000 / (2 * pi) * 1.024e-3, 21.0);
     jump.run("update", 1'024'000, 3000);
     profile.run("update", 1'024'000, 3000);
     EXPECT_TRUE(profile.get<bool>("profile-done"));
-    for (Motor* motor : {&profile, &jump}) EXPECT_NEAR(motor->get<std::int32_t>("counts"), 5000, 20);
+    for (Motor* motor : {&profile, &jump}) {
+        EXPECT_NEAR(motor->get<std::int32_t>("counts"), 5000, 20);
+    }
 }
 
 TEST(SimHctl1100, reports_a_stall_and_a_following_error) {
@@ -226,7 +255,8 @@ TEST(SampledPid, computes_once_per_sample_and_holds_an_output_back) {
 
 TEST(SampleClock, measures_the_delay_of_each_sample) {
     Instance clock("sample_clock");
-    for (int i = 0; i < 100; ++i) {  // every fifth cycle a sample, whose effect comes after one or two cycles in turn
+    // every fifth cycle a sample, whose effect comes after one or two cycles in turn
+    for (int i = 0; i < 100; ++i) {
         clock.run("sample");
         const auto number = clock.get<std::uint32_t>("sequence");
         const bool late = number % 2 == 0;

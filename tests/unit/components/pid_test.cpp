@@ -35,16 +35,20 @@ TEST(Pid, Disabled_its_output_is_zero_and_the_error_goes_on) {
     EXPECT_DOUBLE_EQ(loop.step(3.0, 2.0), 0.5 + 2.0 + 1000.0 * 1e-3);
 }
 
-// The manual's example: an error of 0.02 for 10 seconds is an errorI of 0.2; with Igain 20 it adds 4.
+// The manual's example: an error of 0.02 for 10 seconds is an errorI of 0.2; with Igain 20 it adds
+// 4.
 TEST(Pid, Integral_term_sums_the_error_over_time) {
     Loop loop;
     loop.set("Igain", 20.0);
-    for (int i = 0; i < 10'000; ++i) loop.step(0.02, 0.0);
+    for (int i = 0; i < 10'000; ++i) {
+        loop.step(0.02, 0.0);
+    }
     EXPECT_NEAR(loop.real("errorI"), 0.2, 1e-12);
     EXPECT_NEAR(loop.output(), 4.0, 1e-10);
 }
 
-// An error that rises from 0.02 to 0.03 in 0.2 seconds is an errorD of 0.05; with Dgain 5 it adds 0.25.
+// An error that rises from 0.02 to 0.03 in 0.2 seconds is an errorD of 0.05; with Dgain 5 it adds
+// 0.25.
 TEST(Pid, Derivative_term_is_the_slope_of_the_error) {
     Loop loop;
     loop.set("Dgain", 5.0);
@@ -56,9 +60,12 @@ TEST(Pid, Derivative_term_is_the_slope_of_the_error) {
 
 TEST(Pid, Feed_forward_uses_the_command_and_its_derivatives) {
     Loop loop;
-    const auto command = [](int k) { return 1e-3 * k * k * k; };  // per cycle of 1 s: third difference 6e-3
+    // per cycle of 1 s: third difference 6e-3
+    const auto command = [](int k) { return 1e-3 * k * k * k; };
     const auto run = [&] {
-        for (int k = 0; k < 6; ++k) loop.step(command(k), command(k), 1'000'000'000);
+        for (int k = 0; k < 6; ++k) {
+            loop.step(command(k), command(k), 1'000'000'000);
+        }
         return loop.output();
     };
     loop.set("FF0", 2.0);
@@ -99,7 +106,9 @@ TEST(Pid, Every_limit_limits_and_zero_is_none) {
 
     loop.set("Igain", 1.0);
     loop.set("maxerrorI", 0.25);
-    for (int i = 0; i < 10; ++i) loop.step(100.0, 0.0);
+    for (int i = 0; i < 10; ++i) {
+        loop.step(100.0, 0.0);
+    }
     EXPECT_EQ(loop.output(), 0.25);
     loop.set("Igain", 0.0);
 
@@ -114,7 +123,9 @@ TEST(Pid, Every_limit_limits_and_zero_is_none) {
     for (int i = 0; i < 3; ++i) {
         loop.set(gains[i], 1.0);
         loop.set(limits[i], 0.5);
-        for (int settle = 0; settle < 5; ++settle) loop.step(0.0, 0.0);
+        for (int settle = 0; settle < 5; ++settle) {
+            loop.step(0.0, 0.0);
+        }
         EXPECT_EQ(loop.step(1.0, 1.0), 0.5) << limits[i];
         loop.set(gains[i], 0.0);
         loop.set(limits[i], 0.0);
@@ -127,7 +138,9 @@ TEST(Pid, Saturation_is_shown_with_its_duration) {
     loop.set("maxoutput", 2.0);
     EXPECT_EQ(loop.step(1.0, 0.0), 1.0);
     EXPECT_FALSE(loop.get<bool>("saturated"));
-    for (int i = 0; i < 3; ++i) EXPECT_EQ(loop.step(-5.0, 0.0), -2.0);
+    for (int i = 0; i < 3; ++i) {
+        EXPECT_EQ(loop.step(-5.0, 0.0), -2.0);
+    }
     EXPECT_TRUE(loop.get<bool>("saturated"));
     EXPECT_NEAR(loop.real("saturated-s"), 0.003, 1e-15);
     EXPECT_EQ(loop.get<std::int32_t>("saturated-count"), 3);
@@ -158,7 +171,9 @@ TEST(Pid, The_integral_does_not_wind_up_while_saturated) {
     loop.set("Pgain", 1.0);
     loop.set("Igain", 1.0);
     loop.set("maxoutput", 2.0);
-    for (int i = 0; i < 1000; ++i) loop.step(5.0, 0.0);
+    for (int i = 0; i < 1000; ++i) {
+        loop.step(5.0, 0.0);
+    }
     EXPECT_NEAR(loop.real("errorI"), 0.005, 1e-12) << "one cycle, before it was saturated";
     loop.step(-1.0, 0.0);
     EXPECT_NEAR(loop.real("errorI"), 0.004, 1e-12) << "what leads out counts";
@@ -186,7 +201,9 @@ TEST(Pid, A_jump_of_the_coordinates_at_the_index_makes_no_spike) {
         loop.set("FF2", 1.0);
         loop.set("index-enable", true);
         double position = 0.0;
-        for (int i = 0; i < 10; ++i, position += 2e-3) loop.step(position, position);
+        for (int i = 0; i < 10; ++i, position += 2e-3) {
+            loop.step(position, position);
+        }
         const double steady = loop.output();
         EXPECT_NEAR(loop.real("commandD"), 2.0, 1e-9);
         loop.set("index-enable", false);
@@ -217,11 +234,14 @@ TEST(Pid, The_derivative_damps_where_deadband_and_maxerror_take_the_error_away) 
     EXPECT_NEAR(loop.step(1e-3, 0.0), 1.0, 1e-9) << "the slope of this cycle";
 }
 
-// The slope is held; what is derived from it goes on from there, so over both cycles the second derivative adds up.
+// The slope is held; what is derived from it goes on from there, so over both cycles the second
+// derivative adds up.
 TEST(Pid, At_the_index_only_the_slope_is_held) {
     Loop loop;
     loop.set("index-enable", true);
-    for (const double command : {0.0, 1e-3, 3e-3}) loop.step(command, 0.0);
+    for (const double command : {0.0, 1e-3, 3e-3}) {
+        loop.step(command, 0.0);
+    }
     EXPECT_NEAR(loop.real("commandDD"), 1000.0, 1e-6);
     loop.set("index-enable", false);
     loop.step(-7.0, 0.0);
@@ -255,7 +275,9 @@ TEST(Pid, Enabling_in_motion_makes_no_spike) {
     loop.set("FF1", 1.0);
     loop.set("enable", false);
     double position = 50.0;
-    for (int i = 0; i < 5; ++i, position += 3e-3) loop.step(position, 0.0);
+    for (int i = 0; i < 5; ++i, position += 3e-3) {
+        loop.step(position, 0.0);
+    }
     loop.set("enable", true);
     EXPECT_NEAR(loop.step(position, 0.0), 6.0, 1e-9) << "errorD 3, commandD 3";
 }
@@ -269,13 +291,17 @@ TEST(Pid, An_input_that_is_not_a_number_stops_the_output_for_that_cycle_only) {
     loop.set("FF2", 0.1);
     loop.set("FF3", 0.1);
     for (const char* pin : {"feedback", "command"}) {
-        for (int i = 0; i < 100; ++i) loop.step(1.0, 0.0);
+        for (int i = 0; i < 100; ++i) {
+            loop.step(1.0, 0.0);
+        }
         const double before = loop.output();
         loop.set(pin, nan);
         loop.run("do-pid-calcs");
         EXPECT_EQ(loop.output(), 0.0) << pin;
         EXPECT_TRUE(std::isnan(loop.real("error"))) << pin;
-        for (int i = 0; i < 4; ++i) loop.step(1.0, 0.0);
+        for (int i = 0; i < 4; ++i) {
+            loop.step(1.0, 0.0);
+        }
         EXPECT_NEAR(loop.output(), before + 0.004, 1e-9) << pin;
     }
     EXPECT_TRUE(loop.pin("error").flags & HAL_PIN_FINITE);
@@ -291,7 +317,8 @@ TEST(Pid, An_infinite_gain_stops_the_output_until_it_is_taken_back) {
 
 TEST(Pid, Debug_pins_are_there_on_request_only) {
     const Instance plain("pid"), debug("pid", {{"debug", "1"}});
-    for (const char* pin : {"errorI", "errorD", "commandD", "commandDD", "commandDDD", "feedbackD", "ultimate-gain", "ultimate-period"}) {
+    for (const char* pin : {"errorI", "errorD", "commandD", "commandDD", "commandDDD", "feedbackD",
+                            "ultimate-gain", "ultimate-period"}) {
         EXPECT_FALSE(plain.has_pin(pin)) << pin;
         EXPECT_TRUE(debug.has_pin(pin)) << pin;
     }

@@ -36,7 +36,8 @@ void start_tuning(Loop& loop, int type) {
     loop.set("tune-start", true);
 }
 
-// A relay of height h around an integrator with dead time L swings with amplitude h L and period 4 L.
+// A relay of height h around an integrator with dead time L swings with amplitude h L and period 4
+// L.
 TEST(Pid_auto_tuning, Finds_the_ultimate_gain_of_an_integrator_with_dead_time) {
     for (const int type : {0, 1}) {
         Loop loop;
@@ -53,7 +54,10 @@ TEST(Pid_auto_tuning, Finds_the_ultimate_gain_of_an_integrator_with_dead_time) {
         EXPECT_NEAR(loop.real("ultimate-period"), 0.4, 0.02 * 0.4);
         EXPECT_NEAR(cycles, 22 * 200, 200);
 
-        const double gain = loop.real("ultimate-gain"), period = loop.real("ultimate-period"), p = loop.real("Pgain");
+        const double gain = loop.real("ultimate-gain");
+        const double period = loop.real("ultimate-period");
+
+        const double p = loop.real("Pgain");
         EXPECT_DOUBLE_EQ(p, (type ? 0.45 : 0.6) * gain);
         EXPECT_DOUBLE_EQ(loop.real("Igain"), type ? p / (period / 1.2) : p / (period / 2.0));
         EXPECT_NEAR(loop.real("Dgain"), type ? 0.0 : p * period / 8.0, 1e-12);
@@ -66,9 +70,13 @@ TEST(Pid_auto_tuning, Tuned_gains_make_a_stable_loop) {
     DelayedIntegrator plant(50);
     start_tuning(loop, 0);
     double seen = 0.0;
-    while (loop.get<bool>("tune-start")) seen = plant.step(loop.step(0.0, seen));
+    while (loop.get<bool>("tune-start")) {
+        seen = plant.step(loop.step(0.0, seen));
+    }
     loop.set("tune-mode", false);
-    for (int i = 0; i < 20'000; ++i) seen = plant.step(loop.step(1.0, seen));
+    for (int i = 0; i < 20'000; ++i) {
+        seen = plant.step(loop.step(1.0, seen));
+    }
     EXPECT_NEAR(seen, 1.0, 1e-3);
 }
 
@@ -90,7 +98,9 @@ TEST(Pid_auto_tuning, Is_aborted_by_enable_tune_mode_and_tune_start_without_touc
         Loop loop;
         loop.set("Pgain", 3.0);
         start_tuning(loop, 0);
-        for (int i = 0; i < 50; ++i) loop.step(0.0, i % 10 < 5 ? 1.0 : -1.0);
+        for (int i = 0; i < 50; ++i) {
+            loop.step(0.0, i % 10 < 5 ? 1.0 : -1.0);
+        }
         ASSERT_TRUE(loop.get<bool>("tune-start"));
         loop.set(pin, false);
         loop.step(0.0, 0.0);
@@ -107,7 +117,9 @@ TEST(Pid_auto_tuning, Leaves_linked_gains_to_their_signal) {
     loop.link("Pgain");
     loop.set("Pgain", 3.0);
     start_tuning(loop, 0);
-    for (int i = 0; loop.get<bool>("tune-start") && i < 10'000; ++i) loop.step(0.0, i % 10 < 5 ? 1.0 : -1.0);
+    for (int i = 0; loop.get<bool>("tune-start") && i < 10'000; ++i) {
+        loop.step(0.0, i % 10 < 5 ? 1.0 : -1.0);
+    }
     EXPECT_EQ(loop.real("Pgain"), 3.0);
     EXPECT_GT(loop.real("Igain"), 0.0);
 }
@@ -122,7 +134,9 @@ TEST(Pid_auto_tuning, Ends_when_the_feedback_is_lost_or_nothing_swings) {
     Loop still;  // an error of exactly 0 never crosses 0
     still.set("Pgain", 3.0);
     start_tuning(still, 0);
-    for (int i = 0; i < 1000; ++i) still.step(0.0, 0.0);
+    for (int i = 0; i < 1000; ++i) {
+        still.step(0.0, 0.0);
+    }
     EXPECT_TRUE(still.get<bool>("tune-start"));
     still.set("tune-mode", false);
     still.step(0.0, 0.0);

@@ -11,7 +11,8 @@ namespace {
 
 using hal::test::Instance;
 
-constexpr std::int64_t base_ns = 50'000, servo_ns = 1'000'000;
+constexpr std::int64_t base_ns = 50'000;
+constexpr std::int64_t servo_ns = 1'000'000;
 
 struct Pwm : Instance {
     explicit Pwm(const char* type = "1") : Instance("pwmgen", {{"output_type", type}}) {
@@ -20,11 +21,14 @@ struct Pwm : Instance {
     }
     void make() { run("make-pulses", base_ns); }
     void update() { run("update", servo_ns); }
-    /// Part of the time `pin` is high over `cycles` fast cycles, with an update every 20 as at 1 kHz.
+    /// Part of the time `pin` is high over `cycles` fast cycles, with an update every 20 as at 1
+    /// kHz.
     double average(const char* pin, int cycles = 20'000) {
         int high = 0;
         for (int i = 0; i < cycles; ++i) {
-            if (i % 20 == 0) update();
+            if (i % 20 == 0) {
+                update();
+            }
             make();
             high += get<bool>(pin) ? 1 : 0;
         }
@@ -85,8 +89,11 @@ TEST(Pwmgen, Pdm_is_exact_in_the_average_and_evenly_spread) {
     int gap = 0;
     for (int i = 0; i < 1000; ++i) {
         p.make();
-        if (p.get<bool>("pwm")) gap = 0;
-        else ASSERT_LE(++gap, 4);
+        if (p.get<bool>("pwm")) {
+            gap = 0;
+        } else {
+            ASSERT_LE(++gap, 4);
+        }
     }
     p.set("value", 1.0);
     EXPECT_DOUBLE_EQ(p.average("pwm", 100), 1.0);
@@ -110,8 +117,11 @@ TEST(Pwmgen, Limits_and_offset_bound_the_duty) {
     Pwm p;
     p.set("max-dc", 0.9);
     p.set("min-dc", 0.1);
-    struct Case { double value, offset, duty; };
-    for (const Case c : {Case{2.0, 0, 0.9}, Case{0.0, 0, 0.1}, Case{-0.05, 0, -0.1}, Case{-3.0, 0, -0.9}, Case{0.3, 0.2, 0.5}, Case{-0.3, 0.1, -0.2}}) {
+    struct Case {
+        double value, offset, duty;
+    };
+    for (const Case c : {Case{2.0, 0, 0.9}, Case{0.0, 0, 0.1}, Case{-0.05, 0, -0.1},
+                         Case{-3.0, 0, -0.9}, Case{0.3, 0.2, 0.5}, Case{-0.3, 0.1, -0.2}}) {
         p.set("value", c.value);
         p.set("offset", c.offset);
         p.update();

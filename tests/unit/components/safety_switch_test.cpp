@@ -11,7 +11,21 @@ namespace {
 
 using hal::test::Instance;
 
-enum : std::uint32_t { is_safe, open, closing, opening, waits, button_down, no_close = 10, no_open, test_a_failed, test_b_failed, short_between, stuck, bad };
+enum : std::uint32_t {
+    is_safe,
+    open,
+    closing,
+    opening,
+    waits,
+    button_down,
+    no_close = 10,
+    no_open,
+    test_a_failed,
+    test_b_failed,
+    short_between,
+    stuck,
+    bad
+};
 
 struct Switch : Instance {
     explicit Switch(int reset_mode = 1) : Instance("safety_switch") {
@@ -39,8 +53,12 @@ struct Switch : Instance {
 };
 
 TEST(SafetySwitch, Equivalent_truth_table) {
-    struct Case { bool a, b; std::uint32_t from_open, from_safe; };
-    for (const Case c : {Case{false, false, open, open}, Case{true, false, closing, opening}, Case{false, true, closing, opening}, Case{true, true, waits, is_safe}}) {
+    struct Case {
+        bool a, b;
+        std::uint32_t from_open, from_safe;
+    };
+    for (const Case c : {Case{false, false, open, open}, Case{true, false, closing, opening},
+                         Case{false, true, closing, opening}, Case{true, true, waits, is_safe}}) {
         Switch fresh, closed;
         fresh.contacts(c.a, c.b);
         EXPECT_EQ(fresh.reason(), c.from_open);
@@ -54,8 +72,12 @@ TEST(SafetySwitch, Equivalent_truth_table) {
 }
 
 TEST(SafetySwitch, Antivalent_truth_table) {
-    struct Case { bool a, b; std::uint32_t reason; };
-    for (const Case c : {Case{false, true, open}, Case{true, true, closing}, Case{false, false, closing}, Case{true, false, waits}}) {
+    struct Case {
+        bool a, b;
+        std::uint32_t reason;
+    };
+    for (const Case c : {Case{false, true, open}, Case{true, true, closing},
+                         Case{false, false, closing}, Case{true, false, waits}}) {
         Switch s;
         s.set("antivalent", true);
         s.contacts(false, true);
@@ -94,7 +116,9 @@ TEST(SafetySwitch, Discrepancy_beyond_its_time_is_a_fault_either_way) {
     for (const bool from_safe : {false, true}) {
         Switch s;
         s.set("discrepancy-time", 0.020);
-        if (from_safe) s.make_safe();
+        if (from_safe) {
+            s.make_safe();
+        }
         s.contacts(true, false, 21);
         EXPECT_FALSE(s.get<bool>("fault"));
         s.run(1);
@@ -148,8 +172,12 @@ TEST(SafetySwitch, Manual_reset_acts_on_pressing_after_closing) {
 }
 
 TEST(SafetySwitch, Monitored_reset_acts_on_releasing_a_press_of_valid_duration) {
-    struct Case { int cycles; bool taken; };
-    for (const Case c : {Case{49, false}, Case{50, true}, Case{500, true}, Case{1001, true}, Case{1002, false}}) {
+    struct Case {
+        int cycles;
+        bool taken;
+    };
+    for (const Case c :
+         {Case{49, false}, Case{50, true}, Case{500, true}, Case{1001, true}, Case{1002, false}}) {
         Switch s(2);
         s.set("reset-min-time", 0.050);
         s.set("reset-max-time", 1.000);
@@ -223,8 +251,12 @@ TEST(SafetySwitch, Invalid_parameters_are_a_fault) {
 
 /// A switch fed by its own test outputs through wires with a fault, a cycle of delay each way.
 struct Wired : Switch {
-    bool a_closed = true, b_closed = true;
-    bool a_to_supply = false, b_to_supply = false, shorted_or = false, shorted_and = false;
+    bool a_closed = true;
+    bool b_closed = true;
+    bool a_to_supply = false;
+    bool b_to_supply = false;
+    bool shorted_or = false;
+    bool shorted_and = false;
 
     Wired() : Switch(0) {
         set("test-period", 0.100);
@@ -234,9 +266,14 @@ struct Wired : Switch {
     }
     void cycle(int cycles) {
         for (int i = 0; i < cycles; ++i) {
-            bool a = a_closed && get<bool>("test-a"), b = b_closed && get<bool>("test-b");
-            if (shorted_or) a = b = a || b;
-            if (shorted_and) a = b = a && b;
+            bool a = a_closed && get<bool>("test-a");
+            bool b = b_closed && get<bool>("test-b");
+            if (shorted_or) {
+                a = b = a || b;
+            }
+            if (shorted_and) {
+                a = b = a && b;
+            }
             set("in-a", a || a_to_supply);
             set("in-b", b || b_to_supply);
             run(1);
@@ -245,7 +282,8 @@ struct Wired : Switch {
             EXPECT_TRUE(get<bool>("test-a") || get<bool>("test-b"));
         }
     }
-    int pulses_a = 0, pulses_b = 0;
+    int pulses_a = 0;
+    int pulses_b = 0;
 };
 
 TEST(SafetySwitch, Test_pulses_do_not_disturb_a_good_switch) {
@@ -296,10 +334,15 @@ TEST(SafetySwitch, Test_pulses_find_shorts_between_the_contacts) {
 
 TEST(SafetySwitch, Opening_during_a_test_pulse_is_seen_right_after_it) {
     Wired s;
-    while (s.get<bool>("test-a")) s.cycle(1);
+    while (s.get<bool>("test-a")) {
+        s.cycle(1);
+    }
     s.a_closed = false;
     int cycles = 0;
-    while (s.get<bool>("safe") && cycles < 100) s.cycle(1), ++cycles;
+    while (s.get<bool>("safe") && cycles < 100) {
+        s.cycle(1);
+        ++cycles;
+    }
     EXPECT_LE(cycles, 7);  // width, response and the cycle of the wires
     s.b_closed = false;
     s.cycle(1);

@@ -14,12 +14,18 @@ using hal::test::Instance;
 // --- estop_latch, charge_pump ----------------------------------------------------------------------------------------
 
 TEST(EstopLatch, Truth_table) {
-    for (const bool was_ok : {false, true})
-        for (const bool ok_in : {false, true})
-            for (const bool fault_in : {false, true})
+    for (const bool was_ok : {false, true}) {
+        for (const bool ok_in : {false, true}) {
+            for (const bool fault_in : {false, true}) {
                 for (const bool pressed : {false, true}) {
                     Instance latch("estop_latch");
-                    if (was_ok) latch.set("reset", true), latch.run(1), latch.set("reset", false), latch.run(1);
+                    if (was_ok) {
+                        latch.set("reset", true);
+                        latch.run(1);
+                        latch.set("reset", false);
+
+                        latch.run(1);
+                    }
                     ASSERT_EQ(latch.get<bool>("ok-out"), was_ok);
                     latch.set("ok-in", ok_in);
                     latch.set("fault-in", fault_in);
@@ -29,6 +35,9 @@ TEST(EstopLatch, Truth_table) {
                     EXPECT_EQ(latch.get<bool>("ok-out"), ok);
                     EXPECT_EQ(latch.get<bool>("fault-out"), !ok);
                 }
+            }
+        }
+    }
 }
 
 TEST(EstopLatch, Resets_only_on_a_rising_edge_without_fault) {
@@ -87,7 +96,9 @@ TEST(Watchdog, Trips_when_an_input_times_out_and_stays_tripped) {
     dog.run("set-timeouts");
     bool level = false;
     for (int i = 0; i < 100; ++i) {
-        if (i % 4 == 0) level = !level;
+        if (i % 4 == 0) {
+            level = !level;
+        }
         dog.set("input-0", level);
         dog.set("input-1", level);
         dog.run("process");

@@ -26,7 +26,10 @@ TEST(Siggen, Waves_have_their_shape_and_phase) {
     Instance siggen("siggen");
     for (std::size_t sample = 0; sample < 24; ++sample) {
         siggen.run("update", eighth);
-        for (const auto& [wave, values] : one_period) EXPECT_NEAR(siggen.get<double>(wave), values[(sample + 1) % 8], 1e-12) << wave << " " << sample;
+        for (const auto& [wave, values] : one_period) {
+            EXPECT_NEAR(siggen.get<double>(wave), values[(sample + 1) % 8], 1e-12)
+                << wave << " " << sample;
+        }
         EXPECT_EQ(siggen.get<bool>("clock"), one_period.at("square")[(sample + 1) % 8] > 0.0);
     }
 }
@@ -38,20 +41,27 @@ TEST(Siggen, Amplitude_offset_and_frequency_apply) {
     siggen.set("frequency", 2.0);
     for (std::size_t sample = 0; sample < 8; ++sample) {
         siggen.run("update", eighth);
-        for (const auto& [wave, values] : one_period) EXPECT_NEAR(siggen.get<double>(wave), 10.0 + 3.0 * values[2 * (sample + 1) % 8], 1e-12) << wave << " " << sample;
+        for (const auto& [wave, values] : one_period) {
+            EXPECT_NEAR(siggen.get<double>(wave), 10.0 + 3.0 * values[2 * (sample + 1) % 8], 1e-12)
+                << wave << " " << sample;
+        }
     }
 }
 
 TEST(Siggen, Reset_holds_the_middle_of_the_period) {
     Instance siggen("siggen");
     siggen.set("amplitude", 2.0);
-    for (int i = 0; i < 3; ++i) siggen.run("update", eighth);
+    for (int i = 0; i < 3; ++i) {
+        siggen.run("update", eighth);
+    }
     siggen.set("reset", true);
     for (int i = 0; i < 2; ++i) {
         siggen.run("update", eighth);
         EXPECT_EQ(siggen.get<double>("sine"), 0.0);
         EXPECT_EQ(siggen.get<double>("sawtooth"), 0.0);
-        for (const char* wave : {"square", "cosine", "triangle"}) EXPECT_EQ(siggen.get<double>(wave), -2.0) << wave;
+        for (const char* wave : {"square", "cosine", "triangle"}) {
+            EXPECT_EQ(siggen.get<double>(wave), -2.0) << wave;
+        }
         EXPECT_FALSE(siggen.get<bool>("clock"));
     }
     siggen.set("reset", false);
@@ -65,7 +75,8 @@ TEST(Siggen, Runs_backwards_and_survives_any_frequency) {
     siggen.set("frequency", -1.0);
     siggen.run("update", eighth);
     EXPECT_NEAR(siggen.get<double>("sine"), -root, 1e-12);
-    for (const double bad : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), -1e-20, 1e300}) {
+    for (const double bad : {std::numeric_limits<double>::quiet_NaN(),
+                             std::numeric_limits<double>::infinity(), -1e-20, 1e300}) {
         siggen.set("frequency", bad);
         siggen.run("update", eighth);
         EXPECT_LE(std::fabs(siggen.get<double>("triangle")), 1.0) << bad;

@@ -19,15 +19,24 @@ constexpr std::int64_t base_ns = 100'000;
 
 /// A furuta without friction and with the amplifier off.
 struct FreeFuruta : Instance {
-    explicit FreeFuruta(const char* pendulum = "0", const char* arm = "0") : Instance("furuta", {{"pendulum_angle", pendulum}, {"arm_angle", arm}}) {
-        for (const char* friction : {"arm-viscous", "arm-coulomb", "pendulum-viscous", "pendulum-coulomb"}) set(friction, 0.0);
+    explicit FreeFuruta(const char* pendulum = "0", const char* arm = "0")
+        : Instance("furuta", {{"pendulum_angle", pendulum}, {"arm_angle", arm}}) {
+        for (const char* friction :
+             {"arm-viscous", "arm-coulomb", "pendulum-viscous", "pendulum-coulomb"}) {
+            set(friction, 0.0);
+        }
         set("enable", false);
     }
 };
 
 /// The constants of the default rig, from the manual's own words: bars and rods.
 struct Rig {
-    double L = 0.2, l = 0.15, m = 0.1, arm_mass = 0.2, rotor = 7.5e-5, g = 9.80665;
+    double L = 0.2;
+    double l = 0.15;
+    double m = 0.1;
+    double arm_mass = 0.2;
+    double rotor = 7.5e-5;
+    double g = 9.80665;
     double J = rotor + 6.667e-4 + arm_mass * 0.1 * 0.1 + m * L * L;
     double K = 7.5e-4 + m * l * l;
 };
@@ -56,14 +65,18 @@ TEST(Furuta, Energy_does_not_depend_on_the_thread_period) {
 
 /// Mean period of the swing over `swings` zero crossings upwards.
 double period_of_swing(Instance& furuta, int swings) {
-    double last = 0.0, first_at = 0.0, at = 0.0;
+    double last = 0.0;
+    double first_at = 0.0;
+    double at = 0.0;
     int seen = -1;
     for (std::int64_t cycle = 1; seen < swings; ++cycle) {
         furuta.run("update", base_ns);
         const double now = furuta.get<double>("pendulum-angle");
         if (last < 0.0 && now >= 0.0) {
             at = (static_cast<double>(cycle) - now / (now - last)) * 1e-9 * base_ns;
-            if (++seen == 0) first_at = at;
+            if (++seen == 0) {
+                first_at = at;
+            }
         }
         last = now;
     }
@@ -74,7 +87,8 @@ TEST(Furuta, Small_swings_have_the_frequency_of_the_linear_equations) {
     const Rig rig;
     FreeFuruta free("0.001");
     const double c = rig.m * rig.L * rig.l;
-    EXPECT_NEAR(2 * pi / period_of_swing(free, 10), std::sqrt(rig.m * rig.g * rig.l * rig.J / (rig.J * rig.K - c * c)), 1e-4);
+    EXPECT_NEAR(2 * pi / period_of_swing(free, 10),
+                std::sqrt(rig.m * rig.g * rig.l * rig.J / (rig.J * rig.K - c * c)), 1e-4);
 
     FreeFuruta held("0.001");
     held.set("rotor-inertia", 1e6);
@@ -88,7 +102,9 @@ TEST(Furuta, A_free_swing_halves_in_some_fifteen_seconds) {
     double largest = 0.0;
     for (int i = 0; i < 16000; ++i) {
         furuta.run("update", 1'000'000);
-        if (i >= 14000) largest = std::max(largest, furuta.get<double>("pendulum-angle"));
+        if (i >= 14000) {
+            largest = std::max(largest, furuta.get<double>("pendulum-angle"));
+        }
     }
     EXPECT_NEAR(largest, 0.25, 0.05);
 }
@@ -131,10 +147,13 @@ TEST(Furuta, Pendulum_encoder_arrives_late_by_the_radio_delay) {
     std::vector<std::int32_t> due;
     for (int i = 0; i < 3000; ++i) {
         furuta.run("update", base_ns);
-        due.push_back(static_cast<std::int32_t>(std::floor(furuta.get<double>("pendulum-angle") * 2000 / (2 * pi) + 0.5)));
+        due.push_back(static_cast<std::int32_t>(
+            std::floor(furuta.get<double>("pendulum-angle") * 2000 / (2 * pi) + 0.5)));
         const std::size_t sent = static_cast<std::size_t>(std::max(0, i - 50));
         ASSERT_EQ(furuta.get<std::int32_t>("pendulum-counts"), due[sent]) << i;
-        ASSERT_EQ(furuta.get<std::int32_t>("arm-counts"), static_cast<std::int32_t>(std::floor(furuta.get<double>("arm-angle") * 2000 / (2 * pi) + 0.5)));
+        ASSERT_EQ(furuta.get<std::int32_t>("arm-counts"),
+                  static_cast<std::int32_t>(
+                      std::floor(furuta.get<double>("arm-angle") * 2000 / (2 * pi) + 0.5)));
     }
     EXPECT_LT(due.back(), 0);
 }
@@ -156,8 +175,10 @@ TEST(Furuta, Quadrature_outputs_decode_to_the_counts) {
     for (int i = 0; i < 20'000; ++i) {
         sample();
         ASSERT_EQ(arm.get<std::int32_t>("rawcounts"), furuta.get<std::int32_t>("arm-counts"));
-        ASSERT_EQ(pendulum.get<std::int32_t>("rawcounts"), furuta.get<std::int32_t>("pendulum-counts") - start);
-        ASSERT_EQ(furuta.get<bool>("pendulum-phase-Z"), furuta.get<std::int32_t>("pendulum-counts") % 2000 == 0);
+        ASSERT_EQ(pendulum.get<std::int32_t>("rawcounts"),
+                  furuta.get<std::int32_t>("pendulum-counts") - start);
+        ASSERT_EQ(furuta.get<bool>("pendulum-phase-Z"),
+                  furuta.get<std::int32_t>("pendulum-counts") % 2000 == 0);
     }
     EXPECT_EQ(pendulum.get<std::uint32_t>("quad-errors"), 0u);
 }
@@ -168,29 +189,42 @@ Vector cross(const Vector& a, const Vector& b) {
     return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
 
-/// tip_ratio the long way: arm and rod as rows of mass points, their accelerations by differences of positions.
-double tip_ratio_of_points(const sim::FurutaDynamics& rig, const sim::FurutaState& s, double torque) {
+/// tip_ratio the long way: arm and rod as rows of mass points, their accelerations by differences
+/// of positions.
+double tip_ratio_of_points(const sim::FurutaDynamics& rig, const sim::FurutaState& s,
+                           double torque) {
     constexpr double h = 1e-4;
     constexpr int parts = 400;
-    const std::array<sim::FurutaState, 3> states{rig.step(s, torque, -h), s, rig.step(s, torque, h)};
+    const std::array<sim::FurutaState, 3> states{rig.step(s, torque, -h), s,
+                                                 rig.step(s, torque, h)};
     Vector moment{};
     double force_up = rig.base_mass * rig.gravity;
     const auto add = [&](double mass, auto place) {
-        const Vector before = place(states[0]), now = place(states[1]), after = place(states[2]);
+        const Vector before = place(states[0]);
+        const Vector now = place(states[1]);
+        const Vector after = place(states[2]);
         Vector force;
-        for (std::size_t i = 0; i < 3; ++i) force[i] = mass * ((before[i] - 2 * now[i] + after[i]) / (h * h) + (i == 2 ? rig.gravity : 0.0));
+        for (std::size_t i = 0; i < 3; ++i) {
+            force[i] = mass * ((before[i] - 2 * now[i] + after[i]) / (h * h) +
+                               (i == 2 ? rig.gravity : 0.0));
+        }
         const Vector m = cross(now, force);
-        for (std::size_t i = 0; i < 3; ++i) moment[i] += m[i];
+        for (std::size_t i = 0; i < 3; ++i) {
+            moment[i] += m[i];
+        }
         force_up += force[2];
     };
     for (int part = 0; part < parts; ++part) {
         const double along = 2.0 * (part + 0.5) / parts;
         add(rig.arm_mass / parts, [&](const sim::FurutaState& at) {
-            return Vector{rig.arm_centre * along * std::cos(at.arm), rig.arm_centre * along * std::sin(at.arm), rig.base_height};
+            return Vector{rig.arm_centre * along * std::cos(at.arm),
+                          rig.arm_centre * along * std::sin(at.arm), rig.base_height};
         });
         add(rig.pendulum_mass / parts, [&](const sim::FurutaState& at) {
-            const double r = rig.pendulum_centre * along, out = r * std::sin(at.pendulum);
-            return Vector{rig.arm_length * std::cos(at.arm) - out * std::sin(at.arm), rig.arm_length * std::sin(at.arm) + out * std::cos(at.arm),
+            const double r = rig.pendulum_centre * along;
+            const double out = r * std::sin(at.pendulum);
+            return Vector{rig.arm_length * std::cos(at.arm) - out * std::sin(at.arm),
+                          rig.arm_length * std::sin(at.arm) + out * std::cos(at.arm),
                           rig.base_height - r * std::cos(at.pendulum)};
         });
     }
@@ -199,15 +233,30 @@ double tip_ratio_of_points(const sim::FurutaDynamics& rig, const sim::FurutaStat
 
 TEST(Furuta, Tip_ratio_is_that_of_the_sum_over_mass_points) {
     const Rig p;
-    sim::FurutaDynamics rig{.gravity = p.g, .arm_length = p.L, .arm_mass = p.arm_mass, .arm_centre = 0.1, .arm_inertia = p.J - p.m * p.L * p.L,
-                            .arm_viscous = 1e-3, .arm_coulomb = 0, .pendulum_mass = p.m, .pendulum_centre = p.l, .pendulum_inertia = 7.5e-4,
-                            .pendulum_viscous = 1e-3, .pendulum_coulomb = 0, .base_mass = 2.5, .base_radius = 0.08, .base_height = 0.4};
-    const std::array<sim::FurutaState, 5> states{{{0, 0, 0, 0}, {0.3, 0.7, 2, -3}, {-1, 2.5, -6, 4}, {2, -1.2, 9, 11}, {0.1, 3.1, 0, -14}}};
-    for (const auto& s : states)
+    sim::FurutaDynamics rig{.gravity = p.g,
+                            .arm_length = p.L,
+                            .arm_mass = p.arm_mass,
+                            .arm_centre = 0.1,
+                            .arm_inertia = p.J - p.m * p.L * p.L,
+                            .arm_viscous = 1e-3,
+                            .arm_coulomb = 0,
+                            .pendulum_mass = p.m,
+                            .pendulum_centre = p.l,
+                            .pendulum_inertia = 7.5e-4,
+                            .pendulum_viscous = 1e-3,
+                            .pendulum_coulomb = 0,
+                            .base_mass = 2.5,
+                            .base_radius = 0.08,
+                            .base_height = 0.4};
+    const std::array<sim::FurutaState, 5> states{
+        {{0, 0, 0, 0}, {0.3, 0.7, 2, -3}, {-1, 2.5, -6, 4}, {2, -1.2, 9, 11}, {0.1, 3.1, 0, -14}}};
+    for (const auto& s : states) {
         for (const double torque : {0.0, 0.25}) {
             const double expected = tip_ratio_of_points(rig, s, torque);
-            EXPECT_NEAR(rig.tip_ratio(s, rig.acceleration(s, torque)), expected, 1e-3 * expected) << s.pendulum << ' ' << torque;
+            EXPECT_NEAR(rig.tip_ratio(s, rig.acceleration(s, torque)), expected, 1e-3 * expected)
+                << s.pendulum << ' ' << torque;
         }
+    }
 }
 
 TEST(Furuta, Base_lifts_when_the_arm_spins_and_falls_back) {
@@ -220,7 +269,9 @@ TEST(Furuta, Base_lifts_when_the_arm_spins_and_falls_back) {
     furuta.set("enable", true);
     furuta.set("voltage", 24.0);
     std::uint64_t cycles = 0;
-    while (furuta.get<bool>("base-down") && ++cycles < 20'000) furuta.run("update", base_ns);
+    while (furuta.get<bool>("base-down") && ++cycles < 20'000) {
+        furuta.run("update", base_ns);
+    }
     EXPECT_GT(furuta.get<double>("tip-ratio"), 1.0);
     EXPECT_TRUE(furuta.get<bool>("base-lifted"));
     EXPECT_GT(std::abs(furuta.get<double>("arm-velocity")), 5.0);
@@ -253,12 +304,14 @@ TEST(DcMotor, Settles_at_the_speed_of_the_closed_form) {
     motor.set("current-limit", 0.0);
     motor.set("voltage", 12.0);
     motor.run("update", base_ns, 20'000);
-    const double k = 0.0677, speed = 12.0 * k / (k * k + 0.68 * 1e-4);
+    const double k = 0.0677;
+    const double speed = 12.0 * k / (k * k + 0.68 * 1e-4);
     EXPECT_NEAR(motor.get<double>("velocity"), speed, 1e-6 * speed);
     EXPECT_NEAR(motor.get<double>("current"), 1e-4 * speed / k, 1e-6);
     motor.set("load-torque", 0.05);
     motor.run("update", base_ns, 20'000);
-    EXPECT_NEAR(motor.get<double>("velocity"), (12.0 * k - 0.68 * 0.05) / (k * k + 0.68 * 1e-4), 1e-6 * speed);
+    EXPECT_NEAR(motor.get<double>("velocity"), (12.0 * k - 0.68 * 0.05) / (k * k + 0.68 * 1e-4),
+                1e-6 * speed);
 }
 
 TEST(DcMotor, Current_rises_with_the_time_constant_of_the_winding_up_to_the_limit) {
@@ -285,11 +338,15 @@ TEST(DcMotor, Accelerates_by_the_current_limit_and_moves_the_screw) {
     motor.set("pitch", 5.0);
     motor.set("max-position", 1.0);
     motor.set("pwm", true);
-    motor.run("update", base_ns, 1000);  // 0.1 s at 4 A: 0.2708 N*m on 2e-4 kg*m^2 stays below the no-load speed
+    // 0.1 s at 4 A: 0.2708 N*m on 2e-4 kg*m^2 stays below the no-load speed
+    motor.run("update", base_ns, 1000);
     const double a = 4.0 * 0.0677 / 2e-4;
-    EXPECT_NEAR(motor.get<double>("velocity"), a * 0.1, 0.2);  // half a step less: the torque is the mean of a step
+    // half a step less: the torque is the mean of a step
+    EXPECT_NEAR(motor.get<double>("velocity"), a * 0.1, 0.2);
     EXPECT_NEAR(motor.get<double>("position"), 0.5 * a * 0.01 / (2 * pi) * 5.0, 0.02);
-    EXPECT_EQ(motor.get<std::int32_t>("counts"), static_cast<std::int32_t>(std::floor(motor.get<double>("angle") * 2000 / (2 * pi) + 0.5)));
+    EXPECT_EQ(
+        motor.get<std::int32_t>("counts"),
+        static_cast<std::int32_t>(std::floor(motor.get<double>("angle") * 2000 / (2 * pi) + 0.5)));
     EXPECT_TRUE(motor.get<bool>("at-max"));
     EXPECT_FALSE(motor.get<bool>("at-min"));
 }

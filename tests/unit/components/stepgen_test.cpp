@@ -16,11 +16,13 @@ namespace {
 
 using hal::test::Instance;
 
-constexpr std::int64_t base_ns = 50'000, servo_ns = 1'000'000;
+constexpr std::int64_t base_ns = 50'000;
+constexpr std::int64_t servo_ns = 1'000'000;
 
 struct Stepgen : Instance {
     explicit Stepgen(const char* type, const char* control = "p", const char* user = "")
-        : Instance("stepgen", {{"step_type", type}, {"ctrl_type", control}, {"user_step_type", user}}) {
+        : Instance("stepgen",
+                   {{"step_type", type}, {"ctrl_type", control}, {"user_step_type", user}}) {
         set("enable", true);
         run("make-pulses", base_ns);
     }
@@ -30,7 +32,10 @@ struct Stepgen : Instance {
         for (int i = 0; i < cycles; ++i) {
             run("capture-position", servo_ns);
             run("update-freq", servo_ns);
-            for (int k = 0; k < 20; ++k) run("make-pulses", base_ns), each();
+            for (int k = 0; k < 20; ++k) {
+                run("make-pulses", base_ns);
+                each();
+            }
         }
         run("capture-position", servo_ns);
     }
@@ -83,13 +88,23 @@ TEST(Stepgen, Keeps_every_time_of_step_and_direction) {
     s.set("stepspace", 150'000); // 3
     s.set("dirhold", 200'000);   // 4
     s.set("dirsetup", 250'000);  // 5
-    int high = 0, low = 1000, dir_age = 1000, shortest_high = 1000, longest_high = 0, shortest_low = 1000, shortest_hold = 1000, shortest_setup = 1000;
-    bool step = false, dir = false;
+    int high = 0;
+    int low = 1000;
+    int dir_age = 1000;
+    int shortest_high = 1000;
+    int longest_high = 0;
+
+    int shortest_low = 1000;
+    int shortest_hold = 1000;
+    int shortest_setup = 1000;
+    bool step = false;
+    bool dir = false;
     int reversals = 0;
     for (int round = 0; round < 40; ++round) {
         s.set("velocity-cmd", (round % 2 != 0 ? -1.0 : 1.0) * (500.0 + 90.0 * round));
         s.servo(7, [&] {
-            const bool now = s.get<bool>("step"), now_dir = s.get<bool>("dir");
+            const bool now = s.get<bool>("step");
+            const bool now_dir = s.get<bool>("dir");
             if (now_dir != dir) {
                 EXPECT_FALSE(now && step);
                 shortest_hold = std::min(shortest_hold, low);
@@ -108,7 +123,8 @@ TEST(Stepgen, Keeps_every_time_of_step_and_direction) {
             }
             ++(now ? high : low);
             ++dir_age;
-            step = now, dir = now_dir;
+            step = now;
+            dir = now_dir;
         });
     }
     EXPECT_GT(reversals, 20);
@@ -135,14 +151,19 @@ TEST(Stepgen, Follows_a_position_within_its_limits_and_does_not_overshoot) {
     s.set("maxvel", 5.0);
     s.set("maxaccel", 20.0);
     s.set("position-cmd", 3.0);
-    double speed = 0.0, last = 0.0, highest = 0.0, fastest = 0.0;
+    double speed = 0.0;
+    double last = 0.0;
+    double highest = 0.0;
+    double fastest = 0.0;
     for (int i = 0; i < 2000; ++i) {
         s.servo(1);
-        const double at = s.get<double>("position-fb"), now = (at - last) / 1e-3;
+        const double at = s.get<double>("position-fb");
+        const double now = (at - last) / 1e-3;
         EXPECT_LE(std::abs(now - speed), 20.0 * 1e-3 * 1.0001 + 1e-9);
         fastest = std::max(fastest, now);
         highest = std::max(highest, at);
-        speed = now, last = at;
+        speed = now;
+        last = at;
         if (i == 900) {  // 0.25 s up, 0.35 s at speed, 0.25 s down
             EXPECT_NEAR(at, 3.0, 1e-3);
         }
@@ -160,7 +181,8 @@ TEST(Stepgen, Follows_a_moving_position_one_cycle_behind) {
         s.set("position-cmd", 2.0 * i * 1e-3);
         s.servo(1);
     }
-    EXPECT_NEAR(s.get<double>("position-fb"), 4.0 + 2e-3, 1e-4);  // where the command will be at the next cycle
+    // where the command will be at the next cycle
+    EXPECT_NEAR(s.get<double>("position-fb"), 4.0 + 2e-3, 1e-4);
 }
 
 TEST(Stepgen, Disabled_makes_no_steps_and_catches_up_later) {
@@ -177,12 +199,15 @@ TEST(Stepgen, Disabled_makes_no_steps_and_catches_up_later) {
 
 TEST(Stepgen, Up_and_down_pulse_on_their_own_pins) {
     Stepgen s("1", "v");
-    int ups = 0, downs = 0;
-    bool up = false, down = false;
+    int ups = 0;
+    int downs = 0;
+    bool up = false;
+    bool down = false;
     const auto look = [&] {
         ups += s.get<bool>("up") && !up ? 1 : 0;
         downs += s.get<bool>("down") && !down ? 1 : 0;
-        up = s.get<bool>("up"), down = s.get<bool>("down");
+        up = s.get<bool>("up");
+        down = s.get<bool>("down");
         EXPECT_FALSE(up && down);
     };
     s.set("velocity-cmd", 2000.0);
@@ -193,27 +218,38 @@ TEST(Stepgen, Up_and_down_pulse_on_their_own_pins) {
     EXPECT_NEAR(downs, 50, 1);
 }
 
-/// The states a stepgen goes through, seen from its phase pins, over `steps` steps at a step per four periods.
+/// The states a stepgen goes through, seen from its phase pins, over `steps` steps at a step per
+/// four periods.
 std::vector<unsigned> states(Stepgen& s, int phases, int steps) {
     static constexpr std::array names{"phase-A", "phase-B", "phase-C", "phase-D", "phase-E"};
     std::vector<unsigned> seen;
     s.set("velocity-cmd", 5000.0);
     s.servo(steps, [&] {
         unsigned state = 0;
-        for (int i = 0; i < phases; ++i) state |= s.get<bool>(names[static_cast<std::size_t>(i)]) ? 1u << i : 0u;
-        if (seen.empty() || seen.back() != state) seen.push_back(state);
+        for (int i = 0; i < phases; ++i) {
+            state |= s.get<bool>(names[static_cast<std::size_t>(i)]) ? 1u << i : 0u;
+        }
+        if (seen.empty() || seen.back() != state) {
+            seen.push_back(state);
+        }
     });
     seen.resize(static_cast<std::size_t>(steps));
     return seen;
 }
 
 TEST(Stepgen, Unipolar_phases_are_switched_in_the_documented_way) {
-    struct Case { const char* type; int phases, length, fewest_on, most_on; };
-    for (const Case c : {Case{"2", 2, 4, 0, 2}, Case{"3", 3, 3, 1, 1}, Case{"4", 3, 6, 1, 2}, Case{"5", 4, 4, 1, 1}, Case{"6", 4, 4, 2, 2}, Case{"9", 4, 8, 1, 2},
-                         Case{"11", 5, 5, 1, 1}, Case{"12", 5, 5, 2, 2}, Case{"13", 5, 10, 1, 2}, Case{"14", 5, 10, 2, 3}}) {
+    struct Case {
+        const char* type;
+        int phases, length, fewest_on, most_on;
+    };
+    for (const Case c : {Case{"2", 2, 4, 0, 2}, Case{"3", 3, 3, 1, 1}, Case{"4", 3, 6, 1, 2},
+                         Case{"5", 4, 4, 1, 1}, Case{"6", 4, 4, 2, 2}, Case{"9", 4, 8, 1, 2},
+                         Case{"11", 5, 5, 1, 1}, Case{"12", 5, 5, 2, 2}, Case{"13", 5, 10, 1, 2},
+                         Case{"14", 5, 10, 2, 3}}) {
         Stepgen s(c.type, "v");
         const std::vector<unsigned> seen = states(s, c.phases, 24);
-        const bool alternates = c.fewest_on != c.most_on;  // half steps and quadrature: one phase changes; else one comes, one goes
+        // half steps and quadrature: one phase changes; else one comes, one goes
+        const bool alternates = c.fewest_on != c.most_on;
         for (std::size_t k = 0; k < seen.size(); ++k) {
             EXPECT_GE(std::popcount(seen[k]), c.fewest_on) << c.type;
             EXPECT_LE(std::popcount(seen[k]), c.most_on) << c.type;
@@ -221,21 +257,30 @@ TEST(Stepgen, Unipolar_phases_are_switched_in_the_documented_way) {
                 EXPECT_EQ(std::popcount(seen[k] ^ seen[k - 1]), alternates ? 1 : 2) << c.type;
             }
             const auto cycle = static_cast<std::size_t>(c.length);
-            for (std::size_t j = k + 1; j < seen.size(); ++j) EXPECT_EQ(seen[j] == seen[k], (j - k) % cycle == 0) << c.type;
+            for (std::size_t j = k + 1; j < seen.size(); ++j) {
+                EXPECT_EQ(seen[j] == seen[k], (j - k) % cycle == 0) << c.type;
+            }
         }
     }
 }
 
 TEST(Stepgen, Bipolar_phases_turn_the_current_evenly) {
-    struct Case { const char* type; int step_degrees; };
+    struct Case {
+        const char* type;
+        int step_degrees;
+    };
     for (const Case c : {Case{"7", 90}, Case{"8", 90}, Case{"10", 45}}) {
         Stepgen s(c.type, "v");
         int last = -1;
         for (const unsigned state : states(s, 4, 24)) {
             const auto on = [state](int phase) { return static_cast<int>(state >> phase & 1u); };
-            const double x = on(0) - on(1), y = on(2) - on(3);  // current in bridge A-B and in bridge C-D
+            // current in bridge A-B and in bridge C-D
+            const double x = on(0) - on(1);
+            const double y = on(2) - on(3);
             ASSERT_TRUE(x != 0.0 || y != 0.0) << c.type;
-            const int angle = static_cast<int>(std::lround(std::atan2(y, x) * 180.0 / std::numbers::pi) + 360) % 360;
+            const int angle =
+                static_cast<int>(std::lround(std::atan2(y, x) * 180.0 / std::numbers::pi) + 360) %
+                360;
             if (last >= 0) {
                 EXPECT_EQ(angle, (last + c.step_degrees) % 360) << c.type;
             }

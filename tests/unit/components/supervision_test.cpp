@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What a netlist cannot test of the supervising components and the plants: the host's safe values, random states, random
-// parameters.
+// What a netlist cannot test of the supervising components and the plants: the host's safe values,
+// random states, random parameters.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -22,7 +22,8 @@ void press(Instance& instance) {
     instance.run(1);
 }
 
-// The host writes the declared safe value on stop and on a stopping fault; then the function runs again.
+// The host writes the declared safe value on stop and on a stopping fault; then the function runs
+// again.
 TEST(Supervision, After_a_stop_of_the_runtime_a_reset_is_needed) {
     Instance guard("safe_limit");
     press(guard);
@@ -35,7 +36,10 @@ TEST(Supervision, After_a_stop_of_the_runtime_a_reset_is_needed) {
     EXPECT_TRUE(guard.get<bool>("power"));
 
     Instance lock("interlock");
-    for (const char* in : {"in-00", "in-01", "in-02", "in-03", "in-04", "in-05", "in-06", "in-07"}) lock.set(in, true);
+    for (const char* in :
+         {"in-00", "in-01", "in-02", "in-03", "in-04", "in-05", "in-06", "in-07"}) {
+        lock.set(in, true);
+    }
     press(lock);
     ASSERT_TRUE(lock.get<bool>("ok"));
     lock.set("ok", false);
@@ -73,7 +77,8 @@ TEST(Supervision, After_a_stop_of_the_runtime_a_reset_is_needed) {
     EXPECT_TRUE(beat.get<bool>("ok"));
 }
 
-// An axis that follows command-out, a command and limits that change at random: it never passes what a stop 1 takes.
+// An axis that follows command-out, a command and limits that change at random: it never passes
+// what a stop 1 takes.
 TEST(SafeLimit, An_axis_that_obeys_stays_within_its_limits_and_the_way_to_stop) {
     for (unsigned seed = 0; seed < 20; ++seed) {
         std::mt19937 random(seed);
@@ -86,7 +91,9 @@ TEST(SafeLimit, An_axis_that_obeys_stays_within_its_limits_and_the_way_to_stop) 
         guard.set("speed-reaction", 2);
         double position = 0.0;
         for (int cycle = 0; cycle < 20'000; ++cycle) {
-            if (cycle % 200 == 0) guard.set("command", 4 * unit(random));
+            if (cycle % 200 == 0) {
+                guard.set("command", 4 * unit(random));
+            }
             guard.set("reset", cycle % 500 == 499);
             guard.set("position", position);
             guard.run(1);
@@ -95,13 +102,15 @@ TEST(SafeLimit, An_axis_that_obeys_stays_within_its_limits_and_the_way_to_stop) 
             ASSERT_TRUE(guard.get<bool>("power") || speed == 0.0);
             position += 1e-3 * speed;
             // 2^2 / (2 * 10) to stop, and two cycles to see it
-            ASSERT_LE(std::fabs(position), 1.0 + 0.2 + 0.004) << "seed " << seed << " cycle " << cycle;
+            ASSERT_LE(std::fabs(position), 1.0 + 0.2 + 0.004)
+                << "seed " << seed << " cycle " << cycle;
         }
     }
 }
 
 TEST(SafeLimit, Takes_the_power_in_the_cycle_of_a_value_that_is_not_a_number) {
-    for (const char* pin : {"position", "max-speed", "min-position", "stop-time", "standstill-time"}) {
+    for (const char* pin :
+         {"position", "max-speed", "min-position", "stop-time", "standstill-time"}) {
         Instance guard("safe_limit");
         press(guard);
         ASSERT_TRUE(guard.get<bool>("power"));
@@ -111,18 +120,22 @@ TEST(SafeLimit, Takes_the_power_in_the_cycle_of_a_value_that_is_not_a_number) {
     }
 }
 
-// Odometry against the integral of the motion in fine steps, for speeds that are constant in each cycle.
+// Odometry against the integral of the motion in fine steps, for speeds that are constant in each
+// cycle.
 TEST(DiffDrive, Pose_does_not_depend_on_the_length_of_the_cycle) {
     std::mt19937 random(3);
     std::uniform_real_distribution<double> unit(-1.0, 1.0);
     Instance coarse("diff_drive"), fine("diff_drive");
     coarse.run("odometry");
     fine.run("odometry");
-    double left = 0.0, right = 0.0;
+    double left = 0.0;
+    double right = 0.0;
     for (int cycle = 0; cycle < 1000; ++cycle) {
-        const double l = unit(random), r = unit(random);
+        const double l = unit(random);
+        const double r = unit(random);
         for (int part = 0; part < 50; ++part) {
-            left += l / 50, right += r / 50;
+            left += l / 50;
+            right += r / 50;
             fine.set("left-angle", left);
             fine.set("right-angle", right);
             fine.run("odometry", 1'000'000);
@@ -131,7 +144,9 @@ TEST(DiffDrive, Pose_does_not_depend_on_the_length_of_the_cycle) {
         coarse.set("right-angle", right);
         coarse.run("odometry", 50'000'000);
     }
-    for (const char* pin : {"x", "y", "turned", "distance"}) EXPECT_NEAR(coarse.get<double>(pin), fine.get<double>(pin), 1e-9) << pin;
+    for (const char* pin : {"x", "y", "turned", "distance"}) {
+        EXPECT_NEAR(coarse.get<double>(pin), fine.get<double>(pin), 1e-9) << pin;
+    }
 }
 
 // What is commanded is what is measured: wheels that obey drive the wanted curve.
@@ -141,7 +156,8 @@ TEST(DiffDrive, Command_and_odometry_are_inverse) {
     base.set("right-radius", 0.05);
     base.set("linear", 0.7);
     base.set("angular", -1.3);
-    double left = 0.0, right = 0.0;
+    double left = 0.0;
+    double right = 0.0;
     for (int cycle = 0; cycle < 100; ++cycle) {
         base.run("odometry");
         base.run("command");
@@ -161,16 +177,22 @@ TEST(TwoMass, Keeps_its_energy_without_friction_for_any_period) {
     for (int trial = 0; trial < 100; ++trial) {
         Instance plant("two_mass");
         const auto any = [&] { return std::pow(10.0, magnitude(random)); };
-        const double j1 = any(), j2 = any(), c = 100.0 * any();
+        const double j1 = any();
+        const double j2 = any();
+        const double c = 100.0 * any();
         plant.set("motor-inertia", j1);
         plant.set("load-inertia", j2);
         plant.set("stiffness", c);
-        for (const char* none : {"damping", "motor-viscous", "load-viscous"}) plant.set(none, 0.0);
+        for (const char* none : {"damping", "motor-viscous", "load-viscous"}) {
+            plant.set(none, 0.0);
+        }
         plant.set("torque", 1.0);
         plant.run("update", 10'000'000);
         plant.set("torque", 0.0);
         const auto energy = [&] {
-            const double w1 = plant.get<double>("motor-velocity"), w2 = plant.get<double>("load-velocity");
+            const double w1 = plant.get<double>("motor-velocity");
+
+            const double w2 = plant.get<double>("load-velocity");
             const double twist = plant.get<double>("twist");
             return (j1 * w1 * w1 + j2 * w2 * w2 + c * twist * twist) / 2;
         };
@@ -188,20 +210,30 @@ TEST(Plants, Come_to_rest_with_friction_for_any_parameters) {
     const auto any = [&] { return std::pow(10.0, magnitude(random)); };
     for (int trial = 0; trial < 500; ++trial) {
         Instance two("two_mass"), one("spring_damper");
-        for (const char* pin : {"motor-inertia", "load-inertia", "stiffness", "damping", "motor-viscous", "load-viscous"})
+        for (const char* pin : {"motor-inertia", "load-inertia", "stiffness", "damping",
+                                "motor-viscous", "load-viscous"}) {
             two.set(pin, any());
-        for (const char* pin : {"mass", "stiffness", "damping"}) one.set(pin, any());
+        }
+        for (const char* pin : {"mass", "stiffness", "damping"}) {
+            one.set(pin, any());
+        }
         two.set("torque", 1.0);
         two.run("update");
         two.set("torque", 0.0);
         one.set("force", 1.0);
-        const double first = std::fabs(two.get<double>("motor-velocity")) + std::fabs(two.get<double>("load-velocity"));
+        const double first = std::fabs(two.get<double>("motor-velocity")) +
+                             std::fabs(two.get<double>("load-velocity"));
         for (int cycle = 0; cycle < 200; ++cycle) {
             two.run("update", 100'000'000);
             one.run("update", 100'000'000);
-            const double w1 = two.get<double>("motor-velocity"), w2 = two.get<double>("load-velocity");
-            // Each speed is bounded by the energy of the first push, whatever shares of it the other mass takes.
-            ASSERT_TRUE(std::isfinite(w1) && std::isfinite(w2) && std::isfinite(one.get<double>("position"))) << "trial " << trial;
+            const double w1 = two.get<double>("motor-velocity");
+
+            const double w2 = two.get<double>("load-velocity");
+            // Each speed is bounded by the energy of the first push, whatever shares of it the
+            // other mass takes.
+            ASSERT_TRUE(std::isfinite(w1) && std::isfinite(w2) &&
+                        std::isfinite(one.get<double>("position")))
+                << "trial " << trial;
             ASSERT_LT(std::fabs(w1), 1e12 * (first + 1e-12)) << "trial " << trial;
         }
     }
@@ -210,7 +242,8 @@ TEST(Plants, Come_to_rest_with_friction_for_any_parameters) {
 TEST(Noise, Neighbouring_seeds_are_not_alike) {
     Instance a("noise"), b("noise");
     b.set("seed", 1);
-    double product = 0.0, power = 0.0;
+    double product = 0.0;
+    double power = 0.0;
     for (int i = 0; i < 20'000; ++i) {
         a.run(1);
         b.run(1);

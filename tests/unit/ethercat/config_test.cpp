@@ -17,14 +17,20 @@ Bus good(const std::string& text) {
     EXPECT_EQ(to_string(r, "m.ethercat"), "");
     return r.buses.at(0);
 }
-std::string errors(const std::string& text) { return to_string(read(text, "m.ethercat", read_test_file), "m.ethercat"); }
+std::string errors(const std::string& text) {
+    return to_string(read(text, "m.ethercat", read_test_file), "m.ethercat");
+}
 
 const char* const servo =
-    "[bus]\nlink = sim:line\ncycle = 1ms\nclock = reference\nreference = x\n[domain io]\nevery = 4\n"
-    "[type drive]\nesi = servo.xml\ndevice = SERVO-1\noutputs = 6040 607A 60FE:1 gap 8\ninputs = 6041, 6064\nsdo 60C2:1 = 1\nsdo 60C2:2 = "
+    "[bus]\nlink = sim:line\ncycle = 1ms\nclock = reference\nreference = x\n[domain io]\nevery = "
+    "4\n"
+    "[type drive]\nesi = servo.xml\ndevice = SERVO-1\noutputs = 6040 607A 60FE:1 gap 8\ninputs = "
+    "6041, 6064\nsdo 60C2:1 = 1\nsdo 60C2:2 = "
     "-3\n"
-    "dc = sync0 250us\nwatchdog = 50ms\n607A.scale = 65536/360\n607A.unit = deg\nposition-actual-value.name = position\n"
-    "[slave 0 x]\ntype = drive\n[slave alias=5 y]\ntype = drive\noptional = yes\n[slave 2]\nesi = servo.xml\ndevice = DIO-8\ndomain = io\n";
+    "dc = sync0 250us\nwatchdog = 50ms\n607A.scale = 65536/360\n607A.unit = "
+    "deg\nposition-actual-value.name = position\n"
+    "[slave 0 x]\ntype = drive\n[slave alias=5 y]\ntype = drive\noptional = yes\n[slave 2]\nesi = "
+    "servo.xml\ndevice = DIO-8\ndomain = io\n";
 
 TEST(EthercatConfig, Drives_of_a_type_have_its_PDOs_clocks_and_writes) {
     const Bus bus = good(servo);
@@ -81,8 +87,10 @@ TEST(EthercatConfig, Drives_of_a_type_have_its_PDOs_clocks_and_writes) {
 
 TEST(EthercatConfig, Drive_without_a_description_has_the_objects_of_its_profile) {
     const Bus bus = good(
-        "[bus]\n[slave 0 a]\ndevice = cia402\naxes = 2\nproduct = 0x10\nvendor = 1\nrevision = 0x20+\noutputs = 6040 6840 2000:1 u8\n"
-        "inputs = 6041\nentries-per-pdo = 2\nsdo 6860 = 8\nsdo 8000 complete = 01 00 02\nregister 0420 u16 = 1000\nidn P-0-150 1 = 07 "
+        "[bus]\n[slave 0 a]\ndevice = cia402\naxes = 2\nproduct = 0x10\nvendor = 1\nrevision = "
+        "0x20+\noutputs = 6040 6840 2000:1 u8\n"
+        "inputs = 6041\nentries-per-pdo = 2\nsdo 6860 = 8\nsdo 8000 complete = 01 00 02\nregister "
+        "0420 u16 = 1000\nidn P-0-150 1 = 07 "
         "00\n");
     const master::Slave& s = bus.setup.slaves[0];
     ASSERT_EQ(s.sync_managers[0].pdos.size(), 2U);
@@ -99,99 +107,138 @@ TEST(EthercatConfig, Drive_without_a_description_has_the_objects_of_its_profile)
 }
 
 TEST(EthercatConfig, Errors_name_the_place_and_what_to_write) {
-    EXPECT_EQ(errors("link = x\n[slav 0]\n"),
-              "m.ethercat:1:1: error: this line is before the first section; begin the file with [bus]\n"
-              "m.ethercat:1:1: error: missing section [bus]; write [bus] and below it link = eth:enp3s0 and cycle = 1ms\n"
-              "m.ethercat:2:1: error: unknown section 'slav'; did you mean 'slave'?");
-    EXPECT_EQ(errors("[bus]\n"), "m.ethercat:1:1: error: the configuration has no slave; write [slave 0 NAME] and below it esi = FILE");
+    EXPECT_EQ(
+        errors("link = x\n[slav 0]\n"),
+        "m.ethercat:1:1: error: this line is before the first section; begin the file with [bus]\n"
+        "m.ethercat:1:1: error: missing section [bus]; write [bus] and below it link = eth:enp3s0 "
+        "and cycle = 1ms\n"
+        "m.ethercat:2:1: error: unknown section 'slav'; did you mean 'slave'?");
+    EXPECT_EQ(errors("[bus]\n"),
+              "m.ethercat:1:1: error: the configuration has no slave; write [slave 0 NAME] and "
+              "below it esi = FILE");
     EXPECT_EQ(
         errors("[bus]\ncycle = 3\nclock = me\n[slave 0]\nesi = none.xml\n"),
         "m.ethercat:2:9: error: invalid cycle '3'; write a time of 10us..1s, as in 1ms or 250us\n"
         "m.ethercat:3:9: error: invalid clock 'me'; write reference, thread or none\n"
-        "m.ethercat:5:7: error: cannot read 'none.xml': No such file or directory; write the path of an ESI file, relative to this file");
+        "m.ethercat:5:7: error: cannot read 'none.xml': No such file or directory; write the path "
+        "of an ESI file, relative to this file");
     EXPECT_EQ(errors("[bus]\n[slave 0 a]\nesi = servo.xml\ndevice = SERVO-2\n"),
-              "m.ethercat:4:10: error: 'servo.xml' does not describe a device 'SERVO-2'; did you mean 'SERVO-1'?");
+              "m.ethercat:4:10: error: 'servo.xml' does not describe a device 'SERVO-2'; did you "
+              "mean 'SERVO-1'?");
     EXPECT_EQ(errors("[bus]\n[slave 0 a]\nesi = servo.xml\n"),
-              "m.ethercat:3:7: error: 'servo.xml' describes several devices; write device = NAME; the devices are: SERVO-1, DIO-8");
+              "m.ethercat:3:7: error: 'servo.xml' describes several devices; write device = NAME; "
+              "the devices are: SERVO-1, DIO-8");
     EXPECT_EQ(errors("[bus]\n[slave 0 a]\nesi = servo.xml\nproduct = 9\n"),
-              "m.ethercat:4:11: error: 'servo.xml' does not describe a product 9; the devices are: SERVO-1, DIO-8");
+              "m.ethercat:4:11: error: 'servo.xml' does not describe a product 9; the devices are: "
+              "SERVO-1, DIO-8");
     const std::string a = "[bus]\n[slave 0 a]\nesi = servo.xml\ndevice = SERVO-1\n";
     EXPECT_EQ(errors(a + "outputs = 6040 6072\n"),
-              "m.ethercat:5:16: error: object 6072:00 is not in the description of 'SERVO-1'; write its type, as in 6072 u16; the types "
+              "m.ethercat:5:16: error: object 6072:00 is not in the description of 'SERVO-1'; "
+              "write its type, as in 6072 u16; the types "
               "are bit, u8, u16, u32, u64, "
               "s8, s16, s32, s64, real32 or real64");
     EXPECT_EQ(errors(a + "outputs = 6040 u32\n"),
-              "m.ethercat:5:11: error: object 6040:00 of 'SERVO-1' has 16 bits, not 32; leave out the type");
-    EXPECT_EQ(errors(a + "outputs = 1602\n"), "m.ethercat:5:11: error: unknown PDO '1602'; the PDOs are: 1600, 1601");
+              "m.ethercat:5:11: error: object 6040:00 of 'SERVO-1' has 16 bits, not 32; leave out "
+              "the type");
+    EXPECT_EQ(errors(a + "outputs = 1602\n"),
+              "m.ethercat:5:11: error: unknown PDO '1602'; the PDOs are: 1600, 1601");
     EXPECT_EQ(errors(a + "outputs = 1600 1601\n"),
-              "m.ethercat:5:11: error: PDOs 1600 and 1601 of 'SERVO-1' exclude each other; assign only one of them");
+              "m.ethercat:5:11: error: PDOs 1600 and 1601 of 'SERVO-1' exclude each other; assign "
+              "only one of them");
     EXPECT_EQ(errors(a + "sdo 6060 = 200\n"),
-              "m.ethercat:5:12: error: invalid value '200' of object 6060:00; write a number of -128..127, decimal or with 0x");
+              "m.ethercat:5:12: error: invalid value '200' of object 6060:00; write a number of "
+              "-128..127, decimal or with 0x");
     EXPECT_EQ(errors(a + "607b.scale = 2\noutput = 6040\n"),
-              "m.ethercat:5:1: error: no PDO of this slave has an object '607b'; the objects are: controlword, target-position, "
+              "m.ethercat:5:1: error: no PDO of this slave has an object '607b'; the objects are: "
+              "controlword, target-position, "
               "statusword, position-actual-value\n"
               "m.ethercat:6:1: error: unknown key 'output' of a slave; did you mean 'outputs'?");
-    EXPECT_EQ(errors("[bus]\n[slave 0 a]\nesi = servo.xml\ndevice = DIO-8\noutputs = 7000:1\ndc = sync0\n[slave 0 a]\ndevice = cia402\n"),
-              "m.ethercat:5:11: error: the PDOs of 'DIO-8' are fixed: it has no CoE mailbox to map objects with; delete the line, or "
+    EXPECT_EQ(errors("[bus]\n[slave 0 a]\nesi = servo.xml\ndevice = DIO-8\noutputs = 7000:1\ndc = "
+                     "sync0\n[slave 0 a]\ndevice = cia402\n"),
+              "m.ethercat:5:11: error: the PDOs of 'DIO-8' are fixed: it has no CoE mailbox to map "
+              "objects with; delete the line, or "
               "assign PDOs: 1600\n"
               "m.ethercat:6:6: error: 'DIO-8' has no distributed clocks; delete the line\n"
               "m.ethercat:7:1: error: duplicate slave name 'a'; first in line 2\n"
               "m.ethercat:7:1: error: duplicate position 0; first in line 2");
     EXPECT_EQ(errors(a + "dc = sync0 2ms\n"),
-              "m.ethercat:5:6: error: invalid dc 'sync0 2ms'; write a shift that is shorter than the cycle");
+              "m.ethercat:5:6: error: invalid dc 'sync0 2ms'; write a shift that is shorter than "
+              "the cycle");
     EXPECT_EQ(errors("[bus]\ncycle = 1ms\nsync-window = 1ns\n[slave alias=0 a]\ndevice = cia402\n"),
-              "m.ethercat:3:15: error: invalid sync-window '1ns'; write a time of 10ns..1s, as in 1ms or 250us\n"
-              "m.ethercat:4:8: error: alias 0 means that a slave has none; write its position, as in [slave 0 NAME]");
-    EXPECT_EQ(errors("[bus]\n[domain slow]\nevery = 100\n[slave 0 a]\ndevice = cia402\ndomain = slow\noutputs = 6040\n"),
-              "m.ethercat:4:1: error: the outputs of 'a' are sent every 100ms, but its watchdog ends after 100ms; write watchdog = 500ms "
+              "m.ethercat:3:15: error: invalid sync-window '1ns'; write a time of 10ns..1s, as in "
+              "1ms or 250us\n"
+              "m.ethercat:4:8: error: alias 0 means that a slave has none; write its position, as "
+              "in [slave 0 NAME]");
+    EXPECT_EQ(errors("[bus]\n[domain slow]\nevery = 100\n[slave 0 a]\ndevice = cia402\ndomain = "
+                     "slow\noutputs = 6040\n"),
+              "m.ethercat:4:1: error: the outputs of 'a' are sent every 100ms, but its watchdog "
+              "ends after 100ms; write watchdog = 500ms "
               "in its section, "
               "watchdog = none, or a shorter cycle");
-    EXPECT_EQ(errors("[bus]\n[domain slow]\nevery = 100\n[slave 0 a]\ndevice = cia402\ndomain = slow\noutputs = 6040\nwatchdog = 500ms\n"),
+    EXPECT_EQ(errors("[bus]\n[domain slow]\nevery = 100\n[slave 0 a]\ndevice = cia402\ndomain = "
+                     "slow\noutputs = 6040\nwatchdog = 500ms\n"),
               "");
     EXPECT_EQ(errors("[bus]\n[slave 0]\ndevice = x\n[slave z]\n[slave 1]\ntype = q\n"),
-              "m.ethercat:3:10: error: unknown device 'x'; write device = cia402, or esi = FILE for a device with a description\n"
-              "m.ethercat:4:8: error: invalid slave section: expected a position of 0..65535 and a name; write [slave 0 NAME], [slave "
+              "m.ethercat:3:10: error: unknown device 'x'; write device = cia402, or esi = FILE "
+              "for a device with a description\n"
+              "m.ethercat:4:8: error: invalid slave section: expected a position of 0..65535 and a "
+              "name; write [slave 0 NAME], [slave "
               "alias=5 NAME] or [slave id=5 NAME]\n"
               "m.ethercat:6:8: error: unknown type 'q'; write [type q]");
 }
 
 TEST(EthercatConfig, Plan_shows_the_arithmetic) {
     const Plan p = plan(good(servo));
-    EXPECT_EQ(p.text,
-              "frame 1, every cycle: 84 bytes\n"
-              "  FRMW  10 + 8 + 2 = 20 bytes: time of the reference clock\n"
-              "  LRW   10 + 36 + 2 = 48 bytes: domain default, 22 out, 12 in, 2 mailbox states, working counter 6\n"
-              "frame 2, every 4 cycles: 60 bytes\n"
-              "  FRMW  10 + 8 + 2 = 20 bytes: time of the reference clock\n"
-              "  LRW   10 + 3 + 2 = 15 bytes: domain io, 1 out, 1 in, 1 mailbox state, working counter 3\n"
-              "states and mailboxes, counted in every cycle: 60 bytes, more where the cycle has time\n"
-              "cycle 0 of 4: frame 1, frame 2, states and mailboxes, 22.08 us\n"
-              "cycles 1 to 3 of 4: frame 1, states and mailboxes, 15.36 us\n"
-              "longest cycle: 3 frames, 204 bytes: (204 + 3 x 24) x 80 ns = 22.08 us at 100 Mbit/s\n"
-              "through 3 slaves x 1.00 us = 3.00 us\n"
-              "cycle 1000.00 us: wire load 2.2 %, needed 100.00 us + 22.08 us + 3.00 us = 125.08 us\n"
-              "input to output, default to default, at most 3 x 1000.00 us = 3000.00 us, at SYNC0\n"
-              "input to output, default to io, at most 6 x 1000.00 us = 6000.00 us, at SYNC0\n"
-              "input to output, io to default, at most 6 x 1000.00 us = 6000.00 us, at SYNC0\n"
-              "input to output, io to io, at most 8 x 1000.00 us + 125.08 us = 8125.08 us\n");
+    EXPECT_EQ(
+        p.text,
+        "frame 1, every cycle: 84 bytes\n"
+        "  FRMW  10 + 8 + 2 = 20 bytes: time of the reference clock\n"
+        "  LRW   10 + 36 + 2 = 48 bytes: domain default, 22 out, 12 in, 2 mailbox states, working "
+        "counter 6\n"
+        "frame 2, every 4 cycles: 60 bytes\n"
+        "  FRMW  10 + 8 + 2 = 20 bytes: time of the reference clock\n"
+        "  LRW   10 + 3 + 2 = 15 bytes: domain io, 1 out, 1 in, 1 mailbox state, working counter "
+        "3\n"
+        "states and mailboxes, counted in every cycle: 60 bytes, more where the cycle has time\n"
+        "cycle 0 of 4: frame 1, frame 2, states and mailboxes, 22.08 us\n"
+        "cycles 1 to 3 of 4: frame 1, states and mailboxes, 15.36 us\n"
+        "longest cycle: 3 frames, 204 bytes: (204 + 3 x 24) x 80 ns = 22.08 us at 100 Mbit/s\n"
+        "through 3 slaves x 1.00 us = 3.00 us\n"
+        "cycle 1000.00 us: wire load 2.2 %, needed 100.00 us + 22.08 us + 3.00 us = 125.08 us\n"
+        "input to output, default to default, at most 3 x 1000.00 us = 3000.00 us, at SYNC0\n"
+        "input to output, default to io, at most 6 x 1000.00 us = 6000.00 us, at SYNC0\n"
+        "input to output, io to default, at most 6 x 1000.00 us = 6000.00 us, at SYNC0\n"
+        "input to output, io to io, at most 8 x 1000.00 us + 125.08 us = 8125.08 us\n");
     EXPECT_EQ(p.frames, 3U);
     EXPECT_EQ(p.input_to_output_ns, 8'125'080);
     EXPECT_TRUE(p.fits);
 }
 
 TEST(EthercatConfig, Plan_has_the_frames_that_the_master_sends) {
-    std::string text = "[bus]\ncycle = 2ms\nclock = thread\n[defaults]\ndevice = cia402\noutputs = 2000:1 u32\ninputs = 2001:1 u32\n";
-    for (int n = 0; n < 200; ++n) text += "[slave " + std::to_string(n) + " s" + std::to_string(n) + "]\n" + (n == 199 ? "lrw = no\n" : "");
+    std::string text =
+        "[bus]\ncycle = 2ms\nclock = thread\n[defaults]\ndevice = cia402\noutputs = 2000:1 "
+        "u32\ninputs = 2001:1 u32\n";
+    for (int n = 0; n < 200; ++n) {
+        text += "[slave " + std::to_string(n) + " s" + std::to_string(n) + "]\n" +
+                (n == 199 ? "lrw = no\n" : "");
+    }
     const Bus bus = good(text);
     const Plan p = plan(bus);
-    std::size_t outputs = 0, inputs = 0, states = 0;
+    std::size_t outputs = 0;
+    std::size_t inputs = 0;
+    std::size_t states = 0;
     unsigned wkc = 0;
     ASSERT_EQ(p.cyclic.size(), 2U) << "1800 bytes";
     for (const PlannedFrame& f : p.cyclic) {
         EXPECT_LE(f.bytes, 1514U);
         for (const PlannedDatagram& d : f.datagrams) {
-            outputs += d.output_bytes, inputs += d.input_bytes, states += d.mailbox_states, wkc += d.expected_wkc;
-            EXPECT_EQ(d.data_bytes, d.domain.empty() ? 8 : d.output_bytes + d.input_bytes + d.mailbox_states);
+            outputs += d.output_bytes;
+            inputs += d.input_bytes;
+            states += d.mailbox_states;
+
+            wkc += d.expected_wkc;
+            EXPECT_EQ(d.data_bytes,
+                      d.domain.empty() ? 8 : d.output_bytes + d.input_bytes + d.mailbox_states);
         }
     }
     EXPECT_EQ(outputs, 800U);
@@ -205,14 +252,25 @@ TEST(EthercatConfig, Plan_has_the_frames_that_the_master_sends) {
 
 TEST(EthercatConfig, Written_file_is_read_again_without_errors) {
     Found drive;
-    drive.name = "Axis X", drive.device = "SERVO-1", drive.vendor = 0xcafe, drive.product = 0x402, drive.revision = 0x10001,
+    drive.name = "Axis X";
+    drive.device = "SERVO-1";
+    drive.vendor = 0xcafe;
+    drive.product = 0x402;
+
+    drive.revision = 0x10001;
     drive.assign_activate = 0x300;
-    drive.rx = {{0x1601, 2, 0, "", 0, {{0x6040, 0, "", 6, 16, 0}, {0, 0, "", 0, 8, 0}, {0x7000, 1, "", 1, 1, 0}}},
+    drive.rx = {{0x1601,
+                 2,
+                 0,
+                 "",
+                 0,
+                 {{0x6040, 0, "", 6, 16, 0}, {0, 0, "", 0, 8, 0}, {0x7000, 1, "", 1, 1, 0}}},
                 {0x1602, 0xff, 0, "", 0, {{0x6040, 0, "", 6, 16, 0}}}};
     drive.tx = {{0x1a00, 3, 0, "", 0, {{0x6064, 0, "", 4, 32, 0}}}};
     const std::string text = write("eth:enp3s0", 1'000'000, {drive, drive});
     EXPECT_TRUE(
-        text.starts_with("[bus]\nlink  = eth:enp3s0\ncycle = 1ms\n\n[slave 0 axis-x]  # SERVO-1\nvendor   = 0xCAFE\nproduct  = "
+        text.starts_with("[bus]\nlink  = eth:enp3s0\ncycle = 1ms\n\n[slave 0 axis-x]  # "
+                         "SERVO-1\nvendor   = 0xCAFE\nproduct  = "
                          "0x402\nrevision = 0x10001+  # or a higher one\n"
                          "outputs = 6040 u16, gap 8, 7000:1 bit\ninputs  = 6064 s32\n"))
         << text;
@@ -235,14 +293,20 @@ TEST(EthercatConfig, Any_bytes_are_read_without_harm) {
             default: text.insert(at, text.substr(random() % text.size(), random() % 40)); break;
             }
         }
-        for (const Bus& bus : read(text, "m.ethercat", read_test_file).buses) plan(bus);
+        for (const Bus& bus : read(text, "m.ethercat", read_test_file).buses) {
+            plan(bus);
+        }
     }
 }
 
 TEST(EthercatConfig, Ethernet_over_EtherCAT_has_settings_for_the_slave_and_an_interface_here) {
-    const std::string bus = "[bus]\nlink = sim:line\n", rest = "vendor = 1\nproduct = 2\noutputs = none\ninputs = none\n";
-    const Bus one = good(bus + "[slave 0 panel]\n" + rest + "eoe = 192.168.2.10/28 host 192.168.2.1 dns 10.0.0.1\n[slave 1 b]\n" + rest +
-                         "eoe = dhcp interface eth7\n[slave 2 c]\n" + rest + "eoe = yes\n[slave 3 d]\n" + rest + "eoe = no\n");
+    const std::string bus = "[bus]\nlink = sim:line\n";
+
+    const std::string rest = "vendor = 1\nproduct = 2\noutputs = none\ninputs = none\n";
+    const Bus one = good(bus + "[slave 0 panel]\n" + rest +
+                         "eoe = 192.168.2.10/28 host 192.168.2.1 dns 10.0.0.1\n[slave 1 b]\n" +
+                         rest + "eoe = dhcp interface eth7\n[slave 2 c]\n" + rest +
+                         "eoe = yes\n[slave 3 d]\n" + rest + "eoe = no\n");
     const auto& slaves = one.setup.slaves;
     ASSERT_TRUE(slaves[0].eoe && slaves[0].eoe_ip);
     const eoe::Ip& ip = *slaves[0].eoe_ip;
@@ -261,38 +325,47 @@ TEST(EthercatConfig, Ethernet_over_EtherCAT_has_settings_for_the_slave_and_an_in
     EXPECT_EQ(one.slaves[1].eoe.name, "eth7");
     EXPECT_TRUE(slaves[2].eoe && !slaves[2].eoe_ip);
     EXPECT_FALSE(slaves[3].eoe);
-    const Bus two = good(bus + "eoe-switch = eoe0 192.168.2.1/24\n[slave 0 a]\n" + rest + "eoe = 192.168.2.10/24\n");
+    const Bus two = good(bus + "eoe-switch = eoe0 192.168.2.1/24\n[slave 0 a]\n" + rest +
+                         "eoe = 192.168.2.10/24\n");
     EXPECT_EQ(two.eoe_switch.name, "eoe0");
     EXPECT_EQ(two.eoe_switch.ip, 0xc0a80201U);
 
     const std::string usual =
-        "write yes, dhcp, or an address with its prefix, as in 192.168.2.10/24; gateway ADDRESS, dns ADDRESS, mac "
+        "write yes, dhcp, or an address with its prefix, as in 192.168.2.10/24; gateway ADDRESS, "
+        "dns ADDRESS, mac "
         "ADDRESS, interface NAME and host ADDRESS may follow";
-    for (const char* wrong : {"192.168.2.10", "192.168.2.10/33", "192.168.2.10/24 gateway", "192.168.2.10/24 gateway x",
-                              "yes gateway 10.0.0.1", "yes mac 01:00:00:00:00:01", "yes interface a/b", "maybe"})
-        EXPECT_NE(errors(bus + "[slave 0 a]\n" + rest + "eoe = " + wrong + "\n").find(usual), std::string::npos)
+    for (const char* wrong :
+         {"192.168.2.10", "192.168.2.10/33", "192.168.2.10/24 gateway", "192.168.2.10/24 gateway x",
+          "yes gateway 10.0.0.1", "yes mac 01:00:00:00:00:01", "yes interface a/b", "maybe"}) {
+        EXPECT_NE(errors(bus + "[slave 0 a]\n" + rest + "eoe = " + wrong + "\n").find(usual),
+                  std::string::npos)
             << errors(bus + "[slave 0 a]\n" + rest + "eoe = " + wrong + "\n");
+    }
     EXPECT_EQ(errors(bus + "[slave 0 a-very-long-name]\n" + rest + "eoe = yes\n"),
-              "m.ethercat:3:1: error: 'eoe-a-very-long-name' is too long for the name of an interface: at most 15 characters; write a "
+              "m.ethercat:3:1: error: 'eoe-a-very-long-name' is too long for the name of an "
+              "interface: at most 15 characters; write a "
               "shorter one "
               "at the end of `eoe`: interface eoe0");
-    EXPECT_EQ(
-        errors(bus + "[slave 0 a]\n" + rest + "eoe = 10.0.0.2/8\n[slave 1 b]\n" + rest + "eoe = 10.0.0.2/8 interface eoe-a\n"),
-        "m.ethercat:9:1: error: duplicate interface 'eoe-a'; first in line 3; for one interface of all, write eoe-switch = eoe-a in [bus]\n"
-        "m.ethercat:9:1: error: duplicate IP address 10.0.0.2; first in line 3");
-    EXPECT_EQ(
-        errors(bus + "eoe-switch = eoe0\n[slave 0 a]\n" + rest + "eoe = yes interface x\n"),
-        "m.ethercat:4:1: error: `interface` and `host` of 'a' do not apply: all slaves are at eoe0; delete them from `eoe`, or delete "
-        "`eoe-switch` in [bus]");
+    EXPECT_EQ(errors(bus + "[slave 0 a]\n" + rest + "eoe = 10.0.0.2/8\n[slave 1 b]\n" + rest +
+                     "eoe = 10.0.0.2/8 interface eoe-a\n"),
+              "m.ethercat:9:1: error: duplicate interface 'eoe-a'; first in line 3; for one "
+              "interface of all, write eoe-switch = eoe-a in [bus]\n"
+              "m.ethercat:9:1: error: duplicate IP address 10.0.0.2; first in line 3");
+    EXPECT_EQ(errors(bus + "eoe-switch = eoe0\n[slave 0 a]\n" + rest + "eoe = yes interface x\n"),
+              "m.ethercat:4:1: error: `interface` and `host` of 'a' do not apply: all slaves are "
+              "at eoe0; delete them from `eoe`, or delete "
+              "`eoe-switch` in [bus]");
 }
 
 TEST(EthercatConfig, Reaction_to_a_clock_out_of_step_is_chosen) {
-    const std::string slave = "[slave 0 a]\nvendor = 1\nproduct = 2\noutputs = none\ninputs = none\n";
+    const std::string slave =
+        "[slave 0 a]\nvendor = 1\nproduct = 2\noutputs = none\ninputs = none\n";
     EXPECT_EQ(good("[bus]\n" + slave).setup.dc_loss, master::DcLoss::report);
     const Bus bus = good("[bus]\ndc-loss = safeop\ndc-loss-time = 20ms\n" + slave);
     EXPECT_EQ(bus.setup.dc_loss, master::DcLoss::safeop);
     EXPECT_EQ(bus.setup.dc_loss_ns, 20'000'000);
-    EXPECT_NE(errors("[bus]\ndc-loss = stop\n" + slave).find("report or safeop"), std::string::npos);
+    EXPECT_NE(errors("[bus]\ndc-loss = stop\n" + slave).find("report or safeop"),
+              std::string::npos);
 }
 
 }  // namespace

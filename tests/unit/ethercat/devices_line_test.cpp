@@ -21,67 +21,93 @@ struct Devices : testing::Test {
         device = *make(name, options);
         sii = sii::parse(device.sii);
         EXPECT_TRUE(sii.problems.empty()) << sii.problems.front();
-        w.line.add({.controller = {.dc = device.dc}, .sii = device.sii, .application = device.firmware.get()});
+        w.line.add({.controller = {.dc = device.dc},
+                    .sii = device.sii,
+                    .application = device.firmware.get()});
         w.line.power_on(0);
     }
-    void write(std::uint16_t address, Bytes bytes) { w.send(Command::apwr, at_position(0, address), std::move(bytes)); }
+    void write(std::uint16_t address, Bytes bytes) {
+        w.send(Command::apwr, at_position(0, address), std::move(bytes));
+    }
     Bytes read(std::uint16_t address, std::size_t bytes) {
         w.send(Command::aprd, at_position(0, address), Bytes(bytes));
         return w.data;
     }
     void sync_manager(unsigned n, std::uint16_t start, std::size_t length, std::uint8_t control) {
         Bytes b(8);
-        put(&b[0], start), put(&b[2], static_cast<std::uint16_t>(length));
-        b[4] = control, b[6] = length != 0;
+        put(&b[0], start);
+        put(&b[2], static_cast<std::uint16_t>(length));
+        b[4] = control;
+        b[6] = length != 0;
         write(registers::sync_manager_at(n), b);
     }
     /// Returns AL status, with the code in the upper half.
     std::uint32_t request(State s, unsigned extra = 0) {
-        write(registers::al_control, {static_cast<std::uint8_t>(static_cast<unsigned>(s) | extra), 0});
+        write(registers::al_control,
+              {static_cast<std::uint8_t>(static_cast<unsigned>(s) | extra), 0});
         return status();
     }
     std::uint32_t status() {
         const Bytes b = read(registers::al_status, 6);
-        return get<std::uint16_t>(&b[0]) | static_cast<std::uint32_t>(get<std::uint16_t>(&b[4])) << 16;
+        return get<std::uint16_t>(&b[0]) | static_cast<std::uint32_t>(get<std::uint16_t>(&b[4]))
+                                               << 16;
     }
     void mailboxes(const sii::Mailboxes& m) {
-        sync_manager(0, m.receive.start, m.receive.size, 0x26), sync_manager(1, m.send.start, m.send.size, 0x22);
+        sync_manager(0, m.receive.start, m.receive.size, 0x26);
+
+        sync_manager(1, m.send.start, m.send.size, 0x22);
     }
     void to_preop() {
-        if (sii.has_mailbox()) mailboxes(sii.mailboxes);
+        if (sii.has_mailbox()) {
+            mailboxes(sii.mailboxes);
+        }
         ASSERT_EQ(request(State::preop), 2U);
     }
     void process_data() {
-        for (unsigned n = 0; n < sii.sync_managers.size(); ++n)
-            if (const auto& sm = sii.sync_managers[n]; sm.type == sii::SmType::outputs || sm.type == sii::SmType::inputs)
+        for (unsigned n = 0; n < sii.sync_managers.size(); ++n) {
+            if (const auto& sm = sii.sync_managers[n];
+                sm.type == sii::SmType::outputs || sm.type == sii::SmType::inputs) {
                 sync_manager(n, sm.start, sm.length, sm.control);
+            }
+        }
     }
     const sii::SyncManager& area(sii::SmType type) {
-        for (const auto& sm : sii.sync_managers)
+        for (const auto& sm : sii.sync_managers) {
             if (sm.type == type) return sm;
+        }
         return sii.sync_managers.front();
     }
     void outputs(const Bytes& b) { write(area(sii::SmType::outputs).start, b); }
-    Bytes inputs() { return read(area(sii::SmType::inputs).start, area(sii::SmType::inputs).length); }
+    Bytes inputs() {
+        return read(area(sii::SmType::inputs).start, area(sii::SmType::inputs).length);
+    }
     void to_op(const Bytes& out) {
         to_preop();
         process_data();
         ASSERT_EQ(request(State::safeop), 4U);
-        if (!out.empty()) outputs(out);
+        if (!out.empty()) {
+            outputs(out);
+        }
         request(State::op);
         ASSERT_EQ(status(), 8U);
     }
     void post(MailboxType type, const Bytes& payload) {
         Bytes b(sii.mailboxes.receive.size);
-        write_mailbox_header(b.data(), payload.size(), 0, type, counter = next_mailbox_counter(counter));
+        write_mailbox_header(b.data(), payload.size(), 0, type,
+                             counter = next_mailbox_counter(counter));
         std::copy(payload.begin(), payload.end(), b.begin() + mailbox_header_bytes);
         EXPECT_EQ(w.send(Command::apwr, at_position(0, sii.mailboxes.receive.start), b), 1);
     }
     /// Returns the payload of the next answer; empty if there is none.
     Bytes fetch(MailboxType type) {
-        if (w.send(Command::aprd, at_position(0, sii.mailboxes.send.start), Bytes(sii.mailboxes.send.size)) != 1) return {};
+        if (w.send(Command::aprd, at_position(0, sii.mailboxes.send.start),
+                   Bytes(sii.mailboxes.send.size)) != 1) {
+            return {};
+        }
         const auto m = read_mailbox(w.data);
-        if (!m) return {};
+        if (!m) {
+            return {};
+        }
         EXPECT_EQ(m->type, type);
         return {m->payload.begin(), m->payload.end()};
     }
@@ -89,15 +115,18 @@ struct Devices : testing::Test {
         post(type, payload);
         return fetch(type);
     }
-    Bytes sdo(std::uint8_t command, std::uint16_t index, std::uint8_t sub, std::uint32_t value = 0, const Bytes& data = {}) {
+    Bytes sdo(std::uint8_t command, std::uint16_t index, std::uint8_t sub, std::uint32_t value = 0,
+              const Bytes& data = {}) {
         Bytes b(coe::sdo_bytes);
         coe::write_sdo(b.data(), coe::Service::sdo_request, {command, index, sub, value});
         b.insert(b.end(), data.begin(), data.end());
         return ask(MailboxType::coe, b);
     }
     /// Returns the abort code of a download of up to 4 bytes; 0: accepted.
-    std::uint32_t download(std::uint16_t index, std::uint8_t sub, std::uint32_t value, std::size_t bytes) {
-        const auto r = coe::read_sdo(sdo(coe::expedited_command(coe::command::download, bytes), index, sub, value));
+    std::uint32_t download(std::uint16_t index, std::uint8_t sub, std::uint32_t value,
+                           std::size_t bytes) {
+        const auto r = coe::read_sdo(
+            sdo(coe::expedited_command(coe::command::download, bytes), index, sub, value));
         return r && r->is(coe::command::abort) ? r->value : 0;
     }
     std::uint32_t upload(std::uint16_t index, std::uint8_t sub) {
@@ -175,7 +204,8 @@ TEST_F(Devices, Remapping_changes_the_length_of_the_sync_manager) {
     EXPECT_EQ(assignment, (Bytes{0, 0x30, 0x53, 0x12, 0x1c, 0, 1, 0, 0, 0x16})) << "padded count";
     process_data();
     EXPECT_EQ(request(State::safeop), 0x1d0012U);
-    sync_manager(2, 0, 0, 0), sync_manager(2, area(sii::SmType::outputs).start, 6, 0x64);
+    sync_manager(2, 0, 0, 0);
+    sync_manager(2, area(sii::SmType::outputs).start, 6, 0x64);
     EXPECT_EQ(request(State::safeop, al_error), 4U);
 }
 
@@ -183,7 +213,9 @@ TEST_F(Devices, Servo_follows_its_target_position) {
     start("servo");
     const auto frame = [&](std::uint16_t control, std::int32_t position, std::uint8_t mode = 8) {
         Bytes b(13);
-        put(&b[0], control), b[2] = mode, put(&b[3], position);
+        put(&b[0], control);
+        b[2] = mode;
+        put(&b[3], position);
         outputs(b);
         return get<std::uint16_t>(inputs().data());
     };
@@ -192,7 +224,9 @@ TEST_F(Devices, Servo_follows_its_target_position) {
     EXPECT_EQ(frame(6, 0) & 0x6f, 0x21);
     EXPECT_EQ(frame(7, 0) & 0x6f, 0x23);
     EXPECT_EQ(frame(15, 0) & 0x6f, 0x27);
-    for (int n = 1; n <= 20; ++n) frame(15, n * 10);
+    for (int n = 1; n <= 20; ++n) {
+        frame(15, n * 10);
+    }
     EXPECT_EQ(get<std::int32_t>(&inputs()[3]), 200);
     auto& servo = dynamic_cast<Servo&>(device.firmware->behaviour());
     servo.axis(0).fail(0x2310);
@@ -207,15 +241,19 @@ TEST_F(Devices, Long_objects_travel_in_segments) {
     start("mailbox_device");
     to_preop();
     Bytes data(2000);
-    for (std::size_t i = 0; i < data.size(); ++i) data[i] = static_cast<std::uint8_t>(i * 7);
-    const std::size_t mailbox = sii.mailboxes.receive.size, first = coe::normal_capacity(mailbox);
+    for (std::size_t i = 0; i < data.size(); ++i) {
+        data[i] = static_cast<std::uint8_t>(i * 7);
+    }
+    const std::size_t mailbox = sii.mailboxes.receive.size;
+    const std::size_t first = coe::normal_capacity(mailbox);
     sdo(coe::command::download | coe::command::size_given, 0x2000, 0, 2000,
         {data.begin(), data.begin() + static_cast<std::ptrdiff_t>(first)});
     bool toggle = false;
     for (std::size_t at = first; at < data.size(); toggle = !toggle) {
         const std::size_t n = std::min(coe::segment_capacity(mailbox), data.size() - at);
         Bytes b(mailbox);
-        b.resize(coe::write_segment(b.data(), coe::Service::sdo_request, 0, toggle, at + n == data.size(), {&data[at], n}));
+        b.resize(coe::write_segment(b.data(), coe::Service::sdo_request, 0, toggle,
+                                    at + n == data.size(), {&data[at], n}));
         const Bytes answer = ask(MailboxType::coe, b);
         ASSERT_EQ(answer[2], 0x20 | (toggle ? 0x10 : 0));
         at += n;
@@ -243,7 +281,9 @@ TEST_F(Devices, Other_protocols_answer) {
     EXPECT_EQ(ask(MailboxType::voe, {1, 2, 3, 4, 5, 6, 7}), (Bytes{1, 2, 3, 4, 5, 6, 7}));
     Bytes name(foe::header_bytes);
     foe::write_header(name.data(), foe::Opcode::read, 0);
-    for (const char c : std::string_view("parameters")) name.push_back(static_cast<std::uint8_t>(c));
+    for (const char c : std::string_view("parameters")) {
+        name.push_back(static_cast<std::uint8_t>(c));
+    }
     Bytes file = ask(MailboxType::foe, name);
     EXPECT_EQ(foe::read(file)->text(), "gain = 1\n");
     Bytes soe_read(soe::header_bytes);
@@ -251,9 +291,12 @@ TEST_F(Devices, Other_protocols_answer) {
     EXPECT_EQ(ask(MailboxType::soe, soe_read), (Bytes{2, 0x40, 24, 0, 2, 0, 2, 0, 36, 0}));
     Bytes ads(aoe::header_bytes + aoe::address_bytes);
     aoe::Header h;
-    h.command = aoe::Command::read, h.length = aoe::address_bytes, h.invoke = 9;
+    h.command = aoe::Command::read;
+    h.length = aoe::address_bytes;
+    h.invoke = 9;
     aoe::write(ads.data(), h);
-    put(&ads[32], aoe::group_sdo), put(&ads[36], aoe::sdo_offset(0x1018, 2)), put<std::uint32_t>(&ads[40], 4);
+    put(&ads[32], aoe::group_sdo), put(&ads[36], aoe::sdo_offset(0x1018, 2)),
+        put<std::uint32_t>(&ads[40], 4);
     const Bytes answer = ask(MailboxType::aoe, ads);
     ASSERT_EQ(answer.size(), aoe::header_bytes + 12U);
     EXPECT_EQ(get<std::uint32_t>(&answer[40]), sii.product);
@@ -264,8 +307,9 @@ TEST_F(Devices, Mailbox_device_answers_ARP_and_echo_once_it_has_an_address) {
     to_preop();
     const auto exchange = [&](const Bytes& frame) {
         eoe::Splitter out(frame, 1, sii.mailboxes.receive.size);
-        for (Bytes b(sii.mailboxes.receive.size); const auto n = out.next(b.data());)
+        for (Bytes b(sii.mailboxes.receive.size); const auto n = out.next(b.data());) {
             post(MailboxType::eoe, {b.begin(), b.begin() + static_cast<std::ptrdiff_t>(n)});
+        }
         eoe::Joiner in;
         Bytes back;
         for (unsigned n = 0; n < 10 && back.empty(); ++n) {
@@ -276,27 +320,42 @@ TEST_F(Devices, Mailbox_device_answers_ARP_and_echo_once_it_has_an_address) {
         }
         return back;
     };
-    const Bytes host{2, 0, 0, 0, 0, 9}, own{2, 0xec, 0xa7, 0, 0, 1};
+    const Bytes host{2, 0, 0, 0, 0, 9};
+    const Bytes own{2, 0xec, 0xa7, 0, 0, 1};
     const auto joined = [](std::initializer_list<Bytes> parts) {
         Bytes all;
-        for (const Bytes& p : parts) all.insert(all.end(), p.begin(), p.end());
+        for (const Bytes& p : parts) {
+            all.insert(all.end(), p.begin(), p.end());
+        }
         return all;
     };
     const Bytes everyone(6, 0xff), host_ip{192, 168, 2, 1}, own_ip{192, 168, 2, 10};
-    const Bytes ask_mac = joined({everyone, host, {8, 6, 0, 1, 8, 0, 6, 4, 0, 1}, host, host_ip, Bytes(6), own_ip, Bytes(18)});
+    const Bytes ask_mac = joined({everyone,
+                                  host,
+                                  {8, 6, 0, 1, 8, 0, 6, 4, 0, 1},
+                                  host,
+                                  host_ip,
+                                  Bytes(6),
+                                  own_ip,
+                                  Bytes(18)});
     EXPECT_TRUE(exchange(ask_mac).empty()) << "it has no address yet";
 
     eoe::Ip ip;
-    ip.flags = 0x1f, ip.address = 0xc0a8020a, ip.mask = 0xffffff00;
+    ip.flags = 0x1f;
+    ip.address = 0xc0a8020a;
+    ip.mask = 0xffffff00;
     std::copy(own.begin(), own.end(), ip.mac.begin());
     Bytes settings(eoe::header_bytes + eoe::largest_ip);
     eoe::Header h;
-    h.type = eoe::Type::set_ip, h.last = true;
+    h.type = eoe::Type::set_ip;
+    h.last = true;
     eoe::write(settings.data(), h);
     settings.resize(eoe::header_bytes + eoe::write_ip(&settings[eoe::header_bytes], ip));
     EXPECT_EQ(ask(MailboxType::eoe, settings), (Bytes{3, 1, 0, 0}));
 
-    EXPECT_EQ(exchange(ask_mac), joined({host, own, {8, 6, 0, 1, 8, 0, 6, 4, 0, 2}, own, own_ip, host, host_ip, Bytes(18)}));
+    EXPECT_EQ(
+        exchange(ask_mac),
+        joined({host, own, {8, 6, 0, 1, 8, 0, 6, 4, 0, 2}, own, own_ip, host, host_ip, Bytes(18)}));
     Bytes other = ask_mac;
     other[41] = 11;
     EXPECT_TRUE(exchange(other).empty()) << "the address of another host";
@@ -304,17 +363,29 @@ TEST_F(Devices, Mailbox_device_answers_ARP_and_echo_once_it_has_an_address) {
     // Echo request with 300 bytes; checksums computed by hand: 0x0000 - sum over the words.
     const auto summed = [](Bytes bytes, std::size_t at) {
         std::uint32_t sum = 0;
-        for (std::size_t n = 0; n < bytes.size(); n += 2) sum += static_cast<std::uint32_t>(bytes[n] << 8 | bytes[n + 1]);
-        while (sum > 0xffff) sum = (sum & 0xffff) + (sum >> 16);
-        bytes[at] = static_cast<std::uint8_t>(~sum >> 8), bytes[at + 1] = static_cast<std::uint8_t>(~sum);
+        for (std::size_t n = 0; n < bytes.size(); n += 2) {
+            sum += static_cast<std::uint32_t>(bytes[n] << 8 | bytes[n + 1]);
+        }
+        while (sum > 0xffff) {
+            sum = (sum & 0xffff) + (sum >> 16);
+        }
+        bytes[at] = static_cast<std::uint8_t>(~sum >> 8);
+
+        bytes[at + 1] = static_cast<std::uint8_t>(~sum);
         return bytes;
     };
-    const auto ping = [&](std::uint8_t type, std::uint8_t time_to_live, const Bytes& to, const Bytes& from, const Bytes& to_ip,
-                          const Bytes& from_ip) {
-        const Bytes header = summed(joined({{0x45, 0, 1, 0x48, 0, 1, 0x40, 0, time_to_live, 1, 0, 0}, from_ip, to_ip}), 10);
-        return joined({to, from, {8, 0}, header, summed(joined({{type, 0, 0, 0, 7, 7, 0, 1}, Bytes(300, 0x5a)}), 2)});
+    const auto ping = [&](std::uint8_t type, std::uint8_t time_to_live, const Bytes& to,
+                          const Bytes& from, const Bytes& to_ip, const Bytes& from_ip) {
+        const Bytes header = summed(
+            joined({{0x45, 0, 1, 0x48, 0, 1, 0x40, 0, time_to_live, 1, 0, 0}, from_ip, to_ip}), 10);
+        return joined({to,
+                       from,
+                       {8, 0},
+                       header,
+                       summed(joined({{type, 0, 0, 0, 7, 7, 0, 1}, Bytes(300, 0x5a)}), 2)});
     };
-    EXPECT_EQ(exchange(ping(8, 32, own, host, own_ip, host_ip)), ping(0, 64, host, own, host_ip, own_ip));
+    EXPECT_EQ(exchange(ping(8, 32, own, host, own_ip, host_ip)),
+              ping(0, 64, host, own, host_ip, own_ip));
     Bytes damaged = ping(8, 32, own, host, own_ip, host_ip);
     damaged[100] ^= 1;
     EXPECT_TRUE(exchange(damaged).empty());
@@ -324,14 +395,17 @@ TEST_F(Devices, Mailbox_device_answers_ARP_and_echo_once_it_has_an_address) {
 TEST_F(Devices, Servo_reports_switch_on_disabled_in_PRE_OP_on_every_axis) {
     start("servo", {.axes = 2});
     to_preop();
-    for (unsigned axis = 0; axis < 2; ++axis)
-        EXPECT_EQ(dynamic_cast<Servo&>(device.firmware->behaviour()).axis(axis).statusword(), 0x250) << axis;
+    for (unsigned axis = 0; axis < 2; ++axis) {
+        EXPECT_EQ(dynamic_cast<Servo&>(device.firmware->behaviour()).axis(axis).statusword(), 0x250)
+            << axis;
+    }
     EXPECT_EQ(upload(0x6041, 0) & 0xffff, 0x250U);
     EXPECT_EQ(upload(0x6841, 0) & 0xffff, 0x250U);
 }
 
 TEST(DeviceLine, Description_reports_what_is_invalid) {
-    const auto good = read_line("# line\ncoupler\nservo axes=2 alias=5 serial=1 dc=required\ndigital_in bits=16\n");
+    const auto good = read_line(
+        "# line\ncoupler\nservo axes=2 alias=5 serial=1 dc=required\ndigital_in bits=16\n");
     EXPECT_TRUE(good.messages.empty());
     ASSERT_EQ(make_line(good).size(), 3U);
     EXPECT_EQ(sii::parse(make_line(good)[1].sii).alias(), 5);

@@ -18,19 +18,28 @@ using namespace hal::ethercat;
 
 /// Follows every request at once, and keeps what the master wrote.
 struct Firmware : esc::Application {
-    int runs = 0, starts = 0;
+    int runs = 0;
+    int starts = 0;
     std::vector<std::int64_t> times;
     std::vector<std::uint8_t> input;  ///< written to sync manager 3 at each run
-    bool follow = true, trips = false;
+    bool follow = true;
+    bool trips = false;
 
     void power_on(esc::Pdi&) noexcept override { ++starts; }
     void run(esc::Pdi& pdi, std::int64_t now_ns) noexcept override {
         ++runs;
         times.push_back(now_ns);
-        if (!input.empty()) pdi.write_sync_manager(3, input);
-        if (follow)
-            if (const auto control = pdi.take_al_control()) pdi.set_al_status(*control & 0x0f, 0);
-        if (trips && pdi.watchdog_expired() && pdi.al_status() == 8) pdi.set_al_status(0x14, 0x1b);
+        if (!input.empty()) {
+            pdi.write_sync_manager(3, input);
+        }
+        if (follow) {
+            if (const auto control = pdi.take_al_control()) {
+                pdi.set_al_status(*control & 0x0f, 0);
+            }
+        }
+        if (trips && pdi.watchdog_expired() && pdi.al_status() == 8) {
+            pdi.set_al_status(0x14, 0x1b);
+        }
     }
 };
 
@@ -66,8 +75,9 @@ struct World {
     bool send(std::vector<Item>& items) {
         FrameWriter writer(frame, {0x10, 0, 0, 0, 0, 1});
         for (std::size_t i = 0; i < items.size(); ++i) {
-            std::uint8_t* to = writer.add(items[i].command, static_cast<std::uint8_t>(i), items[i].address,
-                                          static_cast<std::uint16_t>(items[i].data.size()));
+            std::uint8_t* to =
+                writer.add(items[i].command, static_cast<std::uint8_t>(i), items[i].address,
+                           static_cast<std::uint16_t>(items[i].data.size()));
             std::copy(items[i].data.begin(), items[i].data.end(), to);
         }
         const std::size_t length = writer.finish().size();
@@ -76,7 +86,9 @@ struct World {
         FrameReader reader({frame.data(), length});
         for (Item& item : items) {
             const auto d = reader.next();
-            if (!d) ADD_FAILURE() << "datagram missing";
+            if (!d) {
+                ADD_FAILURE() << "datagram missing";
+            }
             item.data.assign(d->data, d->data + d->length);
             item.wkc = d->wkc();
             event = d->event();
@@ -98,31 +110,44 @@ struct World {
     }
     template <class T>
     T read(unsigned slave, std::uint16_t reg) {
-        EXPECT_EQ(send(Command::aprd, at_position(slave, reg), std::vector<std::uint8_t>(sizeof(T))), 1) << std::hex << reg;
+        EXPECT_EQ(
+            send(Command::aprd, at_position(slave, reg), std::vector<std::uint8_t>(sizeof(T))), 1)
+            << std::hex << reg;
         return get<T>(data.data());
     }
     template <class T>
     void write(unsigned slave, std::uint16_t reg, T value) {
         EXPECT_EQ(send(Command::apwr, at_position(slave, reg), bytes(value)), 1) << std::hex << reg;
     }
-    void sync_manager(unsigned slave, unsigned n, std::uint16_t start, std::uint16_t length, std::uint8_t control) {
+    void sync_manager(unsigned slave, unsigned n, std::uint16_t start, std::uint16_t length,
+                      std::uint8_t control) {
         std::vector<std::uint8_t> b(8);
-        put(&b[0], start), put(&b[2], length), b[4] = control, b[6] = 1;
+        put(&b[0], start);
+        put(&b[2], length);
+        b[4] = control;
+        b[6] = 1;
         EXPECT_EQ(send(Command::apwr, at_position(slave, registers::sync_manager_at(n)), b), 1);
     }
     struct Map {
         std::uint32_t logical;
         std::uint16_t length;
-        unsigned start = 0, stop = 7;
+        unsigned start = 0;
+        unsigned stop = 7;
         std::uint16_t physical;
         unsigned bit = 0;
         std::uint8_t type;
     };
     void fmmu(unsigned slave, unsigned n, const Map& m) {
         std::vector<std::uint8_t> b(16);
-        put(&b[0], m.logical), put(&b[4], m.length), put(&b[8], m.physical);
-        b[6] = static_cast<std::uint8_t>(m.start), b[7] = static_cast<std::uint8_t>(m.stop), b[10] = static_cast<std::uint8_t>(m.bit),
-        b[11] = m.type, b[12] = 1;
+        put(&b[0], m.logical);
+        put(&b[4], m.length);
+        put(&b[8], m.physical);
+        b[6] = static_cast<std::uint8_t>(m.start);
+        b[7] = static_cast<std::uint8_t>(m.stop);
+
+        b[10] = static_cast<std::uint8_t>(m.bit);
+        b[11] = m.type;
+        b[12] = 1;
         EXPECT_EQ(send(Command::apwr, at_position(slave, registers::fmmu_at(n)), b), 1);
     }
 };

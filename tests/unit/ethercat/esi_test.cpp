@@ -103,17 +103,21 @@ TEST(Esi, Numbers_are_read_as_real_files_write_them) {
 TEST(Esi, Invalid_files_are_reported_with_their_place) {
     const auto first = [](std::string_view xml) {
         const File file = read(xml);
-        return file.messages.empty() ? ""
-                                     : text::message_text("x.xml", file.messages[0].severity, file.messages[0].at,
-                                                          file.messages[0].sentence, file.messages[0].help);
+        return file.messages.empty()
+                   ? ""
+                   : text::message_text("x.xml", file.messages[0].severity, file.messages[0].at,
+                                        file.messages[0].sentence, file.messages[0].help);
     };
-    EXPECT_EQ(first("<EtherCATInfo>\n<Vendor>"), "x.xml:2:1: error: invalid XML: start-end tags mismatch; is it a device description?");
     EXPECT_EQ(
-        first("<masters/>"),
-        "x.xml:1:1: error: the root element is 'masters', not EtherCATInfo; give the ESI file of the device, an XML file from its maker");
+        first("<EtherCATInfo>\n<Vendor>"),
+        "x.xml:2:1: error: invalid XML: start-end tags mismatch; is it a device description?");
+    EXPECT_EQ(first("<masters/>"),
+              "x.xml:1:1: error: the root element is 'masters', not EtherCATInfo; give the ESI "
+              "file of the device, an XML file from its maker");
     EXPECT_EQ(first("<EtherCATInfo/>"), "x.xml:1:2: error: the file describes no device");
     EXPECT_EQ(
-        first("<EtherCATInfo><Descriptions><Devices><Device>\n<Type ProductCode='#xZZ'/></Device></Devices></Descriptions></EtherCATInfo>"),
+        first("<EtherCATInfo><Descriptions><Devices><Device>\n<Type "
+              "ProductCode='#xZZ'/></Device></Devices></Descriptions></EtherCATInfo>"),
         "x.xml:2:2: warning: invalid ProductCode '#xZZ': expected a number, as in 12 or #x1F");
 }
 
@@ -131,7 +135,9 @@ TEST(Esi, Any_bytes_are_read_without_harm) {
             }
         }
         const File file = read(text);
-        for (const Device& d : file.devices) sii::parse(sii_image(file, with_modules(file, d, {1, 2})));
+        for (const Device& d : file.devices) {
+            sii::parse(sii_image(file, with_modules(file, d, {1, 2})));
+        }
     }
 }
 

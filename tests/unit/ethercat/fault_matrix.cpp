@@ -7,20 +7,26 @@ namespace fault_matrix {
 
 namespace {
 
-constexpr const char* description = "servo\nservo axes=2\nservo\ndigital_out bits=8\ndigital_in bits=8\n";
+constexpr const char* description =
+    "servo\nservo axes=2\nservo\ndigital_out bits=8\ndigital_in bits=8\n";
 constexpr const char* configuration =
     "[bus]\ncycle = 1ms\n"
-    "[type drive]\ndevice = cia402\nvendor = 0x00ffffff\noutputs = 6040 6060 607A 60FF\ninputs = 6041 6061 6064\ndc = sync0 250us\nsdo "
+    "[type drive]\ndevice = cia402\nvendor = 0x00ffffff\noutputs = 6040 6060 607A 60FF\ninputs = "
+    "6041 6061 6064\ndc = sync0 250us\nsdo "
     "60C2:1 = 1\n"
     "[slave 0 x]\ntype = drive\n[slave 1 y]\ntype = drive\n[slave 2 z]\ntype = drive\n"
-    "[slave 3 out]\nvendor = 0x00ffffff\noutputs = 7000:1 bit 7000:2 bit 7000:3 bit 7000:4 bit 7000:5 bit 7000:6 bit 7000:7 bit 7000:8 "
+    "[slave 3 out]\nvendor = 0x00ffffff\noutputs = 7000:1 bit 7000:2 bit 7000:3 bit 7000:4 bit "
+    "7000:5 bit 7000:6 bit 7000:7 bit 7000:8 "
     "bit\n"
     "inputs = none\noutputs.sync-manager = 0\n"
-    "[slave 4 in]\nvendor = 0x00ffffff\ninputs = 6000:1 bit 6000:2 bit 6000:3 bit 6000:4 bit 6000:5 bit 6000:6 bit 6000:7 bit 6000:8 bit\n"
+    "[slave 4 in]\nvendor = 0x00ffffff\ninputs = 6000:1 bit 6000:2 bit 6000:3 bit 6000:4 bit "
+    "6000:5 bit 6000:6 bit 6000:7 bit 6000:8 bit\n"
     "outputs = none\ninputs.sync-manager = 0\n";
 
-constexpr std::int64_t tolerable_jump_ns = 30'000'000;  // a jump after the last look at the clock; frames fail meanwhile
-constexpr std::int64_t tolerable_ns = 20'000;  // twice what the master tolerates: clocks are compared at another moment
+// a jump after the last look at the clock; frames fail meanwhile
+constexpr std::int64_t tolerable_jump_ns = 30'000'000;
+// twice what the master tolerates: clocks are compared at another moment
+constexpr std::int64_t tolerable_ns = 20'000;
 
 }  // namespace
 
@@ -37,11 +43,13 @@ std::string LastEvents::text(const master::Setup& setup) const {
 Machine::Machine() {
     devices = devices::make_line(devices::read_line(description));
     const double drifts[] = {40, -60, 90, 0, 0};
-    for (std::size_t n = 0; n < devices.size(); ++n)
-        line.add(
-            {.controller = {.dc = devices[n].dc, .drift_ppm = drifts[n], .clock_start_ns = 1'000'000'007LL * static_cast<std::int64_t>(n)},
-             .sii = devices[n].sii,
-             .application = devices[n].firmware.get()});
+    for (std::size_t n = 0; n < devices.size(); ++n) {
+        line.add({.controller = {.dc = devices[n].dc,
+                                 .drift_ppm = drifts[n],
+                                 .clock_start_ns = 1'000'000'007LL * static_cast<std::int64_t>(n)},
+                  .sii = devices[n].sii,
+                  .application = devices[n].firmware.get()});
+    }
     const config::Reading read = config::read(configuration, "line.ethercat");
     EXPECT_EQ(config::to_string(read, "line.ethercat"), "");
     setup = read.buses.at(0).setup;
@@ -55,7 +63,8 @@ Machine::Machine() {
 
 std::int64_t Machine::deviation_ns(std::size_t drive) {
     const std::size_t reference = events.reference < drives ? events.reference : 0;
-    return line.controller(drive).clock().system_time(now_ns) - line.controller(reference).clock().system_time(now_ns);
+    return line.controller(drive).clock().system_time(now_ns) -
+           line.controller(reference).clock().system_time(now_ns);
 }
 
 void Machine::cycle() {
@@ -69,23 +78,38 @@ void Machine::cycle() {
         const bool entered = op && !was_op_[n];
         was_op_[n] = op;
         if (!entered) continue;
-        if (!line.controller(n).sync().active) wrong = "drive " + std::to_string(n) + " is in OP without SYNC0";
-        const bool has_reference = events.reference < drives && line.controller(events.reference).powered();
-        if (const std::int64_t d = deviation_ns(n); has_reference && now_ns > jumped_ns + tolerable_jump_ns && std::abs(d) > tolerable_ns)
-            wrong = "drive " + std::to_string(n) + " entered OP " + std::to_string(d) + " ns beside the reference clock";
+        if (!line.controller(n).sync().active) {
+            wrong = "drive " + std::to_string(n) + " is in OP without SYNC0";
+        }
+        const bool has_reference =
+            events.reference < drives && line.controller(events.reference).powered();
+        if (const std::int64_t d = deviation_ns(n);
+            has_reference && now_ns > jumped_ns + tolerable_jump_ns && std::abs(d) > tolerable_ns) {
+            wrong = "drive " + std::to_string(n) + " entered OP " + std::to_string(d) +
+                    " ns beside the reference clock";
+        }
     }
     auto& out = static_cast<devices::IoBehaviour&>(devices[io].firmware->behaviour());
-    if (wrong.empty() && line.controller(io).powered() && devices[io].firmware->state() != State::op)
-        for (unsigned n = 0; n < out.channels(); ++n)
-            if (out.output(n) != 0) wrong = "an output is on outside OP";
+    if (wrong.empty() && line.controller(io).powered() &&
+        devices[io].firmware->state() != State::op) {
+        for (unsigned n = 0; n < out.channels(); ++n) {
+            if (out.output(n) != 0) {
+                wrong = "an output is on outside OP";
+            }
+        }
+    }
 }
 
 unsigned Machine::recover(unsigned most) {
     const auto arrives = [&] {
         auto& out = static_cast<devices::IoBehaviour&>(devices[io].firmware->behaviour());
-        if (!master->status().operational || master->domain(0).state != master::WkcState::complete || out.output(0) == 0) return false;
-        for (const devices::Device& d : devices)
+        if (!master->status().operational ||
+            master->domain(0).state != master::WkcState::complete || out.output(0) == 0) {
+            return false;
+        }
+        for (const devices::Device& d : devices) {
             if (d.firmware->state() != State::op) return false;
+        }
         return true;
     };
     unsigned in_a_row = 0;
@@ -102,7 +126,9 @@ void Machine::repair() {
     line.calm();
     for (std::size_t n = 0; n < slaves; ++n) {
         line.set_cable(n, 0, true);
-        if (!line.controller(n).powered()) line.set_power(n, true, now_ns);
+        if (!line.controller(n).powered()) {
+            line.set_power(n, true, now_ns);
+        }
     }
 }
 

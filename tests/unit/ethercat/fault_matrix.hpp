@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A master on a line of emulated drives and I/O whose frames fail by kind: each n-th one lost, doubled, late, cut or damaged.
+// A master on a line of emulated drives and I/O whose frames fail by kind: each n-th one lost,
+// doubled, late, cut or damaged.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -22,13 +23,27 @@ namespace fault_matrix {
 using namespace hal::ethercat;
 
 enum class Kind : std::uint8_t { any, process_data, mailbox, state, clock, last = clock };
-inline const char* name(Kind k) { return std::array{"any", "process data", "mailbox", "state", "clock"}[static_cast<std::size_t>(k)]; }
+inline const char* name(Kind k) {
+    return std::array{"any", "process data", "mailbox", "state",
+                      "clock"}[static_cast<std::size_t>(k)];
+}
 
 /// `lost_back`: the slaves have executed the frame. `damaged`: a wrong check sequence from a slave on. `foreign`: a header that nobody sent.
-enum class Fault : std::uint8_t { none, lost, lost_back, doubled, executed_twice, late, cut, damaged, foreign, last = foreign };
+enum class Fault : std::uint8_t {
+    none,
+    lost,
+    lost_back,
+    doubled,
+    executed_twice,
+    late,
+    cut,
+    damaged,
+    foreign,
+    last = foreign
+};
 inline const char* name(Fault f) {
-    return std::array{
-        "none", "lost", "lost back", "doubled", "executed twice", "late", "cut", "damaged", "foreign"}[static_cast<std::size_t>(f)];
+    return std::array{"none", "lost", "lost back", "doubled", "executed twice",
+                      "late", "cut",  "damaged",   "foreign"}[static_cast<std::size_t>(f)];
 }
 
 /// Returns whether a frame has a datagram of a kind.
@@ -50,7 +65,9 @@ inline bool has(std::span<std::uint8_t> frame, Kind kind) {
             if (!logical && at >= registers::al_control && at < 0x0140) return true;
             break;
         case Kind::clock:
-            if (!logical && (cyclic_clock || (at >= registers::dc_receive_time && at < 0x0a00))) return true;
+            if (!logical && (cyclic_clock || (at >= registers::dc_receive_time && at < 0x0a00))) {
+                return true;
+            }
             break;
         }
     }
@@ -61,8 +78,12 @@ inline bool has(std::span<std::uint8_t> frame, Kind kind) {
 class FaultyPort final : public hal::ethernet::Port {
 public:
     explicit FaultyPort(esc::Line& line) : line_(line) {
-        for (Held& h : held_) h.bytes.reserve(2048);
-        current_.reserve(2048), copy_.reserve(2048), spare_.reserve(2048);
+        for (Held& h : held_) {
+            h.bytes.reserve(2048);
+        }
+        current_.reserve(2048);
+        copy_.reserve(2048);
+        spare_.reserve(2048);
     }
     Fault fault = Fault::none;
     Kind kind = Kind::any;
@@ -71,7 +92,8 @@ public:
     std::uint64_t hits = 0;
 
     const hal::ethernet::Address& address() const noexcept override { return mine_; }
-    hal::ethernet::Sent send(std::span<const std::uint8_t> frame, const hal::ethernet::Launch&, std::int64_t now_ns) noexcept override {
+    hal::ethernet::Sent send(std::span<const std::uint8_t> frame, const hal::ethernet::Launch&,
+                             std::int64_t now_ns) noexcept override {
         copy_.assign(frame.begin(), frame.end());
         const bool hit = fault != Fault::none && has(copy_, kind) && ++seen_ % every == 0;
         hits += hit ? 1 : 0;
@@ -81,16 +103,24 @@ public:
             spare_ = copy_;
             pass(spare_, now_ns, now, now_ns);
         }
-        if (now == Fault::damaged)
-            line_.disturb({.fault = esc::LineFault::corruption, .slave = static_cast<int>(hits % line_.size()), .count = 1});
+        if (now == Fault::damaged) {
+            line_.disturb({.fault = esc::LineFault::corruption,
+                           .slave = static_cast<int>(hits % line_.size()),
+                           .count = 1});
+        }
         pass(copy_, now_ns, now, now == Fault::late ? now_ns + late_cycles * 1'000'000LL : now_ns);
-        if (now == Fault::damaged) line_.calm();
+        if (now == Fault::damaged) {
+            line_.calm();
+        }
         return hal::ethernet::Sent::queued;
     }
     std::optional<hal::ethernet::Arrival> receive(std::int64_t now_ns) noexcept override {
         Held* first = nullptr;
-        for (Held& h : held_)
-            if (h.used && h.at_ns <= now_ns && (first == nullptr || h.order < first->order)) first = &h;
+        for (Held& h : held_) {
+            if (h.used && h.at_ns <= now_ns && (first == nullptr || h.order < first->order)) {
+                first = &h;
+            }
+        }
         if (first == nullptr) return std::nullopt;
         first->used = false;
         current_ = first->bytes;
@@ -107,17 +137,27 @@ private:
         std::uint64_t order = 0;
         bool used = false;
     };
-    void pass(std::vector<std::uint8_t>& frame, std::int64_t now_ns, Fault now, std::int64_t at_ns) noexcept {
+    void pass(std::vector<std::uint8_t>& frame, std::int64_t now_ns, Fault now,
+              std::int64_t at_ns) noexcept {
         const auto passage = line_.process(frame, esc::End::primary, now_ns);
         if (passage.lost || passage.end != esc::End::primary || now == Fault::lost_back) return;
-        if (now == Fault::cut) frame.resize(frame.size() - 1 - hits * 7 % (frame.size() - 1));
-        if (now == Fault::foreign) frame[14 + hits * 5 % 11] ^= static_cast<std::uint8_t>(1 + hits % 255);
-        for (unsigned copies = now == Fault::doubled ? 2 : 1; copies > 0; --copies) hold(frame, at_ns);
+        if (now == Fault::cut) {
+            frame.resize(frame.size() - 1 - hits * 7 % (frame.size() - 1));
+        }
+        if (now == Fault::foreign) {
+            frame[14 + hits * 5 % 11] ^= static_cast<std::uint8_t>(1 + hits % 255);
+        }
+        for (unsigned copies = now == Fault::doubled ? 2 : 1; copies > 0; --copies) {
+            hold(frame, at_ns);
+        }
     }
     void hold(const std::vector<std::uint8_t>& frame, std::int64_t at_ns) noexcept {
         for (Held& h : held_) {
             if (h.used) continue;
-            h.bytes = frame, h.at_ns = at_ns, h.order = ++order_, h.used = true;
+            h.bytes = frame;
+            h.at_ns = at_ns;
+            h.order = ++order_;
+            h.used = true;
             return;
         }
     }
@@ -127,15 +167,19 @@ private:
     hal::ethernet::Description about_;
     std::array<Held, 64> held_;
     std::vector<std::uint8_t> current_, copy_, spare_;
-    std::uint64_t seen_ = 0, order_ = 0;
+    std::uint64_t seen_ = 0;
+    std::uint64_t order_ = 0;
 };
 
 /// Keeps the newest events only, in one place of memory.
 class LastEvents final : public master::Events {
 public:
-    void report(master::Event event, std::uint32_t slave, std::int64_t first, std::int64_t second) noexcept override {
+    void report(master::Event event, std::uint32_t slave, std::int64_t first,
+                std::int64_t second) noexcept override {
         events_[count_++ % events_.size()] = {event, slave, first, second};
-        if (event == master::Event::reference_clock) reference = slave;
+        if (event == master::Event::reference_clock) {
+            reference = slave;
+        }
     }
     std::uint64_t count() const { return count_; }
     std::string text(const master::Setup& setup) const;
@@ -153,15 +197,20 @@ private:
 
 /// Three drives with DC, mailbox and a mapping of their own, and outputs and inputs behind them.
 struct Machine {
-    static constexpr std::size_t drives = 3, slaves = 5, io = 3;
+    static constexpr std::size_t drives = 3;
+    static constexpr std::size_t slaves = 5;
+    static constexpr std::size_t io = 3;
 
     Machine();
     /// Runs one cycle of 1 ms, and checks that no drive is in OP that may not be there.
     void cycle();
     void run(unsigned cycles) {
-        while (cycles-- > 0) cycle();
+        while (cycles-- > 0) {
+            cycle();
+        }
     }
-    /// Runs until the bus is operational and its outputs arrive. Returns the cycles it took; 0: never within `most`.
+    /// Runs until the bus is operational and its outputs arrive. Returns the cycles it took; 0:
+    /// never within `most`.
     unsigned recover(unsigned most = 60'000);
     /// Makes whole what is broken.
     void repair();
@@ -176,7 +225,8 @@ struct Machine {
     std::unique_ptr<master::CoeClient> client;
     std::unique_ptr<master::Master> master;
     std::span<std::uint8_t> io_data;
-    std::int64_t now_ns = 0, jumped_ns = -1'000'000'000;
+    std::int64_t now_ns = 0;
+    std::int64_t jumped_ns = -1'000'000'000;
     std::string wrong;  ///< the first breach; empty: none
 
 private:

@@ -27,7 +27,8 @@ TEST(EthercatFrame, Reader_gives_back_what_the_writer_wrote) {
 
     FrameReader reader({buffer.data(), frame.size()});
     ASSERT_TRUE(reader.valid());
-    const auto a = reader.next(), b = reader.next();
+    const auto a = reader.next();
+    const auto b = reader.next();
     ASSERT_TRUE(a && b);
     EXPECT_EQ(a->command, Command::brd);
     EXPECT_EQ(a->register_address(), registers::al_status);
@@ -53,7 +54,8 @@ using namespace hal::ethercat::master;
 
 struct Two {
     Task<int> inner(Channel& channel, int by) {
-        const Answer answer = co_await channel.exchange(Command::brd, at_position(0, registers::type), 1);
+        const Answer answer =
+            co_await channel.exchange(Command::brd, at_position(0, registers::type), 1);
         co_return answer.wkc + by;
     }
     Task<> outer(Channel& channel, int& result) {
@@ -78,7 +80,10 @@ TEST(EthercatTask, Nested_tasks_wait_for_their_datagrams_and_give_back_their_mem
     channel.arrive(4);
     EXPECT_EQ(result, 13 + 104);
     EXPECT_FALSE(channel.busy());
-    for (int i = 0; i < 1000; ++i) channel.start([&] { return two.outer(channel, result); });  // ends the previous one in its wait
+    // ends the previous one in its wait
+    for (int i = 0; i < 1000; ++i) {
+        channel.start([&] { return two.outer(channel, result); });
+    }
     channel.stop();
 }
 

@@ -35,11 +35,15 @@ struct GatewayLine {
         EXPECT_EQ(problem, "");
         slave.on_request = [this](const MailboxMessage& m) {
             Bytes p(10);
-            coe::write_sdo(p.data(), coe::Service::sdo_response, {0x43, get<std::uint16_t>(m.payload.data() + 3), m.payload[5], 0xcafe});
+            coe::write_sdo(p.data(), coe::Service::sdo_response,
+                           {0x43, get<std::uint16_t>(m.payload.data() + 3), m.payload[5], 0xcafe});
             slave.reply(MailboxType::coe, p);
         };
         sockaddr_in at{};
-        at.sin_family = AF_INET, at.sin_port = htons(gateway->port()), at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+        at.sin_family = AF_INET;
+        at.sin_port = htons(gateway->port());
+
+        at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
         fd = socket(AF_INET, type, 0);
         EXPECT_EQ(connect(fd, reinterpret_cast<sockaddr*>(&at), sizeof at), 0);
     }
@@ -47,12 +51,16 @@ struct GatewayLine {
         close(fd);
         server.stop();
     }
-    void send(const Bytes& bytes) { EXPECT_EQ(::send(fd, bytes.data(), bytes.size(), 0), static_cast<ssize_t>(bytes.size())); }
+    void send(const Bytes& bytes) {
+        EXPECT_EQ(::send(fd, bytes.data(), bytes.size(), 0), static_cast<ssize_t>(bytes.size()));
+    }
     Bytes receive() {
         Bytes bytes(1500);
         for (unsigned i = 0; i < 5000; ++i) {
             const auto got = recv(fd, bytes.data(), bytes.size(), MSG_DONTWAIT);
-            if (got > 0) return {bytes.begin(), bytes.begin() + got};
+            if (got > 0) {
+                return {bytes.begin(), bytes.begin() + got};
+            }
             server.step(slave.now_ns);
             slave.step(server.channel(0));
             usleep(200);
@@ -75,10 +83,12 @@ TEST(EthercatGateway, Passes_requests_to_the_slave_by_UDP_and_TCP) {
         const Bytes reply = f.receive();
         ASSERT_EQ(reply.size(), 18U);
         EXPECT_EQ(get<std::uint16_t>(reply.data()), 16 | 5 << 12);
-        EXPECT_EQ(get<std::uint16_t>(reply.data() + 4), 0x1001) << "the address is returned unchanged";
+        EXPECT_EQ(get<std::uint16_t>(reply.data() + 4), 0x1001)
+            << "the address is returned unchanged";
         EXPECT_EQ(get<std::uint32_t>(reply.data() + 14), 0xcafeU);
         f.send(f.upload(0, 0xf020, 1));
-        EXPECT_EQ(get<std::uint16_t>(f.receive().data() + 14), 0x1001) << "dictionary of the master";
+        EXPECT_EQ(get<std::uint16_t>(f.receive().data() + 14), 0x1001)
+            << "dictionary of the master";
         f.send(f.upload(0, 0x8000, 6));
         EXPECT_EQ(get<std::uint32_t>(f.receive().data() + 14), 0x1234U);
         f.send(f.upload(0, 0x9999, 0));
@@ -90,15 +100,21 @@ TEST(EthercatGateway, Invalid_requests_are_dropped) {
     GatewayLine f(SOCK_DGRAM);
     std::mt19937 random(3);
     for (unsigned i = 0; i < 500; ++i) {
-        Bytes bytes = f.upload(static_cast<std::uint16_t>(random() % 3), static_cast<std::uint16_t>(random()), 0);
+        Bytes bytes = f.upload(static_cast<std::uint16_t>(random() % 3),
+                               static_cast<std::uint16_t>(random()), 0);
         bytes.resize(random() % 40);
-        for (unsigned k = 0; k < 4 && !bytes.empty(); ++k) bytes[random() % bytes.size()] = static_cast<std::uint8_t>(random());
+        for (unsigned k = 0; k < 4 && !bytes.empty(); ++k) {
+            bytes[random() % bytes.size()] = static_cast<std::uint8_t>(random());
+        }
         (void)!::send(f.fd, bytes.data(), bytes.size(), 0);
     }
     f.send(f.upload(0x1001, 0x2000, 3));
     for (unsigned i = 0; i < 100; ++i) {
         const Bytes reply = f.receive();
-        if (reply.empty()) f.send(f.upload(0x1001, 0x2000, 3));  // a full socket buffer drops requests
+        // a full socket buffer drops requests
+        if (reply.empty()) {
+            f.send(f.upload(0x1001, 0x2000, 3));
+        }
         if (reply.size() == 18 && get<std::uint32_t>(reply.data() + 14) == 0xcafe) return;
     }
     FAIL() << "the valid request is not answered";
@@ -111,7 +127,8 @@ TEST(EthercatGateway, Reports_an_invalid_address) {
     GatewaySetup setup;
     setup.address = "localhost";
     Gateway gateway(server.open(), setup, problem);
-    EXPECT_EQ(problem, "mailbox gateway: 'localhost' is not an IPv4 address; write for example 127.0.0.1");
+    EXPECT_EQ(problem,
+              "mailbox gateway: 'localhost' is not an IPv4 address; write for example 127.0.0.1");
 }
 
 }  // namespace

@@ -8,15 +8,21 @@ using namespace master_world;
 
 master::Setup with_clocks(unsigned count) {
     auto setup = drives(count);
-    for (auto& s : setup.slaves) s.dc = Dc{.assign_activate = 0x0300, .sync0_shift_ns = 250'000};
+    for (auto& s : setup.slaves) {
+        s.dc = Dc{.assign_activate = 0x0300, .sync0_shift_ns = 250'000};
+    }
     return setup;
 }
 
 TEST(EthercatClocks, Come_into_the_window_and_generate_sync0_on_one_grid) {
     World w;
     const double drifts[] = {100, -50, 30, -100};
-    for (unsigned n = 0; n < 4; ++n)
-        w.add(0x100 + n, 0, false, {.dc_64_bit = n != 2, .drift_ppm = drifts[n], .clock_start_ns = 1'000'000'000LL * (n + 1)});
+    for (unsigned n = 0; n < 4; ++n) {
+        w.add(0x100 + n, 0, false,
+              {.dc_64_bit = n != 2,
+               .drift_ppm = drifts[n],
+               .clock_start_ns = 1'000'000'000LL * (n + 1)});
+    }
     w.begin(with_clocks(4));
     ASSERT_TRUE(w.operational(8000)) << w.log.text();
     EXPECT_LT(w.cycles, 2000U);
@@ -27,7 +33,8 @@ TEST(EthercatClocks, Come_into_the_window_and_generate_sync0_on_one_grid) {
         const auto sync = w.line.controller(n).sync();
         ASSERT_TRUE(sync.active) << n;
         EXPECT_GT(sync.pulses, 100U) << n;
-        const auto phase = static_cast<std::int64_t>(n == 2 ? 250'000 : sync.last_pulse_dc_ns % 1'000'000);
+        const auto phase =
+            static_cast<std::int64_t>(n == 2 ? 250'000 : sync.last_pulse_dc_ns % 1'000'000);
         EXPECT_NEAR(static_cast<double>(phase), 250'000.0, 1000.0) << n;
     }
     EXPECT_EQ(w.log.last(Event::reference_clock)->slave, 0U);
@@ -35,18 +42,23 @@ TEST(EthercatClocks, Come_into_the_window_and_generate_sync0_on_one_grid) {
 
 TEST(EthercatClocks, Phase_begins_at_zero_and_follows_the_drift_of_the_reference) {
     World w;
-    for (unsigned n = 0; n < 2; ++n) w.add(0x100 + n, 0, false, {.drift_ppm = 100});
+    for (unsigned n = 0; n < 2; ++n) {
+        w.add(0x100 + n, 0, false, {.drift_ppm = 100});
+    }
     w.begin(with_clocks(2));
     ASSERT_TRUE(w.until([&] { return w.master->dc_phase().fresh; }));
     const auto first = w.master->dc_phase().error_ns;
     EXPECT_NEAR(static_cast<double>(first), 0.0, 5000.0);
     w.run(1000);
-    EXPECT_NEAR(static_cast<double>(w.master->dc_phase().error_ns - first), 100'000.0, 5000.0) << "100 ppm of a second";
+    EXPECT_NEAR(static_cast<double>(w.master->dc_phase().error_ns - first), 100'000.0, 5000.0)
+        << "100 ppm of a second";
 }
 
 TEST(EthercatClocks, The_reference_follows_the_thread_by_choice) {
     World w;
-    for (unsigned n = 0; n < 2; ++n) w.add(0x100 + n, 0, false, {.drift_ppm = 50});
+    for (unsigned n = 0; n < 2; ++n) {
+        w.add(0x100 + n, 0, false, {.drift_ppm = 50});
+    }
     auto setup = with_clocks(2);
     setup.lead = ClockLead::thread;
     w.begin(setup);
@@ -57,7 +69,9 @@ TEST(EthercatClocks, The_reference_follows_the_thread_by_choice) {
 
 TEST(EthercatClocks, Slaves_agree_where_nobody_follows) {
     World w;
-    for (unsigned n = 0; n < 3; ++n) w.add(0x100 + n, 0, false, {.drift_ppm = 40.0 * n});
+    for (unsigned n = 0; n < 3; ++n) {
+        w.add(0x100 + n, 0, false, {.drift_ppm = 40.0 * n});
+    }
     auto setup = with_clocks(3);
     setup.lead = ClockLead::none;
     w.begin(setup);
@@ -68,7 +82,9 @@ TEST(EthercatClocks, Slaves_agree_where_nobody_follows) {
 
 TEST(EthercatClocks, A_clock_that_cannot_be_set_is_reported_as_that_and_set_later) {
     World w;
-    for (unsigned n = 0; n < 4; ++n) w.add(0x100 + n, 0, false, {.drift_ppm = 10.0 * n});
+    for (unsigned n = 0; n < 4; ++n) {
+        w.add(0x100 + n, 0, false, {.drift_ppm = 10.0 * n});
+    }
     w.line.close_ring(3, 1);
     w.begin(with_clocks(4), true);
     ASSERT_TRUE(w.operational(8000)) << w.log.text();
@@ -87,19 +103,25 @@ TEST(EthercatClocks, Sync_signals_begin_in_the_future_at_any_cycle) {
     for (const std::int64_t cycle_ns : {100'000LL, 50'000'000LL, 1'000'000'000LL}) {
         World w;
         w.cycle_ns = cycle_ns;
-        for (unsigned n = 0; n < 2; ++n) w.add(0x100 + n);
+        for (unsigned n = 0; n < 2; ++n) {
+            w.add(0x100 + n);
+        }
         auto setup = with_clocks(2);
         setup.cycle_ns = cycle_ns;
         w.begin(setup);
         ASSERT_TRUE(w.operational(8000)) << cycle_ns << ": " << w.log.text();
         w.run(20);
-        for (std::size_t n = 0; n < 2; ++n) EXPECT_GT(w.line.controller(n).sync().pulses, 5U) << cycle_ns << " " << n;
+        for (std::size_t n = 0; n < 2; ++n) {
+            EXPECT_GT(w.line.controller(n).sync().pulses, 5U) << cycle_ns << " " << n;
+        }
     }
 }
 
 TEST(EthercatClocks, A_clock_that_leaves_the_window_in_OP_is_reported_once) {
     World w;
-    for (unsigned n = 0; n < 2; ++n) w.add(0x100 + n);
+    for (unsigned n = 0; n < 2; ++n) {
+        w.add(0x100 + n);
+    }
     w.begin(with_clocks(2));
     ASSERT_TRUE(w.operational(3000)) << w.log.text();
     w.run(3000);
@@ -124,7 +146,9 @@ TEST(EthercatClocks, A_clock_that_leaves_the_window_in_OP_is_reported_once) {
 
 TEST(EthercatClocks, A_clock_that_is_back_in_the_window_is_reported_and_a_short_excursion_is_not) {
     World w;
-    for (unsigned n = 0; n < 2; ++n) w.add(0x100 + n);
+    for (unsigned n = 0; n < 2; ++n) {
+        w.add(0x100 + n);
+    }
     w.begin(with_clocks(2));
     ASSERT_TRUE(w.operational(3000)) << w.log.text();
     w.run(3000);
@@ -146,9 +170,12 @@ TEST(EthercatClocks, A_clock_that_is_back_in_the_window_is_reported_and_a_short_
 
 TEST(EthercatClocks, A_slave_out_of_step_waits_in_SAFE_OP_where_the_setup_says_so) {
     World w;
-    for (unsigned n = 0; n < 3; ++n) w.add(0x100 + n);
+    for (unsigned n = 0; n < 3; ++n) {
+        w.add(0x100 + n);
+    }
     auto setup = with_clocks(3);
-    setup.dc_loss = DcLoss::safeop, setup.dc_loss_ns = 200'000'000;
+    setup.dc_loss = DcLoss::safeop;
+    setup.dc_loss_ns = 200'000'000;
     w.begin(setup);
     ASSERT_TRUE(w.operational(3000)) << w.log.text();
     w.run(3000);
@@ -166,7 +193,8 @@ TEST(EthercatClocks, A_slave_out_of_step_waits_in_SAFE_OP_where_the_setup_says_s
     }
     ASSERT_TRUE(w.operational(3000)) << w.log.text();
     EXPECT_EQ(state(1), 8);
-    const auto apart = w.line.controller(1).clock().system_time(w.now_ns) - w.line.controller(0).clock().system_time(w.now_ns);
+    const auto apart = w.line.controller(1).clock().system_time(w.now_ns) -
+                       w.line.controller(0).clock().system_time(w.now_ns);
     EXPECT_LT(std::abs(apart), 2000);
     w.run(2000);
     EXPECT_EQ(w.log.count(Event::dc_lost), 1U);
@@ -177,20 +205,25 @@ TEST(EthercatClocks, A_slave_out_of_step_waits_in_SAFE_OP_where_the_setup_says_s
 
 TEST(EthercatClocks, A_slave_that_stays_out_of_step_is_started_anew) {
     World w;
-    for (unsigned n = 0; n < 2; ++n) w.add(0x100 + n);
+    for (unsigned n = 0; n < 2; ++n) {
+        w.add(0x100 + n);
+    }
     auto setup = with_clocks(2);
     setup.dc_loss = DcLoss::safeop;
     w.begin(setup);
     ASSERT_TRUE(w.operational(3000)) << w.log.text();
     w.line.controller(1).set_drift(50'000, w.now_ns);
-    ASSERT_TRUE(w.until([&] { return w.log.count(Event::dc_timeout) != 0; }, 30000)) << w.log.text();
+    ASSERT_TRUE(w.until([&] { return w.log.count(Event::dc_timeout) != 0; }, 30000))
+        << w.log.text();
     w.line.controller(1).set_drift(0, w.now_ns);
     ASSERT_TRUE(w.operational(30000)) << w.log.text();
 }
 
 TEST(EthercatClocks, A_ring_of_slaves_that_were_switched_on_at_other_times_is_in_step) {
     World w;
-    for (unsigned n = 0; n < 4; ++n) w.add(0x100 + n, 0, false, {.clock_start_ns = 777'000'000LL * n});
+    for (unsigned n = 0; n < 4; ++n) {
+        w.add(0x100 + n, 0, false, {.clock_start_ns = 777'000'000LL * n});
+    }
     w.line.close_ring(3, 1);
     w.begin(with_clocks(4), true);
     ASSERT_TRUE(w.operational(8000)) << w.log.text();
@@ -200,7 +233,9 @@ TEST(EthercatClocks, A_ring_of_slaves_that_were_switched_on_at_other_times_is_in
     ASSERT_TRUE(w.operational(8000)) << w.log.text();
     w.run(1000);
     for (std::size_t n = 1; n < 4; ++n) {
-        const auto apart = (w.line.controller(n).sync().last_pulse_ns - w.line.controller(0).sync().last_pulse_ns) % 1'000'000;
+        const auto apart = (w.line.controller(n).sync().last_pulse_ns -
+                            w.line.controller(0).sync().last_pulse_ns) %
+                           1'000'000;
         EXPECT_LT(std::min(std::abs(apart), 1'000'000 - std::abs(apart)), 2000) << n;
     }
 }
@@ -220,14 +255,21 @@ TEST(EthercatTopology, Finds_the_tree_of_a_fork) {
     std::array<BusSlave*, 4> line{};
     const auto use = [](std::initializer_list<unsigned> ports) {
         unsigned status = 0x5500;  // loops closed
-        for (const unsigned p : ports) status = (status & ~(3U << (8 + 2 * p))) | 2U << (8 + 2 * p);
+        for (const unsigned p : ports) {
+            status = (status & ~(3U << (8 + 2 * p))) | 2U << (8 + 2 * p);
+        }
         return static_cast<std::uint16_t>(status);
     };
     slaves[0].dl_status = use({0, 1, 3});
     slaves[1].dl_status = use({0, 1});
     slaves[2].dl_status = use({0});
     slaves[3].dl_status = use({0});
-    for (unsigned n = 0; n < 4; ++n) slaves[n].number = static_cast<std::uint16_t>(n), slaves[n].features = 0x0c, line[n] = &slaves[n];
+    for (unsigned n = 0; n < 4; ++n) {
+        slaves[n].number = static_cast<std::uint16_t>(n);
+        slaves[n].features = 0x0c;
+
+        line[n] = &slaves[n];
+    }
     ASSERT_TRUE(find_tree(line));
     EXPECT_EQ(slaves[1].parent, 0);
     EXPECT_EQ(slaves[1].parent_port, 3);

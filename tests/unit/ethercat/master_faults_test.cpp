@@ -10,11 +10,17 @@ using namespace master_world;
 struct EthercatFaults : testing::Test {
     World w;
     void start(unsigned count, bool ring = false) {
-        for (unsigned n = 0; n < count; ++n) w.add(0x100 + n);
-        if (ring) w.line.close_ring(count - 1, 1);
+        for (unsigned n = 0; n < count; ++n) {
+            w.add(0x100 + n);
+        }
+        if (ring) {
+            w.line.close_ring(count - 1, 1);
+        }
         w.begin(drives(count), ring);
         ASSERT_TRUE(w.operational()) << w.log.text();
-        for (std::size_t n = 0; n < count; ++n) w.master->data(n, 0)[0] = static_cast<std::uint8_t>(n + 1);
+        for (std::size_t n = 0; n < count; ++n) {
+            w.master->data(n, 0)[0] = static_cast<std::uint8_t>(n + 1);
+        }
         w.run(4);
     }
 };
@@ -47,7 +53,9 @@ TEST_F(EthercatFaults, A_power_cycled_slave_in_the_middle_takes_those_behind_alo
     w.line.set_power(1, true, w.now_ns);
     ASSERT_TRUE(w.operational()) << w.log.text();
     w.run(4);
-    for (std::size_t n = 0; n < 4; ++n) EXPECT_EQ(w.master->data(n, 1)[0], n + 2) << n;
+    for (std::size_t n = 0; n < 4; ++n) {
+        EXPECT_EQ(w.master->data(n, 1)[0], n + 2) << n;
+    }
 }
 
 TEST_F(EthercatFaults, An_unplugged_slave_with_power_comes_back) {
@@ -56,7 +64,8 @@ TEST_F(EthercatFaults, An_unplugged_slave_with_power_comes_back) {
     ASSERT_TRUE(w.until([&] { return w.log.count(Event::slave_lost) == 1; }, 200)) << w.log.text();
     w.run(200);
     w.line.set_cable(2, 0, true);
-    ASSERT_TRUE(w.until([&] { return w.log.count(Event::slave_returned) == 1; }, 500)) << w.log.text();
+    ASSERT_TRUE(w.until([&] { return w.log.count(Event::slave_returned) == 1; }, 500))
+        << w.log.text();
     ASSERT_TRUE(w.operational()) << w.log.text();
 }
 
@@ -66,7 +75,8 @@ TEST_F(EthercatFaults, A_slave_that_falls_back_is_reported_with_its_code_and_bro
     ASSERT_TRUE(w.until([&] { return w.log.count(Event::fell_back) == 1; }, 100)) << w.log.text();
     EXPECT_EQ(w.log.last(Event::fell_back)->slave, 1U);
     EXPECT_EQ(w.log.last(Event::fell_back)->second, 0x1b);
-    EXPECT_TRUE(w.until([&] { return w.log.count(Event::slave_operational) == 3; })) << w.log.text();
+    EXPECT_TRUE(w.until([&] { return w.log.count(Event::slave_operational) == 3; }))
+        << w.log.text();
 }
 
 TEST_F(EthercatFaults, Lost_and_doubled_frames_are_counted_and_stop_nothing) {
@@ -74,7 +84,8 @@ TEST_F(EthercatFaults, Lost_and_doubled_frames_are_counted_and_stop_nothing) {
     w.primary.lose_every = 7;
     w.run(70);
     EXPECT_GT(w.master->status().lost, 5U);
-    w.primary.lose_every = 0, w.primary.double_every = 3;
+    w.primary.lose_every = 0;
+    w.primary.double_every = 3;
     w.run(60);
     EXPECT_GT(w.master->status().duplicates, 10U);
     w.primary.double_every = 0;
@@ -85,7 +96,9 @@ TEST_F(EthercatFaults, Lost_and_doubled_frames_are_counted_and_stop_nothing) {
 }
 
 TEST_F(EthercatFaults, Comes_up_although_every_fifth_frame_is_lost) {
-    for (unsigned n = 0; n < 5; ++n) w.add(0x100 + n);
+    for (unsigned n = 0; n < 5; ++n) {
+        w.add(0x100 + n);
+    }
     w.primary.lose_every = 5;
     w.begin(drives(5));
     EXPECT_TRUE(w.operational(20000)) << w.log.text();
@@ -121,10 +134,16 @@ TEST(EthercatSoak, Always_in_op_again_after_power_cables_and_frames_failed_at_ra
     for (const unsigned seed : {1U, 2U, 3U, 4U}) {
         for (const bool ring : {false, true}) {
             World w;
-            for (unsigned n = 0; n < 6; ++n) w.add(0x100 + n, 0, false, {.drift_ppm = 10.0 * n});
-            if (ring) w.line.close_ring(5, 1);
+            for (unsigned n = 0; n < 6; ++n) {
+                w.add(0x100 + n, 0, false, {.drift_ppm = 10.0 * n});
+            }
+            if (ring) {
+                w.line.close_ring(5, 1);
+            }
             auto setup = drives(6);
-            for (auto& s : setup.slaves) s.dc = Dc{.assign_activate = 0x0300};
+            for (auto& s : setup.slaves) {
+                s.dc = Dc{.assign_activate = 0x0300};
+            }
             w.begin(setup, ring);
             std::mt19937 generator(seed);
             const auto random = [&] { return static_cast<unsigned>(generator()); };
@@ -142,21 +161,30 @@ TEST(EthercatSoak, Always_in_op_again_after_power_cables_and_frames_failed_at_ra
             w.primary.lose_every = w.primary.double_every = 0;
             for (std::size_t n = 0; n < 6; ++n) {
                 w.line.set_cable(n, 0, true);
-                if (!w.line.controller(n).powered()) w.line.set_power(n, true, w.now_ns);
+                if (!w.line.controller(n).powered()) {
+                    w.line.set_power(n, true, w.now_ns);
+                }
             }
             w.run(300);  // a change of the last step is noticed
-            ASSERT_TRUE(w.operational(30000)) << "seed " << seed << (ring ? " ring " : " line ")
-                                              << w.log.text().substr(w.log.text().size() -
-                                                                     std::min<std::size_t>(2000, w.log.text().size()));
-            for (std::size_t n = 0; n < 6; ++n) w.master->data(n, 0)[0] = static_cast<std::uint8_t>(n + 50);
+            ASSERT_TRUE(w.operational(30000))
+                << "seed " << seed << (ring ? " ring " : " line ")
+                << w.log.text().substr(w.log.text().size() -
+                                       std::min<std::size_t>(2000, w.log.text().size()));
+            for (std::size_t n = 0; n < 6; ++n) {
+                w.master->data(n, 0)[0] = static_cast<std::uint8_t>(n + 50);
+            }
             w.run(4);
-            for (std::size_t n = 0; n < 6; ++n) EXPECT_EQ(w.master->data(n, 1)[0], n + 51) << n;
+            for (std::size_t n = 0; n < 6; ++n) {
+                EXPECT_EQ(w.master->data(n, 1)[0], n + 51) << n;
+            }
         }
     }
 }
 
 TEST_F(EthercatFaults, An_optional_slave_may_be_missing_and_join_later) {
-    for (unsigned n = 0; n < 3; ++n) w.add(0x100 + n);
+    for (unsigned n = 0; n < 3; ++n) {
+        w.add(0x100 + n);
+    }
     auto setup = drives(3);
     setup.slaves[2].optional = true;
     w.begin(setup);

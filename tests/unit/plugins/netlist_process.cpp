@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// netlist_process PLUGINS real|virtual NETLIST: loads the netlist, starts the threads, runs 200 cycles. Status 3: the netlist was rejected.
+// netlist_process PLUGINS real|virtual NETLIST: loads the netlist, starts the threads, runs 200
+// cycles. Status 3: the netlist was rejected.
 #include <iostream>
 #include <string_view>
 
@@ -15,7 +16,10 @@ int main(int argc, char** argv) {
     hal::Diagnostics diagnostics;
     const auto source = session.sources.add("netlist", argv[3]);
     hal::Transaction transaction = session.begin();
-    for (const hal::Command& command : hal::parse(session.sources, source, {&session.ini, {}}, diagnostics)) hal::apply_edit(transaction, command, diagnostics);
+    for (const hal::Command& command :
+         hal::parse(session.sources, source, {&session.ini, {}}, diagnostics)) {
+        hal::apply_edit(transaction, command, diagnostics);
+    }
     if (!transaction.commit(diagnostics)) {
         std::cerr << hal::render(diagnostics, session.sources);
         return 3;

@@ -11,16 +11,21 @@ struct Clock : hal::Component {
     hal::In<std::int32_t> step{*this, "step", "adjustment per cycle, ns"};
     hal::In<std::int32_t> again{*this, "again", "second adjustment in the same cycle, ns"};
     hal::Out<std::int64_t> due{*this, "due", "start of the cycle"};
-    hal::Out<std::int64_t> shift{*this, "shift", "sum of all adjustments, including those of this cycle"};
+    hal::Out<std::int64_t> shift{*this, "shift",
+                                 "sum of all adjustments, including those of this cycle"};
     hal::Out<std::int64_t> limit{*this, "limit", "limit of the adjustments of one cycle"};
     hal::Out<std::uint32_t> backwards{*this, "backwards", "cycles due before their predecessor"};
     hal::Function run{*this, "", &Clock::adjust, "adjusts the clock and outputs its state"};
 
     void start() {
-        if (lead != 0) clock_.claim();
+        if (lead != 0) {
+            clock_.claim();
+        }
     }
     void adjust(hal::Cycle cycle) noexcept {
-        if (due != 0 && cycle.start_ns() <= due) backwards = backwards + 1;
+        if (due != 0 && cycle.start_ns() <= due) {
+            backwards = backwards + 1;
+        }
         due = cycle.start_ns();
         clock_.step(step);
         clock_.step(again);

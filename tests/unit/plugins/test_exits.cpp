@@ -21,7 +21,9 @@ struct Exits : hal::Component {
 
     void start() {
         leave_in("start");
-        if (in.get() == "child") fork_child();
+        if (in.get() == "child") {
+            fork_child();
+        }
         if (in.get() != "thread") return;
         std::thread helper([] {
             pthread_setname_np(pthread_self(), "helper");
@@ -37,12 +39,18 @@ private:
     // A process that the component forks ends as it likes.
     static void fork_child() {
         const pid_t child = fork();
-        if (child == 0) _exit(0);
+        if (child == 0) {
+            _exit(0);
+        }
         int status = 0;
-        if (waitpid(child, &status, 0) != child || status != 0) throw std::runtime_error("the child ended with another status");
+        if (waitpid(child, &status, 0) != child || status != 0) {
+            throw std::runtime_error("the child ended with another status");
+        }
     }
     void leave_in(const char* place) {
-        if (in.get() == place) std::exit(0);
+        if (in.get() == place) {
+            std::exit(0);
+        }
     }
 };
 

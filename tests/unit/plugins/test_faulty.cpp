@@ -23,7 +23,10 @@ struct Faulty : hal::Component {
     hal::In<bool> sleeps{*this, "sleeps", "sleep"};
     hal::In<bool> raises{*this, "raises", "a fault of its own"};
     hal::In<bool> open{*this, "open", "a fault that lasts"};
-    hal::In<std::uint32_t> dies{*this, "dies", "1 bad address, 2 abort, 3 endless recursion, 4 illegal instruction, 5 floating-point signal, 6 exit(0), 7 _exit(0), 8 quick_exit(0), 9 syscall(), 10 the instruction"};
+    hal::In<std::uint32_t> dies{
+        *this, "dies",
+        "1 bad address, 2 abort, 3 endless recursion, 4 illegal instruction, 5 floating-point "
+        "signal, 6 exit(0), 7 _exit(0), 8 quick_exit(0), 9 syscall(), 10 the instruction"};
     hal::Out<double> value{*this, "value", "the number of the run", {.safe = -5.0, .finite = true}};
     hal::Out<bool> on{*this, "on", "TRUE", {.safe = false}};
     hal::Function run{*this, "run", &Faulty::misbehave, "misbehaves"};
@@ -38,11 +41,19 @@ struct Faulty : hal::Component {
     void misbehave(hal::Cycle cycle) noexcept {
         on = true;
         value = static_cast<double>(cycle.number());
-        if (bad_number) value = std::nan("");
+        if (bad_number) {
+            value = std::nan("");
+        }
         if (throws) throw std::runtime_error("thrown in a cycle");
-        if (raises) faults_->raise(faults_, this, "a finger in the gear", 3.0);
-        if (open && !cover_.lasts()) cover_.begin(faults_, this, "the cover is open");
-        if (!open && cover_.lasts()) cover_.end(faults_, this);
+        if (raises) {
+            faults_->raise(faults_, this, "a finger in the gear", 3.0);
+        }
+        if (open && !cover_.lasts()) {
+            cover_.begin(faults_, this, "the cover is open");
+        }
+        if (!open && cover_.lasts()) {
+            cover_.end(faults_, this);
+        }
         if (allocates) {
             std::string text(1000, 'x');
             keep(text.data());
@@ -55,16 +66,23 @@ struct Faulty : hal::Component {
             const std::lock_guard hold(mutex_);
             keep(&mutex_);
         }
-        if (sleeps) usleep(1);
+        if (sleeps) {
+            usleep(1);
+        }
         if (slow) {
             const auto end = std::chrono::steady_clock::now() + std::chrono::microseconds(slow);
-            while (std::chrono::steady_clock::now() < end) {}
+            while (std::chrono::steady_clock::now() < end) {
+            }
         }
-        if (dies) die(dies);
+        if (dies) {
+            die(dies);
+        }
     }
     void make_safe(hal::Cycle) noexcept {
         const char text[] = "emergency function called\n";
-        if (dies) [[maybe_unused]] const auto written = write(STDERR_FILENO, text, sizeof text - 1);
+        if (dies) [[maybe_unused]] {
+            const auto written = write(STDERR_FILENO, text, sizeof text - 1);
+        }
     }
 
 private:

@@ -21,7 +21,9 @@ struct Life : hal::Component {
 
     ~Life() { ++watch.destroyed; }
     hal::test::Watch& constructed() {
-        if (failing.get() == "construct") throw std::runtime_error("the test rejects the construction");
+        if (failing.get() == "construct") {
+            throw std::runtime_error("the test rejects the construction");
+        }
         auto& found = hal::test::Watch::at(address);
         ++found.constructed;
         return found;
@@ -33,10 +35,13 @@ struct Life : hal::Component {
     void stop() noexcept { ++watch.stopped; }
     void copy(hal::Cycle) noexcept {
         const int now = ++watch.inside;
-        if (now > watch.most_inside) watch.most_inside = now;
+        if (now > watch.most_inside) {
+            watch.most_inside = now;
+        }
         while (watch.hang) {
             watch.hanging = true;
-            std::this_thread::sleep_for(std::chrono::milliseconds(1));  // a loop at real-time priority would stop other tests, too
+            // a loop at real-time priority would stop other tests, too
+            std::this_thread::sleep_for(std::chrono::milliseconds(1));
         }
         watch.hanging = false;
         ++watch.runs;

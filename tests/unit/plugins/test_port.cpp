@@ -21,14 +21,19 @@ struct PortUser : hal::Component {
             written = written + 1;
         }
         for (std::uint8_t byte; from.get().read(&byte, 1);) {
-            if (byte != expected_) wrong = wrong + 1;
+            if (byte != expected_) {
+                wrong = wrong + 1;
+            }
             expected_ = static_cast<std::uint8_t>(byte + 1);
             read = read + 1;
         }
     }
 
 private:
-    std::uint8_t next_ = 0, expected_ = 0;
+    std::uint8_t next_ = 0;
+
+private:
+    std::uint8_t expected_ = 0;
 };
 
 }  // namespace

@@ -8,13 +8,14 @@ namespace {
 
 struct Row : hal::Component {
     using Component::Component;
-    hal::In<bool>          throws{*this, "throws", "throw"};
-    hal::In<std::int32_t>  in{*this, "in", "from the one before"};
+    hal::In<bool> throws{*this, "throws", "throw"};
+    hal::In<std::int32_t> in{*this, "in", "from the one before"};
     hal::Out<std::int32_t> out{*this, "out", "one more than in"};
-    hal::Function          run{*this, "", hal::step<&Row::update>, "counts"};
+    hal::Function run{*this, "", hal::step<&Row::update>, "counts"};
 
     void update(hal::Cycle) noexcept {
-        if (throws) throw std::runtime_error("requested by the test");  // out of a noexcept function
+        // out of a noexcept function
+        if (throws) throw std::runtime_error("requested by the test");
         out = in + 1;
     }
 };

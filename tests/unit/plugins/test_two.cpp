@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Two functions that each have pins of their own, so they may run in two threads; one pin of both when asked for.
+// Two functions that each have pins of their own, so they may run in two threads; one pin of both
+// when asked for.
 #include "hal/component.hpp"
 
 namespace {
@@ -17,7 +18,8 @@ struct Two : hal::Component {
     hal::In<std::uint64_t> a_again{*this, last, "a-again", "the same a"};
     hal::In<std::uint64_t> b_again{*this, last, "b-again", "the same b"};
     hal::Out<std::uint64_t> looks{*this, last, "looks", "runs of last"};
-    hal::Out<std::uint64_t> torn{*this, last, "torn", "runs in which what was read did not fit together"};
+    hal::Out<std::uint64_t> torn{*this, last, "torn",
+                                 "runs in which what was read did not fit together"};
     hal::Ins<bool> both{*this, "both-#", common, "used by all functions"};
 
     void run_fast(hal::Cycle) noexcept {
@@ -30,11 +32,16 @@ struct Two : hal::Component {
     }
     void run_last(hal::Cycle) noexcept {  // in the same thread as first
         looks = looks + 1;
-        if (a_seen_ != b_seen_ || a_again != a_seen_ || b_again != b_seen_) torn = torn + 1;
+        if (a_seen_ != b_seen_ || a_again != a_seen_ || b_again != b_seen_) {
+            torn = torn + 1;
+        }
     }
 
 private:
-    std::uint64_t a_seen_ = 0, b_seen_ = 0;
+    std::uint64_t a_seen_ = 0;
+
+private:
+    std::uint64_t b_seen_ = 0;
 };
 
 }  // namespace

@@ -9,7 +9,8 @@ struct Row {
     hal::In<T> in;
     hal::Out<T> out;
     hal::Io<T> io;
-    Row(hal::Component& c, const char* in_name, const char* out_name, const char* io_name) : in(c, in_name, ""), out(c, out_name, ""), io(c, io_name, "") {}
+    Row(hal::Component& c, const char* in_name, const char* out_name, const char* io_name)
+        : in(c, in_name, ""), out(c, out_name, ""), io(c, io_name, "") {}
     void copy() noexcept { out = in.get(); }
 };
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Files of recordings: what was written is read, also when the file was cut off, damaged, or the disk was full.
+// Files of recordings: what was written is read, also when the file was cut off, damaged, or the
+// disk was full.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -26,7 +27,8 @@ namespace hal::mcap {
 namespace {
 
 struct Folder {
-    Folder() : path(std::filesystem::temp_directory_path() / ("mcap-" + std::to_string(::getpid()))) {
+    Folder()
+        : path(std::filesystem::temp_directory_path() / ("mcap-" + std::to_string(::getpid()))) {
         std::filesystem::create_directories(path);
     }
     ~Folder() { std::filesystem::remove_all(path); }
@@ -39,11 +41,13 @@ const std::vector<Column> columns{{"x.0.pos-cmd", HAL_TYPE_FLOAT, "mm"},
                                   {"count", HAL_TYPE_S32, ""},
                                   {"X-0.pos_cmd", HAL_TYPE_FLOAT, ""},
                                   {"big", HAL_TYPE_U64, ""}};
-constexpr std::uint64_t start_ns = 1'700'000'000'000'000'000, period_ns = 1'000'000;
+constexpr std::uint64_t start_ns = 1'700'000'000'000'000'000;
+constexpr std::uint64_t period_ns = 1'000'000;
 
 std::vector<std::uint64_t> values(std::uint64_t row) {
     return {std::bit_cast<std::uint64_t>(std::sin(static_cast<double>(row) * 0.01)), row / 100 % 2,
-            static_cast<std::uint64_t>(-static_cast<std::int64_t>(row)), std::bit_cast<std::uint64_t>(0.5 * static_cast<double>(row)),
+            static_cast<std::uint64_t>(-static_cast<std::int64_t>(row)),
+            std::bit_cast<std::uint64_t>(0.5 * static_cast<double>(row)),
             std::uint64_t{1} << 63 | row};
 }
 
@@ -53,8 +57,9 @@ bool write(const std::string& path, std::uint64_t rows) {
     RowWriter row(columns);
     const auto schema = writer.add_schema("halcyon_msgs/msg/Servo", "ros2msg", row.schema());
     const auto channel = writer.add_channel(schema, "/hal/servo", "cdr", row.metadata());
-    const auto events =
-        writer.add_channel(writer.add_schema("halcyon.Event", "jsonschema", "{\"type\":\"object\"}"), "/hal/events", "json", {});
+    const auto events = writer.add_channel(
+        writer.add_schema("halcyon.Event", "jsonschema", "{\"type\":\"object\"}"), "/hal/events",
+        "json", {});
     writer.metadata("halcyon", {{"instance", "test"}});
     writer.attachment("netlist.hal", "text/plain", "loadrt and2\n", 1);
     std::string payload;
@@ -62,7 +67,8 @@ bool write(const std::string& path, std::uint64_t rows) {
         row.write(values(i).data(), payload);
         writer.message(channel, static_cast<std::uint32_t>(i), start_ns + i * period_ns, payload);
     }
-    writer.message(events, 0, start_ns + rows * period_ns, R"({"kind":"fault","text":"it \"stopped\""})");
+    writer.message(events, 0, start_ns + rows * period_ns,
+                   R"({"kind":"fault","text":"it \"stopped\""})");
     return writer.close();
 }
 
@@ -72,7 +78,8 @@ std::string content(const std::string& path) {
 }
 
 void put_file(const std::string& path, std::string_view bytes) {
-    std::ofstream(path, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    std::ofstream(path, std::ios::binary)
+        .write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
 }
 
 TEST(Recording, What_is_written_is_read) {
@@ -88,13 +95,16 @@ TEST(Recording, What_is_written_is_read) {
     ASSERT_EQ(table.rows(), 2500u);
     ASSERT_EQ(table.columns.size(), columns.size());
     for (std::size_t c = 0; c < columns.size(); ++c) {
-        const auto original =
-            std::find_if(columns.begin(), columns.end(), [&](const Column& one) { return one.name == table.columns[c].name; });
+        const auto original = std::find_if(columns.begin(), columns.end(), [&](const Column& one) {
+            return one.name == table.columns[c].name;
+        });
         ASSERT_NE(original, columns.end());
         EXPECT_EQ(table.columns[c].type, original->type);
         EXPECT_EQ(table.columns[c].unit, original->unit);
-        for (std::uint64_t row = 0; row < 2500; row += 7)
-            EXPECT_EQ(table.word(row, c), values(row)[static_cast<std::size_t>(original - columns.begin())]);
+        for (std::uint64_t row = 0; row < 2500; row += 7) {
+            EXPECT_EQ(table.word(row, c),
+                      values(row)[static_cast<std::size_t>(original - columns.begin())]);
+        }
     }
     EXPECT_EQ(recording.begin_ns(), static_cast<std::int64_t>(start_ns));
     EXPECT_EQ(recording.end_ns(), static_cast<std::int64_t>(start_ns + 2499 * period_ns));
@@ -111,7 +121,10 @@ TEST(Recording, A_time_window_reads_its_chunks_only) {
     ASSERT_TRUE(reader.open(open_file(folder.file("a.mcap"), problem)));
     ASSERT_GE(reader.chunks().size(), 20u);
     std::uint64_t rows = 0;
-    ASSERT_TRUE(reader.each([&](const Message&) { return ++rows, true; }, start_ns + 10'500 * period_ns, start_ns + 10'600 * period_ns));
+    ASSERT_TRUE(reader.each([&](const Message&) {
+        ++rows;
+        return true;
+    }, start_ns + 10'500 * period_ns, start_ns + 10'600 * period_ns));
     EXPECT_EQ(rows, 100u);
     EXPECT_LE(reader.chunks_read(), 2u);
     EXPECT_EQ(reader.metadata("halcyon").at("instance"), "test");
@@ -124,7 +137,8 @@ TEST(Recording, A_file_without_its_end_is_read_up_to_its_last_chunk) {
     std::size_t last = 0;
     for (const double share : {0.3, 0.6, 0.9, 0.999}) {
         put_file(folder.file("cut.mcap"),
-                 std::string_view(whole).substr(0, static_cast<std::size_t>(static_cast<double>(whole.size()) * share)));
+                 std::string_view(whole).substr(
+                     0, static_cast<std::size_t>(static_cast<double>(whole.size()) * share)));
         Recording recording;
         std::string problem;
         ASSERT_TRUE(load(folder.file("cut.mcap"), recording, problem)) << problem;
@@ -171,8 +185,10 @@ TEST(Recording, On_a_full_disk_the_file_is_complete_up_to_there) {
 }
 
 TEST(Recording, Names_become_distinct_identifiers) {
-    const RowWriter rows(
-        {{"x.0.pos-cmd", HAL_TYPE_FLOAT, "mm"}, {"X-0.pos_cmd", HAL_TYPE_FLOAT, ""}, {"0", HAL_TYPE_BIT, ""}, {"--", HAL_TYPE_S32, ""}});
+    const RowWriter rows({{"x.0.pos-cmd", HAL_TYPE_FLOAT, "mm"},
+                          {"X-0.pos_cmd", HAL_TYPE_FLOAT, ""},
+                          {"0", HAL_TYPE_BIT, ""},
+                          {"--", HAL_TYPE_S32, ""}});
     EXPECT_EQ(rows.schema(), "float64 x_0_pos_cmd\nfloat64 x_0_pos_cmd_2\nint32 v\nbool v_0\n");
     EXPECT_EQ(rows.metadata().at("pin.x_0_pos_cmd_2"), "X-0.pos_cmd");
     EXPECT_EQ(rows.metadata().at("unit.x_0_pos_cmd"), "mm");
@@ -180,8 +196,9 @@ TEST(Recording, Names_become_distinct_identifiers) {
 
 TEST(Recording, Rows_of_another_writer_are_read_with_their_alignment) {
     RowReader reader;
-    ASSERT_TRUE(
-        reader.open({1, "a/msg/B", "ros2msg", "bool on # a comment\nint16 n\nuint8 MOST=5\n\nfloat32 v\n"}, {1, 1, "/a", "cdr", {}}));
+    ASSERT_TRUE(reader.open(
+        {1, "a/msg/B", "ros2msg", "bool on # a comment\nint16 n\nuint8 MOST=5\n\nfloat32 v\n"},
+        {1, 1, "/a", "cdr", {}}));
     std::vector<std::uint64_t> row;
     ASSERT_TRUE(reader.read(std::string_view("\0\1\0\0\1\0\xfe\xff\0\0\xc0\x3f", 12), row));
     EXPECT_EQ(row[0], 1u);
@@ -208,7 +225,8 @@ TEST(Recording, What_is_not_a_recording_is_rejected) {
 }
 
 /// An MCAP file of another writer: nothing of it is in a chunk, and it has no summary.
-std::string without_chunks(std::string_view encoding, std::string_view schema_encoding, std::string_view schema, std::string_view payload) {
+std::string without_chunks(std::string_view encoding, std::string_view schema_encoding,
+                           std::string_view schema, std::string_view payload) {
     std::string file(magic), content;
     const auto add = [&](Opcode opcode) {
         put_record(file, opcode, content);
@@ -218,11 +236,15 @@ std::string without_chunks(std::string_view encoding, std::string_view schema_en
     put_text(content, "other");
     add(op_header);
     put(content, std::uint16_t{1});
-    for (const std::string_view text : {std::string_view("p/msg/X"), schema_encoding, schema}) put_text(content, text);
+    for (const std::string_view text : {std::string_view("p/msg/X"), schema_encoding, schema}) {
+        put_text(content, text);
+    }
     add(op_schema);
     put(content, std::uint16_t{1});
     put(content, std::uint16_t{1});
-    for (const std::string_view text : {std::string_view("/t"), encoding, std::string_view()}) put_text(content, text);
+    for (const std::string_view text : {std::string_view("/t"), encoding, std::string_view()}) {
+        put_text(content, text);
+    }
     add(op_channel);
     for (std::uint32_t i = 0; i < 100; ++i) {
         put(content, std::uint16_t{1});
@@ -241,7 +263,8 @@ std::string without_chunks(std::string_view encoding, std::string_view schema_en
 
 TEST(Recording, Messages_without_a_chunk_are_read) {
     const Folder folder;
-    const std::string whole = without_chunks("cdr", "ros2msg", "float64 a\n", std::string_view("\0\1\0\0\0\0\0\0\0\0\xf8\x3f", 12));
+    const std::string whole = without_chunks("cdr", "ros2msg", "float64 a\n",
+                                             std::string_view("\0\1\0\0\0\0\0\0\0\0\xf8\x3f", 12));
     put_file(folder.file("a.mcap"), whole);
     Recording recording;
     std::string problem;
@@ -270,11 +293,16 @@ TEST(Recording, What_cannot_be_read_is_named) {
         EXPECT_TRUE(recording.tables.empty());
         return recording.unread.substr(0, recording.unread.find(';'));
     };
-    EXPECT_EQ(unread(without_chunks("json", "jsonschema", "{}", "{}")), "topic '/t' is not read: its messages are 'json'");
-    EXPECT_EQ(unread(without_chunks("cdr", "ros2idl", "", "")), "topic '/t' is not read: its schema is 'ros2idl'");
-    EXPECT_EQ(unread(without_chunks("cdr", "ros2msg", "float64[] a\n", "")), "topic '/t' is not read: its schema has no number: a (float64[]) is skipped");
-    EXPECT_EQ(unread(without_chunks("cdr", "ros2msg", "", "")), "topic '/t' is not read: its schema has no field");
-    EXPECT_EQ(unread(without_chunks("cdr", "ros2msg", "float64 a\n", "")), "a message of topic '/t' is shorter than its schema, or not plain CDR");
+    EXPECT_EQ(unread(without_chunks("json", "jsonschema", "{}", "{}")),
+              "topic '/t' is not read: its messages are 'json'");
+    EXPECT_EQ(unread(without_chunks("cdr", "ros2idl", "", "")),
+              "topic '/t' is not read: its schema is 'ros2idl'");
+    EXPECT_EQ(unread(without_chunks("cdr", "ros2msg", "float64[] a\n", "")),
+              "topic '/t' is not read: its schema has no number: a (float64[]) is skipped");
+    EXPECT_EQ(unread(without_chunks("cdr", "ros2msg", "", "")),
+              "topic '/t' is not read: its schema has no field");
+    EXPECT_EQ(unread(without_chunks("cdr", "ros2msg", "float64 a\n", "")),
+              "a message of topic '/t' is shorter than its schema, or not plain CDR");
 }
 
 /// Files that the Python package mcap has written: 40 rows of a header and a number.
@@ -283,7 +311,8 @@ void expect_rows_of_another_writer(const std::string& name) {
     std::string problem;
     ASSERT_TRUE(load("tests/fuzz/corpus/recording/" + name, recording, problem)) << problem;
     EXPECT_EQ(recording.note, "");
-    EXPECT_EQ(recording.skipped, std::vector<std::string>{"topic '/real': not read: header.frame_id (string)"});
+    EXPECT_EQ(recording.skipped,
+              std::vector<std::string>{"topic '/real': not read: header.frame_id (string)"});
     ASSERT_EQ(recording.tables.size(), 1u) << recording.unread;
     const Table& table = recording.tables[0];
     ASSERT_EQ(table.rows(), 40u);
@@ -294,7 +323,9 @@ void expect_rows_of_another_writer(const std::string& name) {
     EXPECT_EQ(table.real(39, 2), 39.5);
 }
 
-TEST(Recording, Chunks_compressed_with_lz4_are_read) { expect_rows_of_another_writer("lz4_chunks.mcap"); }
+TEST(Recording, Chunks_compressed_with_lz4_are_read) {
+    expect_rows_of_another_writer("lz4_chunks.mcap");
+}
 
 TEST(Recording, A_summary_that_omits_channels_and_schemas_is_completed) {
     expect_rows_of_another_writer("omitted_channels.mcap");
@@ -304,34 +335,47 @@ TEST(Recording, A_summary_that_omits_channels_and_schemas_is_completed) {
 TEST(Recording, A_chunk_that_cannot_be_expanded_is_named) {
     const Folder folder;
     std::string bytes = content("tests/fuzz/corpus/recording/lz4_chunks.mcap");
-    for (std::size_t at = bytes.find("lz4"); at != bytes.npos; at = bytes.find("lz4", at)) bytes.replace(at, 3, "lz5");
-    for (const std::size_t end : {bytes.size(), bytes.size() * 9 / 10}) {  // with its index, and without
+    for (std::size_t at = bytes.find("lz4"); at != bytes.npos; at = bytes.find("lz4", at)) {
+        bytes.replace(at, 3, "lz5");
+    }
+    // with its index, and without
+    for (const std::size_t end : {bytes.size(), bytes.size() * 9 / 10}) {
         put_file(folder.file("a.mcap"), std::string_view(bytes).substr(0, end));
         Recording recording;
         std::string problem;
         ASSERT_TRUE(load(folder.file("a.mcap"), recording, problem)) << problem;
         EXPECT_TRUE(recording.tables.empty());
-        EXPECT_EQ(recording.unread, "unsupported compression 'lz5'; supported: zstd, lz4 and none") << end;
+        EXPECT_EQ(recording.unread, "unsupported compression 'lz5'; supported: zstd, lz4 and none")
+            << end;
     }
 }
 
 TEST(Recording, Lz4_is_expanded_to_the_size_that_is_announced) {
     // `lz4.frame.compress(b"abcabcabc" * 10)` of the Python package lz4
     const std::string_view frame(
-        "\x04\x22\x4d\x18\x68\x40\x5a\x00\x00\x00\x00\x00\x00\x00\xec\x0d\x00\x00\x00\x3f\x61\x62\x63\x03"
-        "\x00\x3f\x50\x62\x63\x61\x62\x63\x00\x00\x00\x00", 36);
+        "\x04\x22\x4d\x18\x68\x40\x5a\x00\x00\x00\x00\x00\x00\x00\xec\x0d\x00\x00\x00\x3f\x61\x62"
+        "\x63\x03"
+        "\x00\x3f\x50\x62\x63\x61\x62\x63\x00\x00\x00\x00",
+        36);
     const std::string expected = [] {
         std::string text;
-        for (int i = 0; i < 30; ++i) text += "abc";
+        for (int i = 0; i < 30; ++i) {
+            text += "abc";
+        }
         return text;
     }();
     std::string to, problem;
     EXPECT_TRUE(expand("lz4", frame, 90, to, problem)) << problem;
     EXPECT_EQ(to, expected);
-    EXPECT_TRUE(expand("lz4", std::string(frame) + std::string(frame), 180, to, problem)) << "two frames";
+    EXPECT_TRUE(expand("lz4", std::string(frame) + std::string(frame), 180, to, problem))
+        << "two frames";
     EXPECT_EQ(to, expected + expected);
-    for (const std::uint64_t size : {89, 91, 1 << 28}) EXPECT_FALSE(expand("lz4", frame, size, to, problem)) << size;
-    for (std::size_t end = 0; end < frame.size(); ++end) EXPECT_FALSE(expand("lz4", frame.substr(0, end), 90, to, problem)) << end;
+    for (const std::uint64_t size : {89, 91, 1 << 28}) {
+        EXPECT_FALSE(expand("lz4", frame, size, to, problem)) << size;
+    }
+    for (std::size_t end = 0; end < frame.size(); ++end) {
+        EXPECT_FALSE(expand("lz4", frame.substr(0, end), 90, to, problem)) << end;
+    }
     std::string damaged(frame);
     damaged[8] ^= 0x10;
     EXPECT_FALSE(expand("lz4", damaged, 90, to, problem));
@@ -340,7 +384,9 @@ TEST(Recording, Lz4_is_expanded_to_the_size_that_is_announced) {
 
 TEST(Recording, A_table_has_the_types_that_are_given) {
     const Folder folder;
-    put_file(folder.file("a.csv"), "time_s,on,n,big\n-0.002,1,-5,9007199254740993\n-0.001,0,2147483648,18446744073709551615\n");
+    put_file(folder.file("a.csv"),
+             "time_s,on,n,big\n-0.002,1,-5,9007199254740993\n-0.001,0,2147483648,"
+             "18446744073709551615\n");
     Recording recording;
     std::string problem;
     const auto get = [&](std::map<std::string, hal_type> types) {
@@ -356,9 +402,12 @@ TEST(Recording, A_table_has_the_types_that_are_given) {
     EXPECT_EQ(table.word(0, 2), 9007199254740993u);
     EXPECT_EQ(table.word(1, 2), UINT64_MAX);
     EXPECT_FALSE(get({{"n", HAL_TYPE_S32}}));
-    EXPECT_NE(problem.find("line 3: '2147483648' of 'n' is not a value of type s32"), std::string::npos) << problem;
+    EXPECT_NE(problem.find("line 3: '2147483648' of 'n' is not a value of type s32"),
+              std::string::npos)
+        << problem;
     EXPECT_FALSE(get({{"n", HAL_TYPE_BIT}}));
-    EXPECT_NE(problem.find("line 2: '-5' of 'n' is not a value of type bit"), std::string::npos) << problem;
+    EXPECT_NE(problem.find("line 2: '-5' of 'n' is not a value of type bit"), std::string::npos)
+        << problem;
 }
 
 TEST(Recording, Crc_is_that_of_zlib) {

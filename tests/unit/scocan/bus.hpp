@@ -15,9 +15,11 @@
 
 namespace hal::scocan::test {
 
-inline constexpr Time us = 1000, ms = 1'000'000;
+inline constexpr Time us = 1000;
+inline constexpr Time ms = 1'000'000;
 
-/// Five nodes, 1 ms in ten slots: 1 a private slot of `ir`, 2 of `motor`, 3 of `us`; the others are shared. Mode 1 swaps two of them.
+/// Five nodes, 1 ms in ten slots: 1 a private slot of `ir`, 2 of `motor`, 3 of `us`; the others are
+/// shared. Mode 1 swaps two of them.
 inline constexpr const char* table_text = R"(
 bitrate 1M
 cycle 5ms
@@ -52,20 +54,27 @@ struct Seen {
 
 /// One station with its link; keeps what it reports.
 struct Member final : Sink {
-    Member(const Table& table, const std::string& name, const std::string& bus, StationOptions options = {})
+    Member(const Table& table, const std::string& name, const std::string& bus,
+           StationOptions options = {})
         : station(table, table.find(name).value(), options, *this) {
         auto opened = can::open("sim:" + bus, {.bit_rate = table.bit_rate, .own_frames = true});
         link = std::move(opened.link);
         station.attach(*link);
     }
-    void on_frame(const can::Frame& f, Time begin) noexcept override { received.push_back({f, begin}); }
+    void on_frame(const can::Frame& f, Time begin) noexcept override {
+        received.push_back({f, begin});
+    }
     void on_sent(const can::Frame& f, Time begin) noexcept override { sent.push_back({f, begin}); }
-    void on_event(Event e, std::uint32_t who, std::uint32_t id, Time value) noexcept override { events.push_back({e, who, id, value}); }
+    void on_event(Event e, std::uint32_t who, std::uint32_t id, Time value) noexcept override {
+        events.push_back({e, who, id, value});
+    }
     std::size_t times(Event e) const {
-        return static_cast<std::size_t>(std::count_if(events.begin(), events.end(), [&](const Happened& h) { return h.event == e; }));
+        return static_cast<std::size_t>(std::count_if(
+            events.begin(), events.end(), [&](const Happened& h) { return h.event == e; }));
     }
     std::size_t count(std::uint32_t id) const {
-        return static_cast<std::size_t>(std::count_if(received.begin(), received.end(), [&](const Seen& s) { return s.frame.id == id; }));
+        return static_cast<std::size_t>(std::count_if(
+            received.begin(), received.end(), [&](const Seen& s) { return s.frame.id == id; }));
     }
 
     std::unique_ptr<can::Link> link;
@@ -75,24 +84,38 @@ struct Member final : Sink {
 };
 
 struct Bus {
-    explicit Bus(const char* text = table_text, const char* bus_name = "scocan-test") : name(bus_name) {
+    explicit Bus(const char* text = table_text, const char* bus_name = "scocan-test")
+        : name(bus_name) {
         Reading reading = read(text);
         EXPECT_TRUE(reading.good()) << text::errors_text(reading.messages, "table");
         table = std::move(reading.table);
         listener = can::open("sim:" + name, {.bit_rate = table.bit_rate}).link;
     }
-    Member& add(const std::string& node, StationOptions options = {}) { return nodes.emplace_back(table, node, name, options); }
-    /// Runs all stations; `each` is called in every cycle of the thread between receive and transmit.
+    Member& add(const std::string& node, StationOptions options = {}) {
+        return nodes.emplace_back(table, node, name, options);
+    }
+    /// Runs all stations; `each` is called in every cycle of the thread between receive and
+    /// transmit.
     template <class Each>
     void run(Time duration, Time period, Each each) {
         for (const Time end = now + duration; now < end; now += period) {
-            for (Member& n : nodes)
-                if (n.link) n.station.receive(now);
-            for (can::Frame f; listener->receive(f, now);)
-                wire.push_back({f, f.time_ns - can::duration_ns({can::frame_bits(f).nominal - can::intermission_bits, 0}, table.bit_rate)});
+            for (Member& n : nodes) {
+                if (n.link) {
+                    n.station.receive(now);
+                }
+            }
+            for (can::Frame f; listener->receive(f, now);) {
+                wire.push_back(
+                    {f, f.time_ns - can::duration_ns(
+                                        {can::frame_bits(f).nominal - can::intermission_bits, 0},
+                                        table.bit_rate)});
+            }
             each();
-            for (Member& n : nodes)
-                if (n.link) n.station.transmit(now, period);
+            for (Member& n : nodes) {
+                if (n.link) {
+                    n.station.transmit(now, period);
+                }
+            }
         }
     }
     void run(Time duration, Time period = 500 * us) {

@@ -10,12 +10,17 @@ namespace {
 using namespace hal::can;
 
 TEST(Scocan_link, needs_a_node_of_this_process) {
-    EXPECT_EQ("scocan:nobody: no node 'nobody' in this process; load it before: loadrt scocan config=FILE.scocan node=nobody",
-              open("scocan:nobody").problem);
+    EXPECT_EQ(
+        "scocan:nobody: no node 'nobody' in this process; load it before: loadrt scocan "
+        "config=FILE.scocan node=nobody",
+        open("scocan:nobody").problem);
     const auto exchange = offer_slots("motor", {.bit_rate = 500'000});
-    EXPECT_EQ("scocan:moter: no node 'moter' in this process; nodes are motor", open("scocan:moter").problem);
-    EXPECT_EQ("scocan:motor?slot=x: invalid slot 'x'; write the number of a private slot of motor, as in scocan:motor?slot=3",
-              open("scocan:motor?slot=x").problem);
+    EXPECT_EQ("scocan:moter: no node 'moter' in this process; nodes are motor",
+              open("scocan:moter").problem);
+    EXPECT_EQ(
+        "scocan:motor?slot=x: invalid slot 'x'; write the number of a private slot of motor, as in "
+        "scocan:motor?slot=3",
+        open("scocan:motor?slot=x").problem);
     EXPECT_EQ(nullptr, offer_slots("motor", {})) << "each node once";
     withdraw_slots(*exchange);
     EXPECT_EQ(nullptr, slots_of("motor"));

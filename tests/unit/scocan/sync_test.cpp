@@ -25,10 +25,15 @@ TEST(Backup, replaces_the_sync_node_within_one_cycle) {
     bus.run(100 * ms, 500 * us, send);
     EXPECT_TRUE(spare.station.leading());
     std::vector<Seen> syncs;
-    for (const Seen& s : bus.wire)
-        if (s.frame.id == 0) syncs.push_back(s);
-    for (std::size_t i = 1; i < syncs.size(); ++i)
-        EXPECT_LE(syncs[i].begin - syncs[i - 1].begin, 5 * ms + 100 * us) << "no cycle without a SYNC";
+    for (const Seen& s : bus.wire) {
+        if (s.frame.id == 0) {
+            syncs.push_back(s);
+        }
+    }
+    for (std::size_t i = 1; i < syncs.size(); ++i) {
+        EXPECT_LE(syncs[i].begin - syncs[i - 1].begin, 5 * ms + 100 * us)
+            << "no cycle without a SYNC";
+    }
     EXPECT_GE(syncs.back().begin, lost_at + 90 * ms);
     EXPECT_EQ(0U, motor.station.count().syncs_lost);
     EXPECT_EQ(0U, motor.station.count().missed);
@@ -42,7 +47,10 @@ TEST(Backup, replaces_the_sync_node_within_one_cycle) {
     Time last = 0;
     for (const Seen& s : bus.wire) {
         if (s.frame.id != 0x10A) continue;
-        if (last != 0) { EXPECT_NEAR(5e6, static_cast<double>(s.begin - last), 10) << "private slots keep their times"; }
+        if (last != 0) {
+            EXPECT_NEAR(5e6, static_cast<double>(s.begin - last), 10)
+                << "private slots keep their times";
+        }
         last = s.begin;
     }
 }
@@ -53,7 +61,8 @@ TEST(Sync, lost_for_too_long_silences_a_node_that_recovers) {
     Member& motor = bus.add("motor");
     const auto send = [&] { motor.station.send({0x10A, {7}}, true); };
     bus.run(100 * ms, 500 * us, send);
-    bus.faults().disturb({.fault = Fault::error, .every = 1, .id = 0, .mask = 0x7ff, .until_ns = bus.now + 25 * ms});
+    bus.faults().disturb(
+        {.fault = Fault::error, .every = 1, .id = 0, .mask = 0x7ff, .until_ns = bus.now + 25 * ms});
     const auto sent = motor.station.count().sent_private;
     bus.run(25 * ms, 500 * us, send);
     EXPECT_EQ(State::running, motor.station.state()) << "coasting";
@@ -61,7 +70,11 @@ TEST(Sync, lost_for_too_long_silences_a_node_that_recovers) {
     EXPECT_GE(motor.station.count().syncs_lost, 4U);
     bus.run(25 * ms, 500 * us, send);
     EXPECT_EQ(0U, motor.station.lost());
-    bus.faults().disturb({.fault = Fault::error, .every = 1, .id = 0, .mask = 0x7ff, .until_ns = bus.now + 120 * ms});
+    bus.faults().disturb({.fault = Fault::error,
+                          .every = 1,
+                          .id = 0,
+                          .mask = 0x7ff,
+                          .until_ns = bus.now + 120 * ms});
     bus.run(100 * ms, 500 * us, send);
     EXPECT_EQ(State::silent, motor.station.state());
     EXPECT_EQ(1U, motor.times(Event::sync_lost));
@@ -96,7 +109,9 @@ TEST(Sync, with_any_phase_ends_silence_at_once) {
     bus.now += 1234567;  // the restarted node begins its cycles at any instant
     clock.station.attach(*clock.link);
     const auto syncs = motor.station.count().syncs;
-    while (motor.station.count().syncs == syncs) bus.run(500 * us, 500 * us, send);
+    while (motor.station.count().syncs == syncs) {
+        bus.run(500 * us, 500 * us, send);
+    }
     EXPECT_EQ(State::running, motor.station.state()) << "at the first SYNC";
     bus.run(100 * ms, 500 * us, send);
     EXPECT_EQ(State::running, motor.station.state());
@@ -132,11 +147,17 @@ TEST(Sync, late_or_doubled_is_ignored) {
     bus.add("clock", {.single_shot = false});
     Member& motor = bus.add("motor");
     bus.run(200 * ms, 500 * us, [&] { motor.station.send({0x10A, {7}}, true); });
-    bus.faults().disturb({.fault = Fault::delay, .every = 1, .id = 0, .mask = 0x7ff, .count = 1, .delay_ns = 60 * us});
+    bus.faults().disturb({.fault = Fault::delay,
+                          .every = 1,
+                          .id = 0,
+                          .mask = 0x7ff,
+                          .count = 1,
+                          .delay_ns = 60 * us});
     bus.run(10 * ms);
     EXPECT_EQ(1U, motor.times(Event::sync_late));
     EXPECT_NEAR(60e3, static_cast<double>(motor.events.back().value), 10);
-    bus.faults().disturb({.fault = Fault::duplicate, .every = 1, .id = 0, .mask = 0x7ff, .count = 1});
+    bus.faults().disturb(
+        {.fault = Fault::duplicate, .every = 1, .id = 0, .mask = 0x7ff, .count = 1});
     bus.run(10 * ms);
     EXPECT_EQ(1U, motor.times(Event::sync_doubled));
     EXPECT_EQ(State::running, motor.station.state());
@@ -149,7 +170,8 @@ TEST(Second_sync_node, makes_one_of_them_yield) {
     Member& motor = bus.add("motor");
     bus.run(102 * ms, 500 * us, [&] { motor.station.send({0x10A, {7}}, true); });
     Member& second = bus.add("clock");  // was on a bus of its own, in another phase
-    auto alone = hal::can::open("sim:scocan-other", {.bit_rate = 1'000'000, .own_frames = true}).link;
+    auto alone =
+        hal::can::open("sim:scocan-other", {.bit_rate = 1'000'000, .own_frames = true}).link;
     second.station.attach(*alone);
     bus.run(53 * ms, 500 * us, [&] { motor.station.send({0x10A, {7}}, true); });
     ASSERT_TRUE(second.station.leading());
@@ -167,7 +189,9 @@ TEST(Second_sync_node, makes_one_of_them_yield) {
 TEST(Mode_change, takes_place_at_one_cycle_without_a_lost_or_double_message) {
     Bus bus;
     Member& clock = bus.add("clock");
-    for (const char* name : {"spare", "us", "watch"}) bus.add(name);
+    for (const char* name : {"spare", "us", "watch"}) {
+        bus.add(name);
+    }
     Member& ir = bus.add("ir");
     Member& motor = bus.add("motor");
     std::uint8_t number = 0;
@@ -193,12 +217,18 @@ TEST(Mode_change, takes_place_at_one_cycle_without_a_lost_or_double_message) {
     Time sync = 0;
     bool swapped = false;
     for (const Seen& s : bus.wire) {
-        if (s.frame.id == 0) sync = s.begin, swapped = (s.frame.data[1] & 15) == 1;
+        if (s.frame.id == 0) {
+            sync = s.begin;
+            swapped = (s.frame.data[1] & 15) == 1;
+        }
         if (s.frame.id != 0x10A && s.frame.id != 0x100) continue;
         const bool is_motor = s.frame.id == 0x10A;
-        EXPECT_NEAR(static_cast<double>(sync + (is_motor == swapped ? 500 : 1000) * us), static_cast<double>(s.begin), 2);
+        EXPECT_NEAR(static_cast<double>(sync + (is_motor == swapped ? 500 : 1000) * us),
+                    static_cast<double>(s.begin), 2);
         int& number_of = last[is_motor ? 1 : 0];
-        if (number_of != 0) { EXPECT_EQ(number_of + 1, s.frame.data[0]); }
+        if (number_of != 0) {
+            EXPECT_EQ(number_of + 1, s.frame.data[0]);
+        }
         number_of = s.frame.data[0];
     }
     EXPECT_GT(last[1], 50);
@@ -207,17 +237,22 @@ TEST(Mode_change, takes_place_at_one_cycle_without_a_lost_or_double_message) {
 TEST(Mode_change, is_refused_when_a_node_does_not_answer) {
     Bus bus;
     Member& clock = bus.add("clock");
-    for (const char* name : {"spare", "us", "watch", "motor"}) bus.add(name);
+    for (const char* name : {"spare", "us", "watch", "motor"}) {
+        bus.add(name);
+    }
     bus.run(100 * ms);
     ASSERT_TRUE(clock.station.change_mode(1));
     bus.run(200 * ms);
     ASSERT_EQ(1U, clock.times(Event::mode_refused));
     EXPECT_EQ(bus.table.find("ir").value(), clock.events.back().who);
-    for (Member& n : bus.nodes) EXPECT_EQ(0U, n.station.mode());
+    for (Member& n : bus.nodes) {
+        EXPECT_EQ(0U, n.station.mode());
+    }
 }
 
 TEST(Node_with_another_table, only_listens) {
-    Bus bus, old(std::string(table_text).append("message extra 0x350 node us\n").c_str(), "scocan-test");
+    Bus bus,
+        old(std::string(table_text).append("message extra 0x350 node us\n").c_str(), "scocan-test");
     bus.add("clock");
     Member& motor = old.add("motor");
     const auto send = [&] { motor.station.send({0x10A, {7}}, true); };
@@ -241,7 +276,10 @@ TEST(Sender_outside_of_its_slots, is_reported_and_silences_itself) {
     Time next = bus.now;
     bus.run(100 * ms, 500 * us, [&] {
         motor.station.send({0x10A, {7}}, true);
-        if (bus.now >= next) motor.link->send({0x10A, {9}}, bus.now + 100 * us), next = bus.now + 10 * ms;
+        if (bus.now >= next) {
+            motor.link->send({0x10A, {9}}, bus.now + 100 * us);
+            next = bus.now + 10 * ms;
+        }
     });
     EXPECT_GE(ir.station.count().foreign, 3U);
     EXPECT_EQ(ir.station.count().foreign, ir.station.foreign_of(0x10A));
@@ -272,10 +310,14 @@ TEST(Foreign_frame, has_a_sender_only_where_the_table_knows_one) {
     Bus bus;
     Member& ir = bus.add("ir");
     const EventWords words(bus.table, static_cast<std::size_t>(ir.station.node()), "reset");
-    EXPECT_EQ(words.foreign(sync_id, no_node, "3"), "frame 0x000 in slot 3, outside of its own; a SYNC, of node clock or a backup");
-    EXPECT_EQ(words.foreign(announce_id, no_node, "3"), "frame 0x001 in slot 3, outside of its own; an idle slot announced by the monitor");
-    EXPECT_EQ(words.foreign(answer_id, no_node, "3"), "frame 0x781 in slot 3, outside of its own; reserved for the bus itself");
-    EXPECT_EQ(words.foreign(0x555, no_node, "3"), "frame 0x555 in slot 3, outside of its own; its sender is not in the table");
+    EXPECT_EQ(words.foreign(sync_id, no_node, "3"),
+              "frame 0x000 in slot 3, outside of its own; a SYNC, of node clock or a backup");
+    EXPECT_EQ(words.foreign(announce_id, no_node, "3"),
+              "frame 0x001 in slot 3, outside of its own; an idle slot announced by the monitor");
+    EXPECT_EQ(words.foreign(answer_id, no_node, "3"),
+              "frame 0x781 in slot 3, outside of its own; reserved for the bus itself");
+    EXPECT_EQ(words.foreign(0x555, no_node, "3"),
+              "frame 0x555 in slot 3, outside of its own; its sender is not in the table");
 }
 
 TEST(Bus_off, is_reported_and_recovers) {
@@ -285,7 +327,8 @@ TEST(Bus_off, is_reported_and_recovers) {
     const auto send = [&] { motor.station.send({0x10A, {7}}, true); };
     bus.run(100 * ms, 500 * us, send);
     bus.faults().set_counters(motor.link->simulation()->node(), 255, 0);
-    bus.faults().disturb({.fault = Fault::error, .every = 1, .id = 0x10A, .mask = 0x7ff, .count = 1});
+    bus.faults().disturb(
+        {.fault = Fault::error, .every = 1, .id = 0x10A, .mask = 0x7ff, .count = 1});
     bus.run(20 * ms, 500 * us, send);
     EXPECT_EQ(State::down, motor.station.state());
     EXPECT_EQ(1U, motor.times(Event::bus_off));

@@ -12,7 +12,9 @@ using namespace hal::scocan;
 constexpr const char* head = "node clock A sync\nnode ir A\nnode motor A\nnode us B\n";
 constexpr const char* run = "mode 0 run\n0 sync\n";
 
-std::string errors(const std::string& text) { return hal::text::errors_text(read(text).messages, "t"); }
+std::string errors(const std::string& text) {
+    return hal::text::errors_text(read(text).messages, "t");
+}
 
 TEST(Table, has_the_defaults_of_the_source_system) {
     const Reading r = read(std::string(head) + run);
@@ -27,52 +29,64 @@ TEST(Table, has_the_defaults_of_the_source_system) {
 }
 
 TEST(Table, has_the_crc_of_its_normalised_form) {
-    const Reading a = read(std::string(head) + run + "2 private motor 0x10A\nmessage position 0x10A fields a:s32,b:s32\n");
-    const Reading b =
-        read("# a comment\n" + std::string(head) +
-             "\n\nmode  0   run # another\n0 sync\n2 private motor 266\nmessage position 0x10A fields a:s32,b:s32 node motor\n");
+    const Reading a = read(std::string(head) + run +
+                           "2 private motor 0x10A\nmessage position 0x10A fields a:s32,b:s32\n");
+    const Reading b = read("# a comment\n" + std::string(head) +
+                           "\n\nmode  0   run # another\n0 sync\n2 private motor 266\nmessage "
+                           "position 0x10A fields a:s32,b:s32 node motor\n");
     ASSERT_TRUE(a.good() && b.good());
     EXPECT_EQ(normalised(a.table), normalised(b.table));
     EXPECT_EQ(a.table.crc, b.table.crc);
-    EXPECT_NE(a.table.crc, read(std::string(head) + run + "3 private motor 0x10A\nmessage position 0x10A fields a:s32,b:s32\n").table.crc);
+    EXPECT_NE(a.table.crc,
+              read(std::string(head) + run +
+                   "3 private motor 0x10A\nmessage position 0x10A fields a:s32,b:s32\n")
+                  .table.crc);
     EXPECT_EQ(0x29b1, crc16("123456789"));
 }
 
 TEST(Table, that_cannot_work_is_rejected_with_the_calculation) {
     EXPECT_EQ(
-        "t:8:1: error: slot 2 is too short for 0x10A: 8 bytes take 135 bits + 20 bits for an error at 250000 bit/s, with the guard of 13 "
+        "t:8:1: error: slot 2 is too short for 0x10A: 8 bytes take 135 bits + 20 bits for an error "
+        "at 250000 bit/s, with the guard of 13 "
         "us 633 us; the slot has 500 us; "
         "use fewer slots, a longer cycle, a higher bit rate or a shorter message",
         errors(std::string("bitrate 250k\n") + head + run + "2 private motor 0x10A\n"));
     EXPECT_EQ(
-        "t:8:1: error: slot 2 is used twice in the same cycle: first in line 7; use another slot, or different cycles: every 2 offset 0, "
+        "t:8:1: error: slot 2 is used twice in the same cycle: first in line 7; use another slot, "
+        "or different cycles: every 2 offset 0, "
         "every 2 offset 1",
         errors(std::string(head) + run + "2 private motor 0x10A\n2 private ir 0x100\n"));
     EXPECT_EQ(
-        "t:8:1: error: identifier 0x100 has two senders: motor in line 7, and ir; two nodes that send the same identifier destroy each "
+        "t:8:1: error: identifier 0x100 has two senders: motor in line 7, and ir; two nodes that "
+        "send the same identifier destroy each "
         "other's frames; use another one",
         errors(std::string(head) + run + "2 private motor 0x100\n3 private ir 0x100\n"));
-    EXPECT_EQ("t:1:6: error: no SYNC node; add a line: node clock A sync", errors("node ir A\nmode 0 run\n0 sync\n"));
+    EXPECT_EQ("t:1:6: error: no SYNC node; add a line: node clock A sync",
+              errors("node ir A\nmode 0 run\n0 sync\n"));
     EXPECT_EQ("t:6:6: error: duplicate backup 1: node 'b' in line 5 is it; a bus has one",
               errors(std::string(head) + "node b A backup 1\nnode c A backup 1\n" + run));
     EXPECT_EQ(
-        "t:5:6: error: the SYNC of backup 7 does not fit in slot 0: it ends 8 x (75 + 20 bits + guard) = 792 us behind its start, the slot "
+        "t:5:6: error: the SYNC of backup 7 does not fit in slot 0: it ends 8 x (75 + 20 bits + "
+        "guard) = 792 us behind its start, the slot "
         "has 500 us; use fewer "
         "backups or longer slots",
         errors(std::string(head) + "node b A backup 7\n" + run));
     EXPECT_EQ(
-        "t:2:6: error: guard 1 us is too short: 3 bits + 0.3 us + 4 ppm of the 10 cycles that nodes coast = 3.7 us; delete the line guard, "
+        "t:2:6: error: guard 1 us is too short: 3 bits + 0.3 us + 4 ppm of the 10 cycles that "
+        "nodes coast = 3.7 us; delete the line guard, "
         "write a longer time, or fewer cycles in the line lost",
         errors(std::string("guard 1us\n") + head + run));
     EXPECT_EQ(
-        "t:7:9: error: identifier 0x150 of 'a' is in the range of private slots (0x100..0x2FF) and has none; give it a slot: 3 private ir "
+        "t:7:9: error: identifier 0x150 of 'a' is in the range of private slots (0x100..0x2FF) and "
+        "has none; give it a slot: 3 private ir "
         "0x150, or use 0x300..0x77F",
         errors(std::string(head) + run + "message a 0x150 node ir\n"));
 }
 
 TEST(Guard, covers_the_time_that_nodes_coast) {
     EXPECT_EQ(
-        "t:3:6: error: guard 4 us is too short: 3 bits + 0.3 us + 4 ppm of the 1000 cycles that nodes coast = 43.3 us; delete the line "
+        "t:3:6: error: guard 4 us is too short: 3 bits + 0.3 us + 4 ppm of the 1000 cycles that "
+        "nodes coast = 43.3 us; delete the line "
         "guard, write a longer time, or fewer cycles in the line lost",
         errors(std::string("lost 1000\nguard 4us\n") + head + run));
     EXPECT_EQ("", errors(std::string("lost 1000\nguard 44us\n") + head + run));
@@ -81,20 +95,29 @@ TEST(Guard, covers_the_time_that_nodes_coast) {
 
 TEST(Message, that_contradicts_itself_or_the_pins_of_its_components_is_rejected) {
     const std::string table = std::string(head) + run + "2 private motor 0x10A\n";
-    for (const char* name : {"send", "sent", "fresh", "received", "age", "interval"})
+    for (const char* name : {"send", "sent", "fresh", "received", "age", "interval"}) {
         EXPECT_EQ("t:8:42: error: reserved field name '" + std::string(name) +
-                      "'; each message has pins send, sent, fresh, received, age and interval; choose another name",
+                      "'; each message has pins send, sent, fresh, received, age and interval; "
+                      "choose another name",
                   errors(table + "message position 0x10A fields a:s16,b:s8," + name + ":s32\n"));
+    }
     EXPECT_EQ("", errors(table + "message position 0x10A fields send-a:s16,data:s32\n"));
-    EXPECT_EQ("t:8:36: error: period and event are both given; delete one of them; event T is the shortest interval of an event",
-              errors(table + "message m 0x011 node ir period 1ms event 2ms\n"));
-    EXPECT_EQ("t:8:35: error: period and event are both given; delete one of them; event T is the shortest interval of an event",
-              errors(table + "message m 0x011 node ir event 1ms period 2ms\n"));
-    EXPECT_EQ("t:8:33: error: duplicate key 'bytes'; delete one of them", errors(table + "message m 0x011 node ir bytes 1 bytes 2\n"));
+    EXPECT_EQ(
+        "t:8:36: error: period and event are both given; delete one of them; event T is the "
+        "shortest interval of an event",
+        errors(table + "message m 0x011 node ir period 1ms event 2ms\n"));
+    EXPECT_EQ(
+        "t:8:35: error: period and event are both given; delete one of them; event T is the "
+        "shortest interval of an event",
+        errors(table + "message m 0x011 node ir event 1ms period 2ms\n"));
+    EXPECT_EQ("t:8:33: error: duplicate key 'bytes'; delete one of them",
+              errors(table + "message m 0x011 node ir bytes 1 bytes 2\n"));
 }
 
 TEST(Slot, may_be_shared_by_cycles) {
-    const Reading r = read(std::string(head) + run + "2 private motor 0x10A every 2 offset 0\n2 private ir 0x100 every 4 offset 1\n");
+    const Reading r =
+        read(std::string(head) + run +
+             "2 private motor 0x10A every 2 offset 0\n2 private ir 0x100 every 4 offset 1\n");
     ASSERT_TRUE(r.good());
     EXPECT_EQ(2U, r.table.use(0, 2, 0)->node);
     EXPECT_EQ(1U, r.table.use(0, 2, 1)->node);
@@ -152,7 +175,8 @@ TEST(Plan, of_the_robot) {
     EXPECT_TRUE(p.fits);
     EXPECT_EQ(13U, p.shared_slots);
     const auto& alarm = p.latencies[0];
-    // Queued just behind the begin of slot 19: that slot, three that are not shared, its frame, the guard.
+    // Queued just behind the begin of slot 19: that slot, three that are not shared, its frame, the
+    // guard.
     EXPECT_EQ(500'000 + 1'500'000 + 65'000 + 4'000, alarm.worst);
     const auto& position = p.latencies[2];
     EXPECT_TRUE(position.priv);

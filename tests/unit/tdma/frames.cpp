@@ -9,7 +9,8 @@ namespace {
 
 using namespace hal::tdma;
 
-constexpr Address one{0x02, 0, 0, 0, 0, 1}, two{0x02, 0, 0, 0, 0, 2};
+constexpr Address one{0x02, 0, 0, 0, 0, 1};
+constexpr Address two{0x02, 0, 0, 0, 0, 2};
 
 std::string hex(std::span<const std::uint8_t> bytes) {
     std::string text;
@@ -20,7 +21,9 @@ std::string hex(std::span<const std::uint8_t> bytes) {
     }
     return text;
 }
-std::string padded(std::string text) { return text + std::string(120 - std::min<std::size_t>(text.size(), 120), '0'); }
+std::string padded(std::string text) {
+    return text + std::string(120 - std::min<std::size_t>(text.size(), 120), '0');
+}
 
 TEST(Frame_of_sync, matches_the_specification) {
     const Frame f = encode(one, Sync{0x01020304, 0x1112131415161718, 0x2122232425262728});
@@ -68,7 +71,8 @@ TEST(Frame_of_request, matches_the_specification) {
 }
 
 TEST(Frame_of_reply, matches_the_specification) {
-    const Frame f = encode(two, one, Reply{0x1112131415161718, 0x2122232425262728, 0x3132333435363738});
+    const Frame f =
+        encode(two, one, Reply{0x1112131415161718, 0x2122232425262728, 0x3132333435363738});
     EXPECT_EQ(padded("020000000002"
                      "020000000001"
                      "9021"
@@ -111,7 +115,8 @@ TEST(Frame_decoder, rejects_truncated_and_foreign_frames) {
 
 TEST(Frame_of_another_protocol, survives_the_tunnel) {
     std::vector<std::uint8_t> packet(98, 7);
-    packet[12] = 0x08, packet[13] = 0x00;
+    packet[12] = 0x08;
+    packet[13] = 0x00;
     std::array<std::uint8_t, 200> inside{}, back{};
     const std::size_t length = tunnel(packet, inside);
     ASSERT_EQ(102U, length);
@@ -137,19 +142,23 @@ std::string encoded(const rtcfg::Message& m) {
 TEST(Frame_of_rtcfg, matches_the_specification) {
     const std::uint8_t data[] = {0xaa, 0xbb, 0xcc};
     rtcfg::Message m;
-    m.to = two, m.from = one;
+    m.to = two;
+    m.from = one;
     const std::string head =
         "020000000002"
         "020000000001"
         "9022";
-    m.id = Id::stage_1, m.burst = 4, m.data = data;
+    m.id = Id::stage_1;
+    m.burst = 4;
+    m.data = data;
     EXPECT_EQ(padded(head + "00"
                             "00"
                             "04"
                             "0003"
                             "aabbcc"),
               encoded(m));
-    m.client = {true, {10, 0, 0, 2}}, m.server = {true, {10, 0, 0, 1}};
+    m.client = {true, {10, 0, 0, 2}};
+    m.server = {true, {10, 0, 0, 1}};
     EXPECT_EQ(padded(head + "00"
                             "01"
                             "0a000002"
@@ -158,7 +167,8 @@ TEST(Frame_of_rtcfg, matches_the_specification) {
                             "0003"
                             "aabbcc"),
               encoded(m));
-    m.id = Id::announce_new, m.flags = rtcfg::wants_stage_2;
+    m.id = Id::announce_new;
+    m.flags = rtcfg::wants_stage_2;
     EXPECT_EQ(padded(head + "01"
                             "01"
                             "0a000002"
@@ -172,7 +182,12 @@ TEST(Frame_of_rtcfg, matches_the_specification) {
                             "01"
                             "00"),
               encoded(m));
-    m.id = Id::stage_2, m.flags = rtcfg::is_ready, m.active = 5, m.heartbeat_ms = 1000, m.length = 3;
+    m.id = Id::stage_2;
+    m.flags = rtcfg::is_ready;
+    m.active = 5;
+    m.heartbeat_ms = 1000;
+
+    m.length = 3;
     EXPECT_EQ(padded(head + "03"
                             "02"
                             "00000005"
@@ -180,7 +195,8 @@ TEST(Frame_of_rtcfg, matches_the_specification) {
                             "00000003"
                             "aabbcc"),
               encoded(m));
-    m.id = Id::stage_2_fragment, m.offset = 0x100;
+    m.id = Id::stage_2_fragment;
+    m.offset = 0x100;
     EXPECT_EQ(padded(head + "04"
                             "00000100"
                             "aabbcc"),
@@ -193,7 +209,9 @@ TEST(Frame_of_rtcfg, matches_the_specification) {
     EXPECT_EQ(padded(head + "06"), encoded(m));
     m.id = Id::heartbeat;
     EXPECT_EQ(padded(head + "07"), encoded(m));
-    m.id = Id::dead_station, m.client = {}, m.dead = two;
+    m.id = Id::dead_station;
+    m.client = {};
+    m.dead = two;
     EXPECT_EQ(padded(head + "08"
                             "00"
                             "020000000002"),
@@ -202,11 +220,22 @@ TEST(Frame_of_rtcfg, matches_the_specification) {
 
 TEST(Frame_of_rtcfg, survives_the_round_trip_and_is_rejected_when_truncated) {
     const std::uint8_t data[] = {1, 2, 3, 4, 5};
-    for (unsigned id = 0; id < rtcfg::ids; ++id)
+    for (unsigned id = 0; id < rtcfg::ids; ++id) {
         for (const bool by_ip : {false, true}) {
             rtcfg::Message m;
-            m.id = static_cast<Id>(id), m.to = two, m.from = one, m.client = {by_ip, {10, 0, 0, 7}}, m.flags = 3, m.burst = 4, m.active = 9;
-            m.heartbeat_ms = 77, m.length = 5, m.offset = 88, m.dead = two, m.data = data;
+            m.id = static_cast<Id>(id);
+            m.to = two;
+            m.from = one;
+            m.client = {by_ip, {10, 0, 0, 7}};
+
+            m.flags = 3;
+            m.burst = 4;
+            m.active = 9;
+            m.heartbeat_ms = 77;
+            m.length = 5;
+            m.offset = 88;
+            m.dead = two;
+            m.data = data;
             std::array<std::uint8_t, 1514> out{};
             const std::size_t length = rtcfg::encode(m, out);
             ASSERT_GE(length, 60U);
@@ -214,17 +243,32 @@ TEST(Frame_of_rtcfg, survives_the_round_trip_and_is_rejected_when_truncated) {
             ASSERT_TRUE(rtcfg::decode(std::span(out).first(length), back)) << id;
             EXPECT_EQ(m.id, back.id);
             EXPECT_EQ(m.from, back.from);
-            if (m.id <= Id::announce_reply || m.id == Id::dead_station) { EXPECT_TRUE(!by_ip || back.client.ip[3] == 7); }
-            if (m.id == Id::stage_1 || m.id == Id::stage_2) { EXPECT_EQ(5U, back.data.size()); }
-            if (m.id == Id::stage_2_fragment) { EXPECT_EQ(88U, back.offset); }
-            if (m.id == Id::dead_station) { EXPECT_EQ(two, back.dead); }
-            for (std::size_t cut = 0; cut < 15; ++cut) EXPECT_FALSE(rtcfg::decode(std::span(out).first(cut), back));
+            if (m.id <= Id::announce_reply || m.id == Id::dead_station) {
+                EXPECT_TRUE(!by_ip || back.client.ip[3] == 7);
+            }
+            if (m.id == Id::stage_1 || m.id == Id::stage_2) {
+                EXPECT_EQ(5U, back.data.size());
+            }
+            if (m.id == Id::stage_2_fragment) {
+                EXPECT_EQ(88U, back.offset);
+            }
+            if (m.id == Id::dead_station) {
+                EXPECT_EQ(two, back.dead);
+            }
+            for (std::size_t cut = 0; cut < 15; ++cut) {
+                EXPECT_FALSE(rtcfg::decode(std::span(out).first(cut), back));
+            }
         }
+    }
     std::array<std::uint8_t, 60> frame{};
-    frame[12] = 0x90, frame[13] = 0x22, frame[14] = 0, frame[15] = 2;
+    frame[12] = 0x90;
+    frame[13] = 0x22;
+    frame[14] = 0;
+    frame[15] = 2;
     rtcfg::Message m;
     EXPECT_FALSE(rtcfg::decode(frame, m)) << "an address type that does not exist";
-    frame[15] = 0, frame[17] = 0xff;
+    frame[15] = 0;
+    frame[17] = 0xff;
     EXPECT_FALSE(rtcfg::decode(frame, m)) << "more data than the frame has";
     frame[14] = 9;
     EXPECT_FALSE(rtcfg::decode(frame, m)) << "a frame that does not exist";

@@ -15,7 +15,8 @@ struct Trio : Bed {
     Machine& second;
     Machine& station;
     explicit Trio(double noise_ns, double skew = 0.0)
-        : first(add(1, master())), second(add(2, backup(100'000, 200'000), {skew, 5'000'000'000})),
+        : first(add(1, master())),
+          second(add(2, backup(100'000, 200'000), {skew, 5'000'000'000})),
           station(add(3, slave(600'000), {-skew, -3'000'000'000})) {
         wire.noise_ns = noise_ns;
         run(3000 * ms);
@@ -29,9 +30,13 @@ struct Trio : Bed {
     /// Cycles of `wire.seen` with more than one sync.
     int doubled() const {
         std::map<std::uint32_t, int> syncs;
-        for (const Wire::Frame& f : wire.seen)
-            if (const auto d = decode(f.bytes); d.kind == Kind::sync) ++syncs[d.sync.cycle];
-        return static_cast<int>(std::count_if(syncs.begin(), syncs.end(), [](const auto& s) { return s.second > 1; }));
+        for (const Wire::Frame& f : wire.seen) {
+            if (const auto d = decode(f.bytes); d.kind == Kind::sync) {
+                ++syncs[d.sync.cycle];
+            }
+        }
+        return static_cast<int>(
+            std::count_if(syncs.begin(), syncs.end(), [](const auto& s) { return s.second > 1; }));
     }
 };
 
@@ -40,7 +45,7 @@ TEST_P(Twenty_changes_of_master, keep_the_rate_of_the_crystals) {
     Trio t(GetParam());
     ASSERT_TRUE(t.first.station.ready() && t.second.station.ready() && t.station.station.ready());
     double worst = 0.0;
-    int    doubled = 0;
+    int doubled = 0;
     t.wire.watching = true;
     for (int n = 0; n < 20; ++n) {
         t.wire.seen.clear();
@@ -49,19 +54,23 @@ TEST_P(Twenty_changes_of_master, keep_the_rate_of_the_crystals) {
         const bool back = n % 2 != 0;
         ASSERT_EQ(back, t.first.status().leading && !t.first.off) << n;
         ASSERT_EQ(!back, t.second.status().leading) << n;
-        for (const Machine* m : {&t.first, &t.second, &t.station})
+        for (const Machine* m : {&t.first, &t.second, &t.station}) {
             if (!m->off) {
-                EXPECT_LT(std::abs(m->status().drift), 5 * ppm) << n << ", station " << int{m->station.address()[5]};
+                EXPECT_LT(std::abs(m->status().drift), 5 * ppm)
+                    << n << ", station " << int{m->station.address()[5]};
                 worst = std::max(worst, std::abs(m->status().drift));
             }
+        }
         EXPECT_LE(t.doubled(), 1) << n << ": only the cycle in which the master returns";
         doubled += t.doubled();
         EXPECT_TRUE(t.station.station.ready()) << n;
     }
     EXPECT_EQ(0, t.station.events[Event::sync_lost]);
     RecordProperty("worst_ppb", static_cast<int>(worst * 1e9));
-    std::printf("noise %d ns: |drift| at most %.2f ppm 2 s after a change, %d cycles with two syncs in 20 changes\n", GetParam(), worst * 1e6,
-                doubled);
+    std::printf(
+        "noise %d ns: |drift| at most %.2f ppm 2 s after a change, %d cycles with two syncs in 20 "
+        "changes\n",
+        GetParam(), worst * 1e6, doubled);
 }
 INSTANTIATE_TEST_SUITE_P(noise, Twenty_changes_of_master, testing::Values(0, 300, 2'000, 20'000));
 
@@ -93,11 +102,18 @@ TEST(Clock_estimate, holds_over_within_a_microsecond_for_a_tenth_of_a_second) {
         ClockEstimate clock;
         Time sent = 0;
         const auto local = [&] { return sent + sent / 20'000 + way; };  // 50 ppm fast
-        for (int n = 0; n < 3000; ++n) sent += ms, clock.take(sent, local() + std::llround(noise(random)), way);
+        for (int n = 0; n < 3000; ++n) {
+            sent += ms;
+            clock.take(sent, local() + std::llround(noise(random)), way);
+        }
         clock.lead(local());
         const Time begin = clock.global(local()) - sent - way;
-        for (int n = 0; n < 100; ++n) sent += ms, clock.decay(local());
-        worst = std::max(worst, std::abs(static_cast<double>(clock.global(local()) - sent - way - begin)));
+        for (int n = 0; n < 100; ++n) {
+            sent += ms;
+            clock.decay(local());
+        }
+        worst = std::max(worst,
+                         std::abs(static_cast<double>(clock.global(local()) - sent - way - begin)));
     }
     EXPECT_LT(worst, 1'000.0 + 0.5 * 20e-6 * 0.1 * 1e8);
     std::printf("holdover, 2 us noise: at most %.0f ns in 100 ms\n", worst);
@@ -108,7 +124,10 @@ TEST(Clock_estimate, leads_at_its_own_crystal_when_the_slope_is_not_known_yet) {
     std::normal_distribution<double> noise(0.0, 20'000.0);
     ClockEstimate clock;
     Time sent = 0;
-    for (int n = 0; n < 60; ++n) sent += ms, clock.take(sent, sent + 5'000 + std::llround(noise(random)), 5'000);
+    for (int n = 0; n < 60; ++n) {
+        sent += ms;
+        clock.take(sent, sent + 5'000 + std::llround(noise(random)), 5'000);
+    }
     EXPECT_GT(clock.uncertainty(), 2 * ppm);
     clock.lead(sent);
     EXPECT_EQ(0.0, clock.drift());
@@ -118,7 +137,8 @@ TEST(Clock_estimate, leads_at_its_own_crystal_when_the_slope_is_not_known_yet) {
 void strange_syncs(Bed& bed, int from, int count) {
     for (int n = 0; n < count; ++n) {
         const Time at = bed.now + n * ms + 333'000;
-        const auto f = encode(mac(from), Sync{static_cast<std::uint32_t>(4000 + n), at + 77 * ms, at + 77 * ms});
+        const auto f = encode(
+            mac(from), Sync{static_cast<std::uint32_t>(4000 + n), at + 77 * ms, at + 77 * ms});
         bed.wire.inject({f.begin(), f.end()}, from, at);
     }
 }
@@ -149,7 +169,8 @@ TEST(Master_that_stepped_down, takes_over_when_the_other_is_lost) {
     ASSERT_TRUE(m.status().leading);
     strange_syncs(bed, 1, 999);
     bed.run(900 * ms);
-    EXPECT_EQ(State::withdrawn, m.status().state) << "nobody follows it: the smaller address has it";
+    EXPECT_EQ(State::withdrawn, m.status().state)
+        << "nobody follows it: the smaller address has it";
     bed.run(500 * ms);
     EXPECT_EQ(State::withdrawn, m.status().state);
     bed.run(1000 * ms);
@@ -172,7 +193,8 @@ TEST(Master_that_found_another, takes_over_when_that_one_is_lost) {
 
 TEST(Station_with_a_list_of_masters, ignores_and_reports_syncs_of_others) {
     Bed bed;
-    StationSetup lead = master(), follow = slave(300'000);
+    StationSetup lead = master();
+    StationSetup follow = slave(300'000);
     lead.masters = follow.masters = {mac(5)};
     Machine& m = bed.add(5, lead);
     Machine& s = bed.add(6, follow);
@@ -181,8 +203,8 @@ TEST(Station_with_a_list_of_masters, ignores_and_reports_syncs_of_others) {
     // In the schedule, as a master that takes over would send them.
     for (int n = 0; n < 50; ++n) {
         const std::uint32_t cycle = m.status().cycle + 2 + static_cast<std::uint32_t>(n);
-        const Time          at = m.station.cycle_start(cycle);
-        const auto          f = encode(mac(1), Sync{cycle, at + 60'000, at});
+        const Time at = m.station.cycle_start(cycle);
+        const auto f = encode(mac(1), Sync{cycle, at + 60'000, at});
         bed.wire.inject({f.begin(), f.end()}, 1, m.port.clock().real(at) + 500'000);
     }
     bed.run(100 * ms);

@@ -19,8 +19,11 @@ struct Pair {
     Bed bed;
     Machine &m, &s;
     explicit Pair(Clock clock = {}, std::size_t size = 46)
-        : m(bed.add(1, with(sized(master(), size), {{mac(2), Role::slave, {slave(300'000).slots[0]}}}))),
-          s(bed.add(2, with(sized(slave(300'000), size), {{mac(1), Role::master, {master().slots[0]}}}), clock)) {
+        : m(bed.add(
+              1, with(sized(master(), size), {{mac(2), Role::slave, {slave(300'000).slots[0]}}}))),
+          s(bed.add(
+              2, with(sized(slave(300'000), size), {{mac(1), Role::master, {master().slots[0]}}}),
+              clock)) {
         bed.run(600 * ms);
     }
     static StationSetup sized(StationSetup setup, std::size_t size) {
@@ -39,17 +42,23 @@ TEST(Ping, is_answered_in_the_next_slot_and_gives_the_path_delay) {
         const Pings::Asked& asked = p.m.station.pings()[0];
         ASSERT_EQ(Outcome::answered, asked.outcome);
         EXPECT_EQ(7U, asked.done);
-        EXPECT_NEAR(static_cast<double>(2 * Wire::path), static_cast<double>(asked.round_trip - asked.held), 1'000) << skew;
+        EXPECT_NEAR(static_cast<double>(2 * Wire::path),
+                    static_cast<double>(asked.round_trip - asked.held), 1'000)
+            << skew;
         EXPECT_LE(asked.round_trip, 3 * ms);
-        int pings = 0, echoes = 0;
+        int pings = 0;
+        int echoes = 0;
         for (const Wire::Frame& f : p.bed.wire.seen) {
             const Decoded d = decode(f.bytes);
-            pings += d.kind == Kind::ping, echoes += d.kind == Kind::echo;
+            pings += d.kind == Kind::ping;
+            echoes += d.kind == Kind::echo;
             if (d.kind == Kind::echo) {
-                EXPECT_NEAR(300'000.0,
-                            static_cast<double>(p.m.station.global(p.m.port.clock().local(f.left)) % ms -
-                                                p.m.station.global(p.m.station.cycle_start(p.m.status().cycle)) % ms),
-                            2'000);
+                EXPECT_NEAR(
+                    300'000.0,
+                    static_cast<double>(
+                        p.m.station.global(p.m.port.clock().local(f.left)) % ms -
+                        p.m.station.global(p.m.station.cycle_start(p.m.status().cycle)) % ms),
+                    2'000);
             }
         }
         EXPECT_EQ(1, pings);
@@ -97,8 +106,10 @@ TEST(Ping, uses_only_time_that_frames_leave) {
         std::vector<std::uint8_t> frame(60, 0);
         std::fill_n(frame.begin(), 6, std::uint8_t{0xff});
         std::copy(m.port.address().begin(), m.port.address().end(), frame.begin() + 6);
-        frame[12] = 0x90, frame[13] = 0x23;
-        EXPECT_EQ(ethernet::Sent::queued, m.station.send(frame, 0, 5)) << "its room is not taken by a ping";
+        frame[12] = 0x90;
+        frame[13] = 0x23;
+        EXPECT_EQ(ethernet::Sent::queued, m.station.send(frame, 0, 5))
+            << "its room is not taken by a ping";
     };
     p.bed.run(5 * ms);
     p.m.station.ping(0, 1);
@@ -130,7 +141,9 @@ TEST(Ping, ignores_forged_answers) {
         p.bed.wire.inject({frame.begin(), frame.end()}, from, p.bed.now + 400'000);
         p.bed.run(3 * ms);
     };
-    const Time now = p.m.port.clock().local(p.bed.now), foreign = static_cast<Time>(p.m.status().count.foreign);
+    const Time now = p.m.port.clock().local(p.bed.now);
+
+    const Time foreign = static_cast<Time>(p.m.status().count.foreign);
     send({now - 3 * ms, 10, 20, 8}, 2);                  // of another ping
     send({now - 3 * ms, 10, 20, 9}, 3);                  // of another station
     send({now + 3000 * ms, 10, 20, 9}, 2);               // of the future
@@ -150,7 +163,9 @@ TEST(Ping, is_answered_once_per_sender) {
     }
     p.bed.run(100 * ms);
     int echoes = 0;
-    for (const Wire::Frame& f : p.bed.wire.seen) echoes += decode(f.bytes).kind == Kind::echo;
+    for (const Wire::Frame& f : p.bed.wire.seen) {
+        echoes += decode(f.bytes).kind == Kind::echo;
+    }
     EXPECT_EQ(16, echoes);
 }
 

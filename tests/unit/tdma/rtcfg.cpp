@@ -31,10 +31,13 @@ slot 0 600 1/1 100
 slot 2 700
 )";
 
-/// A station that knows only its address, with the applicant of its component; the helper runs after each cycle.
+/// A station that knows only its address, with the applicant of its component; the helper runs
+/// after each cycle.
 struct Newcomer {
     Newcomer(Machine& m, rtcfg::Logical own, std::string file)
-        : machine(m), applicant("tdma." + std::to_string(m.port.address()[5]), m.station, own, std::move(file), m) {
+        : machine(m),
+          applicant("tdma." + std::to_string(m.port.address()[5]), m.station, own, std::move(file),
+                    m) {
         m.station.accompany(&applicant.client(), nullptr);
         m.in_cycle = [this](Machine& at) {
             applicant.work(at.next);
@@ -67,10 +70,13 @@ struct Cell : Bed {
           y(add(3, unknown())),
           at_x(x, {}, path),
           at_y(y, {true, {10, 0, 0, 3}}, "") {
-        for (int i = 0; i < 3000; ++i) file += static_cast<char>('a' + i % 26);
+        for (int i = 0; i < 3000; ++i) {
+            file += static_cast<char>('a' + i % 26);
+        }
         const auto read = [this](const std::string& name, std::string& bytes) {
             EXPECT_EQ("x.cfg", name);
-            return bytes = file, true;
+            bytes = file;
+            return true;
         };
         service = std::make_unique<rtcfg::Service>(m.station, reading.schedule, 0, read, m);
         m.station.accompany(&service->server(), nullptr);
@@ -117,7 +123,8 @@ TEST(Rtcfg_server, configures_stations_that_know_only_their_address) {
     EXPECT_EQ(rtcfg::ClientState::ready, cell.state(0));
     EXPECT_EQ(rtcfg::ClientState::ready, cell.state(1));
     EXPECT_EQ(2U, cell.service->server().ready());
-    EXPECT_EQ(0U, cell.service->server().foreign() + cell.at_x.applicant.foreign() + cell.at_y.applicant.foreign());
+    EXPECT_EQ(0U, cell.service->server().foreign() + cell.at_x.applicant.foreign() +
+                      cell.at_y.applicant.foreign());
 }
 
 TEST(Rtcfg_server, does_not_invite_a_station_that_already_sends) {
@@ -125,18 +132,22 @@ TEST(Rtcfg_server, does_not_invite_a_station_that_already_sends) {
     Notice said;
     cell.x.in_cycle = nullptr;
     cell.x.station.accompany(nullptr, nullptr);
-    ASSERT_TRUE(cell.x.station.reconfigure(config::setup_of(cell.reading.schedule, 1)));  // from its own file
+    // from its own file
+    ASSERT_TRUE(cell.x.station.reconfigure(config::setup_of(cell.reading.schedule, 1)));
     cell.run(3000 * ms);
     ASSERT_TRUE(cell.x.station.ready());
     cell.x.in_cycle = [](Machine& me) {
-        std::array<std::uint8_t, 60> frame{0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 2, 0, 0, 0, 0, 2, 0x90, 0x23};
+        std::array<std::uint8_t, 60> frame{0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 2,
+                                           0,    0,    0,    0,    2,    0x90, 0x23};
         me.station.send(frame, 0, 0);
     };
     cell.run(2000 * ms);
     int invitations = 0;
     cell.wire.fault = [&](Wire::Frame& f) {
         rtcfg::Message message;
-        if (rtcfg::decode(f.bytes, message) && message.id == rtcfg::Id::stage_1) ++invitations;
+        if (rtcfg::decode(f.bytes, message) && message.id == rtcfg::Id::stage_1) {
+            ++invitations;
+        }
         return true;
     };
     cell.run(5000 * ms);
@@ -181,7 +192,9 @@ TEST(Rtcfg_server, finds_running_stations_after_a_restart) {
 TEST(Rtcfg_server, repeats_lost_frames) {
     Cell cell;
     Notice said;
-    cell.wire.fault = [&cell](Wire::Frame& f) { return f.bytes[13] != 0x22 || cell.wire.random() % 4 != 0; };
+    cell.wire.fault = [&cell](Wire::Frame& f) {
+        return f.bytes[13] != 0x22 || cell.wire.random() % 4 != 0;
+    };
     cell.run(30'000 * ms);
     EXPECT_EQ(cell.file, cell.received());
     EXPECT_EQ(2U, cell.service->server().ready());
@@ -205,9 +218,15 @@ TEST(Rtcfg_service, of_a_backup_omits_files_that_only_the_master_has) {
         "slave:\nname x\nmac 02:00:00:00:00:03\nstage2 x.cfg\nslot 0 600");
     ASSERT_TRUE(reading.good()) << config::to_string(reading, "");
     Cell cell;
-    const auto none = [](const std::string&, std::string& bytes) { return bytes = "No such file or directory", false; };
-    EXPECT_THROW(rtcfg::Service(cell.m.station, reading.schedule, 0, none, cell.m), std::invalid_argument);
-    EXPECT_EQ(1U, rtcfg::Service(cell.m.station, reading.schedule, 1, none, cell.m).server().clients()) << "x";
+    const auto none = [](const std::string&, std::string& bytes) {
+        bytes = "No such file or directory";
+        return false;
+    };
+    EXPECT_THROW(rtcfg::Service(cell.m.station, reading.schedule, 0, none, cell.m),
+                 std::invalid_argument);
+    EXPECT_EQ(1U,
+              rtcfg::Service(cell.m.station, reading.schedule, 1, none, cell.m).server().clients())
+        << "x";
 }
 
 TEST(Rtcfg_client, ignores_a_second_server_and_another_configuration_while_running) {
@@ -217,13 +236,19 @@ TEST(Rtcfg_client, ignores_a_second_server_and_another_configuration_while_runni
     ASSERT_TRUE(cell.x.station.ready());
     const std::string other = "cycle 2000\nslave:\nslot 0 900\n";
     rtcfg::Message m;
-    m.id = rtcfg::Id::stage_1, m.to = mac(2);
+    m.id = rtcfg::Id::stage_1;
+    m.to = mac(2);
     m.data = std::span(reinterpret_cast<const std::uint8_t*>(other.data()), other.size());
-    for (int i = 0; i < 5; ++i) cell.inject(m, 9, cell.now + (2 * i + 1) * ms);
+    for (int i = 0; i < 5; ++i) {
+        cell.inject(m, 9, cell.now + (2 * i + 1) * ms);
+    }
     cell.run(20 * ms);
     EXPECT_EQ(1, cell.x.events[Event::other_server]);
     EXPECT_EQ(mac(9), cell.x.last_who[Event::other_server]);
-    for (int i = 0; i < 5; ++i) cell.inject(m, 1, cell.now + (2 * i + 1) * ms);  // as if from the master
+    // as if from the master
+    for (int i = 0; i < 5; ++i) {
+        cell.inject(m, 1, cell.now + (2 * i + 1) * ms);
+    }
     cell.run(20 * ms);
     EXPECT_EQ(1, cell.x.events[Event::other_configuration]);
     EXPECT_EQ(10U, cell.at_x.applicant.foreign());
@@ -238,12 +263,16 @@ TEST(Rtcfg_client, reports_an_invalid_configuration_once_and_accepts_the_next) {
     cell.m.off = true;
     const std::string wrong = "cycle 1000\nslave:\nslott 0 900\n";
     rtcfg::Message m;
-    m.id = rtcfg::Id::stage_1, m.to = mac(2);
+    m.id = rtcfg::Id::stage_1;
+    m.to = mac(2);
     m.data = std::span(reinterpret_cast<const std::uint8_t*>(wrong.data()), wrong.size());
-    for (int i = 0; i < 5; ++i) cell.inject(m, 9, 10 * ms + i * 5 * ms);
+    for (int i = 0; i < 5; ++i) {
+        cell.inject(m, 9, 10 * ms + i * 5 * ms);
+    }
     cell.run(100 * ms);
     EXPECT_EQ(
-        "tdma.2: rejected the configuration from 02:00:00:00:00:09: stage 1:3:1: error: unknown key 'slott'; "
+        "tdma.2: rejected the configuration from 02:00:00:00:00:09: stage 1:3:1: error: unknown "
+        "key 'slott'; "
         "did you mean 'slot'?; waiting for another\n",
         said.text());
     EXPECT_EQ(State::unconfigured, cell.x.status().state);
@@ -263,16 +292,20 @@ TEST(Rtcfg_client, reports_at_most_three_invalid_configurations) {
     for (int i = 0; i < 50; ++i) {
         const std::string wrong = "cy\x1b[2Jcle " + std::to_string(i) + "\nslave:\nslott 0 900\n";
         rtcfg::Message m;
-        m.id = rtcfg::Id::stage_1, m.to = mac(2);
+        m.id = rtcfg::Id::stage_1;
+        m.to = mac(2);
         m.data = std::span(reinterpret_cast<const std::uint8_t*>(wrong.data()), wrong.size());
         cell.inject(m, 9, 10 * ms + i * 5 * ms);
     }
     cell.run(400 * ms);
     const std::string words = said.text();
     EXPECT_EQ(3, std::count(words.begin(), words.end(), '\n')) << words;
-    EXPECT_TRUE(words.ends_with("; waiting for another (further rejections are not reported)\n")) << words;
-    EXPECT_TRUE(words.starts_with("tdma.2: rejected the configuration from 02:00:00:00:00:09: stage 1:1:1: error: unknown key "
-                                  "'cy?[2Jcle'; "))
+    EXPECT_TRUE(words.ends_with("; waiting for another (further rejections are not reported)\n"))
+        << words;
+    EXPECT_TRUE(
+        words.starts_with("tdma.2: rejected the configuration from 02:00:00:00:00:09: stage 1:1:1: "
+                          "error: unknown key "
+                          "'cy?[2Jcle'; "))
         << words;
     EXPECT_EQ(50U, cell.at_x.applicant.foreign());
 }
@@ -282,11 +315,22 @@ TEST(Rtcfg_client, stays_configured_under_random_frames) {
     Notice said;
     for (int i = 0; i < 20'000; ++i) {
         std::vector<std::uint8_t> frame(14 + cell.wire.random() % 80);
-        for (auto& byte : frame) byte = static_cast<std::uint8_t>(cell.wire.random());
-        std::copy_n((i % 3 == 0 ? mac(2) : i % 3 == 1 ? mac(1) : ethernet::broadcast).begin(), 6, frame.begin());
-        frame[12] = 0x90, frame[13] = 0x22;
-        if (i % 2 == 0) std::copy_n(mac(1 + i / 2 % 2).begin(), 6, frame.begin() + 6);
-        if (frame.size() > 14) frame[14] = static_cast<std::uint8_t>((i % 9 == 0 ? 1 : i % 9));
+        for (auto& byte : frame) {
+            byte = static_cast<std::uint8_t>(cell.wire.random());
+        }
+        std::copy_n((i % 3 == 0   ? mac(2)
+                     : i % 3 == 1 ? mac(1)
+                                  : ethernet::broadcast)
+                        .begin(),
+                    6, frame.begin());
+        frame[12] = 0x90;
+        frame[13] = 0x22;
+        if (i % 2 == 0) {
+            std::copy_n(mac(1 + i / 2 % 2).begin(), 6, frame.begin() + 6);
+        }
+        if (frame.size() > 14) {
+            frame[14] = static_cast<std::uint8_t>((i % 9 == 0 ? 1 : i % 9));
+        }
         cell.wire.inject(std::move(frame), 9, 10 * ms + Time{i} * 150'000);
     }
     cell.run(8000 * ms);

@@ -20,15 +20,27 @@ TEST_P(Station_with_every_7th_frame_damaged, counts_it_and_keeps_its_slots) {
     bed.wire.fault = [&, n = 0](Wire::Frame& f) mutable {
         if (++n % 7 != 0) return true;
         if (what == "lost") return false;
-        if (what == "delayed") f.arrives = 2'300'000;
-        if (what == "cut") f.bytes.resize(static_cast<std::size_t>(n / 7) % 60);
-        if (what == "garbled") f.bytes[bed.wire.random() % 60] = static_cast<std::uint8_t>(bed.wire.random());
-        if (what == "version") f.bytes[n % 2 == 0 ? 16 : 18] ^= 4;
-        if (what == "random")
-            for (std::size_t i = 14; i < 60; ++i) f.bytes[i] = static_cast<std::uint8_t>(bed.wire.random());
+        if (what == "delayed") {
+            f.arrives = 2'300'000;
+        }
+        if (what == "cut") {
+            f.bytes.resize(static_cast<std::size_t>(n / 7) % 60);
+        }
+        if (what == "garbled") {
+            f.bytes[bed.wire.random() % 60] = static_cast<std::uint8_t>(bed.wire.random());
+        }
+        if (what == "version") {
+            f.bytes[n % 2 == 0 ? 16 : 18] ^= 4;
+        }
+        if (what == "random") {
+            for (std::size_t i = 14; i < 60; ++i) {
+                f.bytes[i] = static_cast<std::uint8_t>(bed.wire.random());
+            }
+        }
         if (what == "doubled") {
             Wire::Frame again = f;
-            again.arrives = 0, again.left += 400'000;
+            again.arrives = 0;
+            again.left += 400'000;
             ++n;
             bed.wire.queue(again);
         }
@@ -38,11 +50,13 @@ TEST_P(Station_with_every_7th_frame_damaged, counts_it_and_keeps_its_slots) {
     ASSERT_TRUE(s.station.ready()) << what;
     EXPECT_EQ(0, s.events[Event::sync_lost]) << what;
     EXPECT_EQ(0, m.events[Event::withdrew]);
-    EXPECT_NEAR(static_cast<double>(Wire::path), static_cast<double>(s.status().delay), 1'000) << what;
+    EXPECT_NEAR(static_cast<double>(Wire::path), static_cast<double>(s.status().delay), 1'000)
+        << what;
     double worst = 0;
     s.in_cycle = [&](Machine& x) {
         const Time t = x.port.clock().real(x.next);
-        worst = std::max(worst, std::abs(static_cast<double>(x.station.global(x.next) - m.port.clock().local(t))));
+        worst = std::max(worst, std::abs(static_cast<double>(x.station.global(x.next) -
+                                                             m.port.clock().local(t))));
     };
     bed.run(1000 * ms);
     EXPECT_LT(worst, 2'000) << what << ": global time is right all the time";
@@ -54,7 +68,9 @@ TEST_P(Station_with_every_7th_frame_damaged, counts_it_and_keeps_its_slots) {
         EXPECT_GT(s.status().count.syncs_lost, 50U);
     }
 }
-INSTANTIATE_TEST_SUITE_P(damage, Station_with_every_7th_frame_damaged, testing::Values("lost", "doubled", "delayed", "cut", "garbled", "version", "random"),
+INSTANTIATE_TEST_SUITE_P(damage, Station_with_every_7th_frame_damaged,
+                         testing::Values("lost", "doubled", "delayed", "cut", "garbled", "version",
+                                         "random"),
                          [](const auto& one) { return std::string(one.param); });
 
 TEST(Station, keeps_its_slots_under_random_frames) {
@@ -64,12 +80,19 @@ TEST(Station, keeps_its_slots_under_random_frames) {
     Machine& b = bed.add(3, backup(100'000, 500'000));
     for (int i = 0; i < 20'000; ++i) {
         std::vector<std::uint8_t> frame(bed.wire.random() % 80);
-        for (auto& byte : frame) byte = static_cast<std::uint8_t>(bed.wire.random());
+        for (auto& byte : frame) {
+            byte = static_cast<std::uint8_t>(bed.wire.random());
+        }
         if (frame.size() > 22) {
             std::fill_n(frame.begin(), 6, std::uint8_t{0xff});
-            const std::uint8_t head[] = {0x90, 0x21, 0, 1, 2, 0, 2, 1, 0, static_cast<std::uint8_t>(i % 3 == 0 ? 0 : 0x10 + i % 2)};
+            const std::uint8_t head[] = {
+                0x90, 0x21, 0, 1, 2,
+                0,    2,    1, 0, static_cast<std::uint8_t>(i % 3 == 0 ? 0 : 0x10 + i % 2)};
             std::copy(std::begin(head), std::end(head), frame.begin() + 12);
-            if (i % 5 == 0) std::copy_n(mac(1).begin(), 6, frame.begin() + 6);  // in the master's name
+            // in the master's name
+            if (i % 5 == 0) {
+                std::copy_n(mac(1).begin(), 6, frame.begin() + 6);
+            }
         }
         bed.wire.inject(std::move(frame), 8, 700 * ms + i * 20'000);
     }

@@ -22,7 +22,10 @@ struct Network : Bed {
         run(800 * ms);
         wire.watching = true;
     }
-    bool all_ready() { return first.station.ready() && second.station.ready() && third.station.ready() && station.station.ready(); }
+    bool all_ready() {
+        return first.station.ready() && second.station.ready() && third.station.ready() &&
+               station.station.ready();
+    }
 };
 
 TEST(Backup, takes_over_within_one_cycle_when_the_master_is_lost) {
@@ -32,12 +35,16 @@ TEST(Backup, takes_over_within_one_cycle_when_the_master_is_lost) {
     n.first.off = true;
     n.first.port.cut = true;
     n.run(100 * ms);
-    Time last = 0, taken = 0;
+    Time last = 0;
+    Time taken = 0;
     for (const Wire::Frame& f : n.wire.seen) {
         if (!is_sync(f)) continue;
         EXPECT_NE(3, f.from) << "the one with the smallest offset wins";
-        if (f.from == 1) last = f.left;
-        else if (taken == 0) taken = f.left;
+        if (f.from == 1) {
+            last = f.left;
+        } else if (taken == 0) {
+            taken = f.left;
+        }
     }
     EXPECT_LT(taken - (last + ms), ms) << "from the sync that did not come to the backup's first";
     EXPECT_NEAR(100'000, static_cast<double>(taken - last - ms), 3'000) << "at its offset";
@@ -57,7 +64,8 @@ TEST(Backup, takes_over_when_the_first_backup_fails_too) {
     n.run(50 * ms);
     EXPECT_TRUE(n.third.status().leading);
     EXPECT_EQ(0, n.station.events[Event::sync_lost]);
-    n.second.off = n.second.port.cut = false;  // its thread was suspended; it finds the third, and has the smaller offset
+    // its thread was suspended; it finds the third, and has the smaller offset
+    n.second.off = n.second.port.cut = false;
     n.second.next = n.second.port.clock().local(n.now);
     n.run(600 * ms);
     EXPECT_TRUE(n.second.status().leading);
@@ -81,10 +89,11 @@ TEST(Backup, stops_sending_when_the_master_returns) {
     EXPECT_EQ(mac(1), n.station.status().master);
     n.wire.seen.clear();
     n.run(50 * ms);
-    for (const Wire::Frame& f : n.wire.seen)
+    for (const Wire::Frame& f : n.wire.seen) {
         if (is_sync(f)) {
             EXPECT_EQ(1, f.from);
         }
+    }
 }
 
 TEST(Station, does_not_recalibrate_after_a_short_loss_of_the_master) {
@@ -97,14 +106,16 @@ TEST(Station, does_not_recalibrate_after_a_short_loss_of_the_master) {
     n.first.port.cut = false;
     n.run(900 * ms);
     EXPECT_EQ(mac(1), n.station.status().master);
-    EXPECT_LE(n.station.status().count.requests - before, 2U) << "the station's slot is for its frames";
+    EXPECT_LE(n.station.status().count.requests - before, 2U)
+        << "the station's slot is for its frames";
     EXPECT_EQ(1, n.station.events[Event::calibrated]);
     n.first.port.cut = true;
     n.run(200 * ms);
     n.first.port.cut = false;
     n.run(1700 * ms);
     EXPECT_EQ(mac(1), n.station.status().master);
-    EXPECT_GE(n.station.status().count.requests - before, 100U) << "after a longer time its cable may be another";
+    EXPECT_GE(n.station.status().count.requests - before, 100U)
+        << "after a longer time its cable may be another";
 }
 
 TEST(Station, synchronises_to_a_restarted_master_with_another_time) {
@@ -135,8 +146,13 @@ TEST(Station, is_safe_within_its_limit_when_the_sync_is_lost) {
     m.off = true;
     const std::uint32_t at = s.status().cycle;
     int cycles = 0;
-    while (s.status().synchronous && cycles < 100) bed.run(ms), ++cycles;
-    EXPECT_LE(cycles, 7) << "four cycles, the one that is on its way, and the sync that was sent ahead; from cycle " << at;
+    while (s.status().synchronous && cycles < 100) {
+        bed.run(ms);
+        ++cycles;
+    }
+    EXPECT_LE(cycles, 7)
+        << "four cycles, the one that is on its way, and the sync that was sent ahead; from cycle "
+        << at;
     EXPECT_GE(cycles, 4);
 }
 
@@ -175,7 +191,9 @@ TEST(Master, does_not_send_at_its_start_when_another_one_has_another_cycle) {
     EXPECT_EQ(State::withdrawn, b.status().state);
     EXPECT_EQ(1, b.events[Event::master_there]);
     EXPECT_EQ(0, b.events[Event::leading]);
-    for (const Wire::Frame& f : bed.wire.seen) EXPECT_EQ(1, f.from);
+    for (const Wire::Frame& f : bed.wire.seen) {
+        EXPECT_EQ(1, f.from);
+    }
     a.off = true;
     b.station.reset();
     bed.run(200 * ms);
@@ -184,7 +202,8 @@ TEST(Master, does_not_send_at_its_start_when_another_one_has_another_cycle) {
 
 TEST(Master, recognises_its_backup_when_the_guard_exceeds_the_backup_offset) {
     const auto cell = [](StationSetup s) {
-        s.guard = 150'000, s.backup_from = 100'000;
+        s.guard = 150'000;
+        s.backup_from = 100'000;
         return s;
     };
     Bed bed;
@@ -202,7 +221,8 @@ TEST(Master, recognises_its_backup_when_the_guard_exceeds_the_backup_offset) {
     bed.run(800 * ms);
     EXPECT_TRUE(m.status().leading);
     EXPECT_FALSE(b.status().leading);
-    EXPECT_EQ(0, m.events[Event::master_there] + m.events[Event::other_master] + s.events[Event::sync_lost]);
+    EXPECT_EQ(0, m.events[Event::master_there] + m.events[Event::other_master] +
+                     s.events[Event::sync_lost]);
 }
 
 TEST(Station, without_a_sync_reports_it_once) {
@@ -266,7 +286,8 @@ TEST(Station, whose_thread_stays_out_of_phase_reports_it_once) {
     Bed bed;
     bed.add(1, master());
     Machine& s = bed.add(2, slave(300'000));
-    s.stiff = true, s.next += 400'000;
+    s.stiff = true;
+    s.next += 400'000;
     bed.run(12'000 * ms);
     EXPECT_EQ(State::synchronising, s.status().state);
     EXPECT_EQ(1, s.events[Event::out_of_step]);
@@ -330,7 +351,9 @@ TEST(Station, reports_a_babbling_one) {
     Machine& s = bed.add(2, slave(300'000));
     bed.run(600 * ms);
     const Frame f = encode(mac(2), mac(7), Request{});
-    for (int i = 0; i < 5000; ++i) bed.wire.inject({f.begin(), f.end()}, 7, bed.now + i * 7'000);
+    for (int i = 0; i < 5000; ++i) {
+        bed.wire.inject({f.begin(), f.end()}, 7, bed.now + i * 7'000);
+    }
     bed.run(30 * ms);
     EXPECT_EQ(1, s.events[Event::babbling]);
     EXPECT_EQ(mac(7), s.last_who[Event::babbling]);
@@ -344,12 +367,14 @@ TEST(Station, reports_no_babbling_when_frames_waited_for_a_late_thread) {
     Machine& s = bed.add(2, slave(300'000));
     s.off = true;  // its port is open, its thread does not run yet
     bed.run(300 * ms);
-    s.off = false, s.next = s.port.clock().local(bed.now);
+    s.off = false;
+    s.next = s.port.clock().local(bed.now);
     bed.run(600 * ms);
     ASSERT_TRUE(s.station.ready());
     s.off = true;  // now its thread is delayed
     bed.run(200 * ms);
-    s.off = false, s.next = s.port.clock().local(bed.now);
+    s.off = false;
+    s.next = s.port.clock().local(bed.now);
     bed.run(600 * ms);
     EXPECT_EQ(0, s.events[Event::babbling]);
     EXPECT_TRUE(s.station.ready());

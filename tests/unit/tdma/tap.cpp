@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The tunnel's interfaces in the kernel, in a network namespace of this process's own: a frame from the one to the other, the stations
-// between them on the virtual wire.
+// The tunnel's interfaces in the kernel, in a network namespace of this process's own: a frame from
+// the one to the other, the stations between them on the virtual wire.
 #include <gtest/gtest.h>
 
 #include <arpa/inet.h>
@@ -19,11 +19,14 @@ namespace tdma_tests {
 namespace {
 
 constexpr Time ms = 1'000'000;
-constexpr std::uint16_t experimental = 0x88b5;  // experimental Ethertype of IEEE 802: no protocol answers it
+// experimental Ethertype of IEEE 802: no protocol answers it
+constexpr std::uint16_t experimental = 0x88b5;
 
 /// Creates a network namespace. Returns the reason of a failure.
 std::string enter() {
-    if (::unshare(CLONE_NEWNET) != 0 && ::unshare(CLONE_NEWUSER | CLONE_NEWNET) != 0) return "no network namespace may be made here";
+    if (::unshare(CLONE_NEWNET) != 0 && ::unshare(CLONE_NEWUSER | CLONE_NEWNET) != 0) {
+        return "no network namespace may be made here";
+    }
     const hal::link::Descriptor tun(::open("/dev/net/tun", O_RDWR | O_CLOEXEC));
     return tun ? "" : "there is no /dev/net/tun here";
 }
@@ -35,7 +38,8 @@ hal::link::Descriptor raw(const std::string& name) {
     address.sll_family = AF_PACKET;
     address.sll_protocol = htons(experimental);
     address.sll_ifindex = static_cast<int>(if_nametoindex(name.c_str()));
-    EXPECT_EQ(0, ::bind(fd.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address)) << name << ": " << hal::link::reason();
+    EXPECT_EQ(0, ::bind(fd.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address))
+        << name << ": " << hal::link::reason();
     return fd;
 }
 
@@ -56,17 +60,23 @@ struct Taps : testing::Test, Bed {
 
     void SetUp() override {
         static const std::string why_not = enter();
-        if (!why_not.empty()) GTEST_SKIP() << why_not;
-        StationSetup first = master(), second = slave(300'000);
+        if (!why_not.empty()) {
+            GTEST_SKIP() << why_not;
+        }
+        StationSetup first = master();
+        StationSetup second = slave(300'000);
         first.slots.push_back({.id = tunnel_slot, .offset = 400'000, .size = 300});
         second.slots.push_back({.id = tunnel_slot, .offset = 700'000, .size = 200});
-        m = &add(1, first), s = &add(2, second, {120e-6, 77'000'000});
-        at_m = std::make_unique<Tunnel>(m->station), at_s = std::make_unique<Tunnel>(s->station);
+        m = &add(1, first);
+        s = &add(2, second, {120e-6, 77'000'000});
+        at_m = std::make_unique<Tunnel>(m->station);
+        at_s = std::make_unique<Tunnel>(s->station);
         m->station.accompany(nullptr, at_m.get());
         s->station.accompany(nullptr, at_s.get());
         run(600 * ms);
     }
-    /// Advances the simulated time until the condition is true; the kernel and the interfaces' threads use real time.
+    /// Advances the simulated time until the condition is true; the kernel and the interfaces'
+    /// threads use real time.
     template <class Condition>
     bool eventually(Condition condition) {
         for (int i = 0; i < 20'000; ++i) {
@@ -86,7 +96,9 @@ TEST_F(Taps, carry_a_frame_from_one_to_the_other) {
     EXPECT_EQ("hal0", first.tap->name());
     EXPECT_EQ(296, asked("hal0", SIOCGIFMTU, [](const ifreq& r) { return r.ifr_mtu; }));
     EXPECT_EQ(196, asked("other0", SIOCGIFMTU, [](const ifreq& r) { return r.ifr_mtu; }));
-    const auto ip = [](const ifreq& r) { return ntohl(reinterpret_cast<const sockaddr_in*>(&r.ifr_addr)->sin_addr.s_addr); };
+    const auto ip = [](const ifreq& r) {
+        return ntohl(reinterpret_cast<const sockaddr_in*>(&r.ifr_addr)->sin_addr.s_addr);
+    };
     EXPECT_EQ(0x0a090001u, asked("hal0", SIOCGIFADDR, ip));
     EXPECT_EQ(0xfffff000u, asked("hal0", SIOCGIFNETMASK, ip));
     EXPECT_EQ(mac(2), asked("other0", SIOCGIFHWADDR, [](const ifreq& r) {
@@ -94,16 +106,24 @@ TEST_F(Taps, carry_a_frame_from_one_to_the_other) {
         std::copy_n(r.ifr_hwaddr.sa_data, 6, a.begin());
         return a;
     }));
-    const auto running = [](const ifreq& r) { return (r.ifr_flags & (IFF_UP | IFF_RUNNING)) == (IFF_UP | IFF_RUNNING); };
-    ASSERT_TRUE(eventually([&] { return asked("hal0", SIOCGIFFLAGS, running) && asked("other0", SIOCGIFFLAGS, running); }));
+    const auto running = [](const ifreq& r) {
+        return (r.ifr_flags & (IFF_UP | IFF_RUNNING)) == (IFF_UP | IFF_RUNNING);
+    };
+    ASSERT_TRUE(eventually([&] {
+        return asked("hal0", SIOCGIFFLAGS, running) && asked("other0", SIOCGIFFLAGS, running);
+    }));
 
-    const auto here = raw("hal0"), there = raw("other0");
+    const auto here = raw("hal0");
+    const auto there = raw("other0");
     std::vector<std::uint8_t> frame(120), got(2000);
-    const Address to = mac(2), from = mac(1);
+    const Address to = mac(2);
+    const Address from = mac(1);
     std::copy(to.begin(), to.end(), frame.begin());
     std::copy(from.begin(), from.end(), frame.begin() + 6);
     put(frame, 12, experimental);
-    for (std::uint8_t i = 14; i < 120; ++i) frame[i] = i;
+    for (std::uint8_t i = 14; i < 120; ++i) {
+        frame[i] = i;
+    }
     ssize_t length = 0;
     ASSERT_TRUE(eventually([&] {  // the kernel drops frames while the interface comes up
         (void)!::send(here.get(), frame.data(), frame.size(), 0);
@@ -127,12 +147,15 @@ TEST_F(Taps, follow_another_schedule_and_are_removed_with_their_station) {
     ASSERT_NE(nullptr, opened.tap) << opened.problem;
     EXPECT_EQ("interface hal5 is in use by another process; use another name, for example hal%d",
               open_tap(*at_m, {"hal5", mac(1)}, "x").problem);
-    EXPECT_EQ("interface lo exists, but is not a TAP interface; use another name, for example hal%d",
-              open_tap(*at_m, {"lo", mac(1)}, "x").problem);
+    EXPECT_EQ(
+        "interface lo exists, but is not a TAP interface; use another name, for example hal%d",
+        open_tap(*at_m, {"lo", mac(1)}, "x").problem);
     StationSetup changed = slave(300'000);
     changed.slots.push_back({.id = tunnel_slot, .offset = 700'000, .size = 500});
     ASSERT_TRUE(s->station.reconfigure(changed));
-    EXPECT_TRUE(eventually([&] { return asked("hal5", SIOCGIFMTU, [](const ifreq& r) { return r.ifr_mtu; }) == 496; }));
+    EXPECT_TRUE(eventually([&] {
+        return asked("hal5", SIOCGIFMTU, [](const ifreq& r) { return r.ifr_mtu; }) == 496;
+    }));
     opened.tap.reset();
     EXPECT_EQ(0u, if_nametoindex("hal5"));
 }

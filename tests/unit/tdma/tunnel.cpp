@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Ordinary packets in slot 1, in both directions, next to undisturbed real-time frames; invalid packets.
+// Ordinary packets in slot 1, in both directions, next to undisturbed real-time frames; invalid
+// packets.
 #include <gtest/gtest.h>
 
 #include <set>
@@ -11,7 +12,8 @@ namespace tdma_tests {
 namespace {
 
 constexpr Time ms = 1'000'000;
-constexpr std::size_t slot_bytes = 600, mtu = slot_bytes - rtmac_bytes;
+constexpr std::size_t slot_bytes = 600;
+constexpr std::size_t mtu = slot_bytes - rtmac_bytes;
 
 using Bytes = std::vector<std::uint8_t>;
 
@@ -23,7 +25,9 @@ Bytes packet(const Address& to, const Address& from, std::size_t length, unsigne
     put<std::uint16_t>(f, 12, 0x0800);
     f[14] = 0x45;
     put(f, 16, static_cast<std::uint16_t>(length));
-    if (length >= 24) put(f, 34, static_cast<std::uint32_t>(mark));
+    if (length >= 24) {
+        put(f, 34, static_cast<std::uint32_t>(mark));
+    }
     return f;
 }
 unsigned mark_of(std::span<const std::uint8_t> f) { return get<std::uint32_t>(f, 34); }
@@ -37,16 +41,18 @@ StationSetup with_tunnel(StationSetup s, Time offset, std::uint32_t size = slot_
 struct Pair : Bed {
     Machine& m = add(1, with_tunnel(master(), 400'000));
     Machine& s = add(2, with_tunnel(slave(300'000), 700'000), {120e-6, 77'000'000});
-    Tunnel at_m{m.station}, at_s{s.station};
+    Tunnel at_m{m.station};
+    Tunnel at_s{s.station};
     Pair() {
         m.station.accompany(nullptr, &at_m);
         s.station.accompany(nullptr, &at_s);
-        for (Machine* each : {&m, &s})
+        for (Machine* each : {&m, &s}) {
             each->in_cycle = [](Machine& me) {
                 Bytes f = packet(ethernet::broadcast, me.station.address(), 46);
                 put(f, 12, cane_type);
                 me.station.send(f, 0, 0);
             };
+        }
         run(600 * ms);
         EXPECT_TRUE(at_m.open() && at_s.open());
     }
@@ -61,14 +67,18 @@ TEST(Tunnel, carries_packets_both_ways_in_order) {
     Pair p;
     for (unsigned i = 0; i < 40; ++i) {
         EXPECT_TRUE(p.at_m.give(packet(mac(2), mac(1), 28 + i % 2 * (mtu - 28), i)));
-        EXPECT_TRUE(p.at_s.give(packet(i % 3 == 0 ? ethernet::broadcast : mac(1), mac(2), 100 + i, i)));
+        EXPECT_TRUE(
+            p.at_s.give(packet(i % 3 == 0 ? ethernet::broadcast : mac(1), mac(2), 100 + i, i)));
     }
     p.run(60 * ms);
     for (unsigned i = 0; i < 40; ++i) {
         Bytes sent = packet(mac(2), mac(1), 28 + i % 2 * (mtu - 28), i);
-        sent.resize(std::max<std::size_t>(sent.size(), ethernet::smallest_frame - rtmac_bytes));  // padded like a short frame
+        // padded like a short frame
+        sent.resize(std::max<std::size_t>(sent.size(), ethernet::smallest_frame - rtmac_bytes));
         EXPECT_EQ(sent, Pair::next(p.at_s)) << i;
-        EXPECT_EQ(packet(i % 3 == 0 ? ethernet::broadcast : mac(1), mac(2), 100 + i, i), Pair::next(p.at_m)) << i;
+        EXPECT_EQ(packet(i % 3 == 0 ? ethernet::broadcast : mac(1), mac(2), 100 + i, i),
+                  Pair::next(p.at_m))
+            << i;
     }
     EXPECT_EQ(40u, p.at_m.sent());
     EXPECT_EQ(40u, p.at_m.received());
@@ -84,14 +94,20 @@ TEST(Tunnel, uses_its_own_slot_only) {
             full.at_m.give(packet(mac(2), mac(1), k % 2 == 0 ? mtu : 40, k));
             full.at_s.give(packet(mac(1), mac(2), k % 3 == 0 ? mtu : 40, k));
         }
-        for (Pair* p : {&quiet, &full}) p->run(ms);
-        while (!Pair::next(full.at_m).empty() || !Pair::next(full.at_s).empty()) {}
+        for (Pair* p : {&quiet, &full}) {
+            p->run(ms);
+        }
+        while (!Pair::next(full.at_m).empty() || !Pair::next(full.at_s).empty()) {
+        }
     }
     // Real-time frames leave at the same nanosecond, whatever is in slot 1.
     const auto real_time = [](const Pair& p) {
         std::vector<std::pair<int, Time>> when;
-        for (const Wire::Frame& f : p.wire.seen)
-            if (decode(f.bytes).kind != Kind::tunnelled) when.emplace_back(f.from, f.left);
+        for (const Wire::Frame& f : p.wire.seen) {
+            if (decode(f.bytes).kind != Kind::tunnelled) {
+                when.emplace_back(f.from, f.left);
+            }
+        }
         return when;
     };
     EXPECT_GT(real_time(full).size(), 250u);
@@ -100,13 +116,19 @@ TEST(Tunnel, uses_its_own_slot_only) {
     int tunnelled = 0;
     for (const Wire::Frame& f : full.wire.seen) {
         const Decoded d = decode(f.bytes);
-        if (d.kind == Kind::sync) sync = f.left;
+        if (d.kind == Kind::sync) {
+            sync = f.left;
+        }
         if (d.kind != Kind::tunnelled) continue;
         ++tunnelled;
-        const Time into = f.left - sync, takes = static_cast<Time>(ethernet::wire_bytes(f.bytes.size())) * 80;
+        const Time into = f.left - sync;
+
+        const Time takes = static_cast<Time>(ethernet::wire_bytes(f.bytes.size())) * 80;
         const Time offset = f.from == 1 ? 400'000 : 700'000;
         EXPECT_GE(into, offset - 2'000) << f.from;
-        EXPECT_LE(into + takes, offset + static_cast<Time>(ethernet::wire_bytes(14 + slot_bytes)) * 80 + 2'000) << f.from;
+        EXPECT_LE(into + takes,
+                  offset + static_cast<Time>(ethernet::wire_bytes(14 + slot_bytes)) * 80 + 2'000)
+            << f.from;
     }
     EXPECT_GT(tunnelled, 190);
     EXPECT_GT(full.at_m.dropped(), 0u) << "more than the slot carries was given";
@@ -116,11 +138,15 @@ TEST(Tunnel, uses_its_own_slot_only) {
 
 TEST(Tunnel, drops_the_newest_when_it_is_full) {
     Pair p;
-    for (unsigned i = 0; i < Tunnel::capacity; ++i) EXPECT_TRUE(p.at_m.give(packet(mac(2), mac(1), mtu, i)));
+    for (unsigned i = 0; i < Tunnel::capacity; ++i) {
+        EXPECT_TRUE(p.at_m.give(packet(mac(2), mac(1), mtu, i)));
+    }
     EXPECT_FALSE(p.at_m.give(packet(mac(2), mac(1), mtu, 1000)));
     EXPECT_EQ(1u, p.at_m.dropped());
     p.run(200 * ms);
-    for (unsigned i = 0; i < Tunnel::capacity; ++i) EXPECT_EQ(i, mark_of(Pair::next(p.at_s)));
+    for (unsigned i = 0; i < Tunnel::capacity; ++i) {
+        EXPECT_EQ(i, mark_of(Pair::next(p.at_s)));
+    }
     // Nothing is read: the cycle continues, and the oldest packets are kept.
     for (unsigned i = 0; i < Tunnel::capacity + 6; ++i) {
         EXPECT_TRUE(p.at_m.give(packet(mac(2), mac(1), 60, i)));
@@ -169,7 +195,9 @@ TEST(Tunnel, has_the_mtu_of_slot_1) {
 TEST(Tunnel, sends_no_stale_packets_after_a_sync_loss) {
     Pair p;
     p.m.off = p.m.port.cut = true;
-    for (unsigned i = 0; i < 20; ++i) p.at_s.give(packet(mac(1), mac(2), 300, 1));
+    for (unsigned i = 0; i < 20; ++i) {
+        p.at_s.give(packet(mac(1), mac(2), 300, 1));
+    }
     p.run(50 * ms);
     EXPECT_FALSE(p.at_s.open());
     EXPECT_FALSE(p.at_s.give(packet(mac(1), mac(2), 300, 2))) << "the station may not send";
@@ -202,7 +230,9 @@ TEST_P(Hostile_frame, is_counted_and_rejected) {
     GetParam().spoil(frame);
     EXPECT_FALSE(is_packet(decode(frame), mac(2)));
     const auto before = p.at_s.rejected() + p.s.status().count.foreign;
-    for (int i = 0; i < 5; ++i) p.at_s.arrived(frame, p.now);  // bypasses the driver's filter
+    for (int i = 0; i < 5; ++i) {
+        p.at_s.arrived(frame, p.now);  // bypasses the driver's filter
+    }
     EXPECT_EQ(before + 5, p.at_s.rejected());
     EXPECT_TRUE(Pair::next(p.at_s).empty());
     EXPECT_EQ(0u, p.at_s.received());
@@ -210,22 +240,29 @@ TEST_P(Hostile_frame, is_counted_and_rejected) {
 }
 INSTANTIATE_TEST_SUITE_P(
     Tunnel, Hostile_frame,
-    testing::Values(Hostile{"to_another", [](Bytes& f) { f[5] = 9; }}, Hostile{"from_itself", [](Bytes& f) { f[11] = 2; }},
-                    Hostile{"from_a_group", [](Bytes& f) { f[6] |= 1; }}, Hostile{"no_payload", [](Bytes& f) { f.resize(18); }},
-                    Hostile{"half_a_header", [](Bytes& f) { f.resize(17); }}, Hostile{"nothing", [](Bytes& f) { f.clear(); }},
-                    Hostile{"cut_below_its_length", [](Bytes& f) { f.resize(18 + 99); }},
-                    Hostile{"longer_than_it_is", [](Bytes& f) { put<std::uint16_t>(f, 20, 101); }},
-                    Hostile{"shorter_than_its_header", [](Bytes& f) { put<std::uint16_t>(f, 20, 19); }},
-                    Hostile{"header_of_4_bytes", [](Bytes& f) { f[18] = 0x41; }},
-                    Hostile{"other_ip_version", [](Bytes& f) { f[18] = 0x65; }},
-                    Hostile{"short_arp", [](Bytes& f) { put<std::uint16_t>(f, 14, 0x0806), f.resize(18 + 27); }},
-                    Hostile{"short_ipv6", [](Bytes& f) { put<std::uint16_t>(f, 14, 0x86dd), f[18] = 0x60, f[22] = 1; }},
-                    Hostile{"a_length_for_a_type", [](Bytes& f) { put<std::uint16_t>(f, 14, 100); }},
-                    Hostile{"tunnelled_sync", [](Bytes& f) { put<std::uint16_t>(f, 14, rtmac_type); }},
-                    Hostile{"tunnelled_rtcfg", [](Bytes& f) { put<std::uint16_t>(f, 14, rtcfg_type); }},
-                    Hostile{"tunnelled_process_data", [](Bytes& f) { put<std::uint16_t>(f, 14, cane_type); }},
-                    Hostile{"other_version", [](Bytes& f) { f[16] = 3; }}, Hostile{"no_tunnel", [](Bytes& f) { f[17] = 0; }},
-                    Hostile{"longer_than_a_frame", [](Bytes& f) { f.resize(1600); }}),
+    testing::Values(
+        Hostile{"to_another", [](Bytes& f) { f[5] = 9; }},
+        Hostile{"from_itself", [](Bytes& f) { f[11] = 2; }},
+        Hostile{"from_a_group", [](Bytes& f) { f[6] |= 1; }},
+        Hostile{"no_payload", [](Bytes& f) { f.resize(18); }},
+        Hostile{"half_a_header", [](Bytes& f) { f.resize(17); }},
+        Hostile{"nothing", [](Bytes& f) { f.clear(); }},
+        Hostile{"cut_below_its_length", [](Bytes& f) { f.resize(18 + 99); }},
+        Hostile{"longer_than_it_is", [](Bytes& f) { put<std::uint16_t>(f, 20, 101); }},
+        Hostile{"shorter_than_its_header", [](Bytes& f) { put<std::uint16_t>(f, 20, 19); }},
+        Hostile{"header_of_4_bytes", [](Bytes& f) { f[18] = 0x41; }},
+        Hostile{"other_ip_version", [](Bytes& f) { f[18] = 0x65; }},
+        Hostile{"short_arp",
+                [](Bytes& f) { put<std::uint16_t>(f, 14, 0x0806), f.resize(18 + 27); }},
+        Hostile{"short_ipv6",
+                [](Bytes& f) { put<std::uint16_t>(f, 14, 0x86dd), f[18] = 0x60, f[22] = 1; }},
+        Hostile{"a_length_for_a_type", [](Bytes& f) { put<std::uint16_t>(f, 14, 100); }},
+        Hostile{"tunnelled_sync", [](Bytes& f) { put<std::uint16_t>(f, 14, rtmac_type); }},
+        Hostile{"tunnelled_rtcfg", [](Bytes& f) { put<std::uint16_t>(f, 14, rtcfg_type); }},
+        Hostile{"tunnelled_process_data", [](Bytes& f) { put<std::uint16_t>(f, 14, cane_type); }},
+        Hostile{"other_version", [](Bytes& f) { f[16] = 3; }},
+        Hostile{"no_tunnel", [](Bytes& f) { f[17] = 0; }},
+        Hostile{"longer_than_a_frame", [](Bytes& f) { f.resize(1600); }}),
     [](const auto& test) { return test.param.what; });
 
 TEST(Tunnel, passes_on_only_valid_packets_from_random_frames) {
@@ -236,8 +273,12 @@ TEST(Tunnel, passes_on_only_valid_packets_from_random_frames) {
     std::uint64_t taken = 0;
     for (int i = 0; i < 20'000; ++i) {
         Bytes f = good;
-        for (std::uint64_t n = random() % 5; n > 0; --n) f[random() % 40] = static_cast<std::uint8_t>(random());
-        if (random() % 4 == 0) f.resize(random() % 400);
+        for (std::uint64_t n = random() % 5; n > 0; --n) {
+            f[random() % 40] = static_cast<std::uint8_t>(random());
+        }
+        if (random() % 4 == 0) {
+            f.resize(random() % 400);
+        }
         p.at_s.arrived(f, p.now);
         const std::size_t length = p.at_s.take(out);
         EXPECT_EQ(is_packet(decode(f), mac(2)), length != 0);
@@ -252,11 +293,14 @@ TEST(Tunnel, passes_on_only_valid_packets_from_random_frames) {
 }
 
 TEST(Tap, accepts_valid_interface_names) {
-    for (const char* good : {"hal0", "rtmac%d", "%d", "a.b-c_d", "fifteen-letters"}) EXPECT_EQ("", wrong_name(good)) << good;
-    for (const char* bad : {"", ".", "..", "a/b", "a b", "a:b", "hal%s", "hal%", "%d%d", "sixteen-letters-"}) {
-        const std::string expected =
-            "'" + std::string(bad) +
-            "' is not a valid interface name; use at most 15 letters and digits, for example hal0, or hal%d for the first free number";
+    for (const char* good : {"hal0", "rtmac%d", "%d", "a.b-c_d", "fifteen-letters"}) {
+        EXPECT_EQ("", wrong_name(good)) << good;
+    }
+    for (const char* bad :
+         {"", ".", "..", "a/b", "a b", "a:b", "hal%s", "hal%", "%d%d", "sixteen-letters-"}) {
+        const std::string expected = "'" + std::string(bad) +
+                                     "' is not a valid interface name; use at most 15 letters and "
+                                     "digits, for example hal0, or hal%d for the first free number";
         EXPECT_EQ(expected, wrong_name(bad));
     }
 }
@@ -267,8 +311,9 @@ TEST(Tap, parses_prefix_lengths_and_netmasks) {
     EXPECT_EQ(0u, parse_prefix("0.0.0.0"));
     EXPECT_EQ(32u, parse_prefix("255.255.255.255"));
     EXPECT_EQ(30u, parse_prefix("255.255.255.252"));
-    for (const char* bad : {"", "33", "-1", "24x", "255.0.255.0", "0.255.255.255", "1.2.3"})
+    for (const char* bad : {"", "33", "-1", "24x", "255.0.255.0", "0.255.255.255", "1.2.3"}) {
         EXPECT_EQ(std::nullopt, parse_prefix(bad)) << bad;
+    }
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A segment for stations with clocks of their own. True time is the wire's; a port's user sees only its own clock.
+// A segment for stations with clocks of their own. True time is the wire's; a port's user sees only
+// its own clock.
 #pragma once
 
 #include <algorithm>
@@ -36,28 +37,39 @@ public:
     struct Frame {
         std::vector<std::uint8_t> bytes;
         int from = 0;
-        Time left = 0, arrives = 0;
+        Time left = 0;
+        Time arrives = 0;
     };
 
     class Port final : public ethernet::Port {
     public:
-        Port(Wire& wire, int number, Clock clock) : wire_(wire), number_(number), clock_(clock), address_(mac(number)) {}
+        Port(Wire& wire, int number, Clock clock)
+            : wire_(wire), number_(number), clock_(clock), address_(mac(number)) {}
         const Address& address() const noexcept override { return address_; }
-        ethernet::Sent send(std::span<const std::uint8_t> frame, const ethernet::Launch& launch, std::int64_t now) noexcept override {
+        ethernet::Sent send(std::span<const std::uint8_t> frame, const ethernet::Launch& launch,
+                            std::int64_t now) noexcept override {
             if (cut) return ethernet::Sent::down;
             const Time at = launch.at_ns == 0 ? now : launch.at_ns;
             farthest = std::max(farthest, at - now);
-            if (now > at + (launch.guard_ns == 0 ? INT64_MAX / 4 : launch.guard_ns)) return ethernet::Sent::late;
-            Frame f{{frame.begin(), frame.end()}, number_, clock_.real(std::max(at, now)) + late, 0};
-            if (f.bytes.size() < ethernet::smallest_frame) f.bytes.resize(ethernet::smallest_frame);
-            if (launch.stamp_at != 0) put(f.bytes, launch.stamp_at, clock_.local(f.left) + launch.stamp_add_ns);
+            if (now > at + (launch.guard_ns == 0 ? INT64_MAX / 4 : launch.guard_ns)) {
+                return ethernet::Sent::late;
+            }
+            Frame f{
+                {frame.begin(), frame.end()}, number_, clock_.real(std::max(at, now)) + late, 0};
+            if (f.bytes.size() < ethernet::smallest_frame) {
+                f.bytes.resize(ethernet::smallest_frame);
+            }
+            if (launch.stamp_at != 0) {
+                put(f.bytes, launch.stamp_at, clock_.local(f.left) + launch.stamp_add_ns);
+            }
             wire_.queue(std::move(f));
             return ethernet::Sent::queued;
         }
         std::optional<ethernet::Arrival> receive(std::int64_t now) noexcept override {
             wire_.run(clock_.real(now));
             if (next_ == inbox_.size()) {
-                inbox_.clear(), next_ = 0;
+                inbox_.clear();
+                next_ = 0;
                 return {};
             }
             const Frame& f = inbox_[next_++];
@@ -94,7 +106,9 @@ public:
     double noise_ns = 0.0;
     std::vector<int> deaf;  // ports that get nothing but what is for them alone
 
-    void inject(std::vector<std::uint8_t> bytes, int from, Time at) { queue({std::move(bytes), from, at, 0}); }
+    void inject(std::vector<std::uint8_t> bytes, int from, Time at) {
+        queue({std::move(bytes), from, at, 0});
+    }
     void queue(Frame f) { waiting_.emplace(f.left, std::move(f)); }
 
     /// Delivers what has arrived by then.
@@ -103,9 +117,13 @@ public:
             Frame f = std::move(waiting_.begin()->second);
             waiting_.erase(waiting_.begin());
             if (f.arrives == 0) {
-                if (watching) seen.push_back(f);
+                if (watching) {
+                    seen.push_back(f);
+                }
                 if (fault && !fault(f)) continue;
-                f.arrives += f.left + path + static_cast<Time>(160 * (std::max<std::size_t>(f.bytes.size(), 60) - 60));
+                f.arrives +=
+                    f.left + path +
+                    static_cast<Time>(160 * (std::max<std::size_t>(f.bytes.size(), 60) - 60));
             }
             if (f.arrives > until) {
                 const Time at = f.arrives;
@@ -114,10 +132,15 @@ public:
             }
             for (auto& p : ports_) {
                 Address to{};
-                if (f.bytes.size() >= 6) std::copy_n(f.bytes.begin(), 6, to.begin());
-                const bool shuns = to == ethernet::broadcast && std::find(deaf.begin(), deaf.end(), p->number_) != deaf.end();
-                if (p->number_ != f.from && !p->cut && !shuns && (to == ethernet::broadcast || to == p->address_ || f.bytes.size() < 6))
+                if (f.bytes.size() >= 6) {
+                    std::copy_n(f.bytes.begin(), 6, to.begin());
+                }
+                const bool shuns = to == ethernet::broadcast &&
+                                   std::find(deaf.begin(), deaf.end(), p->number_) != deaf.end();
+                if (p->number_ != f.from && !p->cut && !shuns &&
+                    (to == ethernet::broadcast || to == p->address_ || f.bytes.size() < 6)) {
                     p->inbox_.push_back(f);
+                }
             }
         }
     }
@@ -134,18 +157,24 @@ private:
 
 /// A station with its thread: cycles of its own clock, moved by half of the error each.
 struct Machine final : Events {
-    Machine(Wire& wire, int number, StationSetup setup, Clock clock = {}) : port(wire.port(number, clock)), station(setup, this) {
+    Machine(Wire& wire, int number, StationSetup setup, Clock clock = {})
+        : port(wire.port(number, clock)), station(setup, this) {
         next = clock.local(1'000'000 + 137 * number);
         station.attach(port);
     }
     void cycle() {
         station.receive(next);
-        if (in_cycle) in_cycle(*this);
+        if (in_cycle) {
+            in_cycle(*this);
+        }
         station.transmit(next);
         const Time error = station.error();
         const Time step = std::abs(error) > 20'000 ? error : error / 2;
-        if (stiff || (station.status().leading && !follows)) next += station.setup().cycle;
-        else next += station.setup().cycle + step;
+        if (stiff || (station.status().leading && !follows)) {
+            next += station.setup().cycle;
+        } else {
+            next += station.setup().cycle + step;
+        }
     }
     Time due() const { return port.clock().real(next); }
     const Status& status() const { return station.status(); }
@@ -158,7 +187,9 @@ struct Machine final : Events {
     Wire::Port& port;
     Station station;
     Time next = 0;
-    bool follows = true, off = false, stiff = false;  // stiff: its thread keeps its own time
+    bool follows = true;
+    bool off = false;
+    bool stiff = false;  // stiff: its thread keeps its own time
     std::function<void(Machine&)> in_cycle;
     std::map<Event, int> events;
     std::map<Event, Address> last_who;
@@ -179,8 +210,11 @@ struct Bed {
         const Time end = now + time;
         for (;;) {
             Machine* first = nullptr;
-            for (auto& m : machines)
-                if (!m->off && (first == nullptr || m->due() < first->due())) first = m.get();
+            for (auto& m : machines) {
+                if (!m->off && (first == nullptr || m->due() < first->due())) {
+                    first = m.get();
+                }
+            }
             if (first == nullptr || first->due() > end) break;
             now = first->due();
             first->cycle();
@@ -191,7 +225,8 @@ struct Bed {
 
 inline StationSetup master(Time cycle = 1'000'000) {
     StationSetup s;
-    s.role = Role::master, s.cycle = cycle;
+    s.role = Role::master;
+    s.cycle = cycle;
     s.slots = {{.id = 0, .offset = 50'000, .size = 60}};
     return s;
 }
@@ -203,7 +238,9 @@ inline StationSetup slave(Time offset, Time cycle = 1'000'000) {
 }
 inline StationSetup backup(Time offset, Time slot) {
     StationSetup s;
-    s.role = Role::backup, s.backup_offset = offset, s.phase = offset / 2;
+    s.role = Role::backup;
+    s.backup_offset = offset;
+    s.phase = offset / 2;
     s.slots = {{.id = 0, .offset = slot, .size = 60}};
     return s;
 }

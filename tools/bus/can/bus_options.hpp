@@ -11,22 +11,30 @@
 namespace hal::tools {
 
 inline constexpr const char* bus_address =
-    "can:can0, udp:GROUP:PORT, slcan:/dev/ttyACM0, cane:enp3s0 or replay:FILE; with options: ?bitrate=500k&datarate=2M&listen";
+    "can:can0, udp:GROUP:PORT, slcan:/dev/ttyACM0, cane:enp3s0 or replay:FILE; with options: "
+    "?bitrate=500k&datarate=2M&listen";
 
 /// Declares --filter and --count.
-inline void declare_filter(OptionSet& set, std::vector<std::string>& filters, std::uint64_t& count) {
-    set.values("--filter", filters, "ID[/MASK]", "only frames with this identifier, or ID/MASK: 181, 180/780, 18FF0000/1FFF0000; may be repeated");
+inline void declare_filter(OptionSet& set, std::vector<std::string>& filters,
+                           std::uint64_t& count) {
+    set.values("--filter", filters, "ID[/MASK]",
+               "only frames with this identifier, or ID/MASK: 181, 180/780, 18FF0000/1FFF0000; may "
+               "be repeated");
     set.value("-n,--count", count, "N", "end after N frames");
 }
 
 /// Declares --eds.
-inline void declare_eds(OptionSet& set, std::string& eds, const char* what = "device description (EDS, DCF, XDD) with the names and types of the objects") {
+inline void declare_eds(
+    OptionSet& set, std::string& eds,
+    const char* what =
+        "device description (EDS, DCF, XDD) with the names and types of the objects") {
     set.value("--eds", eds, "FILE", what);
 }
 
 /// Declares --timeout, of one response.
 inline void declare_timeout(OptionSet& set, std::int64_t& timeout_ns) {
-    set.duration("--timeout", timeout_ns, "timeout of one response before a retry: 1s, 200ms … (default 500ms)");
+    set.duration("--timeout", timeout_ns,
+                 "timeout of one response before a retry: 1s, 200ms … (default 500ms)");
 }
 
 }  // namespace hal::tools

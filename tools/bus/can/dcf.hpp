@@ -28,7 +28,8 @@ struct DcfWriteOptions : Options {
     void declare(OptionSet& set) override {
         set.words("ADDRESS NODE FILE", "the bus; node ID 1..127; a DCF");
         set.flag("--check", check, "only print the differences; exit code 1 if there are any");
-        set.flag("--other-node", other_node, "write a DCF that was made for another node ID or bit rate");
+        set.flag("--other-node", other_node,
+                 "write a DCF that was made for another node ID or bit rate");
         declare_timeout(set, timeout_ns);
     }
 };

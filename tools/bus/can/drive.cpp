@@ -18,7 +18,9 @@ using namespace canopen::cia402;
 
 namespace {
 
-constexpr std::int64_t step_ns = 15'000'000'000, motion_ns = 60'000'000'000;  // for a command, when no time is given
+// for a command, when no time is given
+constexpr std::int64_t step_ns = 15'000'000'000;
+constexpr std::int64_t motion_ns = 60'000'000'000;
 
 struct Verb {
     const char *name, *arguments, *what;
@@ -42,31 +44,44 @@ constexpr Verb verbs[] = {
 };
 
 const char* arguments_of(const std::string& verb) {
-    const auto* row = std::find_if(std::begin(verbs), std::end(verbs), [&](const Verb& v) { return verb == v.name; });
+    const auto* row = std::find_if(std::begin(verbs), std::end(verbs),
+                                   [&](const Verb& v) { return verb == v.name; });
     return row == std::end(verbs) ? "" : row->arguments;
 }
 
 }  // namespace
 
-DriveShell::DriveShell(const Options& options, NodeClient& station, Supervision& supervision, const Settings& settings)
+DriveShell::DriveShell(const Options& options, NodeClient& station, Supervision& supervision,
+                       const Settings& settings)
     : options_(options), station_(station), supervision_(supervision), settings_(settings) {}
 
 bool DriveShell::print_line(const std::string& text) const { return print(text + "\n"); }
-bool DriveShell::wrong(const std::string& sentence) const { return fail(options_, sentence), false; }
+bool DriveShell::wrong(const std::string& sentence) const {
+    fail(options_, sentence);
+    return false;
+}
 
 std::string DriveShell::help_text() {
     std::string text = "  write the letter of the axis before a command: A on\n";
-    for (const Verb& v : verbs) text += fmt::format("  {:38} {}\n", std::string(v.name) + " " + v.arguments, v.what);
+    for (const Verb& v : verbs) {
+        text += fmt::format("  {:38} {}\n", std::string(v.name) + " " + v.arguments, v.what);
+    }
     text +=
-        "  COMMAND within TIME: the command fails after TIME, and a motion is stopped (default 60s; on, off, stop ... 15s)\n";
-    text += "  parameters: set NAME VALUE writes, NAME? reads; position?, speed?, torque?, mode? and state? are read-only\n";
-    return text + value_help() + "  HELP lists the robot-shell commands, which end with the axis: ONA: GA:1000 APA?\n";
+        "  COMMAND within TIME: the command fails after TIME, and a motion is stopped (default "
+        "60s; on, off, stop ... 15s)\n";
+    text +=
+        "  parameters: set NAME VALUE writes, NAME? reads; position?, speed?, torque?, mode? and "
+        "state? are read-only\n";
+    return text + value_help() +
+           "  HELP lists the robot-shell commands, which end with the axis: ONA: GA:1000 APA?\n";
 }
 
 bool DriveShell::without_effect(const std::string& command) const {
-    return wrong(fmt::format("{0}: a factor is valid for the commands after it, and there are none; type them as lines of a session: "
-                             "printf '{0}\\nGA:100\\n' | hal can drive {1} --node {2}",
-                             command, options_.words.front(), settings_.node));
+    return wrong(
+        fmt::format("{0}: a factor is valid for the commands after it, and there are none; type "
+                    "them as lines of a session: "
+                    "printf '{0}\\nGA:100\\n' | hal can drive {1} --node {2}",
+                    command, options_.words.front(), settings_.node));
 }
 
 int DriveShell::execute(std::string_view line) {
@@ -79,7 +94,9 @@ int DriveShell::execute(std::string_view line) {
         Words words;
         for (std::size_t at = 0; at < line.size();) {
             const std::size_t end = std::min(line.find_first_of(" \t\r\n:", at), line.size());
-            if (end > at) words.emplace_back(line.substr(at, end - at));
+            if (end > at) {
+                words.emplace_back(line.substr(at, end - at));
+            }
             at = end + 1;
         }
         if (words.empty()) return 0;
@@ -87,7 +104,8 @@ int DriveShell::execute(std::string_view line) {
     }
     if (supervision_.collided() && !over_) {
         good =
-            wrong(fmt::format("another device sends heartbeats as node {}, so the drive would not notice the end of this program; "
+            wrong(fmt::format("another device sends heartbeats as node {}, so the drive would not "
+                              "notice the end of this program; "
                               "start again with another --heartbeat-id",
                               supervision_.own_node()));
         over_ = true;
@@ -100,18 +118,25 @@ int DriveShell::execute(std::string_view line) {
 std::function<void()> DriveShell::meanwhile() {
     return [this] {
         station_.turn(0);
-        if (pressed_.load() || supervision_.collided()) station_.bus.stop.request();  // no command is running that it could interrupt
+        // no command is running that it could interrupt
+        if (pressed_.load() || supervision_.collided()) {
+            station_.bus.stop.request();
+        }
     };
 }
 
 SdoAxis::Interruption DriveShell::interruption() const {
     using enum SdoAxis::Interruption;
-    return station_.bus.stop.requested() || supervision_.collided() ? end : pressed_.load() ? stop : none;
+    return station_.bus.stop.requested() || supervision_.collided() ? end
+           : pressed_.load()                                        ? stop
+                                                                    : none;
 }
 
 SdoAxis& DriveShell::axis(unsigned number) {
     auto& made = axes_[number];
-    if (!made) made = std::make_unique<SdoAxis>(options_, station_, settings_.node, number);
+    if (!made) {
+        made = std::make_unique<SdoAxis>(options_, station_, settings_.node, number);
+    }
     made->interrupted = [this] { return interruption(); };
     return *made;
 }
@@ -123,23 +148,32 @@ int DriveShell::end(bool leave, const char* why, bool expected) {
     for (auto& a : axes_) {
         if (!a || !a->touched()) continue;
         if (leave) {
-            if (supervision_.active() && a->moves())
+            if (supervision_.active() && a->moves()) {
                 write_all(STDERR_FILENO,
-                          fmt::format("{0}: {1}: still moving, no longer supervised; to stop it: hal can drive {2} --node {3} "
+                          fmt::format("{0}: {1}: still moving, no longer supervised; to stop it: "
+                                      "hal can drive {2} --node {3} "
                                       "{1} stop\n",
-                                      options_.program, a->letter(), options_.words.front(), settings_.node));
+                                      options_.program, a->letter(), options_.words.front(),
+                                      settings_.node));
+            }
             continue;
         }
         std::string what;
         const bool done = a->secure(what);
         all = all && done;
         if (what.empty()) continue;
-        if (done && expected) print(fmt::format("{}: {} ({})\n", a->letter(), what, why));
-        else
+        if (done && expected) {
+            print(fmt::format("{}: {} ({})\n", a->letter(), what, why));
+        } else {
             fail(options_, fmt::format("{}: {}{} ({})", a->letter(), what,
-                                       !done && supervision_.active() ? "; the drive stops when it misses our heartbeat" : "", why));
+                                       !done && supervision_.active()
+                                           ? "; the drive stops when it misses our heartbeat"
+                                           : "",
+                                       why));
+        }
     }
-    // An axis that could not be stopped stays supervised: the heartbeat ends with this program, and the drive reacts.
+    // An axis that could not be stopped stays supervised: the heartbeat ends with this program, and
+    // the drive reacts.
     return all && supervision_.release() ? 0 : 1;
 }
 
@@ -147,39 +181,61 @@ bool DriveShell::run(Words words) {
     unsigned number = settings_.axis;
     if (words[0].size() == 1) {
         const char letter = static_cast<char>(words[0][0] & ~0x20);
-        if (letter < 'A' || letter > 'H') return wrong(fmt::format("invalid axis '{}'; write A to H", words[0]));
+        if (letter < 'A' || letter > 'H') {
+            return wrong(fmt::format("invalid axis '{}'; write A to H", words[0]));
+        }
         number = static_cast<unsigned>(letter - 'A');
-        if (settings_.one_shot && settings_.axis_given)
-            return wrong(fmt::format("--axis has no effect on a command with a letter; delete --axis or '{}'", words[0]));
+        if (settings_.one_shot && settings_.axis_given) {
+            return wrong(fmt::format(
+                "--axis has no effect on a command with a letter; delete --axis or '{}'",
+                words[0]));
+        }
         words.erase(words.begin());
-        if (words.empty()) return wrong(fmt::format("missing command for axis {}; type: help", letter));
+        if (words.empty()) {
+            return wrong(fmt::format("missing command for axis {}; type: help", letter));
+        }
     }
     const std::string verb = words[0];
     words.erase(words.begin());
     if (verb == "quit" || verb == "exit") {
-        if (settings_.one_shot) return wrong(fmt::format("{} ends a session, and there is none; type: hal can drive {} --node {}", verb, options_.words.front(), settings_.node));
+        if (settings_.one_shot) {
+            return wrong(fmt::format(
+                "{} ends a session, and there is none; type: hal can drive {} --node {}", verb,
+                options_.words.front(), settings_.node));
+        }
         return left_ = over_ = true;
     }
     if (verb == "help") return print(help_text());
     SdoAxis& a = axis(number);
     if (verb.ends_with('?')) return query(a, verb.substr(0, verb.size() - 1));
-    const auto* row = std::find_if(std::begin(verbs), std::end(verbs), [&](const Verb& v) { return verb == v.name; });
+    const auto* row = std::find_if(std::begin(verbs), std::end(verbs),
+                                   [&](const Verb& v) { return verb == v.name; });
     if (row == std::end(verbs)) {
         Words names;
-        for (const Verb& v : verbs) names.emplace_back(v.name);
+        for (const Verb& v : verbs) {
+            names.emplace_back(v.name);
+        }
         const std::string hint = did_you_mean(verb, names);
-        return wrong(fmt::format("unknown command '{}'; {}", verb, hint.empty() ? "type: help" : hint));
+        return wrong(
+            fmt::format("unknown command '{}'; {}", verb, hint.empty() ? "type: help" : hint));
     }
     return command(a, verb, std::move(words));
 }
 
 bool DriveShell::command(SdoAxis& a, const std::string& verb, Words arguments) {
-    const std::string rest = arguments_of(verb), shown = fmt::format("type: {} {}{}{}", a.letter(), verb, rest.empty() ? "" : " ", rest);
+    const std::string rest = arguments_of(verb);
+
+    const std::string shown =
+        fmt::format("type: {} {}{}{}", a.letter(), verb, rest.empty() ? "" : " ", rest);
     const auto usage = [&] { return wrong(shown); };
     std::int64_t within = settings_.within_ns;
-    if (const auto at = std::find(arguments.begin(), arguments.end(), "within"); at != arguments.end()) {
+    if (const auto at = std::find(arguments.begin(), arguments.end(), "within");
+        at != arguments.end()) {
         const auto ns = at + 1 == arguments.end() ? std::nullopt : parse_duration_ns(at[1]);
-        if (!ns || *ns <= 0) return wrong(fmt::format("{}: missing time after within; type: {} {} within 30s", verb, a.letter(), verb));
+        if (!ns || *ns <= 0) {
+            return wrong(fmt::format("{}: missing time after within; type: {} {} within 30s", verb,
+                                     a.letter(), verb));
+        }
         within = *ns;
         arguments.erase(at, at + 2);
     }
@@ -188,33 +244,61 @@ bool DriveShell::command(SdoAxis& a, const std::string& verb, Words arguments) {
     if (moving) return motion(a, verb, std::move(arguments), shown);
     const char letter = a.letter();
     if (verb == "mode") {
-        constexpr Mode by_hand[] = {Mode::profile_position, Mode::profile_velocity, Mode::profile_torque, Mode::velocity};
+        constexpr Mode by_hand[] = {Mode::profile_position, Mode::profile_velocity,
+                                    Mode::profile_torque, Mode::velocity};
         if (arguments.size() != 1) return usage();
-        for (const Mode mode : by_hand)
-            if (arguments[0] == abbreviation(mode)) return a.set_mode(mode) && print_line(fmt::format("{}: mode {}", letter, arguments[0]));
-        for (const ModeRow& m : modes)
-            if (arguments[0] == m.abbreviation)
+        for (const Mode mode : by_hand) {
+            if (arguments[0] == abbreviation(mode)) {
+                return a.set_mode(mode) &&
+                       print_line(fmt::format("{}: mode {}", letter, arguments[0]));
+            }
+        }
+        for (const ModeRow& m : modes) {
+            if (arguments[0] == m.abbreviation) {
                 return wrong(m.mode == Mode::homing
                                  ? fmt::format("homing is a command: {} home", letter)
-                                 : fmt::format("mode {} needs a set-point every cycle; use component cia402 in a netlist", m.abbreviation));
+                                 : fmt::format("mode {} needs a set-point every cycle; use "
+                                               "component cia402 in a netlist",
+                                               m.abbreviation));
+            }
+        }
         return wrong(fmt::format("invalid mode '{}'; write pp, pv, tq or vl", arguments[0]));
     }
     if (verb == "set") {
-        if (arguments.size() == 1 && arguments[0].ends_with('?')) return query(a, arguments[0].substr(0, arguments[0].size() - 1));
+        if (arguments.size() == 1 && arguments[0].ends_with('?')) {
+            return query(a, arguments[0].substr(0, arguments[0].size() - 1));
+        }
         return arguments.size() == 2 ? set(a, arguments[0], arguments[1]) : usage();
     }
-    if (!arguments.empty()) return wrong(fmt::format("unexpected argument '{}'; type: {} {}", arguments[0], letter, verb));
+    if (!arguments.empty()) {
+        return wrong(
+            fmt::format("unexpected argument '{}'; type: {} {}", arguments[0], letter, verb));
+    }
     if ((verb == "on" || verb == "reset") && !watched(a)) return false;
-    if (verb == "on") return a.on() && print_line(fmt::format("{}: on", letter));
-    if (verb == "off") return a.off() && print_line(fmt::format("{}: off", letter));
-    if (verb == "stop") return a.stop() && print_line(fmt::format("{}: stopped at {:.10g}", letter, a.position()));
-    if (verb == "quickstop") return a.quick_stop() && print_line(fmt::format("{}: stopped and off, at {:.10g}", letter, a.position()));
-    if (verb == "reset") return a.reset() && print_line(fmt::format("{}: no fault", letter));
-    if (verb == "wait") return a.wait() && print_line(fmt::format("{}: at {:.10g}", letter, a.position()));
+    if (verb == "on") {
+        return a.on() && print_line(fmt::format("{}: on", letter));
+    }
+    if (verb == "off") {
+        return a.off() && print_line(fmt::format("{}: off", letter));
+    }
+    if (verb == "stop") {
+        return a.stop() && print_line(fmt::format("{}: stopped at {:.10g}", letter, a.position()));
+    }
+    if (verb == "quickstop") {
+        return a.quick_stop() &&
+               print_line(fmt::format("{}: stopped and off, at {:.10g}", letter, a.position()));
+    }
+    if (verb == "reset") {
+        return a.reset() && print_line(fmt::format("{}: no fault", letter));
+    }
+    if (verb == "wait") {
+        return a.wait() && print_line(fmt::format("{}: at {:.10g}", letter, a.position()));
+    }
     return status(a);
 }
 
-bool DriveShell::motion(SdoAxis& a, const std::string& verb, Words arguments, const std::string& usage) {
+bool DriveShell::motion(SdoAxis& a, const std::string& verb, Words arguments,
+                        const std::string& usage) {
     const auto flag = [&](const char* name) {
         const auto found = std::find(arguments.begin(), arguments.end(), name);
         if (found == arguments.end()) return false;
@@ -227,22 +311,35 @@ bool DriveShell::motion(SdoAxis& a, const std::string& verb, Words arguments, co
         if (arguments.size() > 1) return wrong(usage);
         std::optional<int> method;
         if (!arguments.empty()) {
-            if (!parse_real(arguments[0], value) || value != std::floor(value) || value < -128 || value > 127)
-                return wrong(fmt::format("invalid homing method '{}'; write 1..37, or a negative one of the drive's manual", arguments[0]));
+            if (!parse_real(arguments[0], value) || value != std::floor(value) || value < -128 ||
+                value > 127) {
+                return wrong(
+                    fmt::format("invalid homing method '{}'; write 1..37, or a negative one of the "
+                                "drive's manual",
+                                arguments[0]));
+            }
             method = static_cast<int>(value);
         }
-        return watched(a) && a.home(method) && print_line(fmt::format("{}: homed, at {:.10g}", letter, a.position()));
+        return watched(a) && a.home(method) &&
+               print_line(fmt::format("{}: homed, at {:.10g}", letter, a.position()));
     }
-    const bool relative = verb == "go" && flag("relative"), nowait = flag("nowait");
+    const bool relative = verb == "go" && flag("relative");
+    const bool nowait = flag("nowait");
     if (arguments.size() != 1) return wrong(usage);
-    if (!parse_real(arguments[0], value))
-        return wrong(fmt::format("invalid number '{}'; type: {} {} {}", arguments[0], letter, verb, arguments_of(verb)));
+    if (!parse_real(arguments[0], value)) {
+        return wrong(fmt::format("invalid number '{}'; type: {} {} {}", arguments[0], letter, verb,
+                                 arguments_of(verb)));
+    }
     if (!watched(a)) return false;
     if (verb == "go") {
         if (!a.go(value, relative, !nowait)) return false;
-        return print_line(nowait ? fmt::format("{}: moving", letter) : fmt::format("{}: at {:.10g}", letter, a.position()));
+        return print_line(nowait ? fmt::format("{}: moving", letter)
+                                 : fmt::format("{}: at {:.10g}", letter, a.position()));
     }
-    if (verb == "speed") return a.speed(value, !nowait) && print_line(fmt::format("{}: speed {:.10g}", letter, value));
+    if (verb == "speed") {
+        return a.speed(value, !nowait) &&
+               print_line(fmt::format("{}: speed {:.10g}", letter, value));
+    }
     return a.torque(value, !nowait) && print_line(fmt::format("{}: torque {:.10g}", letter, value));
 }
 
@@ -252,12 +349,19 @@ Completion DriveShell::complete(std::string_view line, std::size_t cursor) {
     completion.begin = begin;
     const std::string_view typed = line.substr(begin, cursor - begin);
     const auto offer = [&](std::string text, const char* hint) {
-        if (text.starts_with(typed)) completion.candidates.push_back({std::move(text), hint});
+        if (text.starts_with(typed)) {
+            completion.candidates.push_back({std::move(text), hint});
+        }
     };
     const bool value = line.find(" set ") < begin || line.starts_with("set ");
-    if (!value)
-        for (const Verb& v : verbs) offer(v.name, v.what);
-    for (const std::string& name : value_names(!value)) offer(name + (value ? "" : "?"), "");
+    if (!value) {
+        for (const Verb& v : verbs) {
+            offer(v.name, v.what);
+        }
+    }
+    for (const std::string& name : value_names(!value)) {
+        offer(name + (value ? "" : "?"), "");
+    }
     return completion;
 }
 
@@ -265,11 +369,16 @@ namespace {
 
 bool duration_of(const Options& options, const std::string& text, std::int64_t& to) {
     const auto ns = parse_duration_ns(text);
-    if (!ns || *ns <= 0) return fail(options, fmt::format("invalid duration '{}'; use 200ms or 1s", text)), false;
-    return to = *ns, true;
+    if (!ns || *ns <= 0) {
+        fail(options, fmt::format("invalid duration '{}'; use 200ms or 1s", text));
+        return false;
+    }
+    to = *ns;
+    return true;
 }
 
-/// Takes the options out of the words: they may be before or after the address. The rest is the command.
+/// Takes the options out of the words: they may be before or after the address. The rest is the
+/// command.
 bool take_options(DriveOptions& options) {
     std::vector<std::string> rest;
     std::string timeout;
@@ -282,24 +391,44 @@ bool take_options(DriveOptions& options) {
                                 : w == "--supervise"    ? &options.supervise
                                 : w == "--heartbeat-id" ? &options.heartbeat_id
                                                         : nullptr;
-        if (w == "-k" || w == "--keep-going") options.keep_going = true;
-        else if (to && i + 1 == options.words.size()) return fail(options, fmt::format("missing value of {}", w)), false;
-        else if (to) *to = options.words[++i];
-        else if (w.starts_with("--")) return fail(options, fmt::format("unknown option '{}'; see: hal help can drive", w)), false;
-        else rest.push_back(w);
+        if (w == "-k" || w == "--keep-going") {
+            options.keep_going = true;
+        } else if (to && i + 1 == options.words.size()) {
+            fail(options, fmt::format("missing value of {}", w));
+            return false;
+        } else if (to) {
+            *to = options.words[++i];
+        } else if (w.starts_with("--")) {
+            fail(options, fmt::format("unknown option '{}'; see: hal help can drive", w));
+
+            return false;
+        } else {
+            rest.push_back(w);
+        }
     }
     options.words = std::move(rest);
     return timeout.empty() || duration_of(options, timeout, options.timeout_ns);
 }
 
 bool supervision_of(const DriveOptions& options, SupervisionSettings& settings) {
-    if (!options.heartbeat_id.empty() && !node_of(options, options.heartbeat_id, settings.own_node)) return false;
+    if (!options.heartbeat_id.empty() &&
+        !node_of(options, options.heartbeat_id, settings.own_node)) {
+        return false;
+    }
     if (options.supervise.empty()) return true;
-    if (options.supervise == "off") return settings.limit_ns = 0, true;
+    if (options.supervise == "off") {
+        settings.limit_ns = 0;
+        return true;
+    }
     const auto ns = parse_duration_ns(options.supervise);
-    if (!ns || *ns < 50'000'000 || *ns > 65'000'000'000)
-        return fail(options, fmt::format("invalid --supervise '{}'; write 50ms to 65s, or off", options.supervise)), false;
-    return settings.limit_ns = *ns, true;
+    if (!ns || *ns < 50'000'000 || *ns > 65'000'000'000) {
+        fail(options,
+             fmt::format("invalid --supervise '{}'; write 50ms to 65s, or off", options.supervise));
+
+        return false;
+    }
+    settings.limit_ns = *ns;
+    return true;
 }
 
 }  // namespace
@@ -307,25 +436,39 @@ bool supervision_of(const DriveOptions& options, SupervisionSettings& settings) 
 int run_can_drive(const DriveOptions& given) {
     DriveOptions options = given;
     if (!take_options(options)) return 1;
-    if (options.words.empty()) return fail(options, "missing address; type: hal can drive can:can0 --node 2 A on");
-    if (options.node.empty()) return fail(options, fmt::format("missing --node; type: hal can drive {} --node 2", options.words[0]));
+    if (options.words.empty()) {
+        return fail(options, "missing address; type: hal can drive can:can0 --node 2 A on");
+    }
+    if (options.node.empty()) {
+        return fail(options, fmt::format("missing --node; type: hal can drive {} --node 2",
+                                         options.words[0]));
+    }
     std::uint8_t node = 0;
     if (!node_of(options, options.node, node)) return 1;
     const std::string& letter = options.axis;
     const char axis = letter.empty() ? 'A' : static_cast<char>(letter[0] & ~0x20);
-    if (letter.size() > 1 || axis < 'A' || axis > 'H') return fail(options, fmt::format("invalid axis '{}'; write A to H", letter));
+    if (letter.size() > 1 || axis < 'A' || axis > 'H') {
+        return fail(options, fmt::format("invalid axis '{}'; write A to H", letter));
+    }
 
     SupervisionSettings watched;
     std::int64_t within = 0;
-    if (!supervision_of(options, watched) || (!options.within.empty() && !duration_of(options, options.within, within)))
+    if (!supervision_of(options, watched) ||
+        (!options.within.empty() && !duration_of(options, options.within, within))) {
         return 1;
+    }
 
     NodeClient station(options, options.timeout_ns);
-    const bool one_shot = options.words.size() > 1, terminal = ::isatty(STDIN_FILENO) == 1;
-    if (one_shot && options.keep_going)
-        return fail(options, "--keep-going is for commands from a file or pipe; delete it, or the command");
-    if (options.supervise == "off" && !options.heartbeat_id.empty())
-        return fail(options, "--heartbeat-id has no effect with --supervise off; delete one of them");
+    const bool one_shot = options.words.size() > 1;
+    const bool terminal = ::isatty(STDIN_FILENO) == 1;
+    if (one_shot && options.keep_going) {
+        return fail(options,
+                    "--keep-going is for commands from a file or pipe; delete it, or the command");
+    }
+    if (options.supervise == "off" && !options.heartbeat_id.empty()) {
+        return fail(options,
+                    "--heartbeat-id has no effect with --supervise off; delete one of them");
+    }
     Supervision supervision(options, station, node, watched);
     DriveShell shell(options, station, supervision,
                      {.node = node,
@@ -336,17 +479,23 @@ int run_can_drive(const DriveOptions& given) {
                       .axis_given = !letter.empty(),
                       .within_ns = within});
     station.bus.stop.when_signalled([&shell] { shell.press(); });
-    station.bus.stop.spare(terminal && !one_shot);  // at a prompt Ctrl-C ends a command, not the session
-    station.outlasts_stop = true;                   // axes are stopped before the session ends
+    // at a prompt Ctrl-C ends a command, not the session
+    station.bus.stop.spare(terminal && !one_shot);
+    station.outlasts_stop = true;  // axes are stopped before the session ends
     if (!station.open(options.words[0])) return 1;
     int status = 1;
     try {
         if (one_shot) {
             std::string line;
-            for (std::size_t i = 1; i < options.words.size(); ++i) line += options.words[i] + " ";
+            for (std::size_t i = 1; i < options.words.size(); ++i) {
+                line += options.words[i] + " ";
+            }
             status = shell.execute(line);
         } else {
-            if (terminal) print(fmt::format("node {} on {}; type 'help' for the commands, Tab completes\n", node, options.words[0]));
+            if (terminal) {
+                print(fmt::format("node {} on {}; type 'help' for the commands, Tab completes\n",
+                                  node, options.words[0]));
+            }
             status = run_prompt_loop(shell, {"drive> ", "drive> "}, station.bus.stop.fd());
         }
     } catch (...) {
@@ -354,7 +503,9 @@ int run_can_drive(const DriveOptions& given) {
         throw;
     }
     const bool ended = station.bus.stop.requested();
-    const bool leave = !ended && (shell.left() || (one_shot && status == 0)), failed = one_shot || shell.over();
+    const bool leave = !ended && (shell.left() || (one_shot && status == 0));
+
+    const bool failed = one_shot || shell.over();
     const char* const why = ended ? "interrupted" : failed ? "after the failure" : "end of input";
     return std::max({status, shell.end(leave, why, !ended && !failed), ended ? 1 : 0});
 }

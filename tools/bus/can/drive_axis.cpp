@@ -33,22 +33,31 @@ bool SdoAxis::refuse(const std::string& sentence) const {
         const std::uint16_t code = node.emergency(0).code;
         text += fmt::format("; last EMCY 0x{:04X}: {}", code, error_word(code));
     }
-    return fail(options_, text), false;
+    fail(options_, text);
+    return false;
 }
 
-bool SdoAxis::read(std::uint16_t index, std::uint8_t sub, std::int64_t& value, bool is_signed, bool* missing) {
+bool SdoAxis::read(std::uint16_t index, std::uint8_t sub, std::int64_t& value, bool is_signed,
+                   bool* missing) {
     std::uint8_t room[8] = {};
     const std::uint16_t at = of_axis(index, axis_);
     SdoRequest request{.index = at, .sub = sub, .upload = true, .buffer = room};
     if (!station_.transfer(node_, request)) {
-        const bool none = request.aborted_by_server && (request.abort == canopen::Abort::no_object || request.abort == canopen::Abort::no_sub);
-        if (missing && none) return *missing = true, false;
-        return station_.fail_transfer(node_, request, fmt::format("{:04X}:{}", at, sub)), false;
+        const bool none =
+            request.aborted_by_server &&
+            (request.abort == canopen::Abort::no_object || request.abort == canopen::Abort::no_sub);
+        if (missing && none) {
+            *missing = true;
+            return false;
+        }
+        station_.fail_transfer(node_, request, fmt::format("{:04X}:{}", at, sub));
+        return false;
     }
     std::uint64_t bits = 0;
     std::memcpy(&bits, room, request.size);
     const unsigned unused = 64 - 8 * static_cast<unsigned>(request.size);
-    value = is_signed && unused < 64 ? static_cast<std::int64_t>(bits << unused) >> unused : static_cast<std::int64_t>(bits);
+    value = is_signed && unused < 64 ? static_cast<std::int64_t>(bits << unused) >> unused
+                                     : static_cast<std::int64_t>(bits);
     return true;
 }
 
@@ -58,33 +67,46 @@ bool SdoAxis::write(std::uint16_t index, std::uint8_t sub, std::int64_t value, u
     const std::uint16_t at = of_axis(index, axis_);
     SdoRequest request{.index = at, .sub = sub, .data = std::span(data, bytes)};
     if (station_.transfer(node_, request)) return true;
-    return station_.fail_transfer(node_, request, fmt::format("{:04X}:{}", at, sub)), false;
+    station_.fail_transfer(node_, request, fmt::format("{:04X}:{}", at, sub));
+    return false;
 }
 
 bool SdoAxis::look() {
     std::int64_t value = 0;
     bool missing = false;
-    if (!read(object::statusword, 0, value, false, &missing))
-        return missing &&
-               refuse(fmt::format("node {} has no such axis: object {:04X} is missing", node_, of_axis(object::statusword, axis_)));
+    if (!read(object::statusword, 0, value, false, &missing)) {
+        return missing && refuse(fmt::format("node {} has no such axis: object {:04X} is missing",
+                                             node_, of_axis(object::statusword, axis_)));
+    }
     feedback_.statusword = static_cast<std::uint16_t>(value);
     const auto optional = [&](bool& there, std::uint16_t index, auto& to) {
         missing = false;
         if (!there) return true;
-        if (read(index, 0, value, true, &missing)) return to = static_cast<std::remove_reference_t<decltype(to)>>(value), true;
+        if (read(index, 0, value, true, &missing)) {
+            to = static_cast<std::remove_reference_t<decltype(to)>>(value);
+            return true;
+        }
         return missing ? (there = false, true) : false;
     };
-    if (!optional(feedback_.has_mode, object::modes_of_operation_display, feedback_.mode)) return false;
-    if (!optional(feedback_.has_velocity, object::velocity_actual, feedback_.velocity)) return false;
+    if (!optional(feedback_.has_mode, object::modes_of_operation_display, feedback_.mode)) {
+        return false;
+    }
+    if (!optional(feedback_.has_velocity, object::velocity_actual, feedback_.velocity)) {
+        return false;
+    }
     if (!optional(has_torque_, object::torque_actual, feedback_.torque)) return false;
     if (!read(object::position_actual, 0, value, true)) return false;
     feedback_.position = static_cast<std::int32_t>(value);
     feedback_.error_code = 0;
     const State state = state_of(feedback_.statusword);
-    if ((state == State::fault || state == State::fault_reaction_active) && read(object::error_code, 0, value, false, &missing))
+    if ((state == State::fault || state == State::fault_reaction_active) &&
+        read(object::error_code, 0, value, false, &missing)) {
         feedback_.error_code = static_cast<std::uint16_t>(value);
+    }
     const std::int64_t now = monotonic_ns();
-    if (feedback_.position != rest_position_ || rest_since_ == 0) rest_since_ = now;
+    if (feedback_.position != rest_position_ || rest_since_ == 0) {
+        rest_since_ = now;
+    }
     rest_position_ = feedback_.position;
     return true;
 }
@@ -94,7 +116,8 @@ bool SdoAxis::adopt() {
     emergencies_ = station_.network.add(node_).emergencies();
     if (adopted_) return true;
     if (!look()) return false;
-    std::int64_t velocity = 0, torque = 0;
+    std::int64_t velocity = 0;
+    std::int64_t torque = 0;
     bool missing = false;
     if (!read(object::target_velocity, 0, velocity, true, &missing) && !missing) return false;
     missing = false;
@@ -103,9 +126,10 @@ bool SdoAxis::adopt() {
     command_.enable = state_of(feedback_.statusword) == State::operation_enabled;
     command_.velocity = rules.velocity.to_user(static_cast<double>(velocity));
     command_.torque = rules.torque.to_user(static_cast<double>(torque));
-    if (command_.mode == Mode::cyclic_position || command_.mode == Mode::cyclic_velocity || command_.mode == Mode::cyclic_torque ||
-        command_.mode == Mode::interpolated_position)
+    if (command_.mode == Mode::cyclic_position || command_.mode == Mode::cyclic_velocity ||
+        command_.mode == Mode::cyclic_torque || command_.mode == Mode::interpolated_position) {
         command_.mode = Mode::profile_position;  // the cyclic set-points of these modes are missing
+    }
     return adopted_ = true;
 }
 
@@ -119,16 +143,31 @@ bool SdoAxis::tell(const AxisOrders& orders) {
     const auto put = [&](auto& told, auto value, std::uint16_t index) {
         if (told == value) return true;
         if (!write(index, 0, static_cast<std::int64_t>(value), sizeof value)) return false;
-        return told = value, true;
+        told = value;
+        return true;
     };
     const auto mode = static_cast<std::int8_t>(orders.mode);
-    if (mode != 0 && !reported_.mode && feedback_.mode == orders.mode) reported_.mode = mode;
+    if (mode != 0 && !reported_.mode && feedback_.mode == orders.mode) {
+        reported_.mode = mode;
+    }
     if (mode != 0 && !put(reported_.mode, mode, object::modes_of_operation)) return false;
     if (machine_.active()) {
-        if (orders.mode == Mode::profile_position && !put(reported_.position, orders.target_position, object::target_position)) return false;
-        if (orders.mode == Mode::profile_velocity && !put(reported_.velocity, orders.target_velocity, object::target_velocity)) return false;
-        if (orders.mode == Mode::profile_torque && !put(reported_.torque, orders.target_torque, object::target_torque)) return false;
-        if (orders.mode == Mode::velocity && !put(reported_.vl, orders.vl_target_velocity, object::vl_target_velocity)) return false;
+        if (orders.mode == Mode::profile_position &&
+            !put(reported_.position, orders.target_position, object::target_position)) {
+            return false;
+        }
+        if (orders.mode == Mode::profile_velocity &&
+            !put(reported_.velocity, orders.target_velocity, object::target_velocity)) {
+            return false;
+        }
+        if (orders.mode == Mode::profile_torque &&
+            !put(reported_.torque, orders.target_torque, object::target_torque)) {
+            return false;
+        }
+        if (orders.mode == Mode::velocity &&
+            !put(reported_.vl, orders.vl_target_velocity, object::vl_target_velocity)) {
+            return false;
+        }
     }
     return put(reported_.controlword, orders.controlword, object::controlword);
 }
@@ -138,18 +177,23 @@ bool SdoAxis::standing() { return monotonic_ns() - rest_since_ >= rest_ns; }
 /// Returns true when the axis has stalled before its target.
 bool SdoAxis::arrived() {
     if (monotonic_ns() - std::max(rest_since_, moved_at_) < stall_ns) return true;
-    return refuse(
-        fmt::format("drive stopped at {:.10g} without reporting target reached (statusword 0x{:04X})", position(), feedback_.statusword));
+    return refuse(fmt::format(
+        "drive stopped at {:.10g} without reporting target reached (statusword 0x{:04X})",
+        position(), feedback_.statusword));
 }
 
 /// Reports why the state machine gave up; it has already disabled the axis.
 bool SdoAxis::report() {
     const std::int64_t end = monotonic_ns() + rules.limits.stop + rules.limits.step;
-    while (machine_.walking() && monotonic_ns() < end && cycle()) {}
+    while (machine_.walking() && monotonic_ns() < end && cycle()) {
+    }
     const Failure& failure = machine_.failure();
     std::string why = text(failure);
-    if (failure.cause == Cause::not_enabled) why += fmt::format("; type: {} on", letter());
-    else if (failure.cause == Cause::drive_fault) why += fmt::format("; remove the cause, then type: {} reset", letter());
+    if (failure.cause == Cause::not_enabled) {
+        why += fmt::format("; type: {} on", letter());
+    } else if (failure.cause == Cause::drive_fault) {
+        why += fmt::format("; remove the cause, then type: {} reset", letter());
+    }
     return refuse(why);
 }
 
@@ -177,14 +221,20 @@ bool SdoAxis::until(const Ready& ready, bool (SdoAxis::*still)()) {
 bool SdoAxis::on() {
     if (!adopt()) return false;
     touched_ = true;
-    if (command_.mode == Mode::none || command_.mode == Mode::homing) command_.mode = Mode::profile_position;
-    if (state_of(feedback_.statusword) != State::operation_enabled) command_.velocity = command_.torque = 0.0;
+    if (command_.mode == Mode::none || command_.mode == Mode::homing) {
+        command_.mode = Mode::profile_position;
+    }
+    if (state_of(feedback_.statusword) != State::operation_enabled) {
+        command_.velocity = command_.torque = 0.0;
+    }
     if (!look()) return false;
     const State state = state_of(feedback_.statusword);
     command_.quick_stop = command_.halt = command_.reset = false;
     if (state != State::operation_enabled || !machine_.enabled()) {
-        if (state != State::fault && machine_.failure()) {  // clears our failure only; a fault of the drive needs `reset`
-            command_.enable = false, command_.reset = true;
+        // clears our failure only; a fault of the drive needs `reset`
+        if (state != State::fault && machine_.failure()) {
+            command_.enable = false;
+            command_.reset = true;
             if (!cycle()) return false;
             command_.reset = false;
         }
@@ -199,7 +249,9 @@ bool SdoAxis::on() {
 bool SdoAxis::off() {
     if (!adopt()) return false;
     command_.enable = command_.go = command_.home = command_.halt = false;
-    return until([&] { return !machine_.walking() && state_of(feedback_.statusword) != State::operation_enabled; });
+    return until([&] {
+        return !machine_.walking() && state_of(feedback_.statusword) != State::operation_enabled;
+    });
 }
 
 /// Checks that the axis is enabled, and selects the mode.
@@ -210,58 +262,83 @@ bool SdoAxis::begin_motion(Mode mode) {
         if (!cycle()) return false;
     }
     if (machine_.failure() && machine_.failure().cause != Cause::drive_fault) {
-        command_.enable = false, command_.reset = true;
+        command_.enable = false;
+        command_.reset = true;
         if (!cycle()) return false;
         command_.reset = false;
     }
     if (machine_.failure()) return report();
-    if (!command_.enable || state_of(feedback_.statusword) != State::operation_enabled)
-        return refuse(fmt::format("not enabled (drive is in \"{}\"); type: {} on", to_string(state_of(feedback_.statusword)), letter()));
-    command_.mode = mode, command_.home = command_.go = false;
+    if (!command_.enable || state_of(feedback_.statusword) != State::operation_enabled) {
+        return refuse(fmt::format("not enabled (drive is in \"{}\"); type: {} on",
+                                  to_string(state_of(feedback_.statusword)), letter()));
+    }
+    command_.mode = mode;
+    command_.home = command_.go = false;
     touched_ = in_motion_ = true;
     return until([&] { return machine_.active(); });
 }
 
 bool SdoAxis::go(double position, bool relative, bool wait, bool queued) {
     const double counts = position * rules.position.ratio();
-    if (std::fabs(counts) > 2147483647.0)
+    if (std::fabs(counts) > 2147483647.0) {
         return refuse(
-            fmt::format("position {:.10g} is {:.10g} counts, out of the range -2147483648..2147483647 of the drive", position, counts));
-    if (adopt() && command_.mode != Mode::profile_position) command_.velocity = 0.0;
+            fmt::format("position {:.10g} is {:.10g} counts, out of the range "
+                        "-2147483648..2147483647 of the drive",
+                        position, counts));
+    }
+    if (adopt() && command_.mode != Mode::profile_position) {
+        command_.velocity = 0.0;
+    }
     if (!begin_motion(Mode::profile_position)) return false;
-    command_.position = position, command_.relative = relative;
-    command_.immediate = wait || !queued, command_.go = true;  // several `nowait` are queued in the drive
+    command_.position = position;
+    command_.relative = relative;
+    // several `nowait` are queued in the drive
+    command_.immediate = wait || !queued;
+    command_.go = true;
     if (!cycle()) return false;
     command_.go = false;
     if (machine_.failure()) return report();
-    const auto done = [&] { return machine_.set_points() == 0 && (machine_.target_reached() || !wait); };
+    const auto done = [&] {
+        return machine_.set_points() == 0 && (machine_.target_reached() || !wait);
+    };
     if (!until(done, wait ? &SdoAxis::arrived : nullptr)) return false;
     if (wait) return true;
-    for (int n = 0; n < 3; ++n)  // the edge, and its end
+    for (int n = 0; n < 3; ++n) {  // the edge, and its end
         if (!cycle()) return false;
+    }
     return !machine_.failure() || report();
 }
 
 bool SdoAxis::speed(double velocity, bool wait) {
     if (!adopt()) return false;
     const Mode mode = command_.mode == Mode::velocity ? Mode::velocity : Mode::profile_velocity;
-    if (command_.mode != mode) command_.velocity = 0.0;
+    if (command_.mode != mode) {
+        command_.velocity = 0.0;
+    }
     if (!begin_motion(mode)) return false;
-    command_.velocity = velocity, command_.halt = false;
-    for (int n = 0; n < 3; ++n)  // by then the status of the drive is that of this speed
+    command_.velocity = velocity;
+    command_.halt = false;
+    for (int n = 0; n < 3; ++n) {  // by then the status of the drive is that of this speed
         if (!cycle()) return false;
+    }
     if (!wait || mode == Mode::velocity) return !machine_.failure() || report();
-    return until([&] { return (feedback_.statusword & status::target_reached) != 0; }, &SdoAxis::arrived);
+    return until([&] { return (feedback_.statusword & status::target_reached) != 0; },
+                 &SdoAxis::arrived);
 }
 
 bool SdoAxis::torque(double permille, bool wait) {
-    if (adopt() && command_.mode != Mode::profile_torque) command_.torque = 0.0;
+    if (adopt() && command_.mode != Mode::profile_torque) {
+        command_.torque = 0.0;
+    }
     if (!begin_motion(Mode::profile_torque)) return false;
-    command_.torque = permille, command_.halt = false;
-    for (int n = 0; n < 3; ++n)
+    command_.torque = permille;
+    command_.halt = false;
+    for (int n = 0; n < 3; ++n) {
         if (!cycle()) return false;
+    }
     if (!wait) return !machine_.failure() || report();
-    return until([&] { return (feedback_.statusword & status::target_reached) != 0; }, &SdoAxis::arrived);
+    return until([&] { return (feedback_.statusword & status::target_reached) != 0; },
+                 &SdoAxis::arrived);
 }
 
 /// Checks that the drive supports a homing method, by 60E3h if it exists.
@@ -271,25 +348,38 @@ bool SdoAxis::choose_homing(int method) {
     SdoRequest request{.index = at, .data = std::span(&data, 1)};
     if (station_.transfer(node_, request)) return true;
     using canopen::Abort;
-    if (!request.aborted_by_server || (request.abort != Abort::value && request.abort != Abort::too_high && request.abort != Abort::too_low))
-        return station_.fail_transfer(node_, request, fmt::format("{:04X}:0", at)), false;
+    if (!request.aborted_by_server ||
+        (request.abort != Abort::value && request.abort != Abort::too_high &&
+         request.abort != Abort::too_low)) {
+        station_.fail_transfer(node_, request, fmt::format("{:04X}:0", at));
+        return false;
+    }
     std::string known;
-    std::int64_t count = 0, one = 0;
+    std::int64_t count = 0;
+    std::int64_t one = 0;
     bool missing = false;
-    if (read(object::supported_homing_methods, 0, count, false, &missing))
+    if (read(object::supported_homing_methods, 0, count, false, &missing)) {
         for (unsigned sub = 1; sub <= count && sub < 255; ++sub) {
-            if (!read(object::supported_homing_methods, static_cast<std::uint8_t>(sub), one, true, &missing)) break;
+            if (!read(object::supported_homing_methods, static_cast<std::uint8_t>(sub), one, true,
+                      &missing)) {
+                break;
+            }
             known += fmt::format("{}{}", known.empty() ? "" : ", ", one);
         }
-    if (known.empty() && !missing) return false;  // the bus failed
-    return refuse(fmt::format("the drive does not support homing method {}; {}", method,
-                              known.empty() ? "see its manual for those it supports" : "it supports " + known));
+    }
+    if (known.empty() && !missing) {
+        return false;  // the bus failed
+    }
+    return refuse(fmt::format(
+        "the drive does not support homing method {}; {}", method,
+        known.empty() ? "see its manual for those it supports" : "it supports " + known));
 }
 
 bool SdoAxis::home(std::optional<int> method) {
     if (!adopt()) return false;
     if (method && !choose_homing(*method)) return false;
-    const Mode before = command_.mode == Mode::profile_position ? command_.mode : Mode::profile_position;
+    const Mode before =
+        command_.mode == Mode::profile_position ? command_.mode : Mode::profile_position;
     command_.velocity = command_.torque = 0.0;
     if (!begin_motion(before)) return false;
     command_.home = true;
@@ -313,14 +403,18 @@ bool SdoAxis::set_mode(Mode mode) {
     command_.velocity = command_.torque = 0.0;
     command_.mode = mode;
     const std::int64_t end = monotonic_ns() + rules.limits.step;
-    return until([&] { return feedback_.mode == mode || !feedback_.has_mode || monotonic_ns() >= end; }) &&
-           (feedback_.mode == mode || !feedback_.has_mode ||
-            refuse(fmt::format("drive does not accept mode {}, displays {}", abbreviation(mode), abbreviation(feedback_.mode))));
+    return until([&] {
+        return feedback_.mode == mode || !feedback_.has_mode || monotonic_ns() >= end;
+    }) && (feedback_.mode == mode || !feedback_.has_mode ||
+           refuse(fmt::format("drive does not accept mode {}, displays {}", abbreviation(mode),
+                              abbreviation(feedback_.mode))));
 }
 
 bool SdoAxis::wait() {
     if (!adopt()) return false;
-    return until([&] { return (feedback_.statusword & status::target_reached) != 0 && machine_.set_points() == 0; }, &SdoAxis::arrived);
+    return until([&] {
+        return (feedback_.statusword & status::target_reached) != 0 && machine_.set_points() == 0;
+    }, &SdoAxis::arrived);
 }
 
 }  // namespace hal::tools

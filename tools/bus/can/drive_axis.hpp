@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// One axis of a drive controlled by SDO: the state machine and handshakes of `components/cia402`, with SDOs in place of process data.
+// One axis of a drive controlled by SDO: the state machine and handshakes of `components/cia402`,
+// with SDOs in place of process data.
 #pragma once
 
 #include <functional>
@@ -19,7 +20,8 @@ public:
     unsigned number() const { return axis_; }
     char letter() const { return static_cast<char>('A' + axis_); }
 
-    /// Sets the timeout of the next command, ns. A motion that takes longer is stopped, and the command fails.
+    /// Sets the timeout of the next command, ns. A motion that takes longer is stopped, and the
+    /// command fails.
     void allow(std::int64_t ns);
 
     // Commands. They return when done, unless `wait` is false.
@@ -37,7 +39,8 @@ public:
     bool wait();
     /// Returns true when a command of this session enabled or moved the axis.
     bool touched() const { return touched_; }
-    /// Stops the axis with quick stop and disables it, in any state. Sets `what` to the result. Returns false after printing the reason.
+    /// Stops the axis with quick stop and disables it, in any state. Sets `what` to the result.
+    /// Returns false after printing the reason.
     bool secure(std::string& what);
     /// Returns true when the axis is enabled and commanded to move.
     bool moves();
@@ -48,9 +51,10 @@ public:
     double position() const { return rules.position.to_user(feedback_.position); }
     double velocity() const { return rules.velocity.to_user(feedback_.velocity); }
 
-    /// Accesses an object of the axis, by its index on the first one. Returns false after printing the reason; or sets `missing` instead when the
-    /// drive has no such object.
-    bool read(std::uint16_t index, std::uint8_t sub, std::int64_t& value, bool is_signed, bool* missing = nullptr);
+    /// Accesses an object of the axis, by its index on the first one. Returns false after printing
+    /// the reason; or sets `missing` instead when the drive has no such object.
+    bool read(std::uint16_t index, std::uint8_t sub, std::int64_t& value, bool is_signed,
+              bool* missing = nullptr);
     bool write(std::uint16_t index, std::uint8_t sub, std::int64_t value, unsigned bytes);
     bool choose_homing(int method);
     /// Prints "A: " and the sentence on stderr. Returns false.
@@ -63,7 +67,8 @@ public:
 
 private:
     using Ready = std::function<bool()>;
-    static constexpr std::int64_t pause_ns = 10'000'000;  // between two cycles, to leave the bus to others
+    // between two cycles, to leave the bus to others
+    static constexpr std::int64_t pause_ns = 10'000'000;
     bool overdue();
     bool is_interrupted() const { return interrupted && interrupted() != Interruption::none; }
     bool adopt();
@@ -82,7 +87,10 @@ private:
     canopen::cia402::Axis machine_;
     canopen::cia402::AxisCommand command_;
     canopen::cia402::AxisFeedback feedback_;
-    bool adopted_ = false, has_torque_ = true, touched_ = false, in_motion_ = false;
+    bool adopted_ = false;
+    bool has_torque_ = true;
+    bool touched_ = false;
+    bool in_motion_ = false;
     struct Told {
         std::optional<std::uint16_t> controlword;
         std::optional<std::int8_t> mode;
@@ -91,7 +99,10 @@ private:
     } reported_;
     std::uint64_t emergencies_ = 0;
     std::int32_t rest_position_ = 0;
-    std::int64_t rest_since_ = 0, moved_at_ = 0, allowed_ = 0, deadline_ = INT64_MAX;
+    std::int64_t rest_since_ = 0;
+    std::int64_t moved_at_ = 0;
+    std::int64_t allowed_ = 0;
+    std::int64_t deadline_ = INT64_MAX;
 };
 
 }  // namespace hal::tools

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The session of `hal can drive`: its own commands, and those of the robot shell, which end with the letter of the axis (`ONA:`).
+// The session of `hal can drive`: its own commands, and those of the robot shell, which end with
+// the letter of the axis (`ONA:`).
 #pragma once
 
 #include <array>
@@ -34,9 +35,10 @@ public:
     bool over() const override { return over_ || station_.bus.stop.requested(); }
     std::function<void()> meanwhile() override;
     void press() { pressed_.store(true); }  ///< Notes a signal. [any]
-    bool left() const { return left_; }     ///< Returns true after `quit`: the axes stay as they are.
-    /// Ends the session. Unless `leave`, first stops and disables every axis that was enabled or moved; an `expected` end is not a failure.
-    /// Returns the exit status.
+    /// Returns true after `quit`: the axes stay as they are.
+    bool left() const { return left_; }
+    /// Ends the session. Unless `leave`, first stops and disables every axis that was enabled or
+    /// moved; an `expected` end is not a failure. Returns the exit status.
     int end(bool leave, const char* why, bool expected = true);
 
 private:
@@ -56,11 +58,13 @@ private:
     bool query(SdoAxis&, const std::string& name);
     bool set(SdoAxis&, const std::string& name, const std::string& value);
     bool status(SdoAxis&);
-    /// Accesses a parameter of the drive by name, in user units. Returns false after printing the reason.
+    /// Accesses a parameter of the drive by name, in user units. Returns false after printing the
+    /// reason.
     bool fetch(SdoAxis&, const std::string& name, double& value);
     bool store(SdoAxis&, const std::string& name, double value, double& back);
     SdoAxis& axis(unsigned number);
-    bool watched(SdoAxis&);  ///< Checks that the axis exists and is supervised as far as possible; call it before a motion.
+    /// Checks that the axis exists and is supervised as far as possible; call it before a motion.
+    bool watched(SdoAxis&);
     SdoAxis::Interruption interruption() const;
     static std::string help_text();
 
@@ -70,14 +74,16 @@ private:
     const Settings settings_;
     std::array<std::unique_ptr<SdoAxis>, canopen::cia402::most_axes> axes_;
     std::atomic<bool> pressed_{false};
-    bool over_ = false, left_ = false;
+    bool over_ = false;
+    bool left_ = false;
 };
 
 // Shared by the sources of the session.
 bool parse_real(const std::string& text, double& value);
 /// Parses `4096/360`, `4096,360`, `4096`.
 bool parse_factor(const std::string& text, canopen::cia402::Factor&);
-/// Returns the names of parameters and factors in the order of the help; with `reading` also the read-only ones.
+/// Returns the names of parameters and factors in the order of the help; with `reading` also the
+/// read-only ones.
 std::vector<std::string> value_names(bool reading);
 std::string value_help();
 

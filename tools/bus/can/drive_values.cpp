@@ -30,22 +30,33 @@ struct Setting {
 using enum Setting::Unit;
 constexpr Setting settings[] = {
     {"max-speed", object::profile_velocity, 0, 4, false, velocity, "profile velocity (6081h)"},
-    {"max-acceleration", object::profile_acceleration, 0, 4, false, acceleration, "profile acceleration (6083h)"},
-    {"max-deceleration", object::profile_deceleration, 0, 4, false, acceleration, "profile deceleration (6084h)"},
-    {"jerk", object::profile_jerk, 1, 4, false, acceleration, "profile jerk, per second, with ramps 3 (60A4h:1)"},
-    {"ramps", object::motion_profile_type, 0, 2, true, none, "motion profile: 0 linear, 3 with limited jerk (6086h)"},
-    {"quick-stop-deceleration", object::quick_stop_deceleration, 0, 4, false, acceleration, "quick stop deceleration (6085h)"},
-    {"max-torque", object::max_torque, 0, 2, false, none, "maximum torque in thousandths of the rated torque (6072h)"},
-    {"following-error-window", object::following_error_window, 0, 4, false, position, "following error window (6065h)"},
-    {"home-offset", object::home_offset, 0, 4, true, position, "position at the home switch (607Ch)"},
+    {"max-acceleration", object::profile_acceleration, 0, 4, false, acceleration,
+     "profile acceleration (6083h)"},
+    {"max-deceleration", object::profile_deceleration, 0, 4, false, acceleration,
+     "profile deceleration (6084h)"},
+    {"jerk", object::profile_jerk, 1, 4, false, acceleration,
+     "profile jerk, per second, with ramps 3 (60A4h:1)"},
+    {"ramps", object::motion_profile_type, 0, 2, true, none,
+     "motion profile: 0 linear, 3 with limited jerk (6086h)"},
+    {"quick-stop-deceleration", object::quick_stop_deceleration, 0, 4, false, acceleration,
+     "quick stop deceleration (6085h)"},
+    {"max-torque", object::max_torque, 0, 2, false, none,
+     "maximum torque in thousandths of the rated torque (6072h)"},
+    {"following-error-window", object::following_error_window, 0, 4, false, position,
+     "following error window (6065h)"},
+    {"home-offset", object::home_offset, 0, 4, true, position,
+     "position at the home switch (607Ch)"},
     {"home-speed", object::homing_speeds, 1, 4, false, velocity, "speed to the switch (6099h:1)"},
-    {"home-slow-speed", object::homing_speeds, 2, 4, false, velocity, "speed to the index pulse or edge (6099h:2)"},
-    {"home-acceleration", object::homing_acceleration, 0, 4, false, acceleration, "homing acceleration (609Ah)"},
+    {"home-slow-speed", object::homing_speeds, 2, 4, false, velocity,
+     "speed to the index pulse or edge (6099h:2)"},
+    {"home-acceleration", object::homing_acceleration, 0, 4, false, acceleration,
+     "homing acceleration (609Ah)"},
 };
 constexpr const char* factors[] = {"position-factor", "velocity-factor", "acceleration-factor"};
 
 const Setting* find_setting(const std::string& name) {
-    const auto* s = std::find_if(std::begin(settings), std::end(settings), [&](const Setting& each) { return name == each.name; });
+    const auto* s = std::find_if(std::begin(settings), std::end(settings),
+                                 [&](const Setting& each) { return name == each.name; });
     return s == std::end(settings) ? nullptr : s;
 }
 
@@ -64,7 +75,10 @@ Factor* find_factor(SdoAxis& a, const std::string& name) {
 
 bool no_such_value(const Options& options, const std::string& name, bool reading) {
     const std::string hint = did_you_mean(name, value_names(reading));
-    return fail(options, fmt::format("unknown parameter '{}'; {}", name, hint.empty() ? "type: help" : hint)), false;
+    fail(options,
+         fmt::format("unknown parameter '{}'; {}", name, hint.empty() ? "type: help" : hint));
+
+    return false;
 }
 
 }  // namespace
@@ -82,96 +96,132 @@ bool parse_factor(const std::string& text, Factor& factor) {
     if (!parse_real(text.substr(0, mark), read.numerator)) return false;
     if (mark != text.npos && !parse_real(text.substr(mark + 1), read.denominator)) return false;
     if (!read.sound()) return false;
-    return factor = read, true;
+    factor = read;
+    return true;
 }
 
 std::vector<std::string> value_names(bool reading) {
     std::vector<std::string> names(std::begin(factors), std::end(factors));
-    for (const Setting& s : settings) names.emplace_back(s.name);
-    if (reading) names.insert(names.end(), {"position", "speed", "torque", "mode", "state"});
+    for (const Setting& s : settings) {
+        names.emplace_back(s.name);
+    }
+    if (reading) {
+        names.insert(names.end(), {"position", "speed", "torque", "mode", "state"});
+    }
     return names;
 }
 
 std::string value_help() {
     std::string text;
-    for (const Setting& s : settings) text += fmt::format("    {:36} {}\n", s.name, s.what);
-    for (const char* name : factors) text += fmt::format("    {:36} drive units per user unit, NUMERATOR/DENOMINATOR\n", name);
+    for (const Setting& s : settings) {
+        text += fmt::format("    {:36} {}\n", s.name, s.what);
+    }
+    for (const char* name : factors) {
+        text += fmt::format("    {:36} drive units per user unit, NUMERATOR/DENOMINATOR\n", name);
+    }
     return text;
 }
 
 bool DriveShell::query(SdoAxis& a, const std::string& name) {
-    if (const Factor* f = find_factor(a, name))
-        return print_line(fmt::format("{}: {} {:.10g}/{:.10g}", a.letter(), name, f->numerator, f->denominator));
+    if (const Factor* f = find_factor(a, name)) {
+        return print_line(
+            fmt::format("{}: {} {:.10g}/{:.10g}", a.letter(), name, f->numerator, f->denominator));
+    }
     for (const Setting& s : settings) {
         if (name != s.name) continue;
         double value = 0;
-        return fetch(a, name, value) && print_line(fmt::format("{}: {} {:.10g}", a.letter(), name, value));
+        return fetch(a, name, value) &&
+               print_line(fmt::format("{}: {} {:.10g}", a.letter(), name, value));
     }
-    const bool known = name == "position" || name == "speed" || name == "torque" || name == "mode" || name == "state";
+    const bool known = name == "position" || name == "speed" || name == "torque" ||
+                       name == "mode" || name == "state";
     if (!known) return no_such_value(options_, name, true);
     if (!a.look()) return false;
     const AxisFeedback& seen = a.seen();
     const std::string value = name == "position" ? fmt::format("{:.10g}", a.position())
                               : name == "speed"  ? fmt::format("{:.10g}", a.velocity())
-                              : name == "torque" ? fmt::format("{:.10g}", a.rules.torque.to_user(seen.torque))
-                              : name == "mode"   ? std::string(abbreviation(seen.mode))
-                                                 : std::string(to_string(state_of(seen.statusword)));
+                              : name == "torque"
+                                  ? fmt::format("{:.10g}", a.rules.torque.to_user(seen.torque))
+                              : name == "mode" ? std::string(abbreviation(seen.mode))
+                                               : std::string(to_string(state_of(seen.statusword)));
     return print_line(fmt::format("{}: {} {}", a.letter(), name, value));
 }
 
 bool DriveShell::set(SdoAxis& a, const std::string& name, const std::string& text) {
     if (Factor* f = find_factor(a, name)) {
-        if (!parse_factor(text, *f))
-            return wrong(fmt::format("invalid factor '{}'; write NUMERATOR/DENOMINATOR, such as 4096/360, neither of them 0", text));
-        if (settings_.one_shot) return without_effect(fmt::format("{} set {} {}", a.letter(), name, text));
+        if (!parse_factor(text, *f)) {
+            return wrong(
+                fmt::format("invalid factor '{}'; write NUMERATOR/DENOMINATOR, such as 4096/360, "
+                            "neither of them 0",
+                            text));
+        }
+        if (settings_.one_shot) {
+            return without_effect(fmt::format("{} set {} {}", a.letter(), name, text));
+        }
         return query(a, name);
     }
-    double value = 0, back = 0;
+    double value = 0;
+    double back = 0;
     if (!find_setting(name)) return no_such_value(options_, name, false);
-    if (!parse_real(text, value)) return wrong(fmt::format("invalid number '{}'; type: {} set {} NUMBER", text, a.letter(), name));
-    return store(a, name, value, back) && print_line(fmt::format("{}: {} {:.10g}", a.letter(), name, back));
+    if (!parse_real(text, value)) {
+        return wrong(
+            fmt::format("invalid number '{}'; type: {} set {} NUMBER", text, a.letter(), name));
+    }
+    return store(a, name, value, back) &&
+           print_line(fmt::format("{}: {} {:.10g}", a.letter(), name, back));
 }
 
 bool DriveShell::fetch(SdoAxis& a, const std::string& name, double& value) {
     const Setting* s = find_setting(name);
     std::int64_t raw = 0;
     if (!s || !a.read(s->index, s->sub, raw, s->is_signed)) return false;
-    return value = static_cast<double>(raw) / factor_of(a, s->unit), true;
+    value = static_cast<double>(raw) / factor_of(a, s->unit);
+    return true;
 }
 
 bool DriveShell::store(SdoAxis& a, const std::string& name, double value, double& back) {
     const Setting* s = find_setting(name);
     if (!s) return false;
     const double raw = std::nearbyint(value * factor_of(a, s->unit));
-    const double most = std::ldexp(1.0, static_cast<int>(8 * s->bytes) - (s->is_signed ? 1 : 0)) - 1;
+    const double most =
+        std::ldexp(1.0, static_cast<int>(8 * s->bytes) - (s->is_signed ? 1 : 0)) - 1;
     const double least = s->is_signed ? -most - 1 : 0.0;
-    if (raw < least || raw > most)
+    if (raw < least || raw > most) {
         return wrong(
-            fmt::format("{} {:.10g} is {:.10g} in drive units, out of the range {:.10g}..{:.10g}", name, value, raw, least, most));
+            fmt::format("{} {:.10g} is {:.10g} in drive units, out of the range {:.10g}..{:.10g}",
+                        name, value, raw, least, most));
+    }
     std::int64_t kept = 0;
     if (!a.write(s->index, s->sub, static_cast<std::int64_t>(raw), s->bytes)) return false;
     if (!a.read(s->index, s->sub, kept, s->is_signed)) return false;
     back = static_cast<double>(kept) / factor_of(a, s->unit);
-    return static_cast<double>(kept) == raw || a.refuse(fmt::format("drive accepted the write but keeps {} at {:.10g}", name, back));
+    return static_cast<double>(kept) == raw ||
+           a.refuse(fmt::format("drive accepted the write but keeps {} at {:.10g}", name, back));
 }
 
 bool DriveShell::status(SdoAxis& a) {
     if (!a.look()) return false;
     const AxisFeedback& seen = a.seen();
     const State state = state_of(seen.statusword);
-    std::string text =
-        fmt::format("{}: {}, mode {}, statusword 0x{:04X}", a.letter(), to_string(state), abbreviation(seen.mode), seen.statusword);
-    constexpr std::pair<std::uint16_t, const char*> bits[] = {{status::voltage_enabled, "voltage enabled"},
-                                                              {status::warning, "warning"},
-                                                              {status::remote, "remote"},
-                                                              {status::target_reached, "target reached"},
-                                                              {status::internal_limit, "internal limit"}};
-    for (const auto& [bit, name] : bits)
-        if ((seen.statusword & bit) != 0) text += fmt::format(", {}", name);
-    text += fmt::format("\n   position {:.10g}, speed {:.10g}, torque {:.10g}", a.position(), a.velocity(),
-                        a.rules.torque.to_user(seen.torque));
-    if (state == State::fault && seen.error_code != 0)
-        text += fmt::format("\n   error 0x{:04X}: {}", seen.error_code, error_word(seen.error_code));
+    std::string text = fmt::format("{}: {}, mode {}, statusword 0x{:04X}", a.letter(),
+                                   to_string(state), abbreviation(seen.mode), seen.statusword);
+    constexpr std::pair<std::uint16_t, const char*> bits[] = {
+        {status::voltage_enabled, "voltage enabled"},
+        {status::warning, "warning"},
+        {status::remote, "remote"},
+        {status::target_reached, "target reached"},
+        {status::internal_limit, "internal limit"}};
+    for (const auto& [bit, name] : bits) {
+        if ((seen.statusword & bit) != 0) {
+            text += fmt::format(", {}", name);
+        }
+    }
+    text += fmt::format("\n   position {:.10g}, speed {:.10g}, torque {:.10g}", a.position(),
+                        a.velocity(), a.rules.torque.to_user(seen.torque));
+    if (state == State::fault && seen.error_code != 0) {
+        text +=
+            fmt::format("\n   error 0x{:04X}: {}", seen.error_code, error_word(seen.error_code));
+    }
     return print_line(text);
 }
 

@@ -45,27 +45,51 @@ struct Source {
     std::vector<can::Frame> room = std::vector<can::Frame>(256);
 };
 
-std::string line(const can::Frame& f, double time, const std::string& bus, const DecodedFrame& decoded, bool coloured) {
+std::string line(const can::Frame& f, double time, const std::string& bus,
+                 const DecodedFrame& decoded, bool coloured) {
     std::string mark = f.fd ? " FD" : "";
-    if (f.bit_rate_switch) mark += '+';
-    if (f.error_state) mark += " ESI";
+    if (f.bit_rate_switch) {
+        mark += '+';
+    }
+    if (f.error_state) {
+        mark += " ESI";
+    }
     std::string text =
-        fmt::format("{:12.6f}  {}{}  {:>8}  [{}]{} {:23}", time, bus, f.own ? "tx" : "rx", id_text(f), f.length, mark, data_text(f, " "));
-    if (!decoded.text.empty()) text += "  " + decoded.text;
-    while (text.back() == ' ') text.pop_back();
+        fmt::format("{:12.6f}  {}{}  {:>8}  [{}]{} {:23}", time, bus, f.own ? "tx" : "rx",
+                    id_text(f), f.length, mark, data_text(f, " "));
+    if (!decoded.text.empty()) {
+        text += "  " + decoded.text;
+    }
+    while (text.back() == ' ') {
+        text.pop_back();
+    }
     const std::string_view start = coloured ? colour(decoded.kind) : "";
     return start.empty() ? text + "\n" : fmt::format("{}{}\x1b[0m\n", start, text);
 }
 
-std::string bus_member(const Source& source) { return source.name.empty() ? "" : fmt::format(R"("bus":{},)", json_text(source.name)); }
+std::string bus_member(const Source& source) {
+    return source.name.empty() ? "" : fmt::format(R"("bus":{},)", json_text(source.name));
+}
 
-std::string json_line(const can::Frame& f, double time, const Source& source, const DecodedFrame& decoded) {
-    std::string text = fmt::format(R"({{"time":{:.6f},{}"direction":"{}","id":{},"extended":{},"length":{},"data":"{}")", time,
-                                   bus_member(source), f.own ? "tx" : "rx", f.id, f.extended, f.length, f.remote ? "" : data_text(f, ""));
-    if (f.remote) text += R"(,"remote":true)";
-    if (f.fd) text += fmt::format(R"(,"fd":true,"bit_rate_switch":{},"error_state":{})", f.bit_rate_switch, f.error_state);
-    if (f.error) text += R"(,"error":true)";
-    if (!decoded.text.empty()) text += fmt::format(R"(,"meaning":"{}")", decoded.text);
+std::string json_line(const can::Frame& f, double time, const Source& source,
+                      const DecodedFrame& decoded) {
+    std::string text = fmt::format(
+        R"({{"time":{:.6f},{}"direction":"{}","id":{},"extended":{},"length":{},"data":"{}")", time,
+        bus_member(source), f.own ? "tx" : "rx", f.id, f.extended, f.length,
+        f.remote ? "" : data_text(f, ""));
+    if (f.remote) {
+        text += R"(,"remote":true)";
+    }
+    if (f.fd) {
+        text += fmt::format(R"(,"fd":true,"bit_rate_switch":{},"error_state":{})",
+                            f.bit_rate_switch, f.error_state);
+    }
+    if (f.error) {
+        text += R"(,"error":true)";
+    }
+    if (!decoded.text.empty()) {
+        text += fmt::format(R"(,"meaning":"{}")", decoded.text);
+    }
     return text + "}\n";
 }
 
@@ -75,13 +99,18 @@ std::string short_name(const std::string& address) {
     return plain.substr(plain.find(':') + 1);
 }
 
-/// Returns the offset from the time of a link's frames to the time of day. A capture is played now and keeps the times of its recording.
+/// Returns the offset from the time of a link's frames to the time of day. A capture is played now
+/// and keeps the times of its recording.
 std::int64_t shift_to_wall(const can::Link& link, const can::Frame& first) {
     const can::Description& about = link.description();
     if (!about.file.empty()) {
         const can::Capture capture = can::read_capture(about.file);
-        for (const can::Frame& f : capture.frames)
-            if (f.same(first)) return f.time_ns - first.time_ns;  // a filter may have dropped the first frame of the file
+        for (const can::Frame& f : capture.frames) {
+            if (f.same(first)) {
+                return f.time_ns -
+                       first.time_ns;  // a filter may have dropped the first frame of the file
+            }
+        }
     }
     timespec real{};
     clock_gettime(CLOCK_REALTIME, &real);
@@ -94,7 +123,8 @@ struct Heard {
 };
 
 /// Like `listen` for several buses: batches in the order of their times.
-void listen_to_all(Bus& bus, std::vector<Source>& sources, std::int64_t for_ns, const std::function<bool(std::span<const Heard>)>& take) {
+void listen_to_all(Bus& bus, std::vector<Source>& sources, std::int64_t for_ns,
+                   const std::function<bool(std::span<const Heard>)>& take) {
     const std::int64_t end = for_ns >= 0 ? monotonic_ns() + for_ns : INT64_MAX;
     std::vector<Heard> batch;
     std::vector<pollfd> descriptors{{bus.stop.fd(), POLLIN, 0}};
@@ -108,14 +138,21 @@ void listen_to_all(Bus& bus, std::vector<Source>& sources, std::int64_t for_ns, 
         bool over = true;
         for (Source& s : sources) {
             const std::size_t count = s.link->receive(s.room, can::unclocked);
-            for (const can::Frame& f : std::span(s.room).first(count)) batch.push_back({&f, &s});
-            over = over && count == 0 && s.link->description().transport == "capture" && s.link->state() == can::State::down;
+            for (const can::Frame& f : std::span(s.room).first(count)) {
+                batch.push_back({&f, &s});
+            }
+            over = over && count == 0 && s.link->description().transport == "capture" &&
+                   s.link->state() == can::State::down;
         }
-        std::stable_sort(batch.begin(), batch.end(), [](const Heard& a, const Heard& b) { return a.frame->time_ns < b.frame->time_ns; });
+        std::stable_sort(batch.begin(), batch.end(), [](const Heard& a, const Heard& b) {
+            return a.frame->time_ns < b.frame->time_ns;
+        });
         if (!batch.empty() && !take(batch)) return;
         const std::int64_t now = monotonic_ns();
         if (now >= end || bus.stop.requested() || over) return;
-        if (batch.empty()) ::poll(descriptors.data(), descriptors.size(), polled ? 20 : 1);
+        if (batch.empty()) {
+            ::poll(descriptors.data(), descriptors.size(), polled ? 20 : 1);
+        }
     }
 }
 
@@ -128,22 +165,30 @@ bool report(const DumpOptions& options, const Source& source, double seconds) {
         return print(fmt::format(
             R"({{"statistics":{{{}"frames":{},"seconds":{:.3f},"load_percent":{},"errors":{},"lost":{},"bus_offs":{},"state":"{}"}}}})"
             "\n",
-            bus_member(source), source.frames, seconds, share, s.errors, s.lost, s.bus_offs, can::to_string(s.state)));
+            bus_member(source), source.frames, seconds, share, s.errors, s.lost, s.bus_offs,
+            can::to_string(s.state)));
     }
-    const std::string share = about.bit_rate ? fmt::format("{:.1f} %", load) : "unknown (add ?bitrate=500k to the address)";
-    write_all(STDERR_FILENO,
-              fmt::format("{}{}{} frame{} in {:.2f} s, bus load {}, {} errors, {} lost{}\n", source.name, source.name.empty() ? "" : ": ",
-                          source.frames, source.frames == 1 ? "" : "s", seconds, share, s.errors, s.lost,
-                          about.transport == "capture" ? "" : fmt::format(", bus {}", can::to_string(s.state))));
+    const std::string share = about.bit_rate ? fmt::format("{:.1f} %", load)
+                                             : "unknown (add ?bitrate=500k to the address)";
+    write_all(
+        STDERR_FILENO,
+        fmt::format(
+            "{}{}{} frame{} in {:.2f} s, bus load {}, {} errors, {} lost{}\n", source.name,
+            source.name.empty() ? "" : ": ", source.frames, source.frames == 1 ? "" : "s", seconds,
+            share, s.errors, s.lost,
+            about.transport == "capture" ? "" : fmt::format(", bus {}", can::to_string(s.state))));
     return true;
 }
 
 }  // namespace
 
 int run_can_dump(const DumpOptions& options) {
-    const bool delta = options.time == "delta", absolute = options.time == "absolute";
-    if (!options.time.empty() && options.time != "relative" && !delta && !absolute)
-        return fail(options, fmt::format("invalid --time '{}'; write relative, delta or absolute", options.time));
+    const bool delta = options.time == "delta";
+    const bool absolute = options.time == "absolute";
+    if (!options.time.empty() && options.time != "relative" && !delta && !absolute) {
+        return fail(options, fmt::format("invalid --time '{}'; write relative, delta or absolute",
+                                         options.time));
+    }
     Bus bus;
     if (!bus.open(options, options.words, options.filters)) return 1;
     bus.announce(options);
@@ -152,7 +197,9 @@ int run_can_dump(const DumpOptions& options) {
     std::size_t width = 0;
     for (std::size_t n = 0; n < sources.size(); ++n) {
         sources[n].link = n == 0 ? bus.link.get() : bus.more[n - 1].get();
-        if (sources.size() > 1) sources[n].name = short_name(options.words[n]);
+        if (sources.size() > 1) {
+            sources[n].name = short_name(options.words[n]);
+        }
         width = std::max(width, sources[n].name.size());
     }
     std::uint64_t frames = 0;
@@ -163,16 +210,28 @@ int run_can_dump(const DumpOptions& options) {
         std::string text;
         for (const auto& [frame, source] : batch) {
             const can::Frame& f = *frame;
-            if (absolute && source->frames == 0) source->to_wall = shift_to_wall(*source->link, f);
-            if (frames++ == 0) before = f.time_ns;
+            if (absolute && source->frames == 0) {
+                source->to_wall = shift_to_wall(*source->link, f);
+            }
+            if (frames++ == 0) {
+                before = f.time_ns;
+            }
             ++source->frames;
-            const double time = static_cast<double>(absolute ? f.time_ns + source->to_wall : f.time_ns - before) / 1e9;
-            if (delta) before = f.time_ns;
+            const double time =
+                static_cast<double>(absolute ? f.time_ns + source->to_wall : f.time_ns - before) /
+                1e9;
+            if (delta) {
+                before = f.time_ns;
+            }
             const DecodedFrame decoded = source->decoder.decode(f);
             const std::string name = width == 0 ? "" : fmt::format("{:{}}  ", source->name, width);
-            text += options.json ? json_line(f, time, *source, decoded) : line(f, time, name, decoded, coloured);
+            text += options.json ? json_line(f, time, *source, decoded)
+                                 : line(f, time, name, decoded, coloured);
             const can::Description& about = source->link->description();
-            if (!f.error) source->busy += can::duration_ns(can::frame_bits(f), about.bit_rate, about.data_rate);
+            if (!f.error) {
+                source->busy +=
+                    can::duration_ns(can::frame_bits(f), about.bit_rate, about.data_rate);
+            }
             if (frames == options.count) break;
         }
         written = print(text);
@@ -180,8 +239,9 @@ int run_can_dump(const DumpOptions& options) {
     });
     if (!written) return 1;
     const double seconds = static_cast<double>(monotonic_ns() - began) / 1e9;
-    for (const Source& source : sources)
+    for (const Source& source : sources) {
         if (!report(options, source, seconds)) return 1;
+    }
     return 0;
 }
 

@@ -18,12 +18,15 @@ struct DumpOptions : Options {
 
     void declare(OptionSet& set) override {
         set.words("ADDRESS",
-                  "one or more buses: can:can0, udp:GROUP:PORT, slcan:/dev/ttyACM0, cane:enp3s0 or replay:FILE; with options: ?bitrate=500k&datarate=2M&listen");
+                  "one or more buses: can:can0, udp:GROUP:PORT, slcan:/dev/ttyACM0, cane:enp3s0 or "
+                  "replay:FILE; with options: ?bitrate=500k&datarate=2M&listen");
         declare_filter(set, filters, count);
         set.for_how_long(for_ns, "end after 2s, 500ms … (default: until Ctrl-C)");
         set.value("--time", time, "relative|delta|absolute",
-                  "relative: seconds since the first frame (default); delta: since the previous frame; absolute: since 1970, as in a .log file");
-        set.flag("--json", json, "print a JSON object per line; the last one of each bus has its statistics");
+                  "relative: seconds since the first frame (default); delta: since the previous "
+                  "frame; absolute: since 1970, as in a .log file");
+        set.flag("--json", json,
+                 "print a JSON object per line; the last one of each bus has its statistics");
     }
 };
 

@@ -13,8 +13,11 @@ struct FlashOptions : Options {
     std::int64_t timeout_ns = 0;  ///< of one response; 0: not given
 
     void declare(OptionSet& set) override {
-        set.words("ADDRESS NODE IMAGE", "the bus; node ID 1..127; program file in the format of the device");
-        set.value("--program", program_number, "N", "program number, sub-index of 1F50h, 1..254 (default 1)").in(1, 254);
+        set.words("ADDRESS NODE IMAGE",
+                  "the bus; node ID 1..127; program file in the format of the device");
+        set.value("--program", program_number, "N",
+                  "program number, sub-index of 1F50h, 1..254 (default 1)")
+            .in(1, 254);
         set.flag("--segmented", segmented, "do not use block transfer");
         declare_timeout(set, timeout_ns);
     }

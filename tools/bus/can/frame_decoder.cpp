@@ -15,41 +15,53 @@ using can::Frame;
 
 std::uint32_t number(const Frame& f, unsigned from, unsigned bytes) {
     std::uint32_t value = 0;
-    for (unsigned i = 0; i < bytes && from + i < f.length; ++i) value |= std::uint32_t{f.data[from + i]} << 8 * i;
+    for (unsigned i = 0; i < bytes && from + i < f.length; ++i) {
+        value |= std::uint32_t{f.data[from + i]} << 8 * i;
+    }
     return value;
 }
 
-std::string object(const Frame& f) { return fmt::format("{:04X}:{:X}", number(f, 1, 2), f.data[3]); }
+std::string object(const Frame& f) {
+    return fmt::format("{:04X}:{:X}", number(f, 1, 2), f.data[3]);
+}
 
 std::string expedited(const Frame& f) {
     const bool sized = (f.data[0] & 1) != 0;
     const unsigned bytes = sized ? 4 - (f.data[0] >> 2 & 3U) : 4;
     const std::uint32_t value = number(f, 4, bytes);
-    return fmt::format("{} = 0x{:0{}X}{}", object(f), value, 2 * bytes, value > 9 ? fmt::format(" ({})", value) : "");
+    return fmt::format("{} = 0x{:0{}X}{}", object(f), value, 2 * bytes,
+                       value > 9 ? fmt::format(" ({})", value) : "");
 }
 
 /// Initiate responses of downloads and uploads have the same flags in both directions.
 std::string initiated(const Frame& f) {
     if ((f.data[0] & 2) != 0) return expedited(f);
-    return object(f) + ((f.data[0] & 1) != 0 ? fmt::format(", {} bytes in segments", number(f, 4, 4)) : ", in segments");
+    return object(f) + ((f.data[0] & 1) != 0
+                            ? fmt::format(", {} bytes in segments", number(f, 4, 4))
+                            : ", in segments");
 }
 
 std::string segment(const Frame& f) {
-    return fmt::format("segment of {} byte{}{}", 7 - (f.data[0] >> 1 & 7U), (f.data[0] >> 1 & 7U) == 6 ? "" : "s",
+    return fmt::format("segment of {} byte{}{}", 7 - (f.data[0] >> 1 & 7U),
+                       (f.data[0] >> 1 & 7U) == 6 ? "" : "s",
                        (f.data[0] & 1) != 0 ? ", the last" : "");
 }
 
 std::string abort_text(const Frame& f) {
     const std::uint32_t code = number(f, 4, 4);
-    return fmt::format("abort {}: {} (0x{:08X})", object(f), canopen::to_string(static_cast<canopen::Abort>(code)), code);
+    return fmt::format("abort {}: {} (0x{:08X})", object(f),
+                       canopen::to_string(static_cast<canopen::Abort>(code)), code);
 }
 
 std::string block_segment(const Frame& f) {
-    return fmt::format("block segment {}{}", f.data[0] & 0x7f, (f.data[0] & 0x80) != 0 ? ", the last" : "");
+    return fmt::format("block segment {}{}", f.data[0] & 0x7f,
+                       (f.data[0] & 0x80) != 0 ? ", the last" : "");
 }
 
 DecodedFrame nmt(const Frame& f) {
-    if (f.remote || f.length != 2) return {FrameKind::nmt, "NMT with a wrong length: it has 2 bytes"};
+    if (f.remote || f.length != 2) {
+        return {FrameKind::nmt, "NMT with a wrong length: it has 2 bytes"};
+    }
     const char* what = nullptr;
     switch (static_cast<canopen::NmtCommand>(f.data[0])) {
     case canopen::NmtCommand::start: what = "start"; break;
@@ -59,35 +71,54 @@ DecodedFrame nmt(const Frame& f) {
     case canopen::NmtCommand::reset_communication: what = "reset communication"; break;
     }
     const std::string command = what ? what : fmt::format("unknown command 0x{:02X}", f.data[0]);
-    return {FrameKind::nmt, fmt::format("NMT {}: {}", command, f.data[1] == 0 ? "all nodes" : fmt::format("node {}", f.data[1]))};
+    return {FrameKind::nmt,
+            fmt::format("NMT {}: {}", command,
+                        f.data[1] == 0 ? "all nodes" : fmt::format("node {}", f.data[1]))};
 }
 
 DecodedFrame emergency(unsigned node, const Frame& f) {
-    if (f.remote || f.length != 8) return {FrameKind::emergency, fmt::format("EMCY of node {} with a wrong length: it has 8 bytes", node)};
+    if (f.remote || f.length != 8) {
+        return {FrameKind::emergency,
+                fmt::format("EMCY of node {} with a wrong length: it has 8 bytes", node)};
+    }
     const auto code = static_cast<std::uint16_t>(number(f, 0, 2));
     return {FrameKind::emergency,
-            fmt::format("EMCY of node {}: {} (0x{:04X}), error register 0x{:02X}", node, canopen::emergency_text(code), code, f.data[2])};
+            fmt::format("EMCY of node {}: {} (0x{:04X}), error register 0x{:02X}", node,
+                        canopen::emergency_text(code), code, f.data[2])};
 }
 
 DecodedFrame time_stamp(const Frame& f) {
-    if (f.remote || f.length != 6) return {FrameKind::time, "TIME with a wrong length: it has 6 bytes"};
+    if (f.remote || f.length != 6) {
+        return {FrameKind::time, "TIME with a wrong length: it has 6 bytes"};
+    }
     const std::uint32_t ms = number(f, 0, 4) & 0x0fffffff;
     constexpr std::time_t from_1970_to_1984 = 5113;  // days
-    const std::time_t seconds = (from_1970_to_1984 + static_cast<std::time_t>(number(f, 4, 2))) * 86400 + ms / 1000;
-    return {FrameKind::time, fmt::format("TIME {:%Y-%m-%d %H:%M:%S}.{:03}", fmt::gmtime(seconds), ms % 1000)};
+    const std::time_t seconds =
+        (from_1970_to_1984 + static_cast<std::time_t>(number(f, 4, 2))) * 86400 + ms / 1000;
+    return {FrameKind::time,
+            fmt::format("TIME {:%Y-%m-%d %H:%M:%S}.{:03}", fmt::gmtime(seconds), ms % 1000)};
 }
 
 DecodedFrame pdo(unsigned function, unsigned node, const Frame& f) {
     const bool transmit = function % 2 == 1;  // 180h, 280h …: from the node
-    return {FrameKind::pdo, fmt::format("{}{}PDO{} of node {}", f.remote ? "request for " : "", transmit ? 'T' : 'R', (function - 1) / 2, node)};
+    return {FrameKind::pdo, fmt::format("{}{}PDO{} of node {}", f.remote ? "request for " : "",
+                                        transmit ? 'T' : 'R', (function - 1) / 2, node)};
 }
 
 DecodedFrame heartbeat(unsigned node, const Frame& f) {
-    if (f.remote) return {FrameKind::heartbeat, fmt::format("node guarding: asks node {}", node)};
-    if (f.length != 1) return {FrameKind::heartbeat, fmt::format("heartbeat of node {} with a wrong length: it has 1 byte", node)};
-    if (f.data[0] == 0) return {FrameKind::heartbeat, fmt::format("boot-up of node {}", node)};
+    if (f.remote) {
+        return {FrameKind::heartbeat, fmt::format("node guarding: asks node {}", node)};
+    }
+    if (f.length != 1) {
+        return {FrameKind::heartbeat,
+                fmt::format("heartbeat of node {} with a wrong length: it has 1 byte", node)};
+    }
+    if (f.data[0] == 0) {
+        return {FrameKind::heartbeat, fmt::format("boot-up of node {}", node)};
+    }
     return {FrameKind::heartbeat,
-            fmt::format("heartbeat of node {}: {}{}", node, canopen::to_string(static_cast<canopen::NmtState>(f.data[0] & 0x7f)),
+            fmt::format("heartbeat of node {}: {}{}", node,
+                        canopen::to_string(static_cast<canopen::NmtState>(f.data[0] & 0x7f)),
                         (f.data[0] & 0x80) != 0 ? ", toggle bit set" : "")};
 }
 
@@ -126,11 +157,14 @@ constexpr LssCommand lss_commands[] = {
 
 DecodedFrame lss(bool master, const Frame& f) {
     const std::string who = master ? "LSS master: " : "LSS slave: ";
-    if (f.remote || f.length != 8) return {FrameKind::lss, who + "wrong length: it has 8 bytes"};
+    if (f.remote || f.length != 8) {
+        return {FrameKind::lss, who + "wrong length: it has 8 bytes"};
+    }
     for (const LssCommand& c : lss_commands) {
         if (c.code != f.data[0]) continue;
         const bool valued = c.bytes > 0 && !(master && c.code >= 0x5a);
-        return {FrameKind::lss, who + c.text + (valued ? fmt::format(" 0x{:X}", number(f, 1, c.bytes)) : "")};
+        return {FrameKind::lss,
+                who + c.text + (valued ? fmt::format(" 0x{:X}", number(f, 1, c.bytes)) : "")};
     }
     return {FrameKind::lss, who + fmt::format("unknown command 0x{:02X}", f.data[0])};
 }
@@ -148,9 +182,14 @@ DecodedFrame error(const Frame& f) {
         {can::error_restarted, "restarted after bus off"},
     };
     std::string text;
-    for (const auto& [bit, word] : words)
-        if ((f.id & bit) != 0) text += (text.empty() ? "" : ", ") + std::string(word);
-    if ((f.id & can::error_controller) != 0) text += fmt::format("; send errors {}, receive errors {}", f.data[6], f.data[7]);
+    for (const auto& [bit, word] : words) {
+        if ((f.id & bit) != 0) {
+            text += (text.empty() ? "" : ", ") + std::string(word);
+        }
+    }
+    if ((f.id & can::error_controller) != 0) {
+        text += fmt::format("; send errors {}, receive errors {}", f.data[6], f.data[7]);
+    }
     return {FrameKind::error, text};
 }
 
@@ -158,12 +197,16 @@ DecodedFrame error(const Frame& f) {
 
 DecodedFrame FrameDecoder::request(unsigned node, const Frame& f) {
     const std::string who = fmt::format("SDO to node {}: ", node);
-    const auto sdo = [&](const std::string& text) { return DecodedFrame{FrameKind::sdo, who + text}; };
+    const auto sdo = [&](const std::string& text) {
+        return DecodedFrame{FrameKind::sdo, who + text};
+    };
     if (f.remote || f.length != 8) return sdo("wrong length: it has 8 bytes");
     Blocks& blocks = blocks_[node];
     const unsigned command = f.data[0] >> 5;
     if (blocks.down && f.data[0] != 0x80) {
-        if ((f.data[0] & 0x80) != 0) blocks.down = false;
+        if ((f.data[0] & 0x80) != 0) {
+            blocks.down = false;
+        }
         return sdo(block_segment(f));
     }
     switch (command) {
@@ -176,12 +219,16 @@ DecodedFrame FrameDecoder::request(unsigned node, const Frame& f) {
         switch (f.data[0] & 3) {
         case 0: return sdo(fmt::format("read {} in blocks of {}", object(f), f.data[4]));
         case 1: return sdo("block read done");
-        case 2: return sdo(fmt::format("block received up to segment {}, next has {}", f.data[1], f.data[2]));
+        case 2:
+            return sdo(
+                fmt::format("block received up to segment {}, next has {}", f.data[1], f.data[2]));
         default: blocks.up = true; return sdo("start block upload");
         }
     case 6:
-        if ((f.data[0] & 1) == 0)
-            return sdo("write " + object(f) + " in blocks" + ((f.data[0] & 2) != 0 ? fmt::format(", {} bytes", number(f, 4, 4)) : ""));
+        if ((f.data[0] & 1) == 0) {
+            return sdo("write " + object(f) + " in blocks" +
+                       ((f.data[0] & 2) != 0 ? fmt::format(", {} bytes", number(f, 4, 4)) : ""));
+        }
         return sdo(fmt::format("block write done, CRC 0x{:04X}", number(f, 1, 2)));
     default: return sdo(fmt::format("unknown command 0x{:02X}", f.data[0]));
     }
@@ -189,12 +236,16 @@ DecodedFrame FrameDecoder::request(unsigned node, const Frame& f) {
 
 DecodedFrame FrameDecoder::answer(unsigned node, const Frame& f) {
     const std::string who = fmt::format("SDO from node {}: ", node);
-    const auto sdo = [&](const std::string& text) { return DecodedFrame{FrameKind::sdo, who + text}; };
+    const auto sdo = [&](const std::string& text) {
+        return DecodedFrame{FrameKind::sdo, who + text};
+    };
     if (f.remote || f.length != 8) return sdo("wrong length: it has 8 bytes");
     Blocks& blocks = blocks_[node];
     const unsigned command = f.data[0] >> 5;
     if (blocks.up && f.data[0] != 0x80) {
-        if ((f.data[0] & 0x80) != 0) blocks.up = false;
+        if ((f.data[0] & 0x80) != 0) {
+            blocks.up = false;
+        }
         return sdo(block_segment(f));
     }
     switch (command) {
@@ -205,13 +256,19 @@ DecodedFrame FrameDecoder::answer(unsigned node, const Frame& f) {
     case 4: blocks = {}; return sdo(abort_text(f));
     case 5:
         switch (f.data[0] & 3) {
-        case 0: blocks.down = true; return sdo(fmt::format("ready for {} in blocks of {}", object(f), f.data[4]));
+        case 0:
+            blocks.down = true;
+            return sdo(fmt::format("ready for {} in blocks of {}", object(f), f.data[4]));
         case 1: return sdo("block write confirmed");
-        default: return sdo(fmt::format("block received up to segment {}, next has {}", f.data[1], f.data[2]));
+        default:
+            return sdo(
+                fmt::format("block received up to segment {}, next has {}", f.data[1], f.data[2]));
         }
     case 6:
-        if ((f.data[0] & 1) == 0)
-            return sdo("has " + object(f) + " in blocks" + ((f.data[0] & 2) != 0 ? fmt::format(", {} bytes", number(f, 4, 4)) : ""));
+        if ((f.data[0] & 1) == 0) {
+            return sdo("has " + object(f) + " in blocks" +
+                       ((f.data[0] & 2) != 0 ? fmt::format(", {} bytes", number(f, 4, 4)) : ""));
+        }
         return sdo(fmt::format("blocks end, CRC 0x{:04X}", number(f, 1, 2)));
     default: return sdo(fmt::format("unknown command 0x{:02X}", f.data[0]));
     }
@@ -219,15 +276,26 @@ DecodedFrame FrameDecoder::answer(unsigned node, const Frame& f) {
 
 DecodedFrame FrameDecoder::decode(const Frame& f) {
     if (f.error) return error(f);
-    if (f.extended || f.fd) return {};
-    const unsigned node = f.id & 0x7f, function = f.id >> 7;
+    if (f.extended || f.fd) {
+        return {};
+    }
+    const unsigned node = f.id & 0x7f;
+    const unsigned function = f.id >> 7;
     if (f.id == 0x000) return nmt(f);
-    if (f.id == 0x080) return {FrameKind::sync, f.length == 1 ? fmt::format("SYNC {}", f.data[0]) : "SYNC"};
+    if (f.id == 0x080) {
+        return {FrameKind::sync, f.length == 1 ? fmt::format("SYNC {}", f.data[0]) : "SYNC"};
+    }
     if (f.id == 0x100) return time_stamp(f);
-    if (f.id == 0x001 && f.length == 0) return {FrameKind::nmt, "global fail-safe command (EN 50325-5)"};
-    if (f.id > 0x100 && f.id <= 0x180) return {FrameKind::pdo, service_name(f.id, false)};
+    if (f.id == 0x001 && f.length == 0) {
+        return {FrameKind::nmt, "global fail-safe command (EN 50325-5)"};
+    }
+    if (f.id > 0x100 && f.id <= 0x180) {
+        return {FrameKind::pdo, service_name(f.id, false)};
+    }
     if (f.id == 0x7e4 || f.id == 0x7e5) return lss(f.id == 0x7e5, f);
-    if (node == 0) return {};
+    if (node == 0) {
+        return {};
+    }
     if (function == 1) return emergency(node, f);
     if (function >= 3 && function <= 10) return pdo(function, node, f);
     if (function == 11) return answer(node, f);
@@ -238,30 +306,55 @@ DecodedFrame FrameDecoder::decode(const Frame& f) {
 
 std::string service_name(std::uint32_t id, bool extended) {
     if (extended) return "";
-    const unsigned node = id & 0x7f, function = id >> 7;
+    const unsigned node = id & 0x7f;
+    const unsigned function = id >> 7;
     if (id == 0x000) return "NMT";
     if (id == 0x080) return "SYNC";
     if (id == 0x100) return "TIME";
     if (id == 0x001) return "global fail-safe command";
-    if (id > 0x100 && id <= 0x180) return fmt::format("SRDO {:03X}, {}", (id - 1) | 1, id % 2 == 1 ? "plain" : "inverted");
+    if (id > 0x100 && id <= 0x180) {
+        return fmt::format("SRDO {:03X}, {}", (id - 1) | 1, id % 2 == 1 ? "plain" : "inverted");
+    }
     if (id == 0x7e4) return "LSS slave";
     if (id == 0x7e5) return "LSS master";
     if (node == 0) return "";
-    if (function == 1) return fmt::format("EMCY of node {}", node);
-    if (function >= 3 && function <= 10) return fmt::format("{}PDO{} of node {}", function % 2 == 1 ? 'T' : 'R', (function - 1) / 2, node);
-    if (function == 11) return fmt::format("SDO from node {}", node);
-    if (function == 12) return fmt::format("SDO to node {}", node);
-    if (function == 14) return fmt::format("heartbeat of node {}", node);
+    if (function == 1) {
+        return fmt::format("EMCY of node {}", node);
+    }
+    if (function >= 3 && function <= 10) {
+        return fmt::format("{}PDO{} of node {}", function % 2 == 1 ? 'T' : 'R', (function - 1) / 2,
+                           node);
+    }
+    if (function == 11) {
+        return fmt::format("SDO from node {}", node);
+    }
+    if (function == 12) {
+        return fmt::format("SDO to node {}", node);
+    }
+    if (function == 14) {
+        return fmt::format("heartbeat of node {}", node);
+    }
     return "";
 }
 
 std::string profile_name(std::uint32_t device_type) {
     constexpr std::pair<std::uint32_t, const char*> known[] = {
-        {0, "no profile"}, {401, "I/O module"},      {402, "drive"},        {404, "measuring device"}, {405, "programmable controller"},
-        {406, "encoder"},  {408, "hydraulic drive"}, {410, "inclinometer"}, {418, "battery"},          {419, "charger"},
+        {0, "no profile"},
+        {401, "I/O module"},
+        {402, "drive"},
+        {404, "measuring device"},
+        {405, "programmable controller"},
+        {406, "encoder"},
+        {408, "hydraulic drive"},
+        {410, "inclinometer"},
+        {418, "battery"},
+        {419, "charger"},
     };
-    for (const auto& [number, word] : known)
-        if ((device_type & 0xffff) == number) return number == 0 ? word : fmt::format("{} {}", number, word);
+    for (const auto& [number, word] : known) {
+        if ((device_type & 0xffff) == number) {
+            return number == 0 ? word : fmt::format("{} {}", number, word);
+        }
+    }
     return fmt::format("profile {}", device_type & 0xffff);
 }
 

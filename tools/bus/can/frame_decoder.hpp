@@ -10,14 +10,26 @@
 
 namespace hal::tools {
 
-enum class FrameKind : std::uint8_t { other, error, nmt, sync, time, emergency, pdo, sdo, heartbeat, lss };
+enum class FrameKind : std::uint8_t {
+    other,
+    error,
+    nmt,
+    sync,
+    time,
+    emergency,
+    pdo,
+    sdo,
+    heartbeat,
+    lss
+};
 
 struct DecodedFrame {
     FrameKind kind = FrameKind::other;
     std::string text;  ///< empty: unknown
 };
 
-/// Decodes frames in the order of the bus: segments of a block transfer are recognised by the preceding frames.
+/// Decodes frames in the order of the bus: segments of a block transfer are recognised by the
+/// preceding frames.
 class FrameDecoder {
 public:
     DecodedFrame decode(const can::Frame&);
@@ -26,7 +38,9 @@ private:
     DecodedFrame request(unsigned node, const can::Frame&);
     DecodedFrame answer(unsigned node, const can::Frame&);
     struct Blocks {
-        bool down = false, up = false;  ///< segments without a command come from the client, from the server
+        /// segments without a command come from the client, from the server
+        bool down = false;
+        bool up = false;
     };
     std::array<Blocks, 128> blocks_{};
 };

@@ -28,28 +28,41 @@ int connect_to_gateway(const GatewayOptions& options) {
     const std::string& place = options.connect;
     const auto colon = place.rfind(':');
     const std::string port = colon == place.npos ? "" : place.substr(colon + 1);
-    const bool tcp = !port.empty() && place.find('/') == place.npos && port.find_first_not_of("0123456789") == port.npos;
+    const bool tcp = !port.empty() && place.find('/') == place.npos &&
+                     port.find_first_not_of("0123456789") == port.npos;
     std::string why;
     int fd = -1;
     if (tcp) {
         addrinfo how{}, *found = nullptr;
         how.ai_socktype = SOCK_STREAM;
-        if (const int code = ::getaddrinfo(place.substr(0, colon).c_str(), port.c_str(), &how, &found); code != 0)
-            return fail(options,
-                        fmt::format("invalid --connect '{}': {}; write HOST:PORT, such as 127.0.0.1:6000", place, ::gai_strerror(code))),
-                   -1;
+        if (const int code =
+                ::getaddrinfo(place.substr(0, colon).c_str(), port.c_str(), &how, &found);
+            code != 0) {
+            fail(options,
+                 fmt::format("invalid --connect '{}': {}; write HOST:PORT, such as 127.0.0.1:6000",
+                             place, ::gai_strerror(code)));
+
+            return -1;
+        }
         for (const addrinfo* at = found; at != nullptr && fd < 0; at = at->ai_next) {
             fd = ::socket(at->ai_family, at->ai_socktype | SOCK_CLOEXEC, at->ai_protocol);
             if (fd >= 0 && ::connect(fd, at->ai_addr, at->ai_addrlen) == 0) break;
             why = std::strerror(errno);
-            if (fd >= 0) ::close(fd);
+            if (fd >= 0) {
+                ::close(fd);
+            }
             fd = -1;
         }
-        if (found != nullptr) ::freeaddrinfo(found);
+        if (found != nullptr) {
+            ::freeaddrinfo(found);
+        }
     } else {
         sockaddr_un at{};
         at.sun_family = AF_UNIX;
-        if (place.size() >= sizeof at.sun_path) return fail(options, fmt::format("path too long for a socket: '{}'", place)), -1;
+        if (place.size() >= sizeof at.sun_path) {
+            fail(options, fmt::format("path too long for a socket: '{}'", place));
+            return -1;
+        }
         std::memcpy(at.sun_path, place.c_str(), place.size() + 1);
         fd = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
         if (::connect(fd, reinterpret_cast<const sockaddr*>(&at), sizeof at) != 0) {
@@ -58,22 +71,30 @@ int connect_to_gateway(const GatewayOptions& options) {
             fd = -1;
         }
     }
-    if (fd < 0)
-        fail(options, fmt::format("cannot connect to the gateway at '{}': {}; start one with: hal can gateway ADDRESS {} {}", place, why,
-                                  tcp ? "--listen" : "--socket", place));
+    if (fd < 0) {
+        fail(options, fmt::format("cannot connect to the gateway at '{}': {}; start one with: hal "
+                                  "can gateway ADDRESS {} {}",
+                                  place, why, tcp ? "--listen" : "--socket", place));
+    }
     return fd;
 }
 
-/// Formats `1 5 EMCY … #life guard error`: net and node by name, the comment as part of the sentence.
+/// Formats `1 5 EMCY … #life guard error`: net and node by name, the comment as part of the
+/// sentence.
 std::string event_text(std::string_view line) {
     std::string text(line);
-    if (const auto mark = text.find(" #"); mark != text.npos) text.replace(mark, 2, ": ");
-    unsigned net = 0, node = 0;
+    if (const auto mark = text.find(" #"); mark != text.npos) {
+        text.replace(mark, 2, ": ");
+    }
+    unsigned net = 0;
+    unsigned node = 0;
     const char* const end = text.data() + text.size();
     const auto after_net = std::from_chars(text.data(), end, net);
     if (after_net.ec != std::errc() || after_net.ptr == end || *after_net.ptr != ' ') return text;
     const auto after_node = std::from_chars(after_net.ptr + 1, end, node);
-    if (after_node.ec != std::errc() || after_node.ptr == end) return fmt::format("net {}: {}", net, after_net.ptr + 1);
+    if (after_node.ec != std::errc() || after_node.ptr == end) {
+        return fmt::format("net {}: {}", net, after_net.ptr + 1);
+    }
     return fmt::format("net {}, node {}: {}", net, node, after_node.ptr + 1);
 }
 
@@ -81,13 +102,21 @@ std::string event_text(std::string_view line) {
 std::string error_text(std::string_view answer) {
     const auto mark = answer.find('#');
     const std::string_view begins = "ERROR:";
-    std::string number(answer.substr(begins.size(), mark == answer.npos ? mark : mark - begins.size()));
-    while (number.ends_with(' ')) number.pop_back();
+    std::string number(
+        answer.substr(begins.size(), mark == answer.npos ? mark : mark - begins.size()));
+    while (number.ends_with(' ')) {
+        number.pop_back();
+    }
     const bool abort = number.starts_with("0x");
-    std::string text = mark == answer.npos ? (abort ? "SDO abort" : "error") : std::string(answer.substr(mark + 1));
+    std::string text = mark == answer.npos ? (abort ? "SDO abort" : "error")
+                                           : std::string(answer.substr(mark + 1));
     text += abort ? fmt::format(" ({})", number) : fmt::format(" (error {})", number);
-    if (number == "104") text += "; write the net before the command, or type: set network NET";
-    if (number == "105") text += "; write the node before the command, or type: set node NODE";
+    if (number == "104") {
+        text += "; write the net before the command, or type: set network NET";
+    }
+    if (number == "105") {
+        text += "; write the node before the command, or type: set node NODE";
+    }
     return text;
 }
 
@@ -95,13 +124,17 @@ std::string error_text(std::string_view answer) {
 std::string joined(std::span<const std::string> words) {
     std::string line;
     for (const std::string& word : words) {
-        if (!line.empty()) line += ' ';
+        if (!line.empty()) {
+            line += ' ';
+        }
         if (!word.empty() && word.find_first_of(" \t#\"") == word.npos) {
             line += word;
             continue;
         }
         line += '"';
-        for (const char c : word) line += c == '"' ? "\"\"" : std::string(1, c);
+        for (const char c : word) {
+            line += c == '"' ? "\"\"" : std::string(1, c);
+        }
         line += '"';
     }
     return line;
@@ -114,16 +147,33 @@ public:
     ~GatewaySession() override { ::close(fd_); }
 
     int execute(std::string_view text) override {
-        while (!text.empty() && (text.back() == ' ' || text.back() == '\t' || text.back() == '\r')) text.remove_suffix(1);
-        while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) text.remove_prefix(1);
+        while (!text.empty() &&
+               (text.back() == ' ' || text.back() == '\t' || text.back() == '\r')) {
+            text.remove_suffix(1);
+        }
+        while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) {
+            text.remove_prefix(1);
+        }
         if (text.empty() || text.front() == '#') return 0;
-        if (text == "quit" || text == "exit") return over_ = true, 0;
-        if (text.front() == '[')
-            return fail(options_, fmt::format("'{}': sequence numbers are added here; type the command without one", text));
+        if (text == "quit" || text == "exit") {
+            over_ = true;
+            return 0;
+        }
+        if (text.front() == '[') {
+            return fail(
+                options_,
+                fmt::format("'{}': sequence numbers are added here; type the command without one",
+                            text));
+        }
         std::string answer;
         if (!ask(text, answer)) return 1;
-        if (answer.starts_with("ERROR:")) return fail(options_, fmt::format("{}: {}", text, error_text(answer)));
-        if (!print(answer + "\n")) return over_ = true, 1;
+        if (answer.starts_with("ERROR:")) {
+            return fail(options_, fmt::format("{}: {}", text, error_text(answer)));
+        }
+        if (!print(answer + "\n")) {
+            over_ = true;
+            return 1;
+        }
         if (text != "help") return 0;
         listing_ = true;  // lines follow the response; the next response ends them
         const bool whole = ask("info version", answer);
@@ -166,8 +216,11 @@ public:
                                          "store",
                                          "version",
                                          "write"};
-        for (const char* word : known)
-            if (std::string_view(word).starts_with(line.substr(out.begin))) out.candidates.push_back({word, {}});
+        for (const char* word : known) {
+            if (std::string_view(word).starts_with(line.substr(out.begin))) {
+                out.candidates.push_back({word, {}});
+            }
+        }
         return out;
     }
     bool collecting() const override { return false; }
@@ -175,7 +228,9 @@ public:
     std::function<void()> meanwhile() override {
         return [this] {
             std::string answer;
-            while (!over_ && readable(0)) take(0, answer);
+            while (!over_ && readable(0)) {
+                take(0, answer);
+            }
         };
     }
 
@@ -192,12 +247,21 @@ private:
             sent += static_cast<std::size_t>(now);
         }
         for (const std::int64_t end = monotonic_ns() + limit; monotonic_ns() < end;) {
-            if (stop_.requested()) return fail(options_, fmt::format("interrupted while waiting for the response to '{}'", text)), false;
+            if (stop_.requested()) {
+                fail(options_,
+                     fmt::format("interrupted while waiting for the response to '{}'", text));
+
+                return false;
+            }
             if (!readable(100)) continue;
             if (take(number, answer)) return true;
             if (over_) return false;
         }
-        return fail(options_, fmt::format("no response to '{}' within 60 s; check that the gateway is running", text)), false;
+        fail(options_,
+             fmt::format("no response to '{}' within 60 s; check that the gateway is running",
+                         text));
+
+        return false;
     }
     bool readable(int ms) {
         if (in_.find('\n') != in_.npos) return true;
@@ -206,9 +270,12 @@ private:
     }
     bool lost() {
         over_ = true;
-        return fail(options_, fmt::format("the gateway at '{}' closed the connection", options_.connect)), false;
+        fail(options_, fmt::format("the gateway at '{}' closed the connection", options_.connect));
+
+        return false;
     }
-    /// Reads pending lines and prints events. Returns true when `answer` is the response to `number`.
+    /// Reads pending lines and prints events. Returns true when `answer` is the response to
+    /// `number`.
     bool take(std::uint32_t number, std::string& answer) {
         if (in_.find('\n') == in_.npos) {
             char bytes[65536];
@@ -221,10 +288,18 @@ private:
         for (std::size_t end; (end = in_.find('\n')) != in_.npos;) {
             std::string line = in_.substr(0, end);
             in_.erase(0, end + 1);
-            if (line.ends_with('\r')) line.pop_back();
-            if (number != 0 && line.starts_with(expected)) return answer = line.substr(expected.size()), true;
-            if (line.starts_with("# ") && listing_) print(line.substr(2) + "\n");
-            else if (!line.starts_with("[") && !line.starts_with("#") && events_) print(event_text(line) + "\n");
+            if (line.ends_with('\r')) {
+                line.pop_back();
+            }
+            if (number != 0 && line.starts_with(expected)) {
+                answer = line.substr(expected.size());
+                return true;
+            }
+            if (line.starts_with("# ") && listing_) {
+                print(line.substr(2) + "\n");
+            } else if (!line.starts_with("[") && !line.starts_with("#") && events_) {
+                print(event_text(line) + "\n");
+            }
         }
         return false;
     }
@@ -233,7 +308,8 @@ private:
     const int fd_;
     StopRequest& stop_;
     const bool events_;
-    bool over_ = false, listing_ = false;
+    bool over_ = false;
+    bool listing_ = false;
     std::uint32_t sequence_ = 0;
     std::string in_;
 };
@@ -241,22 +317,35 @@ private:
 }  // namespace
 
 int run_can_gateway_client(const GatewayOptions& options) {
-    if (!options.socket.empty() || !options.listen.empty() || !options.state.empty())
-        return fail(options, "--connect is for a client; --socket, --listen and --state are for the gateway");
-    if (!options.identity.empty() || !options.vendor_name.empty() || !options.product_name.empty() || !options.order_code.empty())
-        return fail(options, "--connect is for a client; --identity, --vendor-name, --product-name and --order-code are for the gateway");
+    if (!options.socket.empty() || !options.listen.empty() || !options.state.empty()) {
+        return fail(
+            options,
+            "--connect is for a client; --socket, --listen and --state are for the gateway");
+    }
+    if (!options.identity.empty() || !options.vendor_name.empty() ||
+        !options.product_name.empty() || !options.order_code.empty()) {
+        return fail(options,
+                    "--connect is for a client; --identity, --vendor-name, --product-name and "
+                    "--order-code are for the gateway");
+    }
     StopRequest stop;
     const int fd = connect_to_gateway(options);
     if (fd < 0) return 1;
     GatewaySession session(options, fd, stop, options.words.empty());
     if (options.words.empty()) {
         const bool terminal = ::isatty(STDIN_FILENO) == 1;
-        if (terminal) print(fmt::format("connected to {}; type 'help' for the commands, Tab completes\n", options.connect));
+        if (terminal) {
+            print(fmt::format("connected to {}; type 'help' for the commands, Tab completes\n",
+                              options.connect));
+        }
         return run_prompt_loop(session, {"gateway> ", "gateway> "}, stop.fd());
     }
-    if (options.words.front().find(' ') == options.words.front().npos) return session.execute(joined(options.words));
-    for (const std::string& line : options.words)
+    if (options.words.front().find(' ') == options.words.front().npos) {
+        return session.execute(joined(options.words));
+    }
+    for (const std::string& line : options.words) {
         if (session.execute(line) != 0 || session.over()) return 1;
+    }
     return 0;
 }
 

@@ -15,7 +15,9 @@ namespace {
 
 canopen::SdoClientSettings settings_of(std::int64_t timeout_ns) {
     canopen::SdoClientSettings settings;
-    if (timeout_ns > 0) settings.timeout = timeout_ns;
+    if (timeout_ns > 0) {
+        settings.timeout = timeout_ns;
+    }
     return settings;
 }
 
@@ -23,8 +25,9 @@ canopen::SdoClientSettings settings_of(std::int64_t timeout_ns) {
 
 NodeClient::NodeClient(const Options& options, std::int64_t timeout_ns)
     : network(out, *this, settings_of(timeout_ns)),
-      lss(out, timeout_ns > 0 ? canopen::LssMasterSettings{.timeout = timeout_ns, .scan_timeout = timeout_ns}
-                              : canopen::LssMasterSettings{.timeout = canopen::second, .repeats = 5}),
+      lss(out, timeout_ns > 0
+                   ? canopen::LssMasterSettings{.timeout = timeout_ns, .scan_timeout = timeout_ns}
+                   : canopen::LssMasterSettings{.timeout = canopen::second, .repeats = 5}),
       options_(options),
       timeout_ns_(timeout_ns),
       room_(256) {}
@@ -32,10 +35,15 @@ NodeClient::NodeClient(const Options& options, std::int64_t timeout_ns)
 bool NodeClient::open(const std::string& address) { return bus.open(options_, address, false); }
 
 bool NodeClient::turn(std::int64_t wait_ns) {
-    if (on_turn) on_turn(monotonic_ns());
+    if (on_turn) {
+        on_turn(monotonic_ns());
+    }
     network.poll(monotonic_ns());
     lss.poll(monotonic_ns());
-    for (const can::Frame* f; (f = out.front()) != nullptr && bus.link->send(*f, can::unclocked) == can::Sent::queued;) out.drop();
+    for (const can::Frame* f;
+         (f = out.front()) != nullptr && bus.link->send(*f, can::unclocked) == can::Sent::queued;) {
+        out.drop();
+    }
     bus.link->flush(can::unclocked);
     std::size_t count = bus.link->receive(room_, can::unclocked);
     if (count == 0 && wait_ns > 0) {
@@ -45,17 +53,23 @@ bool NodeClient::turn(std::int64_t wait_ns) {
     for (std::size_t n = 0; n < count; ++n) {
         const can::Frame& f = room_[n];
         if (f.own || f.error) continue;
-        if (lss.listens_to(f)) lss.handle(f, monotonic_ns());
-        else network.handle(f, monotonic_ns());
-        if (on_frame) on_frame(f);
+        if (lss.listens_to(f)) {
+            lss.handle(f, monotonic_ns());
+        } else {
+            network.handle(f, monotonic_ns());
+        }
+        if (on_frame) {
+            on_frame(f);
+        }
     }
     return outlasts_stop || !bus.stop.requested();
 }
 
 bool NodeClient::until(const std::function<bool()>& done, std::int64_t for_ns) {
     const std::int64_t began = monotonic_ns();
-    while (!done())
+    while (!done()) {
         if (!turn() || (for_ns >= 0 && monotonic_ns() - began >= for_ns)) return done();
+    }
     return true;
 }
 
@@ -83,14 +97,18 @@ std::string advice(Abort why, const std::string& bus, unsigned node, std::uint16
     case Abort::sequence:
     case Abort::crc:
     case Abort::block_size: return "frames were lost or reordered: retry, or add --segmented";
-    case Abort::command: return "another master may access this node, or it does not support block transfer: add --segmented";
-    case Abort::timeout: return "the device timed out; to check for an overloaded bus: hal can load";
+    case Abort::command:
+        return "another master may access this node, or it does not support block transfer: add "
+               "--segmented";
+    case Abort::timeout:
+        return "the device timed out; to check for an overloaded bus: hal can load";
     case Abort::write_only: return "the object is write-only";
     case Abort::read_only: return "the object is read-only";
     case Abort::no_object: return "see the EDS of the device for its objects";
     case Abort::no_sub: return "sub-index 0 is the highest sub-index of the object";
     case Abort::not_mappable: return "mappable objects have PDOMapping=1 in the EDS of the device";
-    case Abort::pdo_length: return "a PDO holds 8 bytes, and this device may allow fewer objects: map less";
+    case Abort::pdo_length:
+        return "a PDO holds 8 bytes, and this device may allow fewer objects: map less";
     case Abort::length:
     case Abort::too_long:
     case Abort::too_short: return "the object has another length: add --type, such as u16 or i32";
@@ -101,18 +119,30 @@ std::string advice(Abort why, const std::string& bus, unsigned node, std::uint16
     case Abort::internal_incompatible:
     case Abort::range_reversed: return "it conflicts with another object of the device";
     case Abort::access:
-        return fmt::format("the object may be locked while in use; disable a PDO before changing it: hal can pdo show {} {}, then pdo disable", bus,
-                           node);
+        return fmt::format(
+            "the object may be locked while in use; disable a PDO before changing it: hal can pdo "
+            "show {} {}, then pdo disable",
+            bus, node);
     case Abort::cannot_store:
-        if (index == 0x1f50) return "the device rejected the image and may have no valid program now; check that the image is for this device";
-        return "1010 accepts only 0x65766173 (save), 1011 only 0x64616F6C (load); otherwise the memory is locked or worn out";
+        if (index == 0x1f50) {
+            return "the device rejected the image and may have no valid program now; check that "
+                   "the image is for this device";
+        }
+        return "1010 accepts only 0x65766173 (save), 1011 only 0x64616F6C (load); otherwise the "
+               "memory is locked or worn out";
     case Abort::local_control: return "the device is under local control";
     case Abort::device_state:
-        if (index == 0x1f50)
-            return fmt::format("stop and clear its program first: hal can sdo write {0} {1} 1F51:1 0 --type u8, then 3", bus,
-                               node);
-        return fmt::format("most settings are accepted in pre-operational only: hal can nmt {} preop {}", bus, node);
-    case Abort::hardware: return fmt::format("see its error register: hal can sdo read {} {} 1001", bus, node);
+        if (index == 0x1f50) {
+            return fmt::format(
+                "stop and clear its program first: hal can sdo write {0} {1} 1F51:1 0 --type u8, "
+                "then 3",
+                bus, node);
+        }
+        return fmt::format(
+            "most settings are accepted in pre-operational only: hal can nmt {} preop {}", bus,
+            node);
+    case Abort::hardware:
+        return fmt::format("see its error register: hal can sdo read {} {} 1001", bus, node);
     case Abort::no_resource: return "all SDO channels of the device are in use";
     default: return "";
     }
@@ -120,34 +150,43 @@ std::string advice(Abort why, const std::string& bus, unsigned node, std::uint16
 
 }  // namespace
 
-int NodeClient::fail_transfer(std::uint8_t node, const canopen::SdoRequest& request, const std::string& object) const {
-    if (bus.stop.requested() && !outlasts_stop && !request.aborted_by_server)
+int NodeClient::fail_transfer(std::uint8_t node, const canopen::SdoRequest& request,
+                              const std::string& object) const {
+    if (bus.stop.requested() && !outlasts_stop && !request.aborted_by_server) {
         return fail(options_, fmt::format("interrupted while accessing node {}, {}", node, object));
+    }
     if (request.abort == Abort::timeout && !request.aborted_by_server) {
         const can::Statistics s = bus.link->statistics();
-        return fail(options_,
-                    fmt::format("node {} did not respond within {:g} s (object {}); the bus is {}; to list the nodes: hal can scan {}",
-                                node, static_cast<double>(settings_of(timeout_ns_).timeout) * (settings_of(timeout_ns_).resends + 1) / 1e9,
-                                object, can::to_string(s.state), options_.words.front()));
+        return fail(options_, fmt::format("node {} did not respond within {:g} s (object {}); the "
+                                          "bus is {}; to list the nodes: hal can scan {}",
+                                          node,
+                                          static_cast<double>(settings_of(timeout_ns_).timeout) *
+                                              (settings_of(timeout_ns_).resends + 1) / 1e9,
+                                          object, can::to_string(s.state), options_.words.front()));
     }
     const std::string what = advice(request.abort, options_.words.front(), node, request.index);
-    return fail(options_, fmt::format("node {}, {}: {}{} (0x{:08X}){}", node, object,
-                                      request.aborted_by_server ? "" : "gave up: ", canopen::to_string(request.abort),
-                                      static_cast<std::uint32_t>(request.abort), what.empty() ? "" : "; " + what));
+    return fail(
+        options_,
+        fmt::format("node {}, {}: {}{} (0x{:08X}){}", node, object,
+                    request.aborted_by_server ? "" : "gave up: ", canopen::to_string(request.abort),
+                    static_cast<std::uint32_t>(request.abort), what.empty() ? "" : "; " + what));
 }
 
 bool parse_node(const std::string& text, std::uint8_t& node) {
     const bool hex = text.starts_with("0x");
     const char* end = text.data() + text.size();
     unsigned number = 0;
-    const auto [stop, error] = std::from_chars(text.data() + (hex ? 2 : 0), end, number, hex ? 16 : 10);
+    const auto [stop, error] =
+        std::from_chars(text.data() + (hex ? 2 : 0), end, number, hex ? 16 : 10);
     if (error != std::errc() || stop != end || number < 1 || number > 127) return false;
-    return node = static_cast<std::uint8_t>(number), true;
+    node = static_cast<std::uint8_t>(number);
+    return true;
 }
 
 bool node_of(const Options& options, const std::string& text, std::uint8_t& node) {
     if (parse_node(text, node)) return true;
-    return fail(options, fmt::format("invalid node '{}'; write 1..127", text)), false;
+    fail(options, fmt::format("invalid node '{}'; write 1..127", text));
+    return false;
 }
 
 }  // namespace hal::tools

@@ -17,13 +17,16 @@ public:
 
     /// Opens the bus. Returns false after printing the reason.
     bool open(const std::string& address);
-    /// Sends and receives what is pending, and waits at most `wait_ns` when nothing is. Returns false after a signal.
+    /// Sends and receives what is pending, and waits at most `wait_ns` when nothing is. Returns
+    /// false after a signal.
     bool turn(std::int64_t wait_ns = 1'000'000);
     /// Turns until `done` or for `for_ns` (negative: no limit). Returns the last result of `done`.
     bool until(const std::function<bool()>& done, std::int64_t for_ns = -1);
-    /// Runs one SDO transfer. Returns false when there is no value; fail_transfer() prints the reason.
+    /// Runs one SDO transfer. Returns false when there is no value; fail_transfer() prints the
+    /// reason.
     bool transfer(std::uint8_t node, canopen::SdoRequest&);
-    int fail_transfer(std::uint8_t node, const canopen::SdoRequest&, const std::string& object) const;
+    int fail_transfer(std::uint8_t node, const canopen::SdoRequest&,
+                      const std::string& object) const;
 
     /// Called with every received frame, after the nodes.
     std::function<void(const can::Frame&)> on_frame;

@@ -9,7 +9,8 @@ namespace hal::tools {
 
 struct NodesOptions : Options {
     std::int64_t for_ns = -1;  ///< -1: not given
-    bool once = false, json = false;
+    bool once = false;
+    bool json = false;
 
     void declare(OptionSet& set) override {
         set.words("ADDRESS", bus_address);

@@ -29,10 +29,13 @@ class ObjectNames {
 public:
     /// Reads an EDS; does nothing when `file` is empty. Returns false after printing the reason.
     bool load(const Options&, const std::string& file);
-    /// Finds `6041`, `0x1018:1`, `Statusword`, `Identity Object/Vendor-ID`, `vendor-id`. Returns false and sets `problem`.
+    /// Finds `6041`, `0x1018:1`, `Statusword`, `Identity Object/Vendor-ID`, `vendor-id`. Returns
+    /// false and sets `problem`.
     bool find(const std::string& text, ObjectName&, std::string& problem) const;
     ObjectName named(std::uint16_t index, std::uint8_t sub) const;
-    const canopen::eds::DeviceDescription* description() const { return description_ ? &*description_ : nullptr; }
+    const canopen::eds::DeviceDescription* description() const {
+        return description_ ? &*description_ : nullptr;
+    }
 
 private:
     struct Row {
@@ -44,19 +47,22 @@ private:
     std::vector<Row> rows_;
 };
 
-/// Parses `u16`, `i32`, `r32`, `visible_string`, `domain`, `UNSIGNED16`, …; nullopt for an invalid type.
+/// Parses `u16`, `i32`, `r32`, `visible_string`, `domain`, `UNSIGNED16`, …; nullopt for an invalid
+/// type.
 std::optional<canopen::Type> parse_type(std::string_view word);
 /// Returns the valid types, for messages.
 std::string type_words();
 /// Returns "u16"; "" for none.
 std::string type_word(canopen::Type);
 
-/// Formats a value for a person: "0x0237 (567)", "-5 (0xFFFB)", "1.5 (0x3FC00000)", "\"text\" (4 bytes)"; without a type, the possible readings.
+/// Formats a value for a person: "0x0237 (567)", "-5 (0xFFFB)", "1.5 (0x3FC00000)", "\"text\" (4
+/// bytes)"; without a type, the possible readings.
 std::string value_text(std::span<const std::uint8_t> bytes, canopen::Type);
 /// Formats a value as JSON: a number, string or true/false.
 std::string value_json(std::span<const std::uint8_t> bytes, canopen::Type);
 /// Parses a value. Returns false and sets `problem`.
-bool parse_value(const std::string& text, canopen::Type, std::vector<std::uint8_t>& bytes, std::string& problem);
+bool parse_value(const std::string& text, canopen::Type, std::vector<std::uint8_t>& bytes,
+                 std::string& problem);
 std::string hex_bytes(std::span<const std::uint8_t> bytes, const char* separator);
 std::string json_text(std::string_view text);
 

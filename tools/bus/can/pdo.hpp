@@ -39,16 +39,24 @@ struct PdoSwitchOptions : PdoOptions {
 struct PdoMapOptions : PdoOptions {
     int transmission = -1;  ///< -1, here and below: unchanged
     std::string id;         ///< empty: unchanged
-    std::int64_t inhibit_ns = -1, event_ns = -1;
+    std::int64_t inhibit_ns = -1;
+    std::int64_t event_ns = -1;
 
     void declare(OptionSet& set) override {
-        set.words("ADDRESS NODE PDO OBJECT", "the bus; node ID 1..127; rpdo1 … or tpdo1 …; mapped objects: INDEX:SUB or a name, with /BITS if the length is unknown");
+        set.words("ADDRESS NODE PDO OBJECT",
+                  "the bus; node ID 1..127; rpdo1 … or tpdo1 …; mapped objects: INDEX:SUB or a "
+                  "name, with /BITS if the length is unknown");
         declare_eds(set, eds);
         declare_timeout(set, timeout_ns);
-        set.value("--transmission", transmission, "N", "transmission type: 0 SYNC after an event, 1..240 every n-th SYNC, 252, 253 on request, 254, 255 on event").in(0, 255);
+        set.value("--transmission", transmission, "N",
+                  "transmission type: 0 SYNC after an event, 1..240 every n-th SYNC, 252, 253 on "
+                  "request, 254, 255 on event")
+            .in(0, 255);
         set.value("--id", id, "ID", "identifier in hex (default: unchanged)");
-        set.duration("--inhibit", inhibit_ns, "TPDO inhibit time, the minimum interval: 1ms, 500us …");
-        set.duration("--event", event_ns, "event timer: maximum interval of a TPDO, deadline of an RPDO");
+        set.duration("--inhibit", inhibit_ns,
+                     "TPDO inhibit time, the minimum interval: 1ms, 500us …");
+        set.duration("--event", event_ns,
+                     "event timer: maximum interval of a TPDO, deadline of an RPDO");
     }
 };
 

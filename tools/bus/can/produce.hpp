@@ -19,7 +19,8 @@ struct GenerateOptions : PeriodicOptions {
     std::string id;          ///< an identifier or a range; empty: all
     int length = -1;         ///< -1: random
     std::int64_t seed = -1;  ///< -1: random
-    bool extended = false, counting = false;
+    bool extended = false;
+    bool counting = false;
 
     void declare(OptionSet& set) override {
         set.words("ADDRESS", bus_address);
@@ -38,7 +39,8 @@ struct ProduceOptions : PeriodicOptions {
     int counter = 0;  ///< overflow value of the SYNC counter; 0: no counter
 
     void declare(OptionSet& set) override {
-        set.words("ADDRESS KIND", "the bus; heartbeat NODE, sync, or guarding NODE (the requests of a master)");
+        set.words("ADDRESS KIND",
+                  "the bus; heartbeat NODE, sync, or guarding NODE (the requests of a master)");
         set.duration("--every", every_ns, "period (default 100ms; sync 10ms)", 1);
         set.for_how_long(for_ns, "end after 2s, 500ms … (default: until Ctrl-C)");
         set.value("-n,--count", count, "N", "end after N frames");

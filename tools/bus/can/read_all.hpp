@@ -16,7 +16,8 @@ struct ReadAllOptions : Options {
     void declare(OptionSet& set) override {
         set.words("ADDRESS NODE", "the bus; node ID 1..127");
         declare_eds(set, eds, "device description (EDS, DCF, XDD) with the objects of the node");
-        set.value("-o,--output", output, "FILE.csv", "write a CSV file instead of a table on standard output");
+        set.value("-o,--output", output, "FILE.csv",
+                  "write a CSV file instead of a table on standard output");
         set.flag("--json", json, "print JSON, a line per object");
         declare_timeout(set, timeout_ns);
     }

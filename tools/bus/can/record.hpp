@@ -25,7 +25,9 @@ struct CanReplayOptions : Options {
     double speed = 1.0;
 
     void declare(OptionSet& set) override {
-        set.words("FILE ADDRESS", "a candump log, pcapng or pcap file; the bus to send its frames to, at their recorded times");
+        set.words("FILE ADDRESS",
+                  "a candump log, pcapng or pcap file; the bus to send its frames to, at their "
+                  "recorded times");
         set.value("--speed", speed, "FACTOR", "replay speed (default 1: as recorded)");
     }
 };

@@ -13,7 +13,9 @@ struct ScanOptions : Options {
 
     void declare(OptionSet& set) override {
         set.words("ADDRESS", bus_address);
-        set.for_how_long(for_ns, "listen for 2s, 500ms … (default 1s); at least the slowest heartbeat period finds stopped nodes too");
+        set.for_how_long(for_ns,
+                         "listen for 2s, 500ms … (default 1s); at least the slowest heartbeat "
+                         "period finds stopped nodes too");
         set.flag("--json", json, "print JSON");
     }
 };

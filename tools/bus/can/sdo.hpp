@@ -14,7 +14,8 @@ namespace hal::tools {
 class ParallelReads {
 public:
     struct Answer {
-        std::uint8_t node = 0, sub = 0;
+        std::uint8_t node = 0;
+        std::uint8_t sub = 0;
         std::uint16_t index = 0;
         bool asked = true;          ///< false: unsolicited, or a duplicate response
         std::uint32_t abort = 0;    ///< abort code; 0: the value is valid

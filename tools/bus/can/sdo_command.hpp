@@ -12,13 +12,16 @@ namespace hal::tools {
 struct SdoOptions : Options {
     std::string eds;   ///< names and types of the objects
     std::string type;  ///< empty: not given
-    bool block = false, segmented = false;
+    bool block = false;
+    bool segmented = false;
     std::int64_t timeout_ns = 0;  ///< of one response; 0: not given
 
 protected:
     void declare_transfer(OptionSet& set) {
         declare_eds(set, eds);
-        set.value("--type", type, "TYPE", "type of the value: u8 … u64, i8 … i64, r32, r64, bool, visible_string, octet_string, domain");
+        set.value("--type", type, "TYPE",
+                  "type of the value: u8 … u64, i8 … i64, r32, r64, bool, visible_string, "
+                  "octet_string, domain");
         set.flag("--block", block, "use block transfer, if the node supports it");
         set.flag("--segmented", segmented, "do not use block transfer");
         declare_timeout(set, timeout_ns);
@@ -30,7 +33,9 @@ struct SdoReadOptions : SdoOptions {
     bool json = false;
 
     void declare(OptionSet& set) override {
-        set.words("ADDRESS NODE OBJECT", "the bus; node ID 1..127; objects: INDEX:SUB in hex (6041, 1018:1) or names of the EDS");
+        set.words("ADDRESS NODE OBJECT",
+                  "the bus; node ID 1..127; objects: INDEX:SUB in hex (6041, 1018:1) or names of "
+                  "the EDS");
         declare_transfer(set);
         set.value("-o,--output", output, "FILE", "write the raw bytes to this file");
         set.flag("--json", json, "print JSON, a line per object");
@@ -41,7 +46,9 @@ struct SdoWriteOptions : SdoOptions {
     std::string input;  ///< --from FILE
 
     void declare(OptionSet& set) override {
-        set.words("ADDRESS NODE OBJECT VALUE", "the bus; node ID 1..127; INDEX:SUB in hex or a name of the EDS; a number, 0x…, text, or hex bytes");
+        set.words("ADDRESS NODE OBJECT VALUE",
+                  "the bus; node ID 1..127; INDEX:SUB in hex or a name of the EDS; a number, 0x…, "
+                  "text, or hex bytes");
         declare_transfer(set);
         set.value("--from", input, "FILE", "write the bytes of this file instead of a value");
     }

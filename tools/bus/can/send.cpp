@@ -14,21 +14,28 @@
 namespace hal::tools {
 
 int run_can_send(const SendOptions& options) {
-    if (options.words.size() < 2) return fail(options, "missing frame; type: hal can send ADDRESS 123#1122AABB");
-    if (options.every_ns == 0 && (options.for_ns >= 0 || options.count != 0))
+    if (options.words.size() < 2) {
+        return fail(options, "missing frame; type: hal can send ADDRESS 123#1122AABB");
+    }
+    if (options.every_ns == 0 && (options.for_ns >= 0 || options.count != 0)) {
         return fail(options, "--for and --count limit the repetition of --every; add --every 10ms");
+    }
     std::vector<can::Frame> frames(options.words.size() - 1);
     std::string problem;
     bool fd = false;
     for (std::size_t i = 0; i < frames.size(); ++i) {
         if (!parse_frame(options.words[i + 1], frames[i], problem)) return fail(options, problem);
-        if (frames[i].error)
-            return fail(options, fmt::format("cannot send error frame '{}'; only a controller can send one", options.words[i + 1]));
+        if (frames[i].error) {
+            return fail(options,
+                        fmt::format("cannot send error frame '{}'; only a controller can send one",
+                                    options.words[i + 1]));
+        }
         fd = fd || frames[i].fd;
     }
     Bus bus;
     if (!bus.open(options, options.words[0], fd)) return 1;
-    std::uint64_t rounds = 0, wanted = 0;
+    std::uint64_t rounds = 0;
+    std::uint64_t wanted = 0;
     const std::int64_t began = monotonic_ns();
     for (std::int64_t due = began;;) {
         for (const can::Frame& f : frames) {
@@ -38,14 +45,19 @@ int run_can_send(const SendOptions& options) {
         bus.link->flush(can::unclocked);
         ++rounds;
         due += options.every_ns;
-        if (options.every_ns == 0 || rounds == options.count || (options.for_ns >= 0 && due - began >= options.for_ns)) break;
+        if (options.every_ns == 0 || rounds == options.count ||
+            (options.for_ns >= 0 && due - began >= options.for_ns)) {
+            break;
+        }
         const std::int64_t left = due - monotonic_ns();
         if (left > 0 ? bus.stop.wait_ns(left) : bus.stop.requested()) break;
     }
     const double seconds = static_cast<double>(monotonic_ns() - began) / 1e9;
     const int status = finish_sending(bus, options, wanted);
-    if (status == 0 && options.every_ns != 0)
-        write_all(STDERR_FILENO, fmt::format("{} frame{} in {:.2f} s\n", wanted, wanted == 1 ? "" : "s", seconds));
+    if (status == 0 && options.every_ns != 0) {
+        write_all(STDERR_FILENO,
+                  fmt::format("{} frame{} in {:.2f} s\n", wanted, wanted == 1 ? "" : "s", seconds));
+    }
     return status;
 }
 
@@ -58,29 +70,40 @@ int run_can_nmt(const NmtOptions& options) {
         {"reset", NmtCommand::reset_node},
         {"reset-comm", NmtCommand::reset_communication},
     };
-    if (options.words.size() != 3)
-        return fail(options, "expected ADDRESS COMMAND NODE; type: hal can nmt ADDRESS start|stop|preop|reset|reset-comm NODE|all");
+    if (options.words.size() != 3) {
+        return fail(options,
+                    "expected ADDRESS COMMAND NODE; type: hal can nmt ADDRESS "
+                    "start|stop|preop|reset|reset-comm NODE|all");
+    }
     const std::string &word = options.words[1], &node_text = options.words[2];
     const NmtCommand* command = nullptr;
     std::vector<std::string> names;
     for (const auto& [name, value] : commands) {
         names.emplace_back(name);
-        if (word == name) command = &value;
+        if (word == name) {
+            command = &value;
+        }
     }
     if (!command) {
         const std::string hint = did_you_mean(word, names);
-        return fail(options, fmt::format("unknown command '{}'; {}", word,
-                                         hint.empty() ? "write start, stop, preop, reset or reset-comm" : hint));
+        return fail(
+            options,
+            fmt::format("unknown command '{}'; {}", word,
+                        hint.empty() ? "write start, stop, preop, reset or reset-comm" : hint));
     }
     unsigned node = 0;
     const bool hex = node_text.starts_with("0x");
     const char* end = node_text.data() + node_text.size();
     const auto read = std::from_chars(node_text.data() + (hex ? 2 : 0), end, node, hex ? 16 : 10);
-    if (node_text != "all" && (read.ec != std::errc() || read.ptr != end || node < 1 || node > 127))
+    if (node_text != "all" &&
+        (read.ec != std::errc() || read.ptr != end || node < 1 || node > 127)) {
         return fail(options, fmt::format("invalid node '{}'; write 1..127, or all", node_text));
+    }
     Bus bus;
     if (!bus.open(options, options.words[0], false)) return 1;
-    send_with_timeout(bus, can::Frame(0x000, {static_cast<std::uint8_t>(*command), static_cast<std::uint8_t>(node_text == "all" ? 0 : node)}));
+    send_with_timeout(
+        bus, can::Frame(0x000, {static_cast<std::uint8_t>(*command),
+                                static_cast<std::uint8_t>(node_text == "all" ? 0 : node)}));
     return finish_sending(bus, options, 1);
 }
 

@@ -13,7 +13,9 @@ struct SendOptions : Options {
     std::uint64_t count = 0;    ///< 0: unlimited
 
     void declare(OptionSet& set) override {
-        set.words("ADDRESS FRAME", "the bus; frames in candump format: 123#1122AABB, 18FF0001#00, 123#R4, 123##1AABB (FD)");
+        set.words("ADDRESS FRAME",
+                  "the bus; frames in candump format: 123#1122AABB, 18FF0001#00, 123#R4, "
+                  "123##1AABB (FD)");
         set.duration("--every", every_ns, "send them periodically with this interval", 1);
         set.for_how_long(for_ns, "with --every: end after 2s, 500ms … (default: until Ctrl-C)");
         set.value("-n,--count", count, "N", "with --every: end after N rounds");
@@ -22,7 +24,9 @@ struct SendOptions : Options {
 
 struct NmtOptions : Options {
     void declare(OptionSet& set) override {
-        set.words("ADDRESS COMMAND NODE", "the bus; start, stop, preop, reset or reset-comm; node ID 1..127 (or 0x..), or all");
+        set.words(
+            "ADDRESS COMMAND NODE",
+            "the bus; start, stop, preop, reset or reset-comm; node ID 1..127 (or 0x..), or all");
     }
 };
 

@@ -28,22 +28,27 @@ const char* word(plan::Entry::What what) {
     return words[static_cast<std::size_t>(what)];
 }
 
-std::string called(const plan::Entry& e) { return e.what == plan::Entry::What::slot ? fmt::format("slot {}", e.id) : word(e.what); }
+std::string called(const plan::Entry& e) {
+    return e.what == plan::Entry::What::slot ? fmt::format("slot {}", e.id) : word(e.what);
+}
 
 std::string table_text(const config::Schedule& s, const plan::Plan& p) {
-    std::string text =
-        fmt::format("{:>9}  {:>9}  {:>9}  {:<16} {:<12} {:>6}  {}\n", "from us", "until", "free", "station", "use", "bytes", "cycles");
+    std::string text = fmt::format("{:>9}  {:>9}  {:>9}  {:<16} {:<12} {:>6}  {}\n", "from us",
+                                   "until", "free", "station", "use", "bytes", "cycles");
     for (std::size_t i = 0; i < p.entries.size(); ++i) {
         const plan::Entry& e = p.entries[i];
         Time next = s.cycle;
-        for (std::size_t k = i + 1; k < p.entries.size(); ++k)
+        for (std::size_t k = i + 1; k < p.entries.size(); ++k) {
             if (plan::meet(e, p.entries[k])) {
                 next = p.entries[k].at;
                 break;
             }
-        const std::string every = e.period == 1 ? "all" : fmt::format("{} of {}", e.phasing + 1, e.period);
-        text += fmt::format("{:>9.2f}  {:>9.2f}  {:>9.2f}  {:<16} {:<12} {:>6}  {}\n", us(e.at), us(e.until), us(next - e.until),
-                            s.stations[e.station].name, called(e), e.bytes, every);
+        }
+        const std::string every =
+            e.period == 1 ? "all" : fmt::format("{} of {}", e.phasing + 1, e.period);
+        text += fmt::format("{:>9.2f}  {:>9.2f}  {:>9.2f}  {:<16} {:<12} {:>6}  {}\n", us(e.at),
+                            us(e.until), us(next - e.until), s.stations[e.station].name, called(e),
+                            e.bytes, every);
     }
     return text;
 }
@@ -54,84 +59,117 @@ std::string timeline_text(const config::Schedule& s, const plan::Plan& p) {
     constexpr std::string_view letters = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ";
     std::string line(places, '.');
     for (const plan::Entry& e : p.entries) {
-        const auto place = [&](Time t) { return std::min(static_cast<std::size_t>(t * static_cast<Time>(places) / s.cycle), places - 1); };
-        const char mark = e.what == plan::Entry::What::sync          ? '|'
-                          : e.what == plan::Entry::What::backup_sync ? '\''
-                                                                     : letters[e.station % letters.size()];
-        for (std::size_t i = place(e.at); i <= place(e.until - 1); ++i)
-            if (i == place(e.at) || line[i] == '.') line[i] = mark;
+        const auto place = [&](Time t) {
+            return std::min(static_cast<std::size_t>(t * static_cast<Time>(places) / s.cycle),
+                            places - 1);
+        };
+        const char mark = e.what == plan::Entry::What::sync ? '|'
+                          : e.what == plan::Entry::What::backup_sync
+                              ? '\''
+                              : letters[e.station % letters.size()];
+        for (std::size_t i = place(e.at); i <= place(e.until - 1); ++i) {
+            if (i == place(e.at) || line[i] == '.') {
+                line[i] = mark;
+            }
+        }
     }
     std::string key;
-    for (std::size_t i = 0; i < s.stations.size(); ++i)
-        key += fmt::format("{}{} {}", i == 0 ? "" : ", ", letters[i % letters.size()], s.stations[i].name);
+    for (std::size_t i = 0; i < s.stations.size(); ++i) {
+        key += fmt::format("{}{} {}", i == 0 ? "" : ", ", letters[i % letters.size()],
+                           s.stations[i].name);
+    }
     return fmt::format("{}\n{}\n", line, key);
 }
 
-std::string trip_text(const config::Schedule& s, const plan::RoundTrip& t, const std::string& by_way_of) {
+std::string trip_text(const config::Schedule& s, const plan::RoundTrip& t,
+                      const std::string& by_way_of) {
     const auto& e = s.stations[t.station];
     return fmt::format(
-        "{}: worst-case latency from input to output {:.2f} us, {} cycle{} after the input is read\n"
-        "  read {:.2f}, sent {:.2f} (slot {}), received {:.2f}; {}'s thread {:.2f}, sent {:.2f}, received {:.2f}; written {:.2f}\n"
+        "{}: worst-case latency from input to output {:.2f} us, {} cycle{} after the input is "
+        "read\n"
+        "  read {:.2f}, sent {:.2f} (slot {}), received {:.2f}; {}'s thread {:.2f}, sent {:.2f}, "
+        "received {:.2f}; written {:.2f}\n"
         "  {:.2f} - {:.2f} + {:.2f} for an input that changed just after it was read = {:.2f} us\n",
-        e.name, us(t.worst), t.cycles, t.cycles == 1 ? "" : "s", us(t.read), us(t.up), e.slots.front().setup.id, us(t.up_arrives),
-        by_way_of, us(t.master), us(t.down), us(t.down_arrives), us(t.output), us(t.output), us(t.read), us(s.cycle), us(t.worst));
+        e.name, us(t.worst), t.cycles, t.cycles == 1 ? "" : "s", us(t.read), us(t.up),
+        e.slots.front().setup.id, us(t.up_arrives), by_way_of, us(t.master), us(t.down),
+        us(t.down_arrives), us(t.output), us(t.output), us(t.read), us(s.cycle), us(t.worst));
 }
 
 std::string text_of(const config::Schedule& s, const plan::Plan& p) {
     const auto slots = static_cast<std::size_t>(
-        std::count_if(p.entries.begin(), p.entries.end(), [](const auto& e) { return e.what == plan::Entry::What::slot; }));
-    std::string text = fmt::format("cycle {:g} us at {} Mbit/s, guard {:g} us: {} station{}, {} slot{}\n\n", us(s.cycle), s.speed,
-                                   us(s.guard), s.stations.size(), s.stations.size() == 1 ? "" : "s", slots, slots == 1 ? "" : "s");
+        std::count_if(p.entries.begin(), p.entries.end(),
+                      [](const auto& e) { return e.what == plan::Entry::What::slot; }));
+    std::string text =
+        fmt::format("cycle {:g} us at {} Mbit/s, guard {:g} us: {} station{}, {} slot{}\n\n",
+                    us(s.cycle), s.speed, us(s.guard), s.stations.size(),
+                    s.stations.size() == 1 ? "" : "s", slots, slots == 1 ? "" : "s");
     text += table_text(s, p) + "\n" + timeline_text(s, p) + "\n";
     text += fmt::format(
-        "load {:.1f} % with frames of full length; a frame of 60 bytes takes {:.2f} us on a line, {:.2f} us from station to "
+        "load {:.1f} % with frames of full length; a frame of 60 bytes takes {:.2f} us on a line, "
+        "{:.2f} us from station to "
         "station\n",
         100 * p.load, us(s.wire(60)), us(s.path(60)));
-    for (const auto& e : s.stations)
-        if (e.role == tdma::Role::backup)
-            text +=
-                fmt::format("{} checks {:g} us after the start of the cycle and takes over {:g} us after a missing sync\n",
-                            e.name, us(e.phase), us(e.backup_offset));
-    text += fmt::format("outputs are set to safe values {} cycle{} after the last sync: {:g} us\n", s.lost, s.lost == 1 ? "" : "s", us(s.cycle * s.lost));
-    for (const plan::RoundTrip& t : p.trips) text += trip_text(s, t, s.stations[*p.by_way_of].name);
+    for (const auto& e : s.stations) {
+        if (e.role == tdma::Role::backup) {
+            text += fmt::format(
+                "{} checks {:g} us after the start of the cycle and takes over {:g} us after a "
+                "missing sync\n",
+                e.name, us(e.phase), us(e.backup_offset));
+        }
+    }
+    text += fmt::format("outputs are set to safe values {} cycle{} after the last sync: {:g} us\n",
+                        s.lost, s.lost == 1 ? "" : "s", us(s.cycle * s.lost));
+    for (const plan::RoundTrip& t : p.trips) {
+        text += trip_text(s, t, s.stations[*p.by_way_of].name);
+    }
     return text;
 }
 
 std::string json_text(const config::Schedule& s, const plan::Plan& p) {
     std::string text =
-        fmt::format(R"({{"cycle_ns":{},"speed":{},"guard_ns":{},"load":{:.6f},"entries":[)", s.cycle, s.speed, s.guard, p.load);
+        fmt::format(R"({{"cycle_ns":{},"speed":{},"guard_ns":{},"load":{:.6f},"entries":[)",
+                    s.cycle, s.speed, s.guard, p.load);
     for (std::size_t i = 0; i < p.entries.size(); ++i) {
         const plan::Entry& e = p.entries[i];
-        text += fmt::format(R"({}{{"station":"{}","use":"{}","slot":{},"from_ns":{},"until_ns":{},"bytes":{},"period":{},"phasing":{}}})",
-                            i == 0 ? "\n " : ",\n ", s.stations[e.station].name, word(e.what),
-                            e.what == plan::Entry::What::slot ? fmt::format("{}", e.id) : "null", e.at, e.until, e.bytes, e.period,
-                            e.phasing + 1);
+        text += fmt::format(
+            R"({}{{"station":"{}","use":"{}","slot":{},"from_ns":{},"until_ns":{},"bytes":{},"period":{},"phasing":{}}})",
+            i == 0 ? "\n " : ",\n ", s.stations[e.station].name, word(e.what),
+            e.what == plan::Entry::What::slot ? fmt::format("{}", e.id) : "null", e.at, e.until,
+            e.bytes, e.period, e.phasing + 1);
     }
     text += "],\"latency\":[";
-    for (std::size_t i = 0; i < p.trips.size(); ++i)
-        text += fmt::format(R"({}{{"station":"{}","worst_ns":{},"cycles":{}}})", i == 0 ? "\n " : ",\n ",
-                            s.stations[p.trips[i].station].name, p.trips[i].worst, p.trips[i].cycles);
+    for (std::size_t i = 0; i < p.trips.size(); ++i) {
+        text += fmt::format(R"({}{{"station":"{}","worst_ns":{},"cycles":{}}})",
+                            i == 0 ? "\n " : ",\n ", s.stations[p.trips[i].station].name,
+                            p.trips[i].worst, p.trips[i].cycles);
+    }
     return text + "]}\n";
 }
 
 }  // namespace
 
 int run_tdma_plan(const TdmaPlanOptions& options) {
-    if (options.words.size() != 1)
-        return fail(options, fmt::format("nothing is expected at '{}'; see: hal help tdma plan", options.words[1]));
+    if (options.words.size() != 1) {
+        return fail(options, fmt::format("nothing is expected at '{}'; see: hal help tdma plan",
+                                         options.words[1]));
+    }
     const std::string& file = options.words[0];
     std::string text;
-    if (!config::read_from_disk(file, text)) return fail(options, fmt::format("cannot read '{}': {}", file, text));
+    if (!config::read_from_disk(file, text)) {
+        return fail(options, fmt::format("cannot read '{}': {}", file, text));
+    }
     const config::Reading reading = config::read(text);
     Sources sources;
     const std::uint32_t source = sources.add(file, text);
     Diagnostics found;
     for (const config::Message& m : reading.messages) {
         const Severity severities[] = {Severity::note, Severity::warning, Severity::error};
-        Diagnostic d{severities[static_cast<std::size_t>(m.severity)], Code::named(config::code_of(m.topic)).value_or(Code("tdma-line")),
-                     m.sentence};
+        Diagnostic d{severities[static_cast<std::size_t>(m.severity)],
+                     Code::named(config::code_of(m.topic)).value_or(Code("tdma-line")), m.sentence};
         d.labels.push_back({Span{source, m.at.offset, m.at.offset + m.at.length}, m.label});
-        if (!m.help.empty()) d.help.push_back(m.help);
+        if (!m.help.empty()) {
+            d.help.push_back(m.help);
+        }
         found.add(std::move(d));
     }
     write_all(STDERR_FILENO, render(found, sources, colours(STDERR_FILENO)));
@@ -144,7 +182,8 @@ int run_tdma_plan(const TdmaPlanOptions& options) {
         const std::string why = write_file(options.svg, picture);
         return why.empty() ? 0 : fail(options, why);
     }
-    return print(options.json ? json_text(reading.schedule, p) : text_of(reading.schedule, p)) ? 0 : 1;
+    return print(options.json ? json_text(reading.schedule, p) : text_of(reading.schedule, p)) ? 0
+                                                                                               : 1;
 }
 
 }  // namespace hal::tools

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The bus that a command names: a port, or an emulated line in this process with a clock of its own. Everything here is [setup].
+// The bus that a command names: a port, or an emulated line in this process with a clock of its
+// own. Everything here is [setup].
 #pragma once
 
 #include <memory>
@@ -16,7 +17,8 @@ namespace hal::tools {
 
 class EthercatAccess {
 public:
-    /// Opens the bus. With `alone`, another active master on it is an error. Returns false after printing the reason.
+    /// Opens the bus. With `alone`, another active master on it is an error. Returns false after
+    /// printing the reason.
     bool open(const EthercatOptions&, bool alone);
     /// Returns the positional arguments behind the address.
     const std::vector<std::string>& arguments() const { return arguments_; }

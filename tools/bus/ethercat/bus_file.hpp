@@ -9,7 +9,9 @@
 
 namespace hal::tools {
 
-/// Reads a configuration. Returns false after printing what is wrong with it; warnings are printed as well. [setup]
-bool read_bus_file(const Options& options, const std::string& path, ethercat::config::Reading& reading);
+/// Reads a configuration. Returns false after printing what is wrong with it; warnings are printed
+/// as well. [setup]
+bool read_bus_file(const Options& options, const std::string& path,
+                   ethercat::config::Reading& reading);
 
 }  // namespace hal::tools

@@ -22,33 +22,50 @@ std::string plan_json(const config::Plan& p) {
     std::string cyclic, slots, trips;
     for (const auto& f : p.cyclic) {
         std::string datagrams;
-        for (const auto& d : f.datagrams)
-            datagrams += fmt::format(R"({}{{"command":"{}","domain":{},"data_bytes":{},"output_bytes":{},"input_bytes":{},"mailbox_states":{},"wkc":{}}})",
-                                     datagrams.empty() ? "" : ",", d.command, d.domain.empty() ? "null" : json_string(d.domain), d.data_bytes,
-                                     d.output_bytes, d.input_bytes, d.mailbox_states, d.expected_wkc);
-        cyclic += fmt::format(R"({}{{"every":{},"bytes":{},"wire_ns":{},"datagrams":[{}]}})", cyclic.empty() ? "" : ",", f.every, f.bytes, f.wire_ns,
-                              datagrams);
+        for (const auto& d : f.datagrams) {
+            datagrams += fmt::format(
+                R"({}{{"command":"{}","domain":{},"data_bytes":{},"output_bytes":{},"input_bytes":{},"mailbox_states":{},"wkc":{}}})",
+                datagrams.empty() ? "" : ",", d.command,
+                d.domain.empty() ? "null" : json_string(d.domain), d.data_bytes, d.output_bytes,
+                d.input_bytes, d.mailbox_states, d.expected_wkc);
+        }
+        cyclic += fmt::format(R"({}{{"every":{},"bytes":{},"wire_ns":{},"datagrams":[{}]}})",
+                              cyclic.empty() ? "" : ",", f.every, f.bytes, f.wire_ns, datagrams);
     }
-    for (const auto& s : p.slots)
-        slots += fmt::format(R"({}{{"cycles":[{}],"frames":[{}],"wire_ns":{}}})", slots.empty() ? "" : ",", fmt::join(s.cycles, ","),
+    for (const auto& s : p.slots) {
+        slots += fmt::format(R"({}{{"cycles":[{}],"frames":[{}],"wire_ns":{}}})",
+                             slots.empty() ? "" : ",", fmt::join(s.cycles, ","),
                              fmt::join(s.frames, ","), s.wire_ns);
-    for (const auto& t : p.trips)
-        trips += fmt::format(R"({}{{"from":{},"to":{},"cycles":{},"synchronised":{},"worst_ns":{}}})", trips.empty() ? "" : ",", json_string(t.from),
-                             json_string(t.to), t.cycles, t.synchronised, t.worst_ns);
-    return fmt::format(R"({{"frames":{},"frame_bytes":{},"wire_ns":{},"propagation_ns":{},"cycle_ns":{},"shortest_cycle_ns":{},)", p.frames,
-                       p.frame_bytes, p.wire_ns, p.propagation_ns, p.cycle_ns, p.shortest_cycle_ns) +
-           fmt::format(R"("input_to_output_ns":{},"load":{:.4f},"fits":{},"period":{},"cyclic":[{}],"slots":[{}],"trips":[{}]}})",
-                       p.input_to_output_ns, p.load, p.fits, p.period, cyclic, slots, trips);
+    }
+    for (const auto& t : p.trips) {
+        trips +=
+            fmt::format(R"({}{{"from":{},"to":{},"cycles":{},"synchronised":{},"worst_ns":{}}})",
+                        trips.empty() ? "" : ",", json_string(t.from), json_string(t.to), t.cycles,
+                        t.synchronised, t.worst_ns);
+    }
+    return fmt::format(
+               R"({{"frames":{},"frame_bytes":{},"wire_ns":{},"propagation_ns":{},"cycle_ns":{},"shortest_cycle_ns":{},)",
+               p.frames, p.frame_bytes, p.wire_ns, p.propagation_ns, p.cycle_ns,
+               p.shortest_cycle_ns) +
+           fmt::format(
+               R"("input_to_output_ns":{},"load":{:.4f},"fits":{},"period":{},"cyclic":[{}],"slots":[{}],"trips":[{}]}})",
+               p.input_to_output_ns, p.load, p.fits, p.period, cyclic, slots, trips);
 }
 
 /// Returns a line per pin, each behind `lead`.
 std::string pin_lines(const config::Bus& bus, const std::string& lead) {
     std::string text;
-    for (const auto& s : bus.setup.slaves)
-        for (const auto& sm : s.sync_managers)
-            for (const auto& pdo : sm.pdos)
-                for (const auto& e : pdo.entries)
-                    if (!e.name.empty()) text += lead + config::pin_line(e, sm.output, s.name);
+    for (const auto& s : bus.setup.slaves) {
+        for (const auto& sm : s.sync_managers) {
+            for (const auto& pdo : sm.pdos) {
+                for (const auto& e : pdo.entries) {
+                    if (!e.name.empty()) {
+                        text += lead + config::pin_line(e, sm.output, s.name);
+                    }
+                }
+            }
+        }
+    }
     return text;
 }
 
@@ -56,13 +73,20 @@ std::string pin_lines(const config::Bus& bus, const std::string& lead) {
 
 bool read_bus_file(const Options& options, const std::string& path, config::Reading& reading) {
     std::string text;
-    if (!config::read_from_disk(path, text)) return fail(options, fmt::format("cannot read '{}': {}", path, text)), false;
+    if (!config::read_from_disk(path, text)) {
+        fail(options, fmt::format("cannot read '{}': {}", path, text));
+        return false;
+    }
     reading = config::read(text, path);
-    if (const std::string messages = config::to_string(reading, path); !messages.empty())
+    if (const std::string messages = config::to_string(reading, path); !messages.empty()) {
         write_all(2, messages.back() == '\n' ? messages : messages + "\n");
-    for (const config::Message& m : reading.messages)
-        if (m.severity == Severity::warning)
-            write_all(2, fmt::format("{}:{}:{}: warning: {}{}{}\n", path, m.at.line, m.at.column, m.sentence, m.help.empty() ? "" : "; ", m.help));
+    }
+    for (const config::Message& m : reading.messages) {
+        if (m.severity == Severity::warning) {
+            write_all(2, fmt::format("{}:{}:{}: warning: {}{}{}\n", path, m.at.line, m.at.column,
+                                     m.sentence, m.help.empty() ? "" : "; ", m.help));
+        }
+    }
     return reading.good();
 }
 
@@ -73,23 +97,31 @@ int run_ethercat_pdos(const EthercatOptions& options) {
     for (std::size_t n = 0; n < wire.size(); ++n) {
         const auto& c = wire.contents(n);
         text += fmt::format("{}  {}\n", n, wire.name(n));
-        for (const bool outputs : {true, false})
+        for (const bool outputs : {true, false}) {
             for (const auto& pdo : outputs ? c.rx : c.tx) {
-                const std::string place = pdo.sync_manager == 0xff ? "not assigned" : fmt::format("sync manager {}", pdo.sync_manager);
-                text += fmt::format("  {:04X} {}, {}  {}\n", pdo.index, outputs ? "outputs" : "inputs", place, pdo.name);
-                json += fmt::format(R"({}{{"position":{},"index":{},"direction":"{}","sync_manager":{},"name":{},"entries":[)",
-                                    json.empty() ? "[" : ",\n ", n, pdo.index, outputs ? "outputs" : "inputs",
-                                    pdo.sync_manager == 0xff ? "null" : std::to_string(pdo.sync_manager), json_string(pdo.name));
+                const std::string place = pdo.sync_manager == 0xff
+                                              ? "not assigned"
+                                              : fmt::format("sync manager {}", pdo.sync_manager);
+                text += fmt::format("  {:04X} {}, {}  {}\n", pdo.index,
+                                    outputs ? "outputs" : "inputs", place, pdo.name);
+                json += fmt::format(
+                    R"({}{{"position":{},"index":{},"direction":"{}","sync_manager":{},"name":{},"entries":[)",
+                    json.empty() ? "[" : ",\n ", n, pdo.index, outputs ? "outputs" : "inputs",
+                    pdo.sync_manager == 0xff ? "null" : std::to_string(pdo.sync_manager),
+                    json_string(pdo.name));
                 for (std::size_t i = 0; i < pdo.entries.size(); ++i) {
                     const auto& e = pdo.entries[i];
-                    text += e.index == 0 ? fmt::format("    gap, {} bit\n", e.bits)
-                                         : fmt::format("    {:04X}:{:X} {}, {} bit  {}\n", e.index, e.sub, ethercat::sii::type_name(e.type),
-                                                       e.bits, e.name);
-                    json += fmt::format(R"({}{{"index":{},"sub":{},"bits":{},"name":{}}})", i == 0 ? "" : ",", e.index, e.sub, e.bits,
-                                        json_string(e.name));
+                    text += e.index == 0
+                                ? fmt::format("    gap, {} bit\n", e.bits)
+                                : fmt::format("    {:04X}:{:X} {}, {} bit  {}\n", e.index, e.sub,
+                                              ethercat::sii::type_name(e.type), e.bits, e.name);
+                    json +=
+                        fmt::format(R"({}{{"index":{},"sub":{},"bits":{},"name":{}}})",
+                                    i == 0 ? "" : ",", e.index, e.sub, e.bits, json_string(e.name));
                 }
                 json += "]}";
             }
+        }
     }
     return print(options.json ? (json.empty() ? "[" : json) + "]\n" : text) ? 0 : 1;
 }
@@ -105,15 +137,24 @@ int run_ethercat_dc(const EthercatOptions& options) {
             text += fmt::format("{}  no clock  {}\n", n, wire.name(n));
             continue;
         }
-        const auto delay = wire.read(n, reg::dc_system_time_delay, 4), difference = wire.read(n, reg::dc_system_time_difference, 4);
+        const auto delay = wire.read(n, reg::dc_system_time_delay, 4);
+
+        const auto difference = wire.read(n, reg::dc_system_time_difference, 4);
         const auto activation = wire.read(n, reg::dc_activation, 1);
-        if (!delay || !difference) return fail(options, fmt::format("slave {} no longer responds; check its supply and cable", n));
+        if (!delay || !difference) {
+            return fail(options,
+                        fmt::format("slave {} no longer responds; check its supply and cable", n));
+        }
         const auto raw = ethercat::get<std::uint32_t>(difference->data());
-        const auto magnitude = static_cast<std::int64_t>(raw & 0x7fffffff), deviation = raw >> 31 != 0 ? -magnitude : magnitude;
+        const auto magnitude = static_cast<std::int64_t>(raw & 0x7fffffff);
+
+        const auto deviation = raw >> 31 != 0 ? -magnitude : magnitude;
         const bool sync = activation && ((*activation)[0] & 0x01) != 0;
-        text += fmt::format("{}  deviation {} ns  delay {} ns  SYNC {}  {}\n", n, deviation, ethercat::get<std::uint32_t>(delay->data()),
-                            sync ? "on" : "off", wire.name(n));
-        json += fmt::format(R"({}{{"position":{},"deviation_ns":{},"delay_ns":{},"sync":{}}})", json.empty() ? "[" : ",\n ", n, deviation,
+        text += fmt::format("{}  deviation {} ns  delay {} ns  SYNC {}  {}\n", n, deviation,
+                            ethercat::get<std::uint32_t>(delay->data()), sync ? "on" : "off",
+                            wire.name(n));
+        json += fmt::format(R"({}{{"position":{},"deviation_ns":{},"delay_ns":{},"sync":{}}})",
+                            json.empty() ? "[" : ",\n ", n, deviation,
                             ethercat::get<std::uint32_t>(delay->data()), sync);
     }
     return print(options.json ? (json.empty() ? "[" : json) + "]\n" : text) ? 0 : 1;
@@ -130,27 +171,33 @@ int run_ethercat_check(const EthercatCheckOptions& options) {
         }
         for (const config::Bus& bus : reading.buses) {
             const std::size_t slaves = bus.setup.slaves.size();
-            if (options.json)
-                json += fmt::format(R"({}{{"file":{},"link":{},"cycle_ns":{},"slaves":{}}})", json.empty() ? "[" : ",\n ",
-                                    json_string(file), json_string(bus.link), bus.setup.cycle_ns, slaves);
-            else if (!print(fmt::format("{}: {}, cycle {} us, {} slave{}\n{}", file, bus.link,
-                                        static_cast<double>(bus.setup.cycle_ns) / 1000, slaves, slaves == 1 ? "" : "s",
-                                        pin_lines(bus, "  "))))
+            if (options.json) {
+                json += fmt::format(R"({}{{"file":{},"link":{},"cycle_ns":{},"slaves":{}}})",
+                                    json.empty() ? "[" : ",\n ", json_string(file),
+                                    json_string(bus.link), bus.setup.cycle_ns, slaves);
+            } else if (!print(fmt::format("{}: {}, cycle {} us, {} slave{}\n{}", file, bus.link,
+                                          static_cast<double>(bus.setup.cycle_ns) / 1000, slaves,
+                                          slaves == 1 ? "" : "s", pin_lines(bus, "  ")))) {
                 return 1;
+            }
         }
     }
     return !options.json || print((json.empty() ? "[" : json) + "]\n") ? status : 1;
 }
 
 int run_ethercat_plan(const EthercatPlanOptions& options) {
-    if (options.words.size() != 1)
-        return fail(options, fmt::format("nothing is expected at '{}'; see: hal help ethercat plan", options.words[1]));
+    if (options.words.size() != 1) {
+        return fail(options, fmt::format("nothing is expected at '{}'; see: hal help ethercat plan",
+                                         options.words[1]));
+    }
     config::Reading reading;
     if (!read_bus_file(options, options.words[0], reading)) return 1;
     if (!options.svg.empty()) {
         if (options.json) return fail(options, "--json and --svg exclude each other");
-        if (reading.buses.size() != 1)
-            return fail(options, fmt::format("{} has {} masters; a picture shows one", options.words[0], reading.buses.size()));
+        if (reading.buses.size() != 1) {
+            return fail(options, fmt::format("{} has {} masters; a picture shows one",
+                                             options.words[0], reading.buses.size()));
+        }
         const config::PlanOptions assumed;
         const config::Plan p = config::plan(reading.buses[0], assumed);
         const std::string picture = ethercat_plan_picture(reading.buses[0], p, assumed);
@@ -168,7 +215,8 @@ int run_ethercat_plan(const EthercatPlanOptions& options) {
     }
     if (!print(options.json ? (json.empty() ? "[" : json) + "]\n" : text)) return 1;
     if (fits) return 0;
-    return fail(options, fmt::format("{}: the cycle is too short; raise `cycle`, or exchange slow slaves in a [domain] with every = 4",
+    return fail(options, fmt::format("{}: the cycle is too short; raise `cycle`, or exchange slow "
+                                     "slaves in a [domain] with every = 4",
                                      options.words[0]));
 }
 

@@ -53,26 +53,33 @@ constexpr RegisterName names[] = {{0x0000, 0x000f, "ESC information"},
                                   {0x0980, 0x09af, "DC SYNC"}};
 
 const char* register_name(std::uint16_t address) {
-    const auto found =
-        std::find_if(std::begin(names), std::end(names), [&](const RegisterName& r) { return address >= r.first && address <= r.last; });
+    const auto found = std::find_if(std::begin(names), std::end(names), [&](const RegisterName& r) {
+        return address >= r.first && address <= r.last;
+    });
     return found == std::end(names) ? "" : found->name;
 }
 
 std::string state_name(unsigned status) {
     const char* const words[] = {"none", "INIT", "PRE-OP", "BOOT", "SAFE-OP", "5", "6", "7", "OP"};
     const unsigned state = status & 0x0f;
-    return fmt::format("{}{}", state <= 8 ? words[state] : "several", (status & 0x10) != 0 ? ", error" : "");
+    return fmt::format("{}{}", state <= 8 ? words[state] : "several",
+                       (status & 0x10) != 0 ? ", error" : "");
 }
 
-std::string object(std::uint16_t index, unsigned sub) { return fmt::format("0x{:04X}:{}", index, sub); }
+std::string object(std::uint16_t index, unsigned sub) {
+    return fmt::format("0x{:04X}:{}", index, sub);
+}
 
 std::string sdo_words(Bytes payload, bool request) {
     const auto sdo = coe::read_sdo(payload);
     if (!sdo) return "SDO";
     namespace command = coe::command;
-    const std::string name = object(sdo->index, sdo->sub) + (sdo->complete() ? ", complete access" : "");
-    if (sdo->is(command::abort))
-        return fmt::format("SDO abort {}: 0x{:08X}, {}", object(sdo->index, sdo->sub), sdo->value, coe::abort_text(sdo->value));
+    const std::string name =
+        object(sdo->index, sdo->sub) + (sdo->complete() ? ", complete access" : "");
+    if (sdo->is(command::abort)) {
+        return fmt::format("SDO abort {}: 0x{:08X}, {}", object(sdo->index, sdo->sub), sdo->value,
+                           coe::abort_text(sdo->value));
+    }
     if (request) {
         if (sdo->is(command::download)) return "SDO download " + name;
         if (sdo->is(command::upload)) return "SDO upload " + name;
@@ -80,19 +87,23 @@ std::string sdo_words(Bytes payload, bool request) {
     }
     if (sdo->is(command::upload_response)) return "SDO uploaded " + name;
     if (sdo->is(command::download_response)) return "SDO downloaded " + name;
-    return sdo->is(command::upload_segment_response) ? "SDO segment uploaded" : "SDO segment downloaded";
+    return sdo->is(command::upload_segment_response) ? "SDO segment uploaded"
+                                                     : "SDO segment downloaded";
 }
 
 std::string coe_words(Bytes payload) {
     if (payload.size() < coe::header_bytes) return "";
     switch (coe::service_of(payload.data())) {
     case coe::Service::emergency:
-        if (const auto e = coe::read_emergency(payload)) return fmt::format("emergency 0x{:04X}", e->code);
+        if (const auto e = coe::read_emergency(payload)) {
+            return fmt::format("emergency 0x{:04X}", e->code);
+        }
         return "emergency";
     case coe::Service::sdo_request: return sdo_words(payload, true);
     case coe::Service::sdo_response: return sdo_words(payload, false);
     case coe::Service::sdo_information: return "SDO information";
-    default: return fmt::format("service {}", static_cast<unsigned>(coe::service_of(payload.data())));
+    default:
+        return fmt::format("service {}", static_cast<unsigned>(coe::service_of(payload.data())));
     }
 }
 
@@ -105,7 +116,9 @@ std::string foe_words(Bytes payload) {
     case foe::Opcode::write: return "write '" + printable(text) + "'";
     case foe::Opcode::data: return fmt::format("data packet {}, {} bytes", m->value, text.size());
     case foe::Opcode::ack: return fmt::format("acknowledge packet {}", m->value);
-    case foe::Opcode::error: return fmt::format("error 0x{:X}, {}", m->value, foe::to_string(static_cast<foe::Error>(m->value)));
+    case foe::Opcode::error:
+        return fmt::format("error 0x{:X}, {}", m->value,
+                           foe::to_string(static_cast<foe::Error>(m->value)));
     case foe::Opcode::busy: return "busy";
     }
     return "";
@@ -119,12 +132,15 @@ std::string mailbox_words(Bytes bytes) {
     case MailboxType::coe: return "CoE " + coe_words(m->payload);
     case MailboxType::foe: return "FoE " + foe_words(m->payload);
     case MailboxType::error:
-        if (const auto error = read_mailbox_error(m->payload)) return std::string("mailbox error: ") + to_string(*error);
+        if (const auto error = read_mailbox_error(m->payload)) {
+            return std::string("mailbox error: ") + to_string(*error);
+        }
         return "";
     case MailboxType::aoe:
     case MailboxType::eoe:
     case MailboxType::soe:
-    case MailboxType::voe: return fmt::format("{}, {} bytes", to_string(m->type), m->payload.size());
+    case MailboxType::voe:
+        return fmt::format("{}, {} bytes", to_string(m->type), m->payload.size());
     }
     return "";
 }
@@ -138,7 +154,9 @@ std::string datagram_address(const DatagramView& d, bool passed) {
     case Command::apwr:
     case Command::aprw:
     case Command::armw:
-        if (passed) return fmt::format("position of 0x{:04X}", d.position());
+        if (passed) {
+            return fmt::format("position of 0x{:04X}", d.position());
+        }
         return fmt::format("slave {}", static_cast<std::uint16_t>(-static_cast<int>(d.position())));
     case Command::fprd:
     case Command::fpwr:
@@ -157,24 +175,36 @@ std::string datagram_address(const DatagramView& d, bool passed) {
 std::string datagram_words(const DatagramView& d) {
     if (d.command == Command::nop || is_logical(d.command)) return "";
     const std::uint16_t address = d.register_address();
-    if (address >= registers::process_data_memory) return mailbox_words({d.data, d.length});
+    if (address >= registers::process_data_memory) {
+        return mailbox_words({d.data, d.length});
+    }
     std::string text = register_name(address);
-    if (address == registers::al_control && d.length >= 1)
-        text += ": " + state_name(d.data[0] & 0x0fU) + ((d.data[0] & 0x10) != 0 ? ", acknowledge" : "");
+    if (address == registers::al_control && d.length >= 1) {
+        text +=
+            ": " + state_name(d.data[0] & 0x0fU) + ((d.data[0] & 0x10) != 0 ? ", acknowledge" : "");
+    }
     if (address == registers::al_status && d.length >= 1) {
         text += ": " + state_name(d.data[0]);
         const std::uint16_t code = d.length >= 6 ? get<std::uint16_t>(d.data + 4) : 0;
         if ((d.data[0] & 0x10) != 0 && code != 0) {
             const AlStatusCode* row = al_status(code);
-            text += fmt::format(" 0x{:04X}{}{}", code, row == nullptr ? "" : ", ", row == nullptr ? "" : row->text);
+            text += fmt::format(" 0x{:04X}{}{}", code, row == nullptr ? "" : ", ",
+                                row == nullptr ? "" : row->text);
         }
     }
-    if (address >= registers::sync_manager && address < 0x0880 && d.length < 8 * 9)
+    if (address >= registers::sync_manager && address < 0x0880 && d.length < 8 * 9) {
         text += fmt::format(" {}", (address - registers::sync_manager) / 8);
-    if (address >= registers::sync_manager && address < 0x0880 && address % 8 == 5 && d.length == 1)
+    }
+    if (address >= registers::sync_manager && address < 0x0880 && address % 8 == 5 &&
+        d.length == 1) {
         text += (d.data[0] & 0x08) != 0 ? ", full" : ", empty";
-    if (address >= registers::fmmu && address < 0x0700) text += fmt::format(" {}", (address - registers::fmmu) / 16);
-    if (address == registers::dc_system_time && d.length == 8) text += fmt::format(": {} ns", get<std::uint64_t>(d.data));
+    }
+    if (address >= registers::fmmu && address < 0x0700) {
+        text += fmt::format(" {}", (address - registers::fmmu) / 16);
+    }
+    if (address == registers::dc_system_time && d.length == 8) {
+        text += fmt::format(": {} ns", get<std::uint64_t>(d.data));
+    }
     return text;
 }
 

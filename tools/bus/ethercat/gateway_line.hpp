@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The mailboxes of slaves behind the mailbox gateway (ETG.8200) of a running master: ours, or another one. Everything here is [setup].
+// The mailboxes of slaves behind the mailbox gateway (ETG.8200) of a running master: ours, or
+// another one. Everything here is [setup].
 #pragma once
 
 #include <cstdint>
@@ -26,7 +27,8 @@ public:
     /// Connects and reads the list of slaves. Returns why not; empty: connected.
     std::string open(const std::string& address);
     bool is_open() const { return fd_ >= 0; }
-    bool is_closed() const { return closed_; }  ///< Returns whether the other side ended the connection.
+    /// Returns whether the other side ended the connection.
+    bool is_closed() const { return closed_; }
 
     std::size_t size() const { return slaves_.size(); }
     ethercat::master::BusSlave& slave(std::size_t position) { return slaves_[position]; }

@@ -22,7 +22,8 @@ struct EthercatOptions : Options {
 protected:
     void declare_bus(OptionSet& set) {
         set.value("--emulate", emulate, "LINE",
-                  "emulate these devices instead of a bus: \"coupler, servo axes=2\", or a file with one device per line");
+                  "emulate these devices instead of a bus: \"coupler, servo axes=2\", or a file "
+                  "with one device per line");
         set.flag("--json", json, "print JSON");
     }
 };
@@ -32,10 +33,14 @@ struct EthercatConfigOptions : EthercatOptions {
     std::string esi;
 
     void declare(OptionSet& set) override {
-        set.words("ADDRESS NAME", "eth:enp3s0, not with --emulate; then the name of the files: NAME.ethercat and NAME.hal", false);
+        set.words("ADDRESS NAME",
+                  "eth:enp3s0, not with --emulate; then the name of the files: NAME.ethercat and "
+                  "NAME.hal",
+                  false);
         declare_bus(set);
         set.value("--esi", esi, "LIST",
-                  "write the files for these descriptions instead of the slaves on a bus: FILE.xml, or FILE.xml:DEVICE, separated by commas");
+                  "write the files for these descriptions instead of the slaves on a bus: "
+                  "FILE.xml, or FILE.xml:DEVICE, separated by commas");
     }
 };
 
@@ -44,9 +49,14 @@ struct EthercatPositionOptions : EthercatOptions {
     int position = -1;  ///< -1: not given
 
     void declare(OptionSet& set) override {
-        set.words("ADDRESS ARG", "eth:enp3s0, not with --emulate; then the arguments of the command: numbers in decimal, 0x… or 0…", false);
+        set.words("ADDRESS ARG",
+                  "eth:enp3s0, not with --emulate; then the arguments of the command: numbers in "
+                  "decimal, 0x… or 0…",
+                  false);
         declare_bus(set);
-        set.value("-p,--position", position, "N", "position of the slave, counted from 0; not needed for a single slave").in(0, 65535);
+        set.value("-p,--position", position, "N",
+                  "position of the slave, counted from 0; not needed for a single slave")
+            .in(0, 65535);
     }
 };
 
@@ -68,7 +78,9 @@ struct EthercatValueOptions : EthercatPositionOptions {
 
     void declare(OptionSet& set) override {
         EthercatPositionOptions::declare(set);
-        set.value("-t,--type", type, "TYPE", "type of the value: bool, int8 … int64, uint8 … uint64, float, double, string, octet_string");
+        set.value("-t,--type", type, "TYPE",
+                  "type of the value: bool, int8 … int64, uint8 … uint64, float, double, string, "
+                  "octet_string");
     }
 };
 
@@ -86,7 +98,8 @@ struct EthercatPlanOptions : Options {
     bool json = false;
 
     void declare(OptionSet& set) override {
-        set.words("FILE", "configuration of the bus, NAME.ethercat or LinuxCNC's ethercat-conf.xml");
+        set.words("FILE",
+                  "configuration of the bus, NAME.ethercat or LinuxCNC's ethercat-conf.xml");
         set.value("--svg", svg, "FILE", "draw the timing of a cycle instead; - prints it");
         set.flag("--json", json, "print JSON");
     }
@@ -97,19 +110,21 @@ struct EthercatLcecOptions : Options {
 
     void declare(OptionSet& set) override {
         set.words("FILE", "LinuxCNC's ethercat-conf.xml");
-        set.value("--name", name, "NAME", "instance of the machine (default: the one that started this program)");
+        set.value("--name", name, "NAME",
+                  "instance of the machine (default: the one that started this program)");
     }
 };
 
 struct EthercatDumpOptions : Options {
     std::string filter;
     std::int64_t for_ns = -1;  ///< -1: not given
-    std::uint64_t count = 0;   ///< 0: not given
+    std::uint64_t count = 0;  ///< 0: not given
     bool json = false;
 
     void declare(OptionSet& set) override {
         set.words("ADDRESS|FILE", "eth:enp3s0, or a capture of Wireshark: FILE.pcapng, FILE.pcap");
-        set.value("--filter", filter, "WORD", "only datagrams with this word in the line: FPRD, CoE, 'AL status', 0x1001");
+        set.value("--filter", filter, "WORD",
+                  "only datagrams with this word in the line: FPRD, CoE, 'AL status', 0x1001");
         set.for_how_long(for_ns, "end after 5s, 500ms … (default: on Ctrl-C)");
         set.value("-n,--count", count, "N", "end after N datagrams");
         set.flag("--json", json, "print a JSON object per line");

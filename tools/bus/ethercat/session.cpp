@@ -14,7 +14,8 @@ using master::BusSlave;
 
 namespace {
 
-constexpr std::int64_t cycle_ns = 1'000'000, second = 1'000'000'000;
+constexpr std::int64_t cycle_ns = 1'000'000;
+constexpr std::int64_t second = 1'000'000'000;
 constexpr std::uint16_t most_slaves = 1024;
 
 }  // namespace
@@ -35,9 +36,15 @@ BusSlave* EthercatSession::find(std::uint16_t number) {
 }
 
 bool EthercatSession::open(const EthercatOptions& options, bool objects) {
-    if (options.emulate.empty() && !options.words.empty() && GatewayLine::is_gateway(options.words.front())) {
-        if (!objects)
-            return fail(options, "this command needs the bus itself; through a gateway there are upload, download and sdos"), false;
+    if (options.emulate.empty() && !options.words.empty() &&
+        GatewayLine::is_gateway(options.words.front())) {
+        if (!objects) {
+            fail(options,
+                 "this command needs the bus itself; through a gateway there are upload, "
+                 "download and sdos");
+
+            return false;
+        }
         arguments_.assign(options.words.begin() + 1, options.words.end());
         const std::string problem = gateway_.open(options.words.front());
         return problem.empty() || (fail(options, problem), false);
@@ -47,26 +54,36 @@ bool EthercatSession::open(const EthercatOptions& options, bool objects) {
     ethernet::Port* port = &access_.port();
     master::Setup setup;
     setup.cycle_ns = cycle_ns;
-    setup.frame_timeout_ns = 20'000'000;  // this program and an emulated line share the processor with others
+    // this program and an emulated line share the processor with others
+    setup.frame_timeout_ns = 20'000'000;
     setup.most_slaves = most_slaves;
     setup.frame_bytes = ethernet::header_bytes + port->statistics().mtu;
-    master_ = std::make_unique<master::Master>(setup, port->address(), static_cast<master::Events&>(*this), server_.coe());
+    master_ = std::make_unique<master::Master>(setup, port->address(),
+                                               static_cast<master::Events&>(*this), server_.coe());
     master_->add(channel_);
-    for (std::size_t n = 0; n < server_.workers(); ++n) master_->add(server_.channel(n));
+    for (std::size_t n = 0; n < server_.workers(); ++n) {
+        master_->add(server_.channel(n));
+    }
     master_->attach(*port);
     if (!until([&] { return master_->status().scanned && master_->found() != 0; }, 2 * second)) {
         const auto& status = master_->status();
-        if (status.responding == 0)
-            return fail(options,
-                        fmt::format("no slave responds on {}; check cable and supply, and that it is the right interface", address)),
-                   false;
-        return fail(options, fmt::format("{} slaves respond on {}, but they could not be identified within 2 s; check the cables",
-                                         status.responding, address)),
-               false;
+        if (status.responding == 0) {
+            fail(options, fmt::format("no slave responds on {}; check cable and supply, and "
+                                      "that it is the right interface",
+                                      address));
+
+            return false;
+        }
+        fail(options, fmt::format("{} slaves respond on {}, but they could not be "
+                                  "identified within 2 s; check the cables",
+                                  status.responding, address));
+
+        return false;
     }
     until([&] {
-        for (std::size_t n = 0; n < size(); ++n)
+        for (std::size_t n = 0; n < size(); ++n) {
             if (!slave(n).al_failed && slave(n).state != State::preop) return false;
+        }
         return true;
     }, 5 * second);
     return true;
@@ -76,7 +93,9 @@ void EthercatSession::cycle() {
     if (gateway_.is_open()) {
         gateway_.receive();
         server_.step(monotonic_ns());
-        for (std::size_t n = 0; n < server_.workers(); ++n) gateway_.serve(server_.channel(n), monotonic_ns());
+        for (std::size_t n = 0; n < server_.workers(); ++n) {
+            gateway_.serve(server_.channel(n), monotonic_ns());
+        }
         return;
     }
     access_.pass(cycle_ns);
@@ -89,52 +108,82 @@ void EthercatSession::cycle() {
 
 bool EthercatSession::until(const std::function<bool()>& done, std::int64_t timeout_ns) {
     const auto now_ns = [this] { return gateway_.is_open() ? monotonic_ns() : access_.now_ns(); };
-    for (const std::int64_t end = now_ns() + timeout_ns; !done(); cycle())
+    for (const std::int64_t end = now_ns() + timeout_ns; !done(); cycle()) {
         if (now_ns() >= end) return false;
+    }
     return true;
 }
 
 BusSlave* EthercatSession::chosen(const EthercatPositionOptions& options) {
-    if (!until([&] { return size() != 0; }, 2 * second))  // a line that paused is scanned again
-        return fail(options, "no slave answers; check the cable and the supply of the first slave"), nullptr;
-    if (options.position < 0 && size() != 1)
-        return fail(options, fmt::format("{} slaves on the bus; choose one with -p 0 … -p {}", size(), size() - 1)), nullptr;
+    if (!until([&] { return size() != 0; }, 2 * second)) {  // a line that paused is scanned again
+        fail(options, "no slave answers; check the cable and the supply of the first slave");
+
+        return nullptr;
+    }
+    if (options.position < 0 && size() != 1) {
+        fail(options,
+             fmt::format("{} slaves on the bus; choose one with -p 0 … -p {}", size(), size() - 1));
+
+        return nullptr;
+    }
     const auto position = static_cast<std::size_t>(options.position < 0 ? 0 : options.position);
-    if (position >= size())
-        return fail(options,
-                    fmt::format("no slave at position {}; the bus has {}, the last one at position {}", position, size(), size() - 1)),
-               nullptr;
+    if (position >= size()) {
+        fail(options,
+             fmt::format("no slave at position {}; the bus has {}, the last one at position {}",
+                         position, size(), size() - 1));
+
+        return nullptr;
+    }
     return &slave(position);
 }
 
 bool EthercatSession::set_boot(const EthercatOptions& options, BusSlave& s, bool boot) {
-    if (boot && !s.bootstrap.usable())
-        return fail(options, fmt::format("slave {}: its EEPROM has no mailbox for BOOT; it takes its firmware in PRE-OP (without --boot), "
-                                         "or by a tool of its maker",
-                                         s.position)),
-               false;
+    if (boot && !s.bootstrap.usable()) {
+        fail(options, fmt::format("slave {}: its EEPROM has no mailbox for BOOT; it takes "
+                                  "its firmware in PRE-OP (without --boot), "
+                                  "or by a tool of its maker",
+                                  s.position));
+
+        return false;
+    }
     const State target = boot ? State::boot : State::preop;
-    if (!until([&] { return master_->idle(s); }, 10 * second))
-        return fail(options, fmt::format("slave {}: its start-up does not end; see: hal ethercat states", s.position)), false;
+    if (!until([&] { return master_->idle(s); }, 10 * second)) {
+        fail(options, fmt::format("slave {}: its start-up does not end; see: hal ethercat states",
+                                  s.position));
+
+        return false;
+    }
     master_->set_boot(s, boot);
     const auto reached = [&] { return s.state == target && !s.al_failed; };
     // a slave that was just flashed may start anew
-    if (until([&] { return reached() || (boot && s.al_failed); }, (boot ? 10 : 60) * second) && reached()) return true;
-    return fail(options, fmt::format("slave {}: {} not reached, it is in {}{}; see: hal ethercat states", s.position, to_string(target),
-                                     to_string(s.state), s.al_failed ? fmt::format(", AL status code 0x{:04X}", s.al_code) : "")),
-           false;
+    if (until([&] { return reached() || (boot && s.al_failed); }, (boot ? 10 : 60) * second) &&
+        reached()) {
+        return true;
+    }
+    fail(options,
+         fmt::format("slave {}: {} not reached, it is in {}{}; see: hal ethercat states",
+                     s.position, to_string(target), to_string(s.state),
+                     s.al_failed ? fmt::format(", AL status code 0x{:04X}", s.al_code) : ""));
+
+    return false;
 }
 
 bool EthercatSession::run(master::MailboxRequest& request) {
     if (!requests_.submit(request)) return false;
     const auto moved = [&] {
-        return request.progress == nullptr ? 0U : request.progress->bytes + (std::uint32_t{request.progress->done} << 16);
+        return request.progress == nullptr
+                   ? 0U
+                   : request.progress->bytes + (std::uint32_t{request.progress->done} << 16);
     };
     const master::BusSlave* const slave = find(request.slave);
-    TransferProgress shown(fmt::format("slave {}, file '{}'", slave != nullptr ? slave->position : 0, request.name));
-    const std::size_t total = request.kind == master::MailboxRequest::Kind::foe_write ? request.data.size() : 0;
+    TransferProgress shown(
+        fmt::format("slave {}, file '{}'", slave != nullptr ? slave->position : 0, request.name));
+    const std::size_t total =
+        request.kind == master::MailboxRequest::Kind::foe_write ? request.data.size() : 0;
     const auto finished = [&] {
-        if (request.progress != nullptr) shown.update(request.progress->bytes, total);
+        if (request.progress != nullptr) {
+            shown.update(request.progress->bytes, total);
+        }
         return requests_.finished(request);
     };
     std::uint32_t before = 0;

@@ -19,10 +19,15 @@ using ethercat::master::BusSlave;
 namespace reg = ethercat::registers;
 
 std::string error_of(const BusSlave& s) {
-    if (!s.al_failed) return {};
+    if (!s.al_failed) {
+        return {};
+    }
     const auto* row = ethercat::al_status(s.al_code);
-    if (row == nullptr) return fmt::format("AL status code 0x{:04X}; see the manual of the device", s.al_code);
-    return fmt::format("AL status code 0x{:04X} ({}): {}; {}", s.al_code, row->text, row->cause, row->remedy);
+    if (row == nullptr) {
+        return fmt::format("AL status code 0x{:04X}; see the manual of the device", s.al_code);
+    }
+    return fmt::format("AL status code 0x{:04X} ({}): {}; {}", s.al_code, row->text, row->cause,
+                       row->remedy);
 }
 
 /// Prints a line per slave by `line`, or JSON by `member`.
@@ -31,31 +36,42 @@ int list(const EthercatOptions& options, EthercatWire& wire, Line line, Member m
     std::string text;
     for (std::size_t n = 0; n < wire.size(); ++n) {
         const BusSlave& s = wire.slave(n);
-        if (options.json)
-            text += fmt::format("{}{{\"position\":{},\"state\":{},\"error\":{}{}}}", n == 0 ? "[" : ",\n ", n,
-                                json_string(ethercat::to_string(s.state)), s.al_failed ? json_string(error_of(s)) : "null", member(s));
-        else text += line(s) + "\n";
+        if (options.json) {
+            text += fmt::format("{}{{\"position\":{},\"state\":{},\"error\":{}{}}}",
+                                n == 0 ? "[" : ",\n ", n, json_string(ethercat::to_string(s.state)),
+                                s.al_failed ? json_string(error_of(s)) : "null", member(s));
+        } else {
+            text += line(s) + "\n";
+        }
     }
     return print(text + (options.json ? "]\n" : "")) ? 0 : 1;
 }
 
 std::string state_column(const BusSlave& s) {
-    return fmt::format("{:<4} {}{}{}", s.position, ethercat::to_string(s.state), s.al_failed ? "  " : "", error_of(s));
+    return fmt::format("{:<4} {}{}{}", s.position, ethercat::to_string(s.state),
+                       s.al_failed ? "  " : "", error_of(s));
 }
 
 std::optional<State> state_named(const std::string& text) {
     std::string plain;
-    for (const char c : text)
-        if (c != '-') plain += static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
-    constexpr std::pair<const char*, State> names[] = {
-        {"INIT", State::init}, {"PREOP", State::preop}, {"BOOT", State::boot}, {"SAFEOP", State::safeop}, {"OP", State::op}};
-    for (const auto& [name, state] : names)
+    for (const char c : text) {
+        if (c != '-') {
+            plain += static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+        }
+    }
+    constexpr std::pair<const char*, State> names[] = {{"INIT", State::init},
+                                                       {"PREOP", State::preop},
+                                                       {"BOOT", State::boot},
+                                                       {"SAFEOP", State::safeop},
+                                                       {"OP", State::op}};
+    for (const auto& [name, state] : names) {
         if (plain == name) return state;
+    }
     return std::nullopt;
 }
 
-bool set_sync_manager(EthercatWire& wire, const BusSlave& s, unsigned number, std::uint16_t start, std::size_t length,
-                      std::uint8_t control) {
+bool set_sync_manager(EthercatWire& wire, const BusSlave& s, unsigned number, std::uint16_t start,
+                      std::size_t length, std::uint8_t control) {
     const auto bytes = static_cast<std::uint16_t>(length);
     const std::uint8_t values[8] = {static_cast<std::uint8_t>(start),
                                     static_cast<std::uint8_t>(start >> 8),
@@ -79,11 +95,18 @@ void prepare(EthercatWire& wire, const BusSlave& s, State next) {
     } else if (next == State::safeop) {
         for (unsigned n = 0; n < c.sync_managers.size(); ++n) {
             const auto& sm = c.sync_managers[n];
-            if (sm.type != ethercat::sii::SmType::outputs && sm.type != ethercat::sii::SmType::inputs) continue;
+            if (sm.type != ethercat::sii::SmType::outputs &&
+                sm.type != ethercat::sii::SmType::inputs) {
+                continue;
+            }
             std::size_t bits = 0;
-            for (const auto* pdos : {&c.tx, &c.rx})
-                for (const auto& pdo : *pdos)
-                    for (const auto& entry : pdo.entries) bits += pdo.sync_manager == n ? entry.bits : 0U;
+            for (const auto* pdos : {&c.tx, &c.rx}) {
+                for (const auto& pdo : *pdos) {
+                    for (const auto& entry : pdo.entries) {
+                        bits += pdo.sync_manager == n ? entry.bits : 0U;
+                    }
+                }
+            }
             set_sync_manager(wire, s, n, sm.start, (bits + 7) / 8, sm.control);
         }
     }
@@ -94,7 +117,8 @@ bool request(EthercatWire& wire, BusSlave& s, State state) {
     constexpr std::int64_t timeout_ns = 10'000'000'000;
     prepare(wire, s, state);
     if (!wire.write(s.position, reg::al_control, static_cast<std::uint16_t>(state))) return false;
-    for (const std::int64_t until = wire.now_ns() + timeout_ns; wire.now_ns() < until; wire.pass(1'000'000)) {
+    for (const std::int64_t until = wire.now_ns() + timeout_ns; wire.now_ns() < until;
+         wire.pass(1'000'000)) {
         wire.read_state(s);
         if (s.state == state && !s.al_failed) return true;
         if (s.al_failed || s.state == State::none) return false;
@@ -105,20 +129,32 @@ bool request(EthercatWire& wire, BusSlave& s, State state) {
 /// Brings a slave to a state step by step; returns the state that it did not reach.
 std::optional<State> bring(EthercatWire& wire, BusSlave& s, State target) {
     if (s.al_failed) {
-        wire.write(s.position, reg::al_control, static_cast<std::uint16_t>(static_cast<unsigned>(s.state) | ethercat::al_error));
+        wire.write(s.position, reg::al_control,
+                   static_cast<std::uint16_t>(static_cast<unsigned>(s.state) | ethercat::al_error));
         wire.read_state(s);
     }
     if (s.state == target && !s.al_failed) return std::nullopt;
     std::vector<State> way;
-    if (target == State::init || target == State::boot || s.state == State::boot || s.state == State::none) way.push_back(State::init);
-    if (target == State::boot) way.push_back(State::boot);
+    if (target == State::init || target == State::boot || s.state == State::boot ||
+        s.state == State::none) {
+        way.push_back(State::init);
+    }
+    if (target == State::boot) {
+        way.push_back(State::boot);
+    }
     const bool up = target != State::boot && (!way.empty() || target > s.state);
     const State from = way.empty() ? s.state : State::init;
-    for (const State step : {State::preop, State::safeop, State::op})
-        if (up && step > from && step <= target) way.push_back(step);
-    if (way.empty()) way.push_back(target);
-    for (const State step : way)
+    for (const State step : {State::preop, State::safeop, State::op}) {
+        if (up && step > from && step <= target) {
+            way.push_back(step);
+        }
+    }
+    if (way.empty()) {
+        way.push_back(target);
+    }
+    for (const State step : way) {
         if (!request(wire, s, step)) return step;
+    }
     return std::nullopt;
 }
 
@@ -129,18 +165,26 @@ int run_ethercat_scan(const EthercatOptions& options) {
     if (!wire.open(options) || !wire.without_arguments(options)) return 1;
     const auto depth = [&](const BusSlave& s) {
         std::size_t count = 0;
-        for (int at = s.parent; at >= 0 && count < wire.size(); at = wire.slave(static_cast<std::size_t>(at)).parent) ++count;
+        for (int at = s.parent; at >= 0 && count < wire.size();
+             at = wire.slave(static_cast<std::size_t>(at)).parent) {
+            ++count;
+        }
         return count;
     };
     return list(options, wire, [&](const BusSlave& s) {
-        std::string text = fmt::format("{}{}  {}{}  {}", std::string(2 * depth(s), ' '), s.position, ethercat::to_string(s.state),
-                                       s.al_failed ? " + error" : "", wire.name(s.position));
-        if (s.parent >= 0) text += fmt::format("  at port {} of slave {}", s.parent_port, s.parent);
+        std::string text = fmt::format("{}{}  {}{}  {}", std::string(2 * depth(s), ' '), s.position,
+                                       ethercat::to_string(s.state), s.al_failed ? " + error" : "",
+                                       wire.name(s.position));
+        if (s.parent >= 0) {
+            text += fmt::format("  at port {} of slave {}", s.parent_port, s.parent);
+        }
         return text + (s.has_dc() ? fmt::format("  delay {} ns", s.delay_ns) : "  no clock");
     }, [&](const BusSlave& s) {
         const std::string parent =
-            s.parent >= 0 ? fmt::format("{},\"parent_port\":{}", s.parent, s.parent_port) : "null,\"parent_port\":null";
-        return fmt::format(R"(,"name":{},"parent":{},"delay_ns":{})", json_string(wire.name(s.position)), parent,
+            s.parent >= 0 ? fmt::format("{},\"parent_port\":{}", s.parent, s.parent_port)
+                          : "null,\"parent_port\":null";
+        return fmt::format(R"(,"name":{},"parent":{},"delay_ns":{})",
+                           json_string(wire.name(s.position)), parent,
                            s.has_dc() ? fmt::format("{}", s.delay_ns) : "null");
     });
 }
@@ -148,26 +192,40 @@ int run_ethercat_scan(const EthercatOptions& options) {
 int run_ethercat_slaves(const EthercatOptions& options) {
     EthercatWire wire;
     if (!wire.open(options) || !wire.without_arguments(options)) return 1;
-    unsigned alias = 0, behind = 0;  // the newest alias along the line, and how far behind it a slave is
+    // the newest alias along the line, and how far behind it a slave is
+    unsigned alias = 0;
+    unsigned behind = 0;
     return list(options, wire, [&](const BusSlave& s) {
-        if (s.alias != 0) alias = s.alias, behind = 0;
-        else if (s.position != 0) ++behind;
-        return fmt::format("{:<4} {:>5}:{:<3} {:<8} {} {}", s.position, alias, behind, ethercat::to_string(s.state),
-                           s.al_failed ? "E" : "+", wire.name(s.position));
+        if (s.alias != 0) {
+            alias = s.alias;
+            behind = 0;
+        } else if (s.position != 0) {
+            ++behind;
+        }
+        return fmt::format("{:<4} {:>5}:{:<3} {:<8} {} {}", s.position, alias, behind,
+                           ethercat::to_string(s.state), s.al_failed ? "E" : "+",
+                           wire.name(s.position));
     }, [&](const BusSlave& s) {
-        return fmt::format(R"(,"alias":{},"vendor":{},"product":{},"revision":{},"serial":{},"name":{})", s.alias, s.vendor, s.product,
-                           s.revision, s.serial, json_string(wire.name(s.position)));
+        return fmt::format(
+            R"(,"alias":{},"vendor":{},"product":{},"revision":{},"serial":{},"name":{})", s.alias,
+            s.vendor, s.product, s.revision, s.serial, json_string(wire.name(s.position)));
     });
 }
 
 int run_ethercat_states(const EthercatPositionOptions& options) {
     const std::size_t address_words = options.emulate.empty() ? 1 : 0;
-    if (options.words.size() > address_words + 1)
-        return fail(options, fmt::format("unexpected argument '{}'", options.words[address_words + 1]));
+    if (options.words.size() > address_words + 1) {
+        return fail(options,
+                    fmt::format("unexpected argument '{}'", options.words[address_words + 1]));
+    }
     std::optional<State> target;
     if (options.words.size() == address_words + 1) {
         target = state_named(options.words.back());
-        if (!target) return fail(options, fmt::format("unknown state '{}'; write INIT, PREOP, BOOT, SAFEOP or OP", options.words.back()));
+        if (!target) {
+            return fail(options,
+                        fmt::format("unknown state '{}'; write INIT, PREOP, BOOT, SAFEOP or OP",
+                                    options.words.back()));
+        }
     }
     EthercatWire wire;
     if (!wire.open(options, target.has_value())) return 1;
@@ -176,12 +234,16 @@ int run_ethercat_states(const EthercatPositionOptions& options) {
     for (std::size_t n = 0; target && n < wire.size(); ++n) {
         if (options.position >= 0 && n != static_cast<std::size_t>(options.position)) continue;
         BusSlave& s = wire.slave(n);
-        if (const auto missed = bring(wire, s, *target))
-            code = fail(options,
-                        fmt::format("slave {}: {} not reached, it is in {}: {}", n, ethercat::to_string(*missed),
-                                    ethercat::to_string(s.state), s.al_failed ? error_of(s) : "no answer to the request within 10 s"));
+        if (const auto missed = bring(wire, s, *target)) {
+            code = fail(
+                options,
+                fmt::format("slave {}: {} not reached, it is in {}: {}", n,
+                            ethercat::to_string(*missed), ethercat::to_string(s.state),
+                            s.al_failed ? error_of(s) : "no answer to the request within 10 s"));
+        }
     }
-    const int printed = list(options, wire, state_column, [](const BusSlave&) { return std::string(); });
+    const int printed =
+        list(options, wire, state_column, [](const BusSlave&) { return std::string(); });
     return code != 0 ? code : printed;
 }
 
@@ -192,32 +254,48 @@ int run_ethercat_crc(const EthercatOptions& options) {
     for (std::size_t n = 0; n < wire.size(); ++n) {
         const BusSlave& s = wire.slave(n);
         auto all = wire.read(n, reg::rx_errors, 20);
-        if (!all && !(all = wire.read(n, reg::rx_errors, 8)))
-            return fail(options, fmt::format("slave {} no longer responds; check its supply and cable", n));
+        if (!all && !(all = wire.read(n, reg::rx_errors, 8))) {
+            return fail(options,
+                        fmt::format("slave {} no longer responds; check its supply and cable", n));
+        }
         all->resize(20);  // counters that the controller does not have are 0
         for (unsigned port = 0; port < 4; ++port) {
             const bool used = port == s.entry_port || s.neighbour[port] >= 0;
-            const unsigned invalid = (*all)[2 * port], receive = (*all)[2 * port + 1], forwarded = (*all)[8 + port],
-                           lost = (*all)[16 + port];
+            const unsigned invalid = (*all)[2 * port];
+            const unsigned receive = (*all)[2 * port + 1];
+
+            const unsigned forwarded = (*all)[8 + port];
+            const unsigned lost = (*all)[16 + port];
             if (!used && invalid + receive + forwarded + lost == 0) continue;
-            text += fmt::format("{:>5} {:>4} {:>8} {:>8} {:>10} {:>12}\n", n, port, invalid, receive, forwarded, lost);
-            rows += fmt::format("{}{{\"position\":{},\"port\":{},\"invalid\":{},\"receive\":{},\"forwarded\":{},\"link_losses\":{}}}",
-                                rows.empty() ? "" : ",\n ", n, port, invalid, receive, forwarded, lost);
-            if (invalid + receive + lost == 0) continue;  // forwarded ones happened before
+            text += fmt::format("{:>5} {:>4} {:>8} {:>8} {:>10} {:>12}\n", n, port, invalid,
+                                receive, forwarded, lost);
+            rows += fmt::format(
+                "{}{{\"position\":{},\"port\":{},\"invalid\":{},\"receive\":{},\"forwarded\":{},"
+                "\"link_losses\":{}}}",
+                rows.empty() ? "" : ",\n ", n, port, invalid, receive, forwarded, lost);
+            if (invalid + receive + lost == 0) {
+                continue;  // forwarded ones happened before
+            }
             const int other = s.neighbour[port];
-            std::string place = n == 0 && port == s.entry_port ? "the master" : "nothing (open now)";
+            std::string place =
+                n == 0 && port == s.entry_port ? "the master" : "nothing (open now)";
             if (other >= 0) {
                 const BusSlave& peer = wire.slave(static_cast<std::size_t>(other));
                 unsigned at = 0;
-                while (at < 3 && peer.neighbour[at] != static_cast<int>(n)) ++at;
+                while (at < 3 && peer.neighbour[at] != static_cast<int>(n)) {
+                    ++at;
+                }
                 place = fmt::format("slave {} port {}", other, at);
             }
-            const std::string cable = fmt::format("check the cable between slave {} port {} and {}", n, port, place);
+            const std::string cable =
+                fmt::format("check the cable between slave {} port {} and {}", n, port, place);
             text += "      " + cable + "\n";
             cables += (cables.empty() ? "" : ",") + json_string(cable);
         }
     }
-    if (options.json) return print(fmt::format("{{\"ports\":[{}],\"cables\":[{}]}}\n", rows, cables)) ? 0 : 1;
+    if (options.json) {
+        return print(fmt::format("{{\"ports\":[{}],\"cables\":[{}]}}\n", rows, cables)) ? 0 : 1;
+    }
     return print(text + (cables.empty() ? "no port has counted errors of its own\n" : "")) ? 0 : 1;
 }
 

@@ -47,7 +47,9 @@ constexpr ValueType value_types[] = {{"bool", Form::logic, 1, code::boolean},
 
 std::uint64_t little_endian(const Bytes& bytes) {
     std::uint64_t value = 0;
-    for (std::size_t n = std::min<std::size_t>(bytes.size(), 8); n-- > 0;) value = value << 8 | bytes[n];
+    for (std::size_t n = std::min<std::size_t>(bytes.size(), 8); n-- > 0;) {
+        value = value << 8 | bytes[n];
+    }
     return value;
 }
 
@@ -66,14 +68,21 @@ std::string value_words(const Bytes& bytes, const ValueType& type, std::string& 
     const std::uint64_t raw = little_endian(bytes);
     if (type.form == Form::real) {
         const double value =
-            type.bytes == 4 ? static_cast<double>(std::bit_cast<float>(static_cast<std::uint32_t>(raw))) : std::bit_cast<double>(raw);
+            type.bytes == 4
+                ? static_cast<double>(std::bit_cast<float>(static_cast<std::uint32_t>(raw)))
+                : std::bit_cast<double>(raw);
         const std::string text = fmt::format("{}", value);
-        if (std::isfinite(value)) plain += text;
-        else json_quote(plain, text);
+        if (std::isfinite(value)) {
+            plain += text;
+        } else {
+            json_quote(plain, text);
+        }
         return text;
     }
     const auto unused = static_cast<unsigned>(64 - 8 * type.bytes);
-    plain += type.form == Form::sign ? fmt::format("{}", static_cast<std::int64_t>(raw << unused) >> unused) : fmt::format("{}", raw);
+    plain += type.form == Form::sign
+                 ? fmt::format("{}", static_cast<std::int64_t>(raw << unused) >> unused)
+                 : fmt::format("{}", raw);
     return fmt::format("0x{:0{}x} {}", raw, 2 * type.bytes, plain);
 }
 
@@ -88,7 +97,9 @@ std::optional<Bytes> value_bytes(const std::string& text, const ValueType& type)
             const unsigned long value = std::strtoul(at, &end, 16);
             if (end == at || value > 0xff) return std::nullopt;
             bytes.push_back(static_cast<std::uint8_t>(value));
-            while (*end == ' ') ++end;
+            while (*end == ' ') {
+                ++end;
+            }
         }
         return bytes.empty() ? std::nullopt : std::optional(bytes);
     }
@@ -97,49 +108,72 @@ std::optional<Bytes> value_bytes(const std::string& text, const ValueType& type)
     if (type.form == Form::real) {
         const double value = std::strtod(text.c_str(), &end);
         if (end == text.c_str() || *end != '\0') return std::nullopt;
-        raw = type.bytes == 4 ? std::bit_cast<std::uint32_t>(static_cast<float>(value)) : std::bit_cast<std::uint64_t>(value);
+        raw = type.bytes == 4 ? std::bit_cast<std::uint32_t>(static_cast<float>(value))
+                              : std::bit_cast<std::uint64_t>(value);
     } else if (type.form == Form::sign) {
         const std::int64_t value = std::strtoll(text.c_str(), &end, 0);
         const std::int64_t least = bits == 64 ? INT64_MIN : -(std::int64_t{1} << (bits - 1));
-        if (end == text.c_str() || *end != '\0' || errno != 0 || value < least || value > -(least + 1)) return std::nullopt;
+        if (end == text.c_str() || *end != '\0' || errno != 0 || value < least ||
+            value > -(least + 1)) {
+            return std::nullopt;
+        }
         raw = static_cast<std::uint64_t>(value);
     } else {
-        const auto value = ethercat_number(text, type.form == Form::logic ? 1 : bits == 64 ? UINT64_MAX : (std::uint64_t{1} << bits) - 1);
+        const auto value = ethercat_number(text, type.form == Form::logic ? 1
+                                                 : bits == 64             ? UINT64_MAX
+                                                              : (std::uint64_t{1} << bits) - 1);
         if (!value) return std::nullopt;
         raw = *value;
     }
-    for (std::size_t n = 0; n < type.bytes; ++n) bytes.push_back(static_cast<std::uint8_t>(raw >> 8 * n));
+    for (std::size_t n = 0; n < type.bytes; ++n) {
+        bytes.push_back(static_cast<std::uint8_t>(raw >> 8 * n));
+    }
     return bytes;
 }
 
 /// Prints why a request to the mailbox failed; returns the exit code.
-int fail_mailbox(const Options& options, const BusSlave& s, const std::string& what, const ethercat::master::MailboxResult& result) {
+int fail_mailbox(const Options& options, const BusSlave& s, const std::string& what,
+                 const ethercat::master::MailboxResult& result) {
     const std::string who = fmt::format("slave {}: {}: ", s.position, what);
     switch (result.outcome) {
     case Outcome::aborted:
-        return fail(options, fmt::format("{}SDO transfer aborted with code 0x{:08X}: {}", who, result.abort,
-                                         ethercat::coe::abort_text(result.abort)));
-    case Outcome::timed_out: return fail(options, who + "no answer from its mailbox; see: hal ethercat states");
-    case Outcome::lost: return fail(options, who + "it no longer responds; check its supply and cable");
-    default: return fail(options, who + (s.mailbox.usable() ? "rejected by the mailbox" : "the slave has no mailbox"));
+        return fail(options, fmt::format("{}SDO transfer aborted with code 0x{:08X}: {}", who,
+                                         result.abort, ethercat::coe::abort_text(result.abort)));
+    case Outcome::timed_out:
+        return fail(options, who + "no answer from its mailbox; see: hal ethercat states");
+    case Outcome::lost:
+        return fail(options, who + "it no longer responds; check its supply and cable");
+    default:
+        return fail(options, who + (s.mailbox.usable() ? "rejected by the mailbox"
+                                                       : "the slave has no mailbox"));
     }
 }
 
-/// Returns the type that --type names, or that the slave reports; nullptr after printing the reason.
-const ValueType* type_of(const EthercatValueOptions& options, EthercatSession& session, const BusSlave& s, std::uint16_t index,
-                         std::uint8_t sub) {
+/// Returns the type that --type names, or that the slave reports; nullptr after printing the
+/// reason.
+const ValueType* type_of(const EthercatValueOptions& options, EthercatSession& session,
+                         const BusSlave& s, std::uint16_t index, std::uint8_t sub) {
     if (!options.type.empty()) {
-        for (const ValueType& t : value_types)
+        for (const ValueType& t : value_types) {
             if (options.type == t.name) return &t;
-        return fail(options, fmt::format("unknown type '{}'; see: hal help ethercat upload", options.type)), nullptr;
+        }
+        fail(options,
+             fmt::format("unknown type '{}'; see: hal help ethercat upload", options.type));
+
+        return nullptr;
     }
     Bytes name(256);
     MailboxRequest request;
     request.kind = MailboxRequest::Kind::entry;
-    request.slave = s.number, request.index = index, request.sub = sub, request.data = name;
-    if (session.run(request) && request.result)
-        for (const ValueType& t : value_types)
+    request.slave = s.number;
+    request.index = index;
+    request.sub = sub;
+    request.data = name;
+    if (session.run(request) && request.result) {
+        for (const ValueType& t : value_types) {
             if (request.entry.type == t.coe_type) return &t;
+        }
+    }
     return &value_types[std::size(value_types) - 1];
 }
 
@@ -148,39 +182,68 @@ int transfer(const EthercatValueOptions& options, bool download) {
     EthercatSession session;
     if (!session.open(options, true)) return 1;
     const auto& words = session.arguments();
-    if (words.size() != (download ? 3U : 2U))
-        return fail(options, fmt::format("type: {} ADDRESS -p N INDEX SUB{}", options.program, download ? " VALUE" : ""));
-    const auto index = ethercat_number(words[0], 0xffff), sub = ethercat_number(words[1], 0xff);
-    if (!index) return fail(options, fmt::format("invalid index '{}'; write 0..0xffff", words[0]));
-    if (!sub) return fail(options, fmt::format("invalid sub-index '{}'; write 0..255", words[1]));
+    if (words.size() != (download ? 3U : 2U)) {
+        return fail(options, fmt::format("type: {} ADDRESS -p N INDEX SUB{}", options.program,
+                                         download ? " VALUE" : ""));
+    }
+    const auto index = ethercat_number(words[0], 0xffff);
+    const auto sub = ethercat_number(words[1], 0xff);
+    if (!index) {
+        return fail(options, fmt::format("invalid index '{}'; write 0..0xffff", words[0]));
+    }
+    if (!sub) {
+        return fail(options, fmt::format("invalid sub-index '{}'; write 0..255", words[1]));
+    }
     const BusSlave* s = session.chosen(options);
     if (s == nullptr) return 1;
     const std::string what = fmt::format("0x{:04X}:{}", *index, *sub);
-    const ValueType* type = type_of(options, session, *s, static_cast<std::uint16_t>(*index), static_cast<std::uint8_t>(*sub));
+    const ValueType* type = type_of(options, session, *s, static_cast<std::uint16_t>(*index),
+                                    static_cast<std::uint8_t>(*sub));
     if (type == nullptr) return 1;
     Bytes bytes(65536);
     if (download) {
-        if (const auto value = value_bytes(words[2], *type)) bytes = *value;
-        else
-            return fail(options, fmt::format("invalid value '{}' for {}, type {}; --type selects another one", words[2], what, type->name));
+        if (const auto value = value_bytes(words[2], *type)) {
+            bytes = *value;
+        } else {
+            return fail(
+                options,
+                fmt::format("invalid value '{}' for {}, type {}; --type selects another one",
+                            words[2], what, type->name));
+        }
     }
     MailboxRequest request;
     request.kind = download ? MailboxRequest::Kind::sdo_download : MailboxRequest::Kind::sdo_upload;
-    request.slave = s->number, request.index = static_cast<std::uint16_t>(*index), request.sub = static_cast<std::uint8_t>(*sub),
+    request.slave = s->number;
+    request.index = static_cast<std::uint16_t>(*index);
+
+    request.sub = static_cast<std::uint8_t>(*sub);
     request.data = bytes;
-    if (!session.run(request)) return fail(options, fmt::format("slave {}: {}: not finished within 60 s", s->position, what));
-    if (session.gateway_lost()) return fail(options, fmt::format("{} closed the connection; does the machine still run?", options.words.front()));
+    if (!session.run(request)) {
+        return fail(options,
+                    fmt::format("slave {}: {}: not finished within 60 s", s->position, what));
+    }
+    if (session.gateway_lost()) {
+        return fail(options, fmt::format("{} closed the connection; does the machine still run?",
+                                         options.words.front()));
+    }
     if (!request.result) return fail_mailbox(options, *s, what, request.result);
-    if (!download) bytes.resize(request.result.length);
-    if (!download && !options.type.empty() && type->bytes != 0 && bytes.size() != type->bytes)
-        return fail(options, fmt::format("{} has {} bytes, type {} has {}; --type selects another one", what, bytes.size(), type->name, type->bytes));
+    if (!download) {
+        bytes.resize(request.result.length);
+    }
+    if (!download && !options.type.empty() && type->bytes != 0 && bytes.size() != type->bytes) {
+        return fail(options,
+                    fmt::format("{} has {} bytes, type {} has {}; --type selects another one", what,
+                                bytes.size(), type->name, type->bytes));
+    }
     std::string plain;
     const std::string text = value_words(bytes, *type, plain);
-    if (options.json)
-        return print(fmt::format("{{\"position\":{},\"index\":{},\"sub\":{},\"type\":\"{}\",\"value\":{}}}\n", s->position, *index, *sub,
-                                 type->name, plain))
+    if (options.json) {
+        return print(fmt::format(
+                   "{{\"position\":{},\"index\":{},\"sub\":{},\"type\":\"{}\",\"value\":{}}}\n",
+                   s->position, *index, *sub, type->name, plain))
                    ? 0
                    : 1;
+    }
     return download || print(text + "\n") ? 0 : 1;
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Datagrams by position, one at a time, without a master: no state and no address of a slave changes, and a running master goes on.
-// Everything here is [setup]; everything has a timeout.
+// Datagrams by position, one at a time, without a master: no state and no address of a slave
+// changes, and a running master goes on. Everything here is [setup]; everything has a timeout.
 //
 //     EthercatWire wire;
 //     if (!wire.open(options)) return 1;                               // the reason is printed
@@ -22,7 +22,8 @@ namespace hal::tools {
 
 class EthercatWire {
 public:
-    /// Opens the bus and reads what the slaves are. `alone`: see EthercatAccess. Returns false after printing the reason.
+    /// Opens the bus and reads what the slaves are. `alone`: see EthercatAccess. Returns false
+    /// after printing the reason.
     bool open(const EthercatOptions&, bool alone = false);
     const std::vector<std::string>& arguments() const { return access_.arguments(); }
     const std::string& address() const { return access_.address(); }
@@ -33,7 +34,8 @@ public:
     /// Prints an error if there are arguments; returns whether there are none.
     bool without_arguments(const EthercatOptions&) const;
 
-    std::optional<std::vector<std::uint8_t>> read(std::size_t position, std::uint16_t address, std::uint16_t length);
+    std::optional<std::vector<std::uint8_t>> read(std::size_t position, std::uint16_t address,
+                                                  std::uint16_t length);
     bool write(std::size_t position, std::uint16_t address, std::span<const std::uint8_t> bytes);
     bool write(std::size_t position, std::uint16_t address, std::uint16_t value);
     void read_state(ethercat::master::BusSlave&);
@@ -49,8 +51,10 @@ public:
     void pass(std::int64_t ns) { access_.pass(ns); }
 
 private:
-    std::optional<std::uint16_t> exchange(ethercat::Command, std::uint32_t address, std::span<std::uint8_t> data);
-    bool eeprom(std::size_t position, std::uint16_t command, std::uint32_t word, std::vector<std::uint8_t>& answer);
+    std::optional<std::uint16_t> exchange(ethercat::Command, std::uint32_t address,
+                                          std::span<std::uint8_t> data);
+    bool eeprom(std::size_t position, std::uint16_t command, std::uint32_t word,
+                std::vector<std::uint8_t>& answer);
     bool identify(std::size_t position);
 
     EthercatAccess access_;

@@ -20,14 +20,19 @@ inline std::optional<std::uint64_t> ethercat_number(const std::string& text, std
     char* end = nullptr;
     errno = 0;
     const std::uint64_t value = std::strtoull(text.c_str(), &end, 0);
-    if (text.empty() || text[0] < '0' || text[0] > '9' || *end != '\0' || errno != 0 || value > most) return std::nullopt;
+    if (text.empty() || text[0] < '0' || text[0] > '9' || *end != '\0' || errno != 0 ||
+        value > most) {
+        return std::nullopt;
+    }
     return value;
 }
 
 /// Returns "0x12 0x34". [any]
 inline std::string hex_words(std::span<const std::uint8_t> bytes) {
     std::string text;
-    for (const std::uint8_t b : bytes) text += fmt::format("{}0x{:02x}", text.empty() ? "" : " ", b);
+    for (const std::uint8_t b : bytes) {
+        text += fmt::format("{}0x{:02x}", text.empty() ? "" : " ", b);
+    }
     return text;
 }
 

@@ -29,8 +29,9 @@ public:
         thread_.join();
     }
 
-    /// Queues text. Never waits: while the writer holds the buffer, the text is kept until the next call. Returns false when standard output is
-    /// closed. One thread. [realtime] except for allocation
+    /// Queues text. Never waits: while the writer holds the buffer, the text is kept until the next
+    /// call. Returns false when standard output is closed. One thread. [realtime] except for
+    /// allocation
     bool write(const std::string& text) {
         held_ += text;
         if (!held_.empty() && mutex_.try_lock()) {
@@ -50,7 +51,9 @@ private:
             std::string text;
             text.swap(waiting_);
             lock.unlock();
-            if (!text.empty() && !print(text)) is_read_ = false;
+            if (!text.empty() && !print(text)) {
+                is_read_ = false;
+            }
             lock.lock();
         }
     }

@@ -35,11 +35,15 @@ public:
         for (std::size_t n = 0; n < status_.size(); ++n) {
             esc::Controller& controller = line.controller(n);
             const std::uint8_t* code = controller.memory(registers::al_status_code);
-            status_[n].store(controller.al_status() | static_cast<std::uint32_t>(code[0] | code[1] << 8) << 16, std::memory_order_relaxed);
+            status_[n].store(
+                controller.al_status() | static_cast<std::uint32_t>(code[0] | code[1] << 8) << 16,
+                std::memory_order_relaxed);
         }
     }
     /// Returns AL status in the low half, its code in the high half. [any]
-    std::uint32_t operator[](std::size_t slave) const noexcept { return status_[slave].load(std::memory_order_relaxed); }
+    std::uint32_t operator[](std::size_t slave) const noexcept {
+        return status_[slave].load(std::memory_order_relaxed);
+    }
 
 private:
     std::vector<std::atomic<std::uint32_t>> status_;
@@ -48,12 +52,16 @@ private:
 std::unique_ptr<ethernet::Port> open_interface(const Options& options, const std::string& address) {
     const ethernet::Description about = ethernet::describe(address);
     if (about.in_memory) {
-        fail(options, fmt::format("'{}' is a segment in memory, which other programs cannot open; write --link eth:enp3s0, or emulate the line in the "
-                                  "netlist of the master: loadrt ethercat_segment link={}", address, address));
+        fail(options, fmt::format("'{}' is a segment in memory, which other programs cannot open; "
+                                  "write --link eth:enp3s0, or emulate the line in the "
+                                  "netlist of the master: loadrt ethercat_segment link={}",
+                                  address, address));
         return nullptr;
     }
     if (about.recorded) {
-        fail(options, fmt::format("'{}' is a capture, which no master can reach; write --link eth:enp3s0 or --link udp:127.0.0.1", address));
+        fail(options, fmt::format("'{}' is a capture, which no master can reach; write --link "
+                                  "eth:enp3s0 or --link udp:127.0.0.1",
+                                  address));
         return nullptr;
     }
     ethernet::Options how;
@@ -62,7 +70,9 @@ std::unique_ptr<ethernet::Port> open_interface(const Options& options, const std
     how.policy = ethernet::Policy::block;
     how.send_capacity = how.receive_capacity = 256;
     ethernet::Opened opened = ethernet::open(address, how);
-    if (!opened) fail(options, opened.problem);
+    if (!opened) {
+        fail(options, opened.problem);
+    }
     return std::move(opened.port);
 }
 
@@ -79,7 +89,8 @@ std::string state_words(std::uint32_t status) {
     }
     if ((status & 0x10) != 0) {
         const AlStatusCode* row = al_status(code);
-        text += fmt::format(", error 0x{:04X}{}{}", code, row == nullptr ? "" : ": ", row == nullptr ? "" : row->text);
+        text += fmt::format(", error 0x{:04X}{}{}", code, row == nullptr ? "" : ": ",
+                            row == nullptr ? "" : row->text);
     }
     return text;
 }
@@ -87,11 +98,16 @@ std::string state_words(std::uint32_t status) {
 /// Returns the terminals of an output device as text; empty for other devices.
 std::string output_words(const devices::Device& device) {
     auto* io = dynamic_cast<const devices::IoBehaviour*>(&device.firmware->behaviour());
-    if (io == nullptr) return {};
+    if (io == nullptr) {
+        return {};
+    }
     std::string text;
     for (unsigned c = 0; c < io->channels(); ++c) {
-        if (device.name == "digital_out") text += io->output(c) != 0 ? '1' : '0';
-        else if (device.name == "analog_out") text += fmt::format("{}{}", c == 0 ? "" : " ", io->output(c));
+        if (device.name == "digital_out") {
+            text += io->output(c) != 0 ? '1' : '0';
+        } else if (device.name == "analog_out") {
+            text += fmt::format("{}{}", c == 0 ? "" : " ", io->output(c));
+        }
     }
     return text;
 }
@@ -99,16 +115,24 @@ std::string output_words(const devices::Device& device) {
 /// Prints what changes on the line: states at once, outputs at most once per second.
 class LineReporter {
 public:
-    LineReporter(const std::vector<devices::Device>& line, const StatusCopy& status, std::int64_t began)
-        : line_(line), status_(status), began_(began), seen_(line.size(), 1), outputs_(line.size()) {
-        for (std::size_t n = 0; n < line.size(); ++n) outputs_[n] = output_words(line[n]);
+    LineReporter(const std::vector<devices::Device>& line, const StatusCopy& status,
+                 std::int64_t began)
+        : line_(line),
+          status_(status),
+          began_(began),
+          seen_(line.size(), 1),
+          outputs_(line.size()) {
+        for (std::size_t n = 0; n < line.size(); ++n) {
+            outputs_[n] = output_words(line[n]);
+        }
     }
 
     /// Returns false when standard output is closed.
     bool look(std::int64_t now) {
         std::string text;
         const auto report = [&](std::size_t n, const std::string& what) {
-            text += fmt::format("{:9.3f} s  slave {} ({}): {}\n", static_cast<double>(now - began_) / 1e9, n, line_[n].name, what);
+            text += fmt::format("{:9.3f} s  slave {} ({}): {}\n",
+                                static_cast<double>(now - began_) / 1e9, n, line_[n].name, what);
         };
         for (std::size_t n = 0; n < line_.size(); ++n) {
             const std::uint32_t status = status_[n];
@@ -116,12 +140,14 @@ public:
             seen_[n] = status;
             report(n, state_words(status));
         }
-        if (now - outputs_at_ >= 1'000'000'000)
-            for (std::size_t n = 0; n < line_.size(); ++n)
+        if (now - outputs_at_ >= 1'000'000'000) {
+            for (std::size_t n = 0; n < line_.size(); ++n) {
                 if (std::string words = output_words(line_[n]); words != outputs_[n]) {
                     outputs_at_ = now;
                     report(n, "outputs " + (outputs_[n] = std::move(words)));
                 }
+            }
+        }
         return text.empty() || print(text);
     }
 
@@ -136,19 +162,32 @@ private:
 
 /// Reads the description of the line. Returns false after printing what is wrong.
 bool read_devices(const Options& options, std::vector<devices::Device>& to) {
-    if (options.words.size() != 1) return fail(options, "one line per process; write one FILE"), false;
+    if (options.words.size() != 1) {
+        fail(options, "one line per process; write one FILE");
+        return false;
+    }
     const std::string& path = options.words.front();
     std::string text;
-    if (!read_file(path, text)) return fail(options, fmt::format("cannot read '{}': {}", path, text)), false;
-    const devices::LineDescription description = devices::read_line(text, ethercat::devices::beside(path));
+    if (!read_file(path, text)) {
+        fail(options, fmt::format("cannot read '{}': {}", path, text));
+        return false;
+    }
+    const devices::LineDescription description =
+        devices::read_line(text, ethercat::devices::beside(path));
     bool good = true;
     for (const auto& message : description.messages) {
-        const std::string place = message.at.line == 0 ? path : fmt::format("{}:{}:{}", path, message.at.line, message.at.column);
+        const std::string place =
+            message.at.line == 0
+                ? path
+                : fmt::format("{}:{}:{}", path, message.at.line, message.at.column);
         const bool is_error = message.severity == Severity::error;
         good = good && !is_error;
-        fail(options, fmt::format("{}: {}{}; {}", place, is_error ? "" : "warning: ", message.sentence, message.help));
+        fail(options, fmt::format("{}: {}{}; {}", place,
+                                  is_error ? "" : "warning: ", message.sentence, message.help));
     }
-    if (good) to = devices::make_line(description);
+    if (good) {
+        to = devices::make_line(description);
+    }
     return good;
 }
 
@@ -162,41 +201,70 @@ std::string read_fault(const std::string& text, std::size_t slaves, esc::LineCom
                                    {"corrupt-every", esc::LineFault::corruption},
                                    {"double-every", esc::LineFault::duplicate},
                                    {"noise-every", esc::LineFault::noise}};
-    const auto colon = text.find(':'), equals = text.find('=');
+    const auto colon = text.find(':');
+    const auto equals = text.find('=');
     const auto slave = parse_natural(text.substr(0, colon));
-    if (colon == text.npos || equals == text.npos || equals < colon || !slave)
+    if (colon == text.npos || equals == text.npos || equals < colon || !slave) {
         return fmt::format("invalid --fault '{}'; write --fault 1:corrupt-every=9", text);
-    if (*slave >= slaves) return fmt::format("--fault {}: no slave {}; the last one of {} is {}", text, *slave, slaves, slaves - 1);
-    const std::string name = text.substr(colon + 1, equals - colon - 1), value = text.substr(equals + 1);
+    }
+    if (*slave >= slaves) {
+        return fmt::format("--fault {}: no slave {}; the last one of {} is {}", text, *slave,
+                           slaves, slaves - 1);
+    }
+    const std::string name = text.substr(colon + 1, equals - colon - 1);
+
+    const std::string value = text.substr(equals + 1);
     to.slave = static_cast<unsigned>(*slave);
     if (name == "drift") {
         const auto ppm = parse_real(value);
-        if (!ppm || *ppm < -1000 || *ppm > 1000) return fmt::format("--fault {}: invalid drift '{}'; write -1000..1000 ppm", text, value);
-        to.kind = esc::LineCommand::Kind::drift, to.value = *ppm;
+        if (!ppm || *ppm < -1000 || *ppm > 1000) {
+            return fmt::format("--fault {}: invalid drift '{}'; write -1000..1000 ppm", text,
+                               value);
+        }
+        to.kind = esc::LineCommand::Kind::drift;
+        to.value = *ppm;
         return {};
     }
     for (const Row& row : rows) {
         if (name != row.name) continue;
         const auto every = parse_natural(value);
-        if (!every || *every < 1 || *every > 1'000'000'000) return fmt::format("--fault {}: invalid number '{}'; write 1..1000000000", text, value);
+        if (!every || *every < 1 || *every > 1'000'000'000) {
+            return fmt::format("--fault {}: invalid number '{}'; write 1..1000000000", text, value);
+        }
         to.kind = esc::LineCommand::Kind::disturb;
-        to.disturbance = {.fault = row.fault, .slave = static_cast<int>(*slave), .port = 0, .every = static_cast<std::uint32_t>(*every)};
+        to.disturbance = {.fault = row.fault,
+                          .slave = static_cast<int>(*slave),
+                          .port = 0,
+                          .every = static_cast<std::uint32_t>(*every)};
         return {};
     }
-    return fmt::format("--fault {}: unknown fault '{}'; write one of: lose-every, corrupt-every, double-every, noise-every, drift", text, name);
+    return fmt::format(
+        "--fault {}: unknown fault '{}'; write one of: lose-every, corrupt-every, double-every, "
+        "noise-every, drift",
+        text, name);
 }
 
 }  // namespace
 
 int run_node_ethercat(const EthercatLineOptions& options) {
-    if (options.link.empty()) return fail(options, "missing --link; add --link eth:enp3s0, the interface towards the master, or --link udp:127.0.0.1 for one on this machine");
+    if (options.link.empty()) {
+        return fail(options,
+                    "missing --link; add --link eth:enp3s0, the interface towards the master, or "
+                    "--link udp:127.0.0.1 for one on this machine");
+    }
     std::vector<devices::Device> devices;
     if (!read_devices(options, devices)) return 1;
-    if (options.faults.size() > esc::Line::most_disturbances)
-        return fail(options, fmt::format("at most {} faults are possible", esc::Line::most_disturbances));
+    if (options.faults.size() > esc::Line::most_disturbances) {
+        return fail(options,
+                    fmt::format("at most {} faults are possible", esc::Line::most_disturbances));
+    }
     std::vector<esc::LineCommand> faults(options.faults.size());
-    for (std::size_t n = 0; n < faults.size(); ++n)
-        if (const std::string problem = read_fault(options.faults[n], devices.size(), faults[n]); !problem.empty()) return fail(options, problem);
+    for (std::size_t n = 0; n < faults.size(); ++n) {
+        if (const std::string problem = read_fault(options.faults[n], devices.size(), faults[n]);
+            !problem.empty()) {
+            return fail(options, problem);
+        }
+    }
     StopRequest stop;
     const auto primary = open_interface(options, options.link);
     if (!primary) return 1;
@@ -204,17 +272,29 @@ int run_node_ethercat(const EthercatLineOptions& options) {
     if (!options.backup.empty() && !(secondary = open_interface(options, options.backup))) return 1;
 
     esc::Line line;
-    for (devices::Device& d : devices) line.add({.controller = {.dc = d.dc}, .sii = d.sii, .application = d.firmware.get()});
-    if (secondary && !line.close_ring(static_cast<unsigned>(devices.size() - 1), 1))
-        return fail(options, "--backup: the last device has no second port; put one with two ports at the end");
-    const std::int64_t began = link::monotonic_ns(), end = options.for_ns >= 0 ? began + options.for_ns : INT64_MAX;
-    line.power_on(began);
-    for (const esc::LineCommand& fault : faults) line.execute(fault, began);
+    for (devices::Device& d : devices) {
+        line.add({.controller = {.dc = d.dc}, .sii = d.sii, .application = d.firmware.get()});
+    }
+    if (secondary && !line.close_ring(static_cast<unsigned>(devices.size() - 1), 1)) {
+        return fail(
+            options,
+            "--backup: the last device has no second port; put one with two ports at the end");
+    }
+    const std::int64_t began = link::monotonic_ns();
 
-    std::string text = fmt::format("EtherCAT line of {} slave{} on {}{}{} ({}); press Ctrl-C to end\n", devices.size(), devices.size() == 1 ? "" : "s",
-                                   primary->description().address, secondary ? " and " : "", secondary ? secondary->description().address : "",
-                                   primary->description().transport);
-    for (std::size_t n = 0; n < devices.size(); ++n) text += fmt::format("{:4}  {}\n", n, devices[n].name);
+    const std::int64_t end = options.for_ns >= 0 ? began + options.for_ns : INT64_MAX;
+    line.power_on(began);
+    for (const esc::LineCommand& fault : faults) {
+        line.execute(fault, began);
+    }
+
+    std::string text = fmt::format(
+        "EtherCAT line of {} slave{} on {}{}{} ({}); press Ctrl-C to end\n", devices.size(),
+        devices.size() == 1 ? "" : "s", primary->description().address, secondary ? " and " : "",
+        secondary ? secondary->description().address : "", primary->description().transport);
+    for (std::size_t n = 0; n < devices.size(); ++n) {
+        text += fmt::format("{:4}  {}\n", n, devices[n].name);
+    }
     if (!print(text)) return 1;
 
     StatusCopy status(devices.size());
@@ -222,15 +302,21 @@ int run_node_ethercat(const EthercatLineOptions& options) {
     std::atomic<bool> ended{false};
     std::thread server([&] { esc::serve(line, *primary, secondary.get(), ended, &status); });
     bool is_read = true;
-    while (is_read && !stop.wait_ns(10'000'000) && link::monotonic_ns() < end) is_read = reporter.look(link::monotonic_ns());
+    while (is_read && !stop.wait_ns(10'000'000) && link::monotonic_ns() < end) {
+        is_read = reporter.look(link::monotonic_ns());
+    }
     ended = true;
     server.join();
     if (!is_read) return 1;
     const std::int64_t now = link::monotonic_ns();
     if (!reporter.look(now)) return 1;
     const ethernet::Statistics s = primary->statistics();
-    return print(fmt::format("{:.1f} s: {} frames passed, {} sent, {} lost here\n", static_cast<double>(now - began) / 1e9, line.frames(),
-                             s.sent + (secondary ? secondary->statistics().sent : 0), s.lost + s.dropped)) ? 0 : 1;
+    return print(fmt::format("{:.1f} s: {} frames passed, {} sent, {} lost here\n",
+                             static_cast<double>(now - began) / 1e9, line.frames(),
+                             s.sent + (secondary ? secondary->statistics().sent : 0),
+                             s.lost + s.dropped))
+               ? 0
+               : 1;
 }
 
 }  // namespace hal::tools
@@ -240,7 +326,9 @@ int run_node_ethercat(const EthercatLineOptions& options) {
 namespace hal::tools {
 
 int run_node_ethercat(const EthercatLineOptions& options) {
-    return fail(options, "this program was built without EtherCAT; type: sudo apt install libpugixml-dev, and build it again");
+    return fail(options,
+                "this program was built without EtherCAT; type: sudo apt install libpugixml-dev, "
+                "and build it again");
 }
 
 }  // namespace hal::tools

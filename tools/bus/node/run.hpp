@@ -15,7 +15,8 @@ struct NodeKind {
     std::string name;     ///< "drive"
     std::string what;     ///< "CiA 402, 2 axes"
     std::uint8_t id = 0;  ///< default node ID; 0: --id is required
-    std::function<std::string()> keep = {};  ///< called in every turn to save persistent state; returns the problem, or ""
+    /// called in every turn to save persistent state; returns the problem, or ""
+    std::function<std::string()> keep = {};
 };
 
 /// Runs the device, or prints its EDS, as in the options. Returns the exit code.

@@ -23,25 +23,31 @@ namespace hal::tools {
 class TdmaStation : private tdma::Events {
 public:
     ~TdmaStation() override;
-    /// Creates the station named by options and schedule on the interface of the link, and offers its slots to `cane:` links. Adds its slot to `link` if
-    /// it names none. With `--tdma auto` it waits for the schedule from the master and calls `ended` every few milliseconds to see whether to give
-    /// up. Returns the problem, or "". [setup]
-    static std::string make(const NodeOptions&, std::string& link, const std::function<bool()>& ended, std::unique_ptr<TdmaStation>& made);
+    /// Creates the station named by options and schedule on the interface of the link, and offers
+    /// its slots to `cane:` links. Adds its slot to `link` if it names none. With `--tdma auto` it
+    /// waits for the schedule from the master and calls `ended` every few milliseconds to see
+    /// whether to give up. Returns the problem, or "". [setup]
+    static std::string make(const NodeOptions&, std::string& link,
+                            const std::function<bool()>& ended, std::unique_ptr<TdmaStation>& made);
 
-    /// Turns until `turn` returns false: once a cycle, shortly before the slot, with the time of the station's clock. Prints the events of the
-    /// segment on standard error.
+    /// Turns until `turn` returns false: once a cycle, shortly before the slot, with the time of
+    /// the station's clock. Prints the events of the segment on standard error.
     void run(const std::function<bool(std::int64_t local_ns, bool synchronous)>& turn);
     std::string summary() const;  ///< Returns a line with the statistics of the cycles.
 
 private:
-    TdmaStation(const tdma::StationSetup&, tdma::config::Schedule, std::string segment, std::unique_ptr<ethernet::Port>, double skew,
-                double drift);
-    std::string take_schedule(const NodeOptions&, const std::function<bool()>& ended);  ///< Returns the problem, or "".
-    std::string open_tunnel(const NodeOptions&, const tdma::config::StationEntry&);  ///< Returns the problem, or "".
+    TdmaStation(const tdma::StationSetup&, tdma::config::Schedule, std::string segment,
+                std::unique_ptr<ethernet::Port>, double skew, double drift);
+    /// Returns the problem, or "".
+    std::string take_schedule(const NodeOptions&, const std::function<bool()>& ended);
+    /// Returns the problem, or "".
+    std::string open_tunnel(const NodeOptions&, const tdma::config::StationEntry&);
     std::int64_t sleep_until(std::int64_t local_ns) const noexcept;  ///< Returns the time after it.
     void take_over() noexcept;  ///< Switches to a new schedule. [realtime]
-    void look() noexcept;       ///< Reads files and prints messages, outside the loop.
-    void on_event(tdma::Event event, const tdma::Address& who, tdma::Time value) noexcept override { reported_.push({event, who, value}); }
+    void look() noexcept;  ///< Reads files and prints messages, outside the loop.
+    void on_event(tdma::Event event, const tdma::Address& who, tdma::Time value) noexcept override {
+        reported_.push({event, who, value});
+    }
 
     const tdma::config::Schedule schedule_;  // empty if received from the master
     const tdma::EventWords words_{schedule_, "start this node again"};
@@ -54,12 +60,14 @@ private:
     SkewedPort port_;
     tdma::Station station_;
     SkewedDiscipline discipline_{station_, clock_};
-    std::unique_ptr<tdma::rtcfg::Applicant> applicant_;  // if the schedule is received from the master
+    // if the schedule is received from the master
+    std::unique_ptr<tdma::rtcfg::Applicant> applicant_;
     std::unique_ptr<tdma::Tunnel> tunnel_;  // before tap_, which uses it
     std::unique_ptr<tdma::Tap> tap_;
     hal::Discipline beat_;
     bool had_beat_ = false;
-    std::uint64_t cycles_ = 0, missed_ = 0;
+    std::uint64_t cycles_ = 0;
+    std::uint64_t missed_ = 0;
 };
 
 }  // namespace hal::tools

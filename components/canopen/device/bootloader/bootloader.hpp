@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// A device with a boot loader (CiA 302): program download (1F50h), program control (1F51h), software identification (1F56h) and flash
-// status (1F57h). After an update its revision number and software version are those of the new program.
+// A device with a boot loader (CiA 302): program download (1F50h), program control (1F51h),
+// software identification (1F56h) and flash status (1F57h). After an update its revision number and
+// software version are those of the new program.
 #pragma once
 
 #include <optional>
@@ -14,34 +15,50 @@ namespace hal::canopen {
 struct ProgramHeader {
     static constexpr std::size_t size = 20;
     static constexpr std::uint32_t signature = 0x50434c48;  ///< "HLCP"
-    std::uint32_t product = 0, version = 0, length = 0, crc = 0;  ///< `length` in bytes, CRC-32 of the bytes after the header
+    /// `length` in bytes, CRC-32 of the bytes after the header
+    std::uint32_t product = 0;
+    std::uint32_t version = 0;
+    std::uint32_t length = 0;
+    std::uint32_t crc = 0;
 };
 /// Returns the CRC-32 of Ethernet and zip; object 1F56h is that of the whole image. [any]
 std::uint32_t crc32(std::span<const std::uint8_t>) noexcept;
 /// Returns an image with `length` bytes of program; version 0x00020001 is 2.1. [any, not real time]
-std::vector<std::uint8_t> program_image(std::uint32_t product, std::uint32_t version, std::size_t length);
+std::vector<std::uint8_t> program_image(std::uint32_t product, std::uint32_t version,
+                                        std::size_t length);
 
 struct BootloaderSettings {
-    std::uint32_t product = 0x302, serial = 1;
-    std::uint32_t version = 0x00010000;           ///< of the initial program; 0: the flash is empty
-    std::size_t flash = 1 << 20;                  ///< capacity in bytes
-    Time erase = 20 * millisecond;                ///< time to clear the flash, ns
+    std::uint32_t product = 0x302;
+    std::uint32_t serial = 1;
+    std::uint32_t version = 0x00010000;  ///< of the initial program; 0: the flash is empty
+    std::size_t flash = 1 << 20;  ///< capacity in bytes
+    Time erase = 20 * millisecond;  ///< time to clear the flash, ns
     std::uint16_t heartbeat_ms = 0;
-    std::optional<std::vector<std::uint8_t>> image{};  ///< initial content of the flash, instead of a program
+    /// initial content of the flash, instead of a program
+    std::optional<std::vector<std::uint8_t>> image{};
 };
 
 /// Error codes in bits 1..7 of 1F57h (CiA 302); bit 0 is busy.
 enum class FlashError : std::uint8_t {
-    none = 0, no_program = 1, unknown_format = 2, wrong_data = 3, not_cleared = 4, write_error = 5, address = 6, secured = 7,
+    none = 0,
+    no_program = 1,
+    unknown_format = 2,
+    wrong_data = 3,
+    not_cleared = 4,
+    write_error = 5,
+    address = 6,
+    secured = 7,
 };
 
 /// The device. All functions are called by the thread that turns its Node.
 class Bootloader final : public Program {
 public:
-    /// Creates the device. Throws std::invalid_argument when the image is longer than the flash. [setup]
+    /// Creates the device. Throws std::invalid_argument when the image is longer than the flash.
+    /// [setup]
     explicit Bootloader(BootloaderSettings);
 
-    /// Returns true while the program runs, false while the boot loader runs, which accepts a new program. [realtime]
+    /// Returns true while the program runs, false while the boot loader runs, which accepts a new
+    /// program. [realtime]
     bool running() const noexcept { return running_; }
     /// Returns the version of the program in the flash, 0 without a valid one. [realtime]
     std::uint32_t version() const noexcept { return running_ || valid() ? header_.version : 0; }
@@ -67,7 +84,9 @@ private:
     public:
         explicit Flash(Bootloader& device) : device_(device) {}
         Abort open_read(Entry&, std::uint32_t&) noexcept override { return Abort::write_only; }
-        Abort read(Entry&, std::uint32_t, std::span<std::uint8_t>) noexcept override { return Abort::write_only; }
+        Abort read(Entry&, std::uint32_t, std::span<std::uint8_t>) noexcept override {
+            return Abort::write_only;
+        }
         Abort open_write(Entry&, std::uint32_t size) noexcept override;
         Abort write(Entry&, std::uint32_t offset, std::span<const std::uint8_t>) noexcept override;
         Abort close(Entry&, bool writing, bool whole) noexcept override;
@@ -87,9 +106,15 @@ private:
     ProgramHeader header_;
     std::uint32_t identification_ = 0;
     FlashError error_ = FlashError::no_program;
-    bool running_ = false, writing_ = false, erasing_ = false, wants_reset_ = false, starts_ = false;
+    bool running_ = false;
+    bool writing_ = false;
+    bool erasing_ = false;
+    bool wants_reset_ = false;
+
+    bool starts_ = false;
     bool broken_off_ = false;  // a download was; it may be begun anew
-    Time now_ = 0, erased_at_ = 0;
+    Time now_ = 0;
+    Time erased_at_ = 0;
     unsigned changes_ = 0;
     Flash stream_{*this};
 };

@@ -17,7 +17,8 @@ constexpr Time pause = 100 * millisecond;
 Drive::Drive(const DriveSettings& settings, const DeviceSettings& device, Events* also)
     : Drive(drive_description(settings), settings, device, also) {}
 
-Drive::Drive(const Description& description, const DriveSettings& settings, const DeviceSettings& device, Events* also)
+Drive::Drive(const Description& description, const DriveSettings& settings,
+             const DeviceSettings& device, Events* also)
     : also_(also != nullptr ? *also : nobody), device_(description, device, *this) {
     for (unsigned n = 0; n < std::clamp(settings.axes, 1U, most_axes); ++n) {
         axes_.push_back(std::make_unique<DriveAxis>(n, settings.axis[n]));
@@ -25,14 +26,18 @@ Drive::Drive(const Description& description, const DriveSettings& settings, cons
         axes_[n]->power_up();
     }
     // Event-driven TPDOs of a drive are sent when what they carry changed.
-    for (unsigned n = 1; n <= Pdos::max_pdos; ++n) device_.pdos().send_on_change(n);
+    for (unsigned n = 1; n <= Pdos::max_pdos; ++n) {
+        device_.pdos().send_on_change(n);
+    }
 }
 
 Drive::~Drive() = default;
 
 void Drive::start(Time now) noexcept {
     last_ = now;
-    for (auto& a : axes_) a->power_up();
+    for (auto& a : axes_) {
+        a->power_up();
+    }
     device_.start(now);
 }
 
@@ -42,37 +47,58 @@ void Drive::step(Time now) noexcept {
     if (passed <= 0) return;
     const double dt = static_cast<double>(std::min(passed, pause)) / static_cast<double>(second);
     const int steps = std::max(1, static_cast<int>(std::ceil(dt / longest_step * (1 - 1e-9))));
-    for (int n = 0; n < steps; ++n)
-        for (auto& a : axes_) a->step(dt / steps);
+    for (int n = 0; n < steps; ++n) {
+        for (auto& a : axes_) {
+            a->step(dt / steps);
+        }
+    }
 }
 
-AxisStatus Drive::status(unsigned axis) const noexcept { return axis < axes_.size() ? axes_[axis]->status() : AxisStatus{}; }
+AxisStatus Drive::status(unsigned axis) const noexcept {
+    return axis < axes_.size() ? axes_[axis]->status() : AxisStatus{};
+}
 void Drive::set_load_torque(unsigned axis, double torque) noexcept {
-    if (axis < axes_.size()) axes_[axis]->set_load_torque(torque);
+    if (axis < axes_.size()) {
+        axes_[axis]->set_load_torque(torque);
+    }
 }
 void Drive::set_inputs(unsigned axis, std::uint32_t bits) noexcept {
-    if (axis < axes_.size()) axes_[axis]->set_inputs(bits);
+    if (axis < axes_.size()) {
+        axes_[axis]->set_inputs(bits);
+    }
 }
 void Drive::set_dc_link(unsigned axis, double volts) noexcept {
-    if (axis < axes_.size()) axes_[axis]->set_dc_link(volts);
+    if (axis < axes_.size()) {
+        axes_[axis]->set_dc_link(volts);
+    }
 }
 void Drive::set_encoder_broken(unsigned axis, bool broken) noexcept {
-    if (axis < axes_.size()) axes_[axis]->set_encoder_broken(broken);
+    if (axis < axes_.size()) {
+        axes_[axis]->set_encoder_broken(broken);
+    }
 }
 
-// The master is lost with the bus or its heartbeat, and when it stops the node or resets the communication.
+// The master is lost with the bus or its heartbeat, and when it stops the node or resets the
+// communication.
 
 void Drive::on_state(NmtState state) noexcept {
-    if (state == NmtState::stopped)
-        for (auto& a : axes_) a->lose_connection();
+    if (state == NmtState::stopped) {
+        for (auto& a : axes_) {
+            a->lose_connection();
+        }
+    }
     also_.on_state(state);
 }
 void Drive::on_reset(bool application) noexcept {
-    for (auto& a : axes_) application ? a->power_up() : a->lose_connection();
+    for (auto& a : axes_) {
+        application ? a->power_up() : a->lose_connection();
+    }
     also_.on_reset(application);
 }
 void Drive::on_communication_error(Time now) noexcept {
-    for (auto& a : axes_) a->lose_connection();
+    for (auto& a : axes_) {
+        a->lose_connection();
+    }
     also_.on_communication_error(now);
 }
 
@@ -83,15 +109,27 @@ void Drive::on_sync_lost(Time now) noexcept { also_.on_sync_lost(now); }
 void Drive::on_time(const TimeOfDay& time, Time now) noexcept { also_.on_time(time, now); }
 void Drive::on_rpdo(unsigned number, Time now) noexcept { also_.on_rpdo(number, now); }
 void Drive::on_rpdo_late(unsigned number, Time now) noexcept { also_.on_rpdo_late(number, now); }
-void Drive::on_rpdo_short(unsigned number, unsigned bytes, Time now) noexcept { also_.on_rpdo_short(number, bytes, now); }
-void Drive::on_node(std::uint8_t node, NodeEvent event, NmtState state, Time now) noexcept { also_.on_node(node, event, state, now); }
-void Drive::on_emergency(std::uint8_t node, const Emergency& emergency) noexcept { also_.on_emergency(node, emergency); }
+void Drive::on_rpdo_short(unsigned number, unsigned bytes, Time now) noexcept {
+    also_.on_rpdo_short(number, bytes, now);
+}
+void Drive::on_node(std::uint8_t node, NodeEvent event, NmtState state, Time now) noexcept {
+    also_.on_node(node, event, state, now);
+}
+void Drive::on_emergency(std::uint8_t node, const Emergency& emergency) noexcept {
+    also_.on_emergency(node, emergency);
+}
 void Drive::on_life_guarding(bool lost, Time now) noexcept { also_.on_life_guarding(lost, now); }
 void Drive::on_id_collision(Time now) noexcept { also_.on_id_collision(now); }
 Abort Drive::on_store(std::uint8_t sub) noexcept { return also_.on_store(sub); }
 Abort Drive::on_restore(std::uint8_t sub) noexcept { return also_.on_restore(sub); }
-bool Drive::on_lss_store(std::uint8_t node_id, std::uint32_t bit_rate) noexcept { return also_.on_lss_store(node_id, bit_rate); }
-bool Drive::on_lss_bit_rate(std::uint32_t bit_rate) noexcept { return also_.on_lss_bit_rate(bit_rate); }
-void Drive::on_lss_activate(std::uint32_t bit_rate, Time delay) noexcept { also_.on_lss_activate(bit_rate, delay); }
+bool Drive::on_lss_store(std::uint8_t node_id, std::uint32_t bit_rate) noexcept {
+    return also_.on_lss_store(node_id, bit_rate);
+}
+bool Drive::on_lss_bit_rate(std::uint32_t bit_rate) noexcept {
+    return also_.on_lss_bit_rate(bit_rate);
+}
+void Drive::on_lss_activate(std::uint32_t bit_rate, Time delay) noexcept {
+    also_.on_lss_activate(bit_rate, delay);
+}
 
 }  // namespace hal::canopen::cia402

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
-// One axis of a drive: state machine, modes, position, velocity and torque loops, monitoring. Inside, positions are encoder increments
-// counted from power-on, not rounded: the loops see the encoder as one that interpolates; the objects show whole numbers.
-// drive_state.cpp has the state machine and faults, drive_modes.cpp, drive_profiles.cpp and drive_cyclic.cpp the modes, drive_servo.cpp the
-// loops, drive_axis.cpp monitoring and the values of the objects.
+// One axis of a drive: state machine, modes, position, velocity and torque loops, monitoring.
+// Inside, positions are encoder increments counted from power-on, not rounded: the loops see the
+// encoder as one that interpolates; the objects show whole numbers. drive_state.cpp has the state
+// machine and faults, drive_modes.cpp, drive_profiles.cpp and drive_cyclic.cpp the modes,
+// drive_servo.cpp the loops, drive_axis.cpp monitoring and the values of the objects.
 #pragma once
 
 #include <cmath>
@@ -17,7 +18,9 @@ namespace hal::canopen::cia402 {
 /// Rounds to the next integer; clamps what is beyond any counter. [any]
 inline std::int64_t whole(double value) noexcept {
     constexpr double most = 1LL << 52;
-    return value >= -most && value <= most ? std::llround(value) : value > 0 ? 1LL << 52 : -(1LL << 52);
+    return value >= -most && value <= most ? std::llround(value)
+           : value > 0                     ? 1LL << 52
+                                           : -(1LL << 52);
 }
 
 /// Converts 1/min to 1/s. [any]
@@ -49,7 +52,14 @@ public:
 private:
     enum class Control : std::uint8_t { off, position, velocity, torque };
     enum class Cause : std::uint8_t {
-        over_current, over_voltage, under_voltage, over_temperature, position_sensor, over_speed, connection, following_error,
+        over_current,
+        over_voltage,
+        under_voltage,
+        over_temperature,
+        position_sensor,
+        over_speed,
+        connection,
+        following_error,
     };
     static constexpr unsigned causes = 8;
     enum class HomingPhase : std::uint8_t { idle, search, back, done, error };
@@ -60,12 +70,16 @@ private:
     template <class T, unsigned room>
     struct Queue {
         std::array<T, room> items{};
-        unsigned head = 0, count = 0;
+        unsigned head = 0;
+        unsigned count = 0;
         bool full(unsigned most = room) const noexcept { return count >= most; }
         void clear() noexcept { head = count = 0; }
         void push(const T& item) noexcept { items[(head + count++) % room] = item; }
         const T& front() const noexcept { return items[head]; }
-        void pop() noexcept { head = (head + 1) % room, --count; }
+        void pop() noexcept {
+            head = (head + 1) % room;
+            --count;
+        }
     };
 
     // State machine.
@@ -124,7 +138,9 @@ private:
     double encoder(double user) const noexcept { return origin_ + user * units_.position; }
     std::int32_t shown(double encoder) const noexcept;
     double highest_speed() const noexcept;  // increments/s
-    double torque_of(double per_mille) const noexcept { return per_mille / 1000 * settings_.motor.rated_torque; }
+    double torque_of(double per_mille) const noexcept {
+        return per_mille / 1000 * settings_.motor.rated_torque;
+    }
     double acceleration(std::uint32_t wanted) const noexcept;
     double deceleration(std::uint32_t wanted) const noexcept;
     Profile::Limits profile_limits() const noexcept;
@@ -140,26 +156,35 @@ private:
     Device* device_ = nullptr;
     Plant plant_;
     double load_ = 0, dc_link_;
-    std::uint32_t external_inputs_ = 0, inputs_ = 0, inputs_before_ = 0;
+    std::uint32_t external_inputs_ = 0;
+    std::uint32_t inputs_ = 0;
+    std::uint32_t inputs_before_ = 0;
     bool encoder_cut_ = false;
 
     struct Units {
-        double position = 1, velocity = 1;    // increments (per second) per unit, with the sign of 607Eh
-        double speed = 1, acceleration = 1;   // without
+        // increments (per second) per unit, with the sign of 607Eh
+        double position = 1;
+        double velocity = 1;
+        double speed = 1;
+        double acceleration = 1;   // without
     } units_;
     double encoder_zero_ = 0;  // along the travel, where the encoder counts 0
     double measured_ = 0;      // encoder
     double origin_ = 0;        // encoder, where the user's position is 0
 
     State state_ = State::not_ready_to_switch_on;
-    std::uint16_t control_ = 0, edges_ = 0;
-    bool enable_next_ = false;              // transition 3 was made by "enable operation"; 4 follows
+    std::uint16_t control_ = 0;
+    std::uint16_t edges_ = 0;
+    // transition 3 was made by "enable operation"; 4 follows
+    bool enable_next_ = false;
     bool stopping_ = false;
     Stop stop_ = Stop::disable;
     State after_stop_ = State::unknown;
-    double stop_time_ = 0, still_time_ = 0;  // since the demand is 0, and since standstill
+    double stop_time_ = 0;
+    double still_time_ = 0;  // since the demand is 0, and since standstill
     std::uint16_t faults_ = 0;              // a bit for each Cause
-    double release_left_ = 0, engage_left_ = 0;
+    double release_left_ = 0;
+    double engage_left_ = 0;
     bool connected_ = true;
 
     Mode mode_ = Mode::none;
@@ -168,8 +193,11 @@ private:
     double demand_before_ = 0;              // position at its beginning
     double torque_ref_ = 0;                 // N·m
     double wanted_ = 0;                     // its sign is the commanded direction
-    double integral_ = 0, velocity_wanted_ = 0, torque_demand_ = 0;
-    bool limited_ = false, saturated_ = false;
+    double integral_ = 0;
+    double velocity_wanted_ = 0;
+    double torque_demand_ = 0;
+    bool limited_ = false;
+    bool saturated_ = false;
 
     Profile profile_;
     Smoother smoother_;                     // of pp and pv
@@ -178,12 +206,22 @@ private:
     SetPoint active_set_point_;
     Queue<std::int32_t, interpolation_room> records_;
     double last_target_ = 0;
-    bool active_ = false, acknowledged_ = false, halted_ = false, has_target_ = false, fresh_ = false, reached_ = false;
+    bool active_ = false;
+    bool acknowledged_ = false;
+    bool halted_ = false;
+    bool has_target_ = false;
+
+    bool fresh_ = false;
+    bool reached_ = false;
     bool record_lost_ = false;
     int guard_ = 0;                         // direction in which a limit stops the motion
     Motion guarded_;
-    double following_time_ = 0, reached_time_ = 0, speed_zero_time_ = 0;
-    bool following_ = false, speed_zero_ = false, slipping_ = false;
+    double following_time_ = 0;
+    double reached_time_ = 0;
+    double speed_zero_time_ = 0;
+    bool following_ = false;
+    bool speed_zero_ = false;
+    bool slipping_ = false;
 
     HomingSearch search_;
     HomingPhase homing_phase_ = HomingPhase::idle;

@@ -12,9 +12,13 @@ template <class T>
 constexpr Type type_for() noexcept {
     constexpr bool sign = std::is_signed_v<T>;
     static_assert(std::is_integral_v<T> && sizeof(T) <= 4);
-    if constexpr (sizeof(T) == 1) return sign ? Type::integer8 : Type::unsigned8;
-    else if constexpr (sizeof(T) == 2) return sign ? Type::integer16 : Type::unsigned16;
-    else return sign ? Type::integer32 : Type::unsigned32;
+    if constexpr (sizeof(T) == 1) {
+        return sign ? Type::integer8 : Type::unsigned8;
+    } else if constexpr (sizeof(T) == 2) {
+        return sign ? Type::integer16 : Type::unsigned16;
+    } else {
+        return sign ? Type::integer32 : Type::unsigned32;
+    }
 }
 
 void add_axis(Description& d, unsigned axis, const AxisSettings& settings) {
@@ -25,13 +29,22 @@ void add_axis(Description& d, unsigned axis, const AxisSettings& settings) {
         using T = std::remove_cvref_t<decltype(value)>;
         const auto index = of_axis(row.index, axis);
         if (row.sub != 0) {
-            if (row.sub == 1) d.add(index, 0, Type::unsigned8, Access::constant, 0, "Highest sub-index" + suffix);
+            if (row.sub == 1) {
+                d.add(index, 0, Type::unsigned8, Access::constant, 0, "Highest sub-index" + suffix);
+            }
             d.find(index, 0)->value[0] = row.sub;
         }
-        auto& entry = d.add(index, row.sub, type_for<T>(), row.access, static_cast<std::uint64_t>(value), row.name + suffix);
-        if (row.pdo == ObjectRow::sent) entry.sent();
-        if (row.pdo == ObjectRow::received) entry.mappable();
-        if (row.low != 0 || row.high != 0) entry.limited(row.low, row.high);
+        auto& entry = d.add(index, row.sub, type_for<T>(), row.access,
+                            static_cast<std::uint64_t>(value), row.name + suffix);
+        if (row.pdo == ObjectRow::sent) {
+            entry.sent();
+        }
+        if (row.pdo == ObjectRow::received) {
+            entry.mappable();
+        }
+        if (row.low != 0 || row.high != 0) {
+            entry.limited(row.low, row.high);
+        }
     });
     struct Carried {
         std::uint16_t index;
@@ -39,36 +52,53 @@ void add_axis(Description& d, unsigned axis, const AxisSettings& settings) {
     };
     using namespace object;
     constexpr Carried nothing{0, 0, 0};
-    constexpr Carried received[] = {nothing, {modes_of_operation, 0, 8}, {target_position, 0, 32}, {target_velocity, 0, 32},
-                                    {target_torque, 0, 16}, {vl_target_velocity, 0, 16}, {digital_outputs, 1, 32}};
-    constexpr Carried sent[] = {nothing, {modes_of_operation_display, 0, 8}, {position_actual, 0, 32}, {velocity_actual, 0, 32},
-                                {torque_actual, 0, 16}, {vl_control_effort, 0, 16}, {digital_inputs, 0, 32}};
+    constexpr Carried received[] = {nothing,
+                                    {modes_of_operation, 0, 8},
+                                    {target_position, 0, 32},
+                                    {target_velocity, 0, 32},
+                                    {target_torque, 0, 16},
+                                    {vl_target_velocity, 0, 16},
+                                    {digital_outputs, 1, 32}};
+    constexpr Carried sent[] = {nothing,
+                                {modes_of_operation_display, 0, 8},
+                                {position_actual, 0, 32},
+                                {velocity_actual, 0, 32},
+                                {torque_actual, 0, 16},
+                                {vl_control_effort, 0, 16},
+                                {digital_inputs, 0, 32}};
     const auto mapping = [&](std::uint16_t word, const Carried& c) {
         std::vector<std::uint32_t> result{map_entry(of_axis(word, axis), 0, 16)};
-        if (c.index != 0) result.push_back(map_entry(of_axis(c.index, axis), c.sub, c.bits));
+        if (c.index != 0) {
+            result.push_back(map_entry(of_axis(c.index, axis), c.sub, c.bits));
+        }
         return result;
     };
     for (unsigned n = 1; n <= 7; ++n) {
         // Status is sent on change; values that change continuously are sent with the SYNC.
         add_rpdo(d, pdo_of_axis(n, axis), {.mapping = mapping(controlword, received[n - 1])});
         const std::uint8_t transmission = n <= 2 ? 255 : 1;
-        add_tpdo(d, pdo_of_axis(n, axis), {.transmission = transmission, .mapping = mapping(statusword, sent[n - 1])});
+        add_tpdo(d, pdo_of_axis(n, axis),
+                 {.transmission = transmission, .mapping = mapping(statusword, sent[n - 1])});
     }
 }
 }  // namespace
 
 AxisSettings possible(AxisSettings settings) {
     auto& m = settings.motor;
-    const auto at_least = [](double& value, double least) { value = value >= least && value < 1e12 ? value : least; };
+    const auto at_least = [](double& value, double least) {
+        value = value >= least && value < 1e12 ? value : least;
+    };
     at_least(m.inertia, 1e-9);
     at_least(m.rated_torque, 1e-6);
     at_least(m.peak_torque, m.rated_torque);
     at_least(m.rated_current, 1e-6);
     at_least(m.rated_voltage, 1e-3);
     at_least(m.highest_speed, 1);
-    for (double* none : {&m.viscous_friction, &m.coulomb_friction, &m.current_loop_time, &m.thermal_time_constant, &m.brake_torque,
-                         &m.brake_release, &m.brake_engage})
+    for (double* none :
+         {&m.viscous_friction, &m.coulomb_friction, &m.current_loop_time, &m.thermal_time_constant,
+          &m.brake_torque, &m.brake_release, &m.brake_engage}) {
         at_least(*none, 0);
+    }
     m.resolution = std::max(m.resolution, 1U);
     return settings;
 }
@@ -76,7 +106,9 @@ AxisSettings possible(AxisSettings settings) {
 Objects::Objects(const AxisSettings& settings) {
     const auto& m = settings.motor;
     const auto turn = m.resolution;  // one revolution, in increments
-    const auto whole = [](double value) { return static_cast<std::uint32_t>(std::clamp(value + 0.5, 0.0, 4294967295.0)); };
+    const auto whole = [](double value) {
+        return static_cast<std::uint32_t>(std::clamp(value + 0.5, 0.0, 4294967295.0));
+    };
     rated_current = whole(m.rated_current * 1000);
     rated_torque = whole(m.rated_torque * 1000);
     max_torque = max_current = positive_torque_limit = negative_torque_limit =
@@ -98,26 +130,34 @@ Objects::Objects(const AxisSettings& settings) {
     homing_switch_speed = 5 * turn;
     homing_zero_speed = std::max(1U, turn / 2);
     homing_acceleration = 100 * turn;
-    for (const auto& row : modes) supported_modes |= bit_of(row.mode);
+    for (const auto& row : modes) {
+        supported_modes |= bit_of(row.mode);
+    }
 }
 
 Description drive_description(const DriveSettings& settings) {
     const auto axes = std::clamp(settings.axes, 1U, most_axes);
-    Description d = basic_device({.device_type = (axes == 1 ? servo_drive : 0xffff0000) | profile_number,
-                                  .vendor = settings.vendor,
-                                  .product = settings.product,
-                                  .revision = settings.revision,
-                                  .serial = settings.serial,
-                                  .name = settings.name,
-                                  .heartbeat_ms = settings.heartbeat_ms});
+    Description d =
+        basic_device({.device_type = (axes == 1 ? servo_drive : 0xffff0000) | profile_number,
+                      .vendor = settings.vendor,
+                      .product = settings.product,
+                      .revision = settings.revision,
+                      .serial = settings.serial,
+                      .name = settings.name,
+                      .heartbeat_ms = settings.heartbeat_ms});
     for (const std::uint16_t index : {std::uint16_t{0x1010}, std::uint16_t{0x1011}}) {
         const bool stores = index == 0x1010;
         d.add(index, 0, Type::unsigned8, Access::constant, 3, "Highest sub-index");
-        d.add(index, 1, Type::unsigned32, Access::read_write, 1, stores ? "Save all" : "Restore all");
-        d.add(index, 2, Type::unsigned32, Access::read_write, 1, stores ? "Save communication" : "Restore communication");
-        d.add(index, 3, Type::unsigned32, Access::read_write, 1, stores ? "Save application" : "Restore application");
+        d.add(index, 1, Type::unsigned32, Access::read_write, 1,
+              stores ? "Save all" : "Restore all");
+        d.add(index, 2, Type::unsigned32, Access::read_write, 1,
+              stores ? "Save communication" : "Restore communication");
+        d.add(index, 3, Type::unsigned32, Access::read_write, 1,
+              stores ? "Save application" : "Restore application");
     }
-    for (unsigned n = 0; n < axes; ++n) add_axis(d, n, settings.axis[n]);
+    for (unsigned n = 0; n < axes; ++n) {
+        add_axis(d, n, settings.axis[n]);
+    }
     for (const std::uint16_t index : settings.without) {
         std::erase_if(d.entries, [&](const EntryDescription& e) { return e.index == index; });
         d.objects.erase(index);

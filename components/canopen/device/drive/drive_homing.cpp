@@ -31,11 +31,14 @@ bool HomingSearch::supports(int method) noexcept {
 }
 
 Range HomingSearch::range(const Plant& plant, Switch which) noexcept {
-    return which == Switch::negative ? plant.negative_limit() : which == Switch::positive ? plant.positive_limit() : plant.home();
+    return which == Switch::negative   ? plant.negative_limit()
+           : which == Switch::positive ? plant.positive_limit()
+                                       : plant.home();
 }
 
 HomingSearch::Region HomingSearch::before_edge() const noexcept {
-    return rule_.edge == Edge::left ? (rule_.last > 0 ? left : inside) : (rule_.last > 0 ? inside : right);
+    return rule_.edge == Edge::left ? (rule_.last > 0 ? left : inside)
+                                    : (rule_.last > 0 ? inside : right);
 }
 
 bool HomingSearch::begin(int method, const Plant& plant) noexcept {
@@ -55,19 +58,31 @@ bool HomingSearch::begin(int method, const Plant& plant) noexcept {
     index_ = method <= 14;
     rule_ = rules[index_ ? method : method - 16];
     const auto r = range(plant, rule_.which);
-    if (r.holds(plant.place())) region_ = inside;
-    else if (rule_.first == 0) region_ = rule_.edge == Edge::left ? left : right;
+    if (r.holds(plant.place())) {
+        region_ = inside;
+    } else if (rule_.first == 0) {
+        region_ = rule_.edge == Edge::left ? left : right;
+    }
     return true;
 }
 
-void HomingSearch::pass(double place, Region to, bool wanted, double speed, double slow, int direction) noexcept {
-    // The last passage counts in the required direction and slow enough; any other only locates the edge.
+void HomingSearch::pass(double place, Region to, bool wanted, double speed, double slow,
+                        int direction) noexcept {
+    // The last passage counts in the required direction and slow enough; any other only locates the
+    // edge.
     if (wanted && direction == rule_.last && edge_found_ && std::abs(speed) <= slow * 1.001) {
         edge_ = place;
-        if (index_) searching_index_ = true, direction_ = direction;
-        else found_ = true, home_ = place;
+        if (index_) {
+            searching_index_ = true;
+            direction_ = direction;
+        } else {
+            found_ = true;
+            home_ = place;
+        }
     }
-    if (wanted) edge_found_ = true;
+    if (wanted) {
+        edge_found_ = true;
+    }
     region_ = to;
 }
 
@@ -80,35 +95,59 @@ void HomingSearch::track(const Plant& plant, double speed, double slow) noexcept
         const bool rising = edge == first;
         const auto place = r.edge(plant.before(), plant.place(), rising);
         if (!place || found_ || searching_index_) continue;
-        pass(*place, rising ? inside : direction > 0 ? right : left, edge == rule_.edge, speed, slow, direction);
+        pass(*place,
+             rising          ? inside
+             : direction > 0 ? right
+                             : left,
+             edge == rule_.edge, speed, slow, direction);
     }
 }
 
 HomingSearch::Order HomingSearch::step(const Plant& plant, double speed, double slow) noexcept {
-    if (!found_ && !searching_index_) track(plant, speed, slow);
-    if (!found_ && searching_index_)
-        if (const auto pulse = plant.index_pulse(edge_, direction_)) found_ = true, home_ = *pulse;
+    if (!found_ && !searching_index_) {
+        track(plant, speed, slow);
+    }
+    if (!found_ && searching_index_) {
+        if (const auto pulse = plant.index_pulse(edge_, direction_)) {
+            found_ = true;
+            home_ = *pulse;
+        }
+    }
     return order(plant);
 }
 
 HomingSearch::Order HomingSearch::order(const Plant& plant) noexcept {
-    if (found_) return {Act::stop_at_home, 0};
-    const bool negative = plant.negative_limit().holds(plant.place()), positive = plant.positive_limit().holds(plant.place());
+    if (found_) {
+        return {Act::stop_at_home, 0};
+    }
+    const bool negative = plant.negative_limit().holds(plant.place());
+
+    const bool positive = plant.positive_limit().holds(plant.place());
     const auto blocked = [&](int direction) { return direction < 0 ? negative : positive; };
     if (searching_index_) {
-        const bool gone = std::abs(plant.place() - edge_) > 1.05 * plant.motor().resolution;  // a full revolution without a pulse
+        // a full revolution without a pulse
+        const bool gone = std::abs(plant.place() - edge_) > 1.05 * plant.motor().resolution;
         return gone || blocked(direction_) ? Order{Act::failed, 0} : Order{Act::slow, direction_};
     }
     if (region_ == unknown && blocked(rule_.first)) {
-        if (blocked(-rule_.first)) return {Act::failed, 0};
+        if (blocked(-rule_.first)) {
+            return {Act::failed, 0};
+        }
         region_ = rule_.first > 0 ? right : left;
     }
     const auto start = before_edge();
-    const int direction = region_ == unknown ? rule_.first : region_ == start ? rule_.last : region_ < start ? 1 : -1;
+    const int direction = region_ == unknown ? rule_.first
+                          : region_ == start ? rule_.last
+                          : region_ < start  ? 1
+                                             : -1;
     // A limit switch in the path is an error, unless it is the one searched for.
     const bool own = rule_.which == (direction < 0 ? Switch::negative : Switch::positive);
-    if (blocked(direction) && !own) return {Act::failed, 0};
-    return {edge_found_ && region_ != unknown && std::abs(region_ - start) <= 1 ? Act::slow : Act::fast, direction};
+    if (blocked(direction) && !own) {
+        return {Act::failed, 0};
+    }
+    return {
+        edge_found_ && region_ != unknown && std::abs(region_ - start) <= 1 ? Act::slow : Act::fast,
+        direction};
 }
 
 }  // namespace hal::canopen::cia402

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The objects of one axis: each is declared once, with its first value; description and binding come from the list below.
+// The objects of one axis: each is declared once, with its first value; description and binding
+// come from the list below.
 #pragma once
 
 #include <cstdint>
@@ -10,25 +11,36 @@
 
 namespace hal::canopen::cia402 {
 
-/// Manufacturer-specific objects, 0x800 further up for each axis: external torque in mN·m, and simulated faults.
-inline constexpr std::uint16_t load_torque_simulated = 0x2010, faults_simulated = 0x2011;
+/// Manufacturer-specific objects, 0x800 further up for each axis: external torque in mN·m, and
+/// simulated faults.
+inline constexpr std::uint16_t load_torque_simulated = 0x2010;
+inline constexpr std::uint16_t faults_simulated = 0x2011;
 namespace simulated {
-inline constexpr std::uint16_t encoder_broken = 0x01, over_voltage = 0x02, under_voltage = 0x04, over_temperature = 0x08,
-                               over_current = 0x10;
-}
+inline constexpr std::uint16_t encoder_broken = 0x01;
+inline constexpr std::uint16_t over_voltage = 0x02;
+inline constexpr std::uint16_t under_voltage = 0x04;
 
-inline constexpr std::array<std::int8_t, 32> homing_methods{1,  2,  3,  4,  5,  6,  7,  8,  9,  10, 11, 12, 13, 14, 17, 18,
-                                                            19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29, 30, 33, 34, 35, 37};
+inline constexpr std::uint16_t over_temperature = 0x08;
+inline constexpr std::uint16_t over_current = 0x10;
+}  // namespace simulated
+
+inline constexpr std::array<std::int8_t, 32> homing_methods{
+    1,  2,  3,  4,  5,  6,  7,  8,  9,  10, 11, 12, 13, 14, 17, 18,
+    19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29, 30, 33, 34, 35, 37};
 inline constexpr unsigned interpolation_room = 32;
 inline constexpr std::uint32_t no_window = 0xffffffff;  ///< of 6065h and 6067h: not monitored
 
-/// Returns the settings with impossible values of the motor (inertia, torque, speed, encoder) replaced by possible ones. [setup]
+/// Returns the settings with impossible values of the motor (inertia, torque, speed, encoder)
+/// replaced by possible ones. [setup]
 AxisSettings possible(AxisSettings);
 
 /// A numerator over a denominator.
 struct Ratio {
-    std::uint32_t numerator = 1, denominator = 1;
-    double value() const noexcept { return denominator == 0 ? 1.0 : static_cast<double>(numerator) / denominator; }
+    std::uint32_t numerator = 1;
+    std::uint32_t denominator = 1;
+    double value() const noexcept {
+        return denominator == 0 ? 1.0 : static_cast<double>(numerator) / denominator;
+    }
 };
 /// A ramp of vl: a speed in r/min per time in s.
 struct Ramp {
@@ -36,37 +48,74 @@ struct Ramp {
     std::uint16_t time = 1;
 };
 
-/// The values of the objects. The dictionary writes command values, the axis writes actual values; both in one thread.
+/// The values of the objects. The dictionary writes command values, the axis writes actual values;
+/// both in one thread.
 struct Objects {
     std::int32_t load_torque = 0;
     std::uint16_t simulated_faults = 0;
     std::int16_t abort_connection_option = 1;
-    std::uint16_t error_code = 0, controlword = 0, statusword = 0;
-    std::int16_t vl_target = 0, vl_demand = 0, vl_actual = 0;
-    std::uint32_t vl_min = 0, vl_max = 6000;
+    std::uint16_t error_code = 0;
+    std::uint16_t controlword = 0;
+    std::uint16_t statusword = 0;
+    std::int16_t vl_target = 0;
+    std::int16_t vl_demand = 0;
+    std::int16_t vl_actual = 0;
+    std::uint32_t vl_min = 0;
+    std::uint32_t vl_max = 6000;
     Ramp vl_acceleration, vl_deceleration, vl_quick_stop{5000, 1};
-    std::int16_t vl_set_point_numerator = 1, vl_set_point_denominator = 1;
-    std::int32_t vl_dimension_numerator = 1, vl_dimension_denominator = 1;
-    std::int16_t quick_stop_option = 2, shutdown_option = 0, disable_operation_option = 1, halt_option = 1, fault_reaction_option = 2;
-    std::int8_t mode = 1, mode_display = 1;
-    std::int32_t position_demand = 0, position_actual_internal = 0, position_actual = 0;
+    std::int16_t vl_set_point_numerator = 1;
+    std::int16_t vl_set_point_denominator = 1;
+    std::int32_t vl_dimension_numerator = 1;
+    std::int32_t vl_dimension_denominator = 1;
+    std::int16_t quick_stop_option = 2;
+    std::int16_t shutdown_option = 0;
+    std::int16_t disable_operation_option = 1;
+
+    std::int16_t halt_option = 1;
+    std::int16_t fault_reaction_option = 2;
+    std::int8_t mode = 1;
+    std::int8_t mode_display = 1;
+    std::int32_t position_demand = 0;
+    std::int32_t position_actual_internal = 0;
+    std::int32_t position_actual = 0;
     std::uint32_t following_error_window = 2048;
     std::uint16_t following_error_timeout = 10;
     std::uint32_t position_window = 10;
     std::uint16_t position_window_time = 5;
-    std::int32_t velocity_sensor = 0, velocity_demand = 0, velocity_actual = 0;
-    std::uint16_t velocity_window = 400, velocity_window_time = 5, velocity_threshold = 200, velocity_threshold_time = 5;
+    std::int32_t velocity_sensor = 0;
+    std::int32_t velocity_demand = 0;
+    std::int32_t velocity_actual = 0;
+    std::uint16_t velocity_window = 400;
+    std::uint16_t velocity_window_time = 5;
+    std::uint16_t velocity_threshold = 200;
+
+    std::uint16_t velocity_threshold_time = 5;
     std::int16_t target_torque = 0;
-    std::uint16_t max_torque = 3000, max_current = 3000;
+    std::uint16_t max_torque = 3000;
+    std::uint16_t max_current = 3000;
     std::int16_t torque_demand = 0;
-    std::uint32_t rated_current = 0, rated_torque = 0;
-    std::int16_t torque_actual = 0, current_actual = 0;
+    std::uint32_t rated_current = 0;
+    std::uint32_t rated_torque = 0;
+    std::int16_t torque_actual = 0;
+    std::int16_t current_actual = 0;
     std::uint32_t dc_link = 0;
-    std::int32_t target_position = 0, range_min = 0, range_max = 0, home_offset = 0;
-    std::int32_t software_min = std::numeric_limits<std::int32_t>::min(), software_max = std::numeric_limits<std::int32_t>::max();
+    std::int32_t target_position = 0;
+    std::int32_t range_min = 0;
+    std::int32_t range_max = 0;
+    std::int32_t home_offset = 0;
+    std::int32_t software_min = std::numeric_limits<std::int32_t>::min();
+
+    std::int32_t software_max = std::numeric_limits<std::int32_t>::max();
     std::uint8_t polarity = 0;
-    std::uint32_t max_profile_velocity = 0, max_motor_speed = 0, profile_velocity = 0, end_velocity = 0, profile_acceleration = 0,
-                  profile_deceleration = 0, quick_stop_deceleration = 0;
+    std::uint32_t max_profile_velocity = 0;
+    std::uint32_t max_motor_speed = 0;
+    std::uint32_t profile_velocity = 0;
+
+    std::uint32_t end_velocity = 0;
+    std::uint32_t profile_acceleration = 0;
+    std::uint32_t profile_deceleration = 0;
+
+    std::uint32_t quick_stop_deceleration = 0;
     std::int16_t motion_profile_type = 0;
     std::uint8_t profile_jerk_use = 1;
     std::uint32_t profile_jerk = 0;
@@ -74,29 +123,46 @@ struct Objects {
     std::int16_t torque_profile_type = 0;
     Ratio position_encoder, velocity_encoder, gear, feed, velocity_factor, acceleration_factor;
     std::int8_t homing_method = 0;
-    std::uint32_t homing_switch_speed = 0, homing_zero_speed = 0, homing_acceleration = 0;
-    std::uint32_t position_unit = 0, velocity_unit = 0, acceleration_unit = 0;
-    std::int32_t position_offset = 0, velocity_offset = 0;
+    std::uint32_t homing_switch_speed = 0;
+    std::uint32_t homing_zero_speed = 0;
+    std::uint32_t homing_acceleration = 0;
+    std::uint32_t position_unit = 0;
+    std::uint32_t velocity_unit = 0;
+    std::uint32_t acceleration_unit = 0;
+    std::int32_t position_offset = 0;
+    std::int32_t velocity_offset = 0;
     std::int16_t torque_offset = 0;
-    std::uint16_t probe_function = 0, probe_status = 0;
+    std::uint16_t probe_function = 0;
+    std::uint16_t probe_status = 0;
     std::array<std::int32_t, 4> probe_positions{};
     std::int16_t interpolation_submode = 0;
     std::int32_t interpolation_record = 0;
     std::uint8_t interpolation_period = 1;
     std::int8_t interpolation_exponent = -3;
-    std::uint32_t buffer_room = interpolation_room, buffer_size = interpolation_room;
+    std::uint32_t buffer_room = interpolation_room;
+    std::uint32_t buffer_size = interpolation_room;
     std::uint8_t buffer_organisation = 0;
     std::uint16_t buffer_position = 0;
-    std::uint8_t buffer_record_size = 4, buffer_clear = 1;
-    std::uint32_t max_acceleration = 0, max_deceleration = 0;
-    std::uint16_t positive_torque_limit = 3000, negative_torque_limit = 3000;
+    std::uint8_t buffer_record_size = 4;
+    std::uint8_t buffer_clear = 1;
+    std::uint32_t max_acceleration = 0;
+    std::uint32_t max_deceleration = 0;
+    std::uint16_t positive_torque_limit = 3000;
+    std::uint16_t negative_torque_limit = 3000;
     std::int32_t additional_position = 0;
     std::uint16_t positioning_option = 0;
-    std::int32_t following_error = 0, max_slippage = 0, control_effort = 0, position_demand_internal = 0;
-    std::uint32_t inputs = 0, outputs = 0, output_mask = 0;
+    std::int32_t following_error = 0;
+    std::int32_t max_slippage = 0;
+    std::int32_t control_effort = 0;
+
+    std::int32_t position_demand_internal = 0;
+    std::uint32_t inputs = 0;
+    std::uint32_t outputs = 0;
+    std::uint32_t output_mask = 0;
     std::int32_t target_velocity = 0;
     std::uint16_t motor_type = 0x000a;  // sinusoidal permanent-magnet brushless
-    std::uint32_t supported_modes = 0, type = servo_drive | profile_number;
+    std::uint32_t supported_modes = 0;
+    std::uint32_t type = servo_drive | profile_number;
     std::array<std::int8_t, homing_methods.size()> supported_homing = homing_methods;
 
     /// Sets the initial values for a motor; units are encoder increments. [setup]
@@ -111,27 +177,34 @@ struct ObjectRow {
     Access access;
     Pdo pdo;
     const char* name;
-    std::int64_t low = 0, high = 0;  ///< both 0: the limits of the type
+    std::int64_t low = 0;
+    std::int64_t high = 0;  ///< both 0: the limits of the type
 };
 
 /// Calls f(row, value) for every object of the first axis. [setup]
 template <class F>
 void each_object(Objects& o, F&& f) {
     using namespace object;
-    constexpr auto rw = Access::read_write, ro = Access::read_only, fixed = Access::constant;
-    constexpr auto no = ObjectRow::no_pdo, tx = ObjectRow::sent, rx = ObjectRow::received;
+    constexpr auto rw = Access::read_write;
+    constexpr auto ro = Access::read_only;
+    constexpr auto fixed = Access::constant;
+    constexpr auto no = ObjectRow::no_pdo;
+    constexpr auto tx = ObjectRow::sent;
+    constexpr auto rx = ObjectRow::received;
     const auto ramp = [&](std::uint16_t index, Ramp& r) {
         f(ObjectRow{index, 1, rw, no, "Delta speed"}, r.speed);
         f(ObjectRow{index, 2, rw, no, "Delta time"}, r.time);
     };
-    const auto ratio = [&](std::uint16_t index, Ratio& r, const char* numerator, const char* denominator) {
+    const auto ratio = [&](std::uint16_t index, Ratio& r, const char* numerator,
+                           const char* denominator) {
         constexpr std::int64_t most = std::numeric_limits<std::uint32_t>::max();
         f(ObjectRow{index, 1, rw, no, numerator, 1, most}, r.numerator);
         f(ObjectRow{index, 2, rw, no, denominator, 1, most}, r.denominator);
     };
     f(ObjectRow{load_torque_simulated, 0, rw, rx, "Load torque"}, o.load_torque);
     f(ObjectRow{faults_simulated, 0, rw, rx, "Simulated faults"}, o.simulated_faults);
-    f(ObjectRow{abort_connection_option, 0, rw, no, "Abort connection option code", 0, 3}, o.abort_connection_option);
+    f(ObjectRow{abort_connection_option, 0, rw, no, "Abort connection option code", 0, 3},
+      o.abort_connection_option);
     f(ObjectRow{error_code, 0, ro, tx, "Error code"}, o.error_code);
     f(ObjectRow{controlword, 0, rw, rx, "Controlword"}, o.controlword);
     f(ObjectRow{statusword, 0, ro, tx, "Statusword"}, o.statusword);
@@ -143,31 +216,43 @@ void each_object(Objects& o, F&& f) {
     ramp(vl_velocity_acceleration, o.vl_acceleration);
     ramp(vl_velocity_deceleration, o.vl_deceleration);
     ramp(vl_velocity_quick_stop, o.vl_quick_stop);
-    f(ObjectRow{vl_set_point_factor, 1, rw, no, "vl set-point factor numerator", 1, 32767}, o.vl_set_point_numerator);
-    f(ObjectRow{vl_set_point_factor, 2, rw, no, "vl set-point factor denominator", 1, 32767}, o.vl_set_point_denominator);
-    f(ObjectRow{vl_dimension_factor, 1, rw, no, "vl dimension factor numerator", 1, 0x7fffffff}, o.vl_dimension_numerator);
-    f(ObjectRow{vl_dimension_factor, 2, rw, no, "vl dimension factor denominator", 1, 0x7fffffff}, o.vl_dimension_denominator);
+    f(ObjectRow{vl_set_point_factor, 1, rw, no, "vl set-point factor numerator", 1, 32767},
+      o.vl_set_point_numerator);
+    f(ObjectRow{vl_set_point_factor, 2, rw, no, "vl set-point factor denominator", 1, 32767},
+      o.vl_set_point_denominator);
+    f(ObjectRow{vl_dimension_factor, 1, rw, no, "vl dimension factor numerator", 1, 0x7fffffff},
+      o.vl_dimension_numerator);
+    f(ObjectRow{vl_dimension_factor, 2, rw, no, "vl dimension factor denominator", 1, 0x7fffffff},
+      o.vl_dimension_denominator);
     f(ObjectRow{quick_stop_option, 0, rw, no, "Quick stop option code", 0, 8}, o.quick_stop_option);
     f(ObjectRow{shutdown_option, 0, rw, no, "Shutdown option code", 0, 1}, o.shutdown_option);
-    f(ObjectRow{disable_operation_option, 0, rw, no, "Disable operation option code", 0, 1}, o.disable_operation_option);
+    f(ObjectRow{disable_operation_option, 0, rw, no, "Disable operation option code", 0, 1},
+      o.disable_operation_option);
     f(ObjectRow{halt_option, 0, rw, no, "Halt option code", 1, 4}, o.halt_option);
-    f(ObjectRow{fault_reaction_option, 0, rw, no, "Fault reaction option code", 0, 4}, o.fault_reaction_option);
+    f(ObjectRow{fault_reaction_option, 0, rw, no, "Fault reaction option code", 0, 4},
+      o.fault_reaction_option);
     f(ObjectRow{modes_of_operation, 0, rw, rx, "Modes of operation"}, o.mode);
-    f(ObjectRow{modes_of_operation_display, 0, ro, tx, "Modes of operation display"}, o.mode_display);
+    f(ObjectRow{modes_of_operation_display, 0, ro, tx, "Modes of operation display"},
+      o.mode_display);
     f(ObjectRow{position_demand, 0, ro, tx, "Position demand value"}, o.position_demand);
-    f(ObjectRow{position_actual_internal, 0, ro, tx, "Position actual internal value"}, o.position_actual_internal);
+    f(ObjectRow{position_actual_internal, 0, ro, tx, "Position actual internal value"},
+      o.position_actual_internal);
     f(ObjectRow{position_actual, 0, ro, tx, "Position actual value"}, o.position_actual);
-    f(ObjectRow{following_error_window, 0, rw, rx, "Following error window"}, o.following_error_window);
-    f(ObjectRow{following_error_timeout, 0, rw, no, "Following error time out"}, o.following_error_timeout);
+    f(ObjectRow{following_error_window, 0, rw, rx, "Following error window"},
+      o.following_error_window);
+    f(ObjectRow{following_error_timeout, 0, rw, no, "Following error time out"},
+      o.following_error_timeout);
     f(ObjectRow{position_window, 0, rw, no, "Position window"}, o.position_window);
     f(ObjectRow{position_window_time, 0, rw, no, "Position window time"}, o.position_window_time);
-    f(ObjectRow{velocity_sensor_actual, 0, ro, tx, "Velocity sensor actual value"}, o.velocity_sensor);
+    f(ObjectRow{velocity_sensor_actual, 0, ro, tx, "Velocity sensor actual value"},
+      o.velocity_sensor);
     f(ObjectRow{velocity_demand, 0, ro, tx, "Velocity demand value"}, o.velocity_demand);
     f(ObjectRow{velocity_actual, 0, ro, tx, "Velocity actual value"}, o.velocity_actual);
     f(ObjectRow{velocity_window, 0, rw, no, "Velocity window"}, o.velocity_window);
     f(ObjectRow{velocity_window_time, 0, rw, no, "Velocity window time"}, o.velocity_window_time);
     f(ObjectRow{velocity_threshold, 0, rw, no, "Velocity threshold"}, o.velocity_threshold);
-    f(ObjectRow{velocity_threshold_time, 0, rw, no, "Velocity threshold time"}, o.velocity_threshold_time);
+    f(ObjectRow{velocity_threshold_time, 0, rw, no, "Velocity threshold time"},
+      o.velocity_threshold_time);
     f(ObjectRow{target_torque, 0, rw, rx, "Target torque"}, o.target_torque);
     f(ObjectRow{max_torque, 0, rw, rx, "Max torque"}, o.max_torque);
     f(ObjectRow{max_current, 0, rw, rx, "Max current"}, o.max_current);
@@ -190,18 +275,23 @@ void each_object(Objects& o, F&& f) {
     f(ObjectRow{end_velocity, 0, rw, rx, "End velocity"}, o.end_velocity);
     f(ObjectRow{profile_acceleration, 0, rw, rx, "Profile acceleration"}, o.profile_acceleration);
     f(ObjectRow{profile_deceleration, 0, rw, rx, "Profile deceleration"}, o.profile_deceleration);
-    f(ObjectRow{quick_stop_deceleration, 0, rw, rx, "Quick stop deceleration"}, o.quick_stop_deceleration);
+    f(ObjectRow{quick_stop_deceleration, 0, rw, rx, "Quick stop deceleration"},
+      o.quick_stop_deceleration);
     f(ObjectRow{motion_profile_type, 0, rw, no, "Motion profile type"}, o.motion_profile_type);
     f(ObjectRow{object::profile_jerk_use, 0, rw, no, "Profile jerk use"}, o.profile_jerk_use);
     f(ObjectRow{object::profile_jerk, 1, rw, no, "Profile jerk"}, o.profile_jerk);
     f(ObjectRow{torque_slope, 0, rw, rx, "Torque slope"}, o.torque_slope);
     f(ObjectRow{torque_profile_type, 0, rw, no, "Torque profile type"}, o.torque_profile_type);
-    ratio(position_encoder_resolution, o.position_encoder, "Encoder increments", "Motor revolutions");
-    ratio(velocity_encoder_resolution, o.velocity_encoder, "Encoder increments per second", "Motor revolutions per second");
+    ratio(position_encoder_resolution, o.position_encoder, "Encoder increments",
+          "Motor revolutions");
+    ratio(velocity_encoder_resolution, o.velocity_encoder, "Encoder increments per second",
+          "Motor revolutions per second");
     ratio(gear_ratio, o.gear, "Motor revolutions", "Shaft revolutions");
     ratio(feed_constant, o.feed, "Feed", "Shaft revolutions");
-    ratio(velocity_factor, o.velocity_factor, "Velocity factor numerator", "Velocity factor divisor");
-    ratio(acceleration_factor, o.acceleration_factor, "Acceleration factor numerator", "Acceleration factor divisor");
+    ratio(velocity_factor, o.velocity_factor, "Velocity factor numerator",
+          "Velocity factor divisor");
+    ratio(acceleration_factor, o.acceleration_factor, "Acceleration factor numerator",
+          "Acceleration factor divisor");
     f(ObjectRow{homing_method, 0, rw, rx, "Homing method"}, o.homing_method);
     f(ObjectRow{homing_speeds, 1, rw, no, "Speed during search for switch"}, o.homing_switch_speed);
     f(ObjectRow{homing_speeds, 2, rw, no, "Speed during search for zero"}, o.homing_zero_speed);
@@ -214,33 +304,54 @@ void each_object(Objects& o, F&& f) {
     f(ObjectRow{torque_offset, 0, rw, rx, "Torque offset"}, o.torque_offset);
     f(ObjectRow{touch_probe_function, 0, rw, rx, "Touch probe function"}, o.probe_function);
     f(ObjectRow{touch_probe_status, 0, ro, tx, "Touch probe status"}, o.probe_status);
-    f(ObjectRow{touch_probe_1_positive, 0, ro, tx, "Touch probe 1 positive edge"}, o.probe_positions[0]);
-    f(ObjectRow{touch_probe_1_negative, 0, ro, tx, "Touch probe 1 negative edge"}, o.probe_positions[1]);
-    f(ObjectRow{touch_probe_2_positive, 0, ro, tx, "Touch probe 2 positive edge"}, o.probe_positions[2]);
-    f(ObjectRow{touch_probe_2_negative, 0, ro, tx, "Touch probe 2 negative edge"}, o.probe_positions[3]);
-    f(ObjectRow{interpolation_submode, 0, rw, no, "Interpolation sub mode select"}, o.interpolation_submode);
-    f(ObjectRow{interpolation_data, 1, rw, rx, "Interpolation data record"}, o.interpolation_record);
-    f(ObjectRow{interpolation_period, 1, rw, no, "Interpolation time period value"}, o.interpolation_period);
-    f(ObjectRow{interpolation_period, 2, rw, no, "Interpolation time index", -6, 0}, o.interpolation_exponent);
+    f(ObjectRow{touch_probe_1_positive, 0, ro, tx, "Touch probe 1 positive edge"},
+      o.probe_positions[0]);
+    f(ObjectRow{touch_probe_1_negative, 0, ro, tx, "Touch probe 1 negative edge"},
+      o.probe_positions[1]);
+    f(ObjectRow{touch_probe_2_positive, 0, ro, tx, "Touch probe 2 positive edge"},
+      o.probe_positions[2]);
+    f(ObjectRow{touch_probe_2_negative, 0, ro, tx, "Touch probe 2 negative edge"},
+      o.probe_positions[3]);
+    f(ObjectRow{interpolation_submode, 0, rw, no, "Interpolation sub mode select"},
+      o.interpolation_submode);
+    f(ObjectRow{interpolation_data, 1, rw, rx, "Interpolation data record"},
+      o.interpolation_record);
+    f(ObjectRow{interpolation_period, 1, rw, no, "Interpolation time period value"},
+      o.interpolation_period);
+    f(ObjectRow{interpolation_period, 2, rw, no, "Interpolation time index", -6, 0},
+      o.interpolation_exponent);
     f(ObjectRow{interpolation_configuration, 1, ro, no, "Maximum buffer size"}, o.buffer_room);
-    f(ObjectRow{interpolation_configuration, 2, rw, no, "Actual buffer size", 1, interpolation_room}, o.buffer_size);
-    f(ObjectRow{interpolation_configuration, 3, rw, no, "Buffer organisation"}, o.buffer_organisation);
+    f(ObjectRow{interpolation_configuration, 2, rw, no, "Actual buffer size", 1,
+                interpolation_room},
+      o.buffer_size);
+    f(ObjectRow{interpolation_configuration, 3, rw, no, "Buffer organisation"},
+      o.buffer_organisation);
     f(ObjectRow{interpolation_configuration, 4, rw, no, "Buffer position"}, o.buffer_position);
-    f(ObjectRow{interpolation_configuration, 5, Access::write_only, no, "Size of data record", 4, 4}, o.buffer_record_size);
-    f(ObjectRow{interpolation_configuration, 6, Access::write_only, no, "Buffer clear"}, o.buffer_clear);
+    f(ObjectRow{interpolation_configuration, 5, Access::write_only, no, "Size of data record", 4,
+                4},
+      o.buffer_record_size);
+    f(ObjectRow{interpolation_configuration, 6, Access::write_only, no, "Buffer clear"},
+      o.buffer_clear);
     f(ObjectRow{max_acceleration, 0, rw, no, "Max acceleration"}, o.max_acceleration);
     f(ObjectRow{max_deceleration, 0, rw, no, "Max deceleration"}, o.max_deceleration);
-    f(ObjectRow{positive_torque_limit, 0, rw, rx, "Positive torque limit value"}, o.positive_torque_limit);
-    f(ObjectRow{negative_torque_limit, 0, rw, rx, "Negative torque limit value"}, o.negative_torque_limit);
-    for (std::size_t n = 0; n < homing_methods.size(); ++n)
-        f(ObjectRow{supported_homing_methods, static_cast<std::uint8_t>(n + 1), fixed, no, "Supported homing method"},
+    f(ObjectRow{positive_torque_limit, 0, rw, rx, "Positive torque limit value"},
+      o.positive_torque_limit);
+    f(ObjectRow{negative_torque_limit, 0, rw, rx, "Negative torque limit value"},
+      o.negative_torque_limit);
+    for (std::size_t n = 0; n < homing_methods.size(); ++n) {
+        f(ObjectRow{supported_homing_methods, static_cast<std::uint8_t>(n + 1), fixed, no,
+                    "Supported homing method"},
           o.supported_homing[n]);
-    f(ObjectRow{additional_position, 1, ro, tx, "1st additional position actual value"}, o.additional_position);
+    }
+    f(ObjectRow{additional_position, 1, ro, tx, "1st additional position actual value"},
+      o.additional_position);
     f(ObjectRow{positioning_option, 0, rw, rx, "Positioning option code"}, o.positioning_option);
-    f(ObjectRow{following_error_actual, 0, ro, tx, "Following error actual value"}, o.following_error);
+    f(ObjectRow{following_error_actual, 0, ro, tx, "Following error actual value"},
+      o.following_error);
     f(ObjectRow{max_slippage, 0, rw, no, "Max slippage"}, o.max_slippage);
     f(ObjectRow{control_effort, 0, ro, tx, "Control effort"}, o.control_effort);
-    f(ObjectRow{position_demand_internal, 0, ro, tx, "Position demand internal value"}, o.position_demand_internal);
+    f(ObjectRow{position_demand_internal, 0, ro, tx, "Position demand internal value"},
+      o.position_demand_internal);
     f(ObjectRow{digital_inputs, 0, ro, tx, "Digital inputs"}, o.inputs);
     f(ObjectRow{digital_outputs, 1, rw, rx, "Physical outputs"}, o.outputs);
     f(ObjectRow{digital_outputs, 2, rw, no, "Bit mask"}, o.output_mask);

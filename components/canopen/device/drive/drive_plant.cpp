@@ -19,12 +19,16 @@ std::optional<double> Range::edge(double before, double after, bool rising) cons
     if (!exists()) return std::nullopt;
     const bool forward = after > before;
     const double place = forward == rising ? from : to;
-    const bool passed = forward ? before < place && place <= after : before >= place && place > after;
+    const bool passed =
+        forward ? before < place && place <= after : before >= place && place > after;
     return passed ? std::optional(place) : std::nullopt;
 }
 
 Plant::Plant(const MotorSettings& motor) noexcept
-    : motor_(motor), per_radian_(motor.resolution / (2 * std::numbers::pi)), place_(motor.start), before_(motor.start) {}
+    : motor_(motor),
+      per_radian_(motor.resolution / (2 * std::numbers::pi)),
+      place_(motor.start),
+      before_(motor.start) {}
 
 Range Plant::negative_limit() const noexcept { return {-infinity, motor_.negative_limit}; }
 Range Plant::positive_limit() const noexcept { return {motor_.positive_limit, infinity}; }
@@ -33,23 +37,33 @@ void Plant::step(double dt, double demand, double load, bool brake_closed) noexc
     before_ = place_;
     const int steps = std::max(1, static_cast<int>(std::ceil(dt / longest_step)));
     const double h = dt / steps;
-    const double still = (motor_.coulomb_friction + (brake_closed ? motor_.brake_torque : 0)) * h / motor_.inertia;
+    const double still =
+        (motor_.coulomb_friction + (brake_closed ? motor_.brake_torque : 0)) * h / motor_.inertia;
     for (int n = 0; n < steps; ++n) {
         torque_ = towards(torque_, demand, h, motor_.current_loop_time);
-        double speed = (speed_ + h * (torque_ + load) / motor_.inertia) / (1 + h * motor_.viscous_friction / motor_.inertia);
+        double speed = (speed_ + h * (torque_ + load) / motor_.inertia) /
+                       (1 + h * motor_.viscous_friction / motor_.inertia);
         speed = speed > still ? speed - still : speed < -still ? speed + still : 0;
         // Trapezoidal in the place: exact for a constant acceleration.
         place_ += 0.5 * (speed_ + speed) * h * per_radian_;
         speed_ = speed;
-        if (place_ >= motor_.positive_stop) place_ = motor_.positive_stop, speed_ = std::min(speed_, 0.0);
-        if (place_ <= motor_.negative_stop) place_ = motor_.negative_stop, speed_ = std::max(speed_, 0.0);
+        if (place_ >= motor_.positive_stop) {
+            place_ = motor_.positive_stop;
+            speed_ = std::min(speed_, 0.0);
+        }
+        if (place_ <= motor_.negative_stop) {
+            place_ = motor_.negative_stop;
+            speed_ = std::max(speed_, 0.0);
+        }
         const double share = motor_.rated_torque > 0 ? torque_ / motor_.rated_torque : 0;
         heat_ = towards(heat_, share * share, h, motor_.thermal_time_constant);
     }
 }
 
 std::optional<double> Plant::index_pulse(double from, int direction) const noexcept {
-    if (!motor_.index_pulse || motor_.resolution == 0 || (place_ - before_) * direction <= 0) return std::nullopt;
+    if (!motor_.index_pulse || motor_.resolution == 0 || (place_ - before_) * direction <= 0) {
+        return std::nullopt;
+    }
     const double turn = motor_.resolution;
     if (direction > 0) {
         const double next = (std::floor(std::max(from, before_) / turn) + 1) * turn;

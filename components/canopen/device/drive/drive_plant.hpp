@@ -6,8 +6,9 @@
 //     dφ/dt = ω
 //     dθ/dt = ((T / T_rated)² − θ) / τ_thermal      heat of the winding, 1 at continuous rated torque (I²t); solved exactly
 //
-// T torque in N·m, J inertia in kg·m², ω speed in rad/s, φ angle in rad, b in N·m·s/rad, τ in s. At rest the Coulomb torque holds
-// against less than itself; a closed brake adds its torque to it. (The usual model of a servo axis, as in textbooks on motion control.)
+// T torque in N·m, J inertia in kg·m², ω speed in rad/s, φ angle in rad, b in N·m·s/rad, τ in s. At
+// rest the Coulomb torque holds against less than itself; a closed brake adds its torque to it.
+// (The usual model of a servo axis, as in textbooks on motion control.)
 #pragma once
 
 #include <optional>
@@ -18,7 +19,8 @@ namespace hal::canopen::cia402 {
 
 /// A range [from, to) of the travel.
 struct Range {
-    double from = 0, to = 0;
+    double from = 0;
+    double to = 0;
     bool holds(double place) const noexcept { return place >= from && place < to; }
     bool exists() const noexcept { return from < to; }
     /// Returns the first place where a motion enters (`rising`) or leaves it. [realtime]
@@ -28,12 +30,13 @@ struct Range {
 class Plant {
 public:
     explicit Plant(const MotorSettings&) noexcept;  // [setup]
-    /// Advances by `dt` s; `torque` in N·m is the demand of the current loop, 0 when it is off. Stable for any `dt`. [realtime]
+    /// Advances by `dt` s; `torque` in N·m is the demand of the current loop, 0 when it is off.
+    /// Stable for any `dt`. [realtime]
     void step(double dt, double torque, double load, bool brake_closed) noexcept;
 
-    double place() const noexcept { return place_; }    ///< encoder increments
+    double place() const noexcept { return place_; }  ///< encoder increments
     double before() const noexcept { return before_; }  ///< the same, one step ago
-    double speed() const noexcept { return speed_; }    ///< rad/s
+    double speed() const noexcept { return speed_; }  ///< rad/s
     double torque() const noexcept { return torque_; }
     double heat() const noexcept { return heat_; }
     double increments_per_radian() const noexcept { return per_radian_; }
@@ -42,9 +45,12 @@ public:
     Range positive_limit() const noexcept;
     Range home() const noexcept { return {motor_.home_from, motor_.home_to}; }
     Range probe(unsigned n) const noexcept { return {motor_.probe_from[n], motor_.probe_to[n]}; }
-    /// Returns the first index pulse beyond `from` that the last step passed in `direction`. [realtime]
+    /// Returns the first index pulse beyond `from` that the last step passed in `direction`.
+    /// [realtime]
     std::optional<double> index_pulse(double from, int direction) const noexcept;
-    std::optional<double> index_pulse() const noexcept { return index_pulse(before_, place_ < before_ ? -1 : 1); }
+    std::optional<double> index_pulse() const noexcept {
+        return index_pulse(before_, place_ < before_ ? -1 : 1);
+    }
     const MotorSettings& motor() const noexcept { return motor_; }
 
 private:

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Modes whose set-points the axis plans itself: profile position, profile velocity, vl and profile torque.
+// Modes whose set-points the axis plans itself: profile position, profile velocity, vl and profile
+// torque.
 #include <algorithm>
 #include <cmath>
 
@@ -11,7 +12,9 @@ namespace hal::canopen::cia402 {
 
 void DriveAxis::accept_set_point() noexcept {
     if (acknowledged_) return;
-    const bool immediately = (control_ & control::change_immediately) != 0, pending = active_ || set_points_.count != 0;
+    const bool immediately = (control_ & control::change_immediately) != 0;
+
+    const bool pending = active_ || set_points_.count != 0;
     if (!immediately && pending && set_points_.full()) return;
     SetPoint next{0, profile_limits()};
     next.limits.end_velocity = objects_.end_velocity * units_.speed;
@@ -20,23 +23,30 @@ void DriveAxis::accept_set_point() noexcept {
         const double base = option == 1 ? ref_.position : option == 2 ? measured_ : last_target_;
         next.target = base + objects_.target_position * units_.position;
     } else {
-        next.target = absolute(objects_.target_position, pending && !immediately ? last_target_ : ref_.position);
+        next.target = absolute(objects_.target_position,
+                               pending && !immediately ? last_target_ : ref_.position);
     }
     next.target = within_limits(next.target);
     last_target_ = next.target;
     acknowledged_ = true;
-    if (immediately) set_points_.clear();
+    if (immediately) {
+        set_points_.clear();
+    }
     if (immediately || !pending) {
         start_set_point(next);
         return;
     }
     set_points_.push(next);
     if ((control_ & control::change_on_set_point) == 0 || set_points_.count != 1 || halted_) return;
-    // Passes the present target without a stop, as fast as the next allows, if the direction is the same.
-    const double ahead = active_set_point_.target - unsmoothed(true).position, further = next.target - active_set_point_.target;
+    // Passes the present target without a stop, as fast as the next allows, if the direction is the
+    // same.
+    const double ahead = active_set_point_.target - unsmoothed(true).position;
+
+    const double further = next.target - active_set_point_.target;
     if (ahead * further <= 0 || profile_.done()) return;
-    active_set_point_.limits.end_velocity = std::min({active_set_point_.limits.velocity, next.limits.velocity,
-                                                      std::sqrt(2 * next.limits.deceleration * std::abs(further))});
+    active_set_point_.limits.end_velocity =
+        std::min({active_set_point_.limits.velocity, next.limits.velocity,
+                  std::sqrt(2 * next.limits.deceleration * std::abs(further))});
     profile_.plan(unsmoothed(true), active_set_point_.target, active_set_point_.limits);
 }
 
@@ -50,8 +60,12 @@ void DriveAxis::start_set_point(const SetPoint& next) noexcept {
 }
 
 void DriveAxis::profile_position(double dt) noexcept {
-    if ((edges_ & control::new_set_point) != 0) accept_set_point();
-    if ((control_ & control::new_set_point) == 0 && !set_points_.full()) acknowledged_ = false;
+    if ((edges_ & control::new_set_point) != 0) {
+        accept_set_point();
+    }
+    if ((control_ & control::new_set_point) == 0 && !set_points_.full()) {
+        acknowledged_ = false;
+    }
     take(Control::position);
     const int direction = ref_.velocity > 0 ? 1 : -1;
     if (ref_.velocity != 0 && blocked(direction)) {
@@ -70,20 +84,30 @@ void DriveAxis::profile_position(double dt) noexcept {
         set_points_.pop();
         start_set_point(next);
     };
-    if (reached_ && set_points_.count != 0) start_next();
+    if (reached_ && set_points_.count != 0) {
+        start_next();
+    }
     Motion& raw = unsmoothed(true);
     double left = profile_.step(raw, dt);
-    while (profile_.done() && active_set_point_.limits.end_velocity > 0 && set_points_.count != 0 && left > 0) {
+    while (profile_.done() && active_set_point_.limits.end_velocity > 0 && set_points_.count != 0 &&
+           left > 0) {
         start_next();
         left = profile_.step(raw, left);
     }
-    if (profile_.done()) raw.position += raw.velocity * left;  // with an end velocity and no further set-point, it keeps moving
+    // with an end velocity and no further set-point, it keeps moving
+    if (profile_.done()) {
+        raw.position += raw.velocity * left;
+    }
     ref_ = smoother_.step(dt);
     if (!profile_.done() || (raw.velocity == 0 && !smoother_.settled())) return;
     const bool there = objects_.position_window == no_window ||
-                       std::abs(active_set_point_.target - measured_) <= objects_.position_window * std::abs(units_.position);
-    if (ref_.velocity == 0 && !there) reached_time_ = 0;
-    else reached_time_ += dt;
+                       std::abs(active_set_point_.target - measured_) <=
+                           objects_.position_window * std::abs(units_.position);
+    if (ref_.velocity == 0 && !there) {
+        reached_time_ = 0;
+    } else {
+        reached_time_ += dt;
+    }
     reached_ = reached_time_ * 1000 >= objects_.position_window_time || ref_.velocity != 0;
 }
 
@@ -93,9 +117,14 @@ void DriveAxis::profile_velocity(double dt) noexcept {
     take(Control::velocity);
     auto limits = profile_limits();
     limits.velocity = highest_speed();
-    if (objects_.max_profile_velocity != 0) limits.velocity = std::min(limits.velocity, objects_.max_profile_velocity * units_.speed);
-    const double target = std::clamp(objects_.target_velocity * units_.velocity, -limits.velocity, limits.velocity);
-    if (target != objects_.target_velocity * units_.velocity) limited_ = true;
+    if (objects_.max_profile_velocity != 0) {
+        limits.velocity = std::min(limits.velocity, objects_.max_profile_velocity * units_.speed);
+    }
+    const double target =
+        std::clamp(objects_.target_velocity * units_.velocity, -limits.velocity, limits.velocity);
+    if (target != objects_.target_velocity * units_.velocity) {
+        limited_ = true;
+    }
     wanted_ = target;
     ramp(unsmoothed(false), target, limits.acceleration, limits.deceleration, dt);
     const Motion from = ref_;
@@ -108,17 +137,27 @@ void DriveAxis::profile_velocity(double dt) noexcept {
 
 void DriveAxis::vl_velocity(double dt) noexcept {
     take(Control::velocity);
-    const auto rate = [&](const Ramp& r) { return per_second(r.speed) / std::max<double>(r.time, 1) * settings_.motor.resolution; };
-    double wanted = static_cast<double>(objects_.vl_target) * objects_.vl_set_point_numerator / objects_.vl_set_point_denominator *
-                    objects_.vl_dimension_numerator / objects_.vl_dimension_denominator;
+    const auto rate = [&](const Ramp& r) {
+        return per_second(r.speed) / std::max<double>(r.time, 1) * settings_.motor.resolution;
+    };
+    double wanted = static_cast<double>(objects_.vl_target) * objects_.vl_set_point_numerator /
+                    objects_.vl_set_point_denominator * objects_.vl_dimension_numerator /
+                    objects_.vl_dimension_denominator;
     if (wanted != 0) {
-        const double amount = std::clamp<double>(std::abs(wanted), objects_.vl_min, std::max(objects_.vl_min, objects_.vl_max));
-        if (amount != std::abs(wanted)) limited_ = true;
+        const double amount = std::clamp<double>(std::abs(wanted), objects_.vl_min,
+                                                 std::max(objects_.vl_min, objects_.vl_max));
+        if (amount != std::abs(wanted)) {
+            limited_ = true;
+        }
         wanted = std::copysign(amount, wanted);
     }
     const double most = highest_speed();
-    double target = std::clamp(per_second(wanted) * settings_.motor.resolution * ((objects_.polarity & 0x40) != 0 ? -1 : 1), -most, most);
-    if ((control_ & control::reference_ramp) == 0) target = 0;
+    double target = std::clamp(per_second(wanted) * settings_.motor.resolution *
+                                   ((objects_.polarity & 0x40) != 0 ? -1 : 1),
+                               -most, most);
+    if ((control_ & control::reference_ramp) == 0) {
+        target = 0;
+    }
     wanted_ = target;
     if ((control_ & control::enable_ramp) == 0) {
         ramp(ref_, 0, rate(objects_.vl_quick_stop), rate(objects_.vl_quick_stop), dt);
@@ -132,7 +171,9 @@ void DriveAxis::vl_velocity(double dt) noexcept {
 
 void DriveAxis::profile_torque(double dt) noexcept {
     take(Control::torque);
-    const double target = torque_of(objects_.target_torque), slope = torque_of(objects_.torque_slope);
+    const double target = torque_of(objects_.target_torque);
+
+    const double slope = torque_of(objects_.torque_slope);
     wanted_ = target;
     const double change = slope > 0 ? slope * dt : std::abs(target - torque_ref_);
     torque_ref_ += std::clamp(target - torque_ref_, -change, change);

@@ -51,11 +51,13 @@ bool axis_in(std::string_view text, std::string_view name, unsigned axes, unsign
 bool set_motor(cia402::MotorSettings& motor, std::string_view name, double value) {
     if (name == "resolution") {
         if (!(value >= 1 && value <= 16'777'216 && value == std::floor(value))) return false;
-        return motor.resolution = static_cast<std::uint32_t>(value), true;
+        motor.resolution = static_cast<std::uint32_t>(value);
+        return true;
     }
     if (name == "endless") return value != 0.0 ? (void)motor.endless() : void(), true;
-    for (const auto& row : motor_rows)
+    for (const auto& row : motor_rows) {
         if (name == row.name) return value >= row.least && (motor.*row.value = value, true);
+    }
     return false;
 }
 
@@ -66,18 +68,25 @@ std::string parse_motor(std::string_view text, cia402::MotorSettings& motor) {
         const auto sign = part.find_first_of(":=");
         double value = 0;
         const auto digits = sign == part.npos ? std::string_view{} : part.substr(sign + 1);
-        const auto [end, wrong] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-        const bool number = wrong == std::errc{} && !digits.empty() && end == digits.data() + digits.size();
+        const auto [end, wrong] =
+            std::from_chars(digits.data(), digits.data() + digits.size(), value);
+        const bool number =
+            wrong == std::errc{} && !digits.empty() && end == digits.data() + digits.size();
         if (number && set_motor(motor, part.substr(0, sign), value)) continue;
         std::string names = "resolution, endless";
-        for (const auto& row : motor_rows) names += std::string(", ") + row.name;
-        return "invalid motor parameter '" + std::string(part) + "'; write NAME:VALUE, as in inertia:1e-4; names: " + names;
+        for (const auto& row : motor_rows) {
+            names += std::string(", ") + row.name;
+        }
+        return "invalid motor parameter '" + std::string(part) +
+               "'; write NAME:VALUE, as in inertia:1e-4; names: " + names;
     }
     return {};
 }
 
 DriveProgram::DriveProgram(const cia402::DriveSettings& settings) : settings_(settings) {
-    if (settings_.vendor == 0) settings_.vendor = example_vendor;
+    if (settings_.vendor == 0) {
+        settings_.vendor = example_vendor;
+    }
 }
 
 Device& DriveProgram::make(const DeviceSettings& settings) {
@@ -87,18 +96,34 @@ Device& DriveProgram::make(const DeviceSettings& settings) {
 
 bool DriveProgram::set(std::string_view name, double value) {
     unsigned axis = 0;
-    if (axis_in(name, "load-torque", settings_.axes, axis)) return drive_->set_load_torque(axis, value), true;
-    if (axis_in(name, "dc-link", settings_.axes, axis)) return drive_->set_dc_link(axis, value), true;
-    if (axis_in(name, "inputs", settings_.axes, axis))
-        return drive_->set_inputs(axis, value >= 0 && value < 4294967296.0 ? static_cast<std::uint32_t>(value) : 0), true;
-    if (axis_in(name, "encoder-broken", settings_.axes, axis)) return drive_->set_encoder_broken(axis, value != 0.0), true;
+    if (axis_in(name, "load-torque", settings_.axes, axis)) {
+        drive_->set_load_torque(axis, value);
+        return true;
+    }
+    if (axis_in(name, "dc-link", settings_.axes, axis)) {
+        drive_->set_dc_link(axis, value);
+        return true;
+    }
+    if (axis_in(name, "inputs", settings_.axes, axis)) {
+        drive_->set_inputs(
+            axis, value >= 0 && value < 4294967296.0 ? static_cast<std::uint32_t>(value) : 0);
+
+        return true;
+    }
+    if (axis_in(name, "encoder-broken", settings_.axes, axis)) {
+        drive_->set_encoder_broken(axis, value != 0.0);
+        return true;
+    }
     return false;
 }
 
 std::vector<std::string> DriveProgram::settable() const {
     std::vector<std::string> names;
-    for (const char* name : {"load-torque-", "dc-link-", "inputs-", "encoder-broken-"})
-        for (unsigned n = 0; n < settings_.axes; ++n) names.push_back(name + std::to_string(n));
+    for (const char* name : {"load-torque-", "dc-link-", "inputs-", "encoder-broken-"}) {
+        for (unsigned n = 0; n < settings_.axes; ++n) {
+            names.push_back(name + std::to_string(n));
+        }
+    }
     return names;
 }
 
@@ -106,9 +131,15 @@ std::string DriveProgram::summary() const {
     std::string text;
     for (unsigned n = 0; n < settings_.axes; ++n) {
         const auto s = drive_->status(n);
-        text += (n == 0 ? "" : "; ") + (settings_.axes == 1 ? std::string() : "axis " + std::to_string(n) + " ") + cia402::to_string(s.state);
-        if (s.mode != cia402::Mode::none) text += std::string(", ") + cia402::to_string(s.mode);
-        if (s.error_code != 0) text += std::string(", error ") + cia402::error_word(s.error_code);
+        text += (n == 0 ? "" : "; ") +
+                (settings_.axes == 1 ? std::string() : "axis " + std::to_string(n) + " ") +
+                cia402::to_string(s.state);
+        if (s.mode != cia402::Mode::none) {
+            text += std::string(", ") + cia402::to_string(s.mode);
+        }
+        if (s.error_code != 0) {
+            text += std::string(", error ") + cia402::error_word(s.error_code);
+        }
     }
     return text;
 }

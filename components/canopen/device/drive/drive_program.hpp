@@ -29,7 +29,8 @@ private:
     std::unique_ptr<cia402::Drive> drive_;
 };
 
-/// Sets a motor parameter by name, as in "inertia" and 1e-4. Returns false for an unknown name. [setup]
+/// Sets a motor parameter by name, as in "inertia" and 1e-4. Returns false for an unknown name.
+/// [setup]
 bool set_motor(cia402::MotorSettings&, std::string_view name, double value);
 /// Parses "inertia:1e-4,resolution:8192"; empty is valid. Returns the problem, or "". [setup]
 std::string parse_motor(std::string_view text, cia402::MotorSettings&);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Trajectories: a ramp, a trapezoidal profile to a place, and the interpolation between two set-points of a master.
+// Trajectories: a ramp, a trapezoidal profile to a place, and the interpolation between two
+// set-points of a master.
 #pragma once
 
 #include <array>
@@ -9,19 +10,25 @@ namespace hal::canopen::cia402 {
 
 /// State of a motion; one unit of length throughout, seconds.
 struct Motion {
-    double position = 0, velocity = 0, acceleration = 0;
+    double position = 0;
+    double velocity = 0;
+    double acceleration = 0;
 };
 
-/// Moves the velocity towards `target`, speeding up by `acceleration`, slowing down by `deceleration`, through 0 if necessary. The position
-/// is integrated exactly. [realtime]
+/// Moves the velocity towards `target`, speeding up by `acceleration`, slowing down by
+/// `deceleration`, through 0 if necessary. The position is integrated exactly. [realtime]
 void ramp(Motion&, double target, double acceleration, double deceleration, double dt) noexcept;
 
-/// A motion of constant accelerations from any state to a place, arriving with a given velocity, 0 by default.
+/// A motion of constant accelerations from any state to a place, arriving with a given velocity, 0
+/// by default.
 class Profile {
 public:
     struct Limits {
-        double velocity = 0, acceleration = 0, deceleration = 0;  ///< amounts
-        double end_velocity = 0;                                  ///< at the target, in the direction of the motion
+        double velocity = 0;
+        double acceleration = 0;
+        double deceleration = 0;  ///< amounts
+        /// at the target, in the direction of the motion
+        double end_velocity = 0;
     };
     /// Plans the motion; if it cannot stop in time, it passes the target and returns. [realtime]
     void plan(const Motion& from, double target, const Limits&) noexcept;
@@ -37,12 +44,16 @@ private:
     };
     void add(double time, double acceleration) noexcept;
     std::array<Segment, 5> segments_{};
-    std::uint8_t count_ = 0, next_ = 0;
-    double elapsed_ = 0, target_ = 0, end_velocity_ = 0;
+    std::uint8_t count_ = 0;
+    std::uint8_t next_ = 0;
+    double elapsed_ = 0;
+    double target_ = 0;
+    double end_velocity_ = 0;
 };
 
-/// Limits the jerk of a motion: its output is the mean of the motion over the last `time` seconds. An acceleration a grows and falls with
-/// the jerk a/time; the motion ends at the same place, `time` later, and exceeds no velocity or acceleration.
+/// Limits the jerk of a motion: its output is the mean of the motion over the last `time` seconds.
+/// An acceleration a grows and falls with the jerk a/time; the motion ends at the same place,
+/// `time` later, and exceeds no velocity or acceleration.
 class Smoother {
 public:
     static constexpr double longest = 1.0;  ///< s
@@ -53,7 +64,9 @@ public:
     /// Returns the smoothed motion `dt` s after the last call. [realtime]
     Motion step(double dt) noexcept;
     /// Returns true when `m` is the result of the last step().
-    bool gave(const Motion& m) const noexcept { return m.position == given_.position && m.velocity == given_.velocity; }
+    bool gave(const Motion& m) const noexcept {
+        return m.position == given_.position && m.velocity == given_.velocity;
+    }
     bool gave_velocity(const Motion& m) const noexcept { return m.velocity == given_.velocity; }
     /// Returns true when the motion has not changed its velocity for `time`. [realtime]
     bool settled() const noexcept { return steady_ >= time_; }
@@ -66,26 +79,47 @@ private:
     static constexpr unsigned room = 1024;
     static constexpr double shortest = 0.00105;  // shorter segments are merged
     std::array<Piece, room> pieces_{};
-    unsigned head_ = 0, count_ = 0;
-    double time_ = 0, held_ = 0, area_ = 0, steady_ = 0;  // time and area of all segments
-    double origin_ = 0;                                   // origin of the positions of the segments, to keep precision
+    unsigned head_ = 0;
+    unsigned count_ = 0;
+    double time_ = 0;
+    double held_ = 0;
+    double area_ = 0;
+    double steady_ = 0;  // time and area of all segments
+    // origin of the positions of the segments, to keep precision
+    double origin_ = 0;
     Motion raw_, before_, given_;
 };
 
-/// Interpolates from the present position to the next set-point over the time between two of them, then waits there.
+/// Interpolates from the present position to the next set-point over the time between two of them,
+/// then waits there.
 class Interpolator {
 public:
-    void hold(double position) noexcept { from_ = to_ = position, left_ = period_ = 0; }
+    void hold(double position) noexcept {
+        from_ = to_ = position;
+        left_ = period_ = 0;
+    }
     /// [realtime]
     void next(double position, double target, double period) noexcept {
-        from_ = position, to_ = target, period_ = left_ = period > 0 ? period : 0;
+        from_ = position;
+        to_ = target;
+        period_ = left_ = period > 0 ? period : 0;
     }
-    /// Advances by `dt` s. Returns the remaining part of `dt` after arrival. The velocity is the mean one over `dt`. [realtime]
+    /// Advances by `dt` s. Returns the remaining part of `dt` after arrival. The velocity is the
+    /// mean one over `dt`. [realtime]
     double step(Motion&, double dt) noexcept;
     bool arrived() const noexcept { return left_ <= 0; }
 
 private:
-    double from_ = 0, to_ = 0, period_ = 0, left_ = 0;
+    double from_ = 0;
+
+private:
+    double to_ = 0;
+
+private:
+    double period_ = 0;
+
+private:
+    double left_ = 0;
 };
 
 }  // namespace hal::canopen::cia402

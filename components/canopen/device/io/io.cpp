@@ -9,9 +9,13 @@ namespace hal::canopen {
 
 namespace {
 std::int16_t counts_of(double value) noexcept {
-    return std::isnan(value) ? std::int16_t{0} : static_cast<std::int16_t>(std::lround(std::clamp(value, -32768.0, 32767.0)));
+    return std::isnan(value)
+               ? std::int16_t{0}
+               : static_cast<std::int16_t>(std::lround(std::clamp(value, -32768.0, 32767.0)));
 }
-constexpr std::int32_t justified(std::int16_t counts) noexcept { return std::int32_t{counts} * 65536; }
+constexpr std::int32_t justified(std::int16_t counts) noexcept {
+    return std::int32_t{counts} * 65536;
+}
 }  // namespace
 
 Io::Io(const IoSettings& settings) : settings_(settings) {}
@@ -29,20 +33,38 @@ void Io::lay(std::uint16_t index, void* image, std::size_t each) {
 void Io::attach(Device& device) {
     Program::attach(device);
     const std::pair<std::uint16_t, Block*> blocks[] = {
-        {0x6000, &inputs_}, {0x6002, &input_polarity_}, {0x6003, &filter_}, {0x6006, &any_change_}, {0x6007, &rising_}, {0x6008, &falling_},
-        {0x6200, &outputs_}, {0x6202, &output_polarity_}, {0x6206, &error_mode_}, {0x6207, &error_value_}, {0x6208, &output_mask_},
+        {0x6000, &inputs_},      {0x6002, &input_polarity_},  {0x6003, &filter_},
+        {0x6006, &any_change_},  {0x6007, &rising_},          {0x6008, &falling_},
+        {0x6200, &outputs_},     {0x6202, &output_polarity_}, {0x6206, &error_mode_},
+        {0x6207, &error_value_}, {0x6208, &output_mask_},
     };
-    for (const auto& [index, block] : blocks) lay(index, block->data(), 1);
-    lay(0x6100, inputs_.data(), 2), lay(0x6120, inputs_.data(), 4);
-    lay(0x6300, outputs_.data(), 2), lay(0x6320, outputs_.data(), 4);
-    lay(0x6005, &interrupts_on_, 1), lay(0x6423, &analog_interrupts_on_, 1), lay(0x2000, &filter_ms_, 2);
-    lay(0x6401, analog_in_.data(), 2), lay(0x6411, analog_out_.data(), 2);
-    lay(0x6421, triggers_.data(), 1), lay(0x6443, analog_error_mode_.data(), 1);
-    lay(0x6424, upper_.data(), 4), lay(0x6425, lower_.data(), 4), lay(0x6444, error_analog_.data(), 4);
-    lay(0x6426, delta_.data(), 4), lay(0x6427, negative_delta_.data(), 4), lay(0x6428, positive_delta_.data(), 4);
-    for (const int index : {0x6020, 0x6220, 0x6200, 0x6202, 0x6208, 0x6300, 0x6320, 0x6400, 0x6402, 0x6403, 0x6410, 0x6411, 0x6412,
-                            0x6413, 0x6422, 0x6445})
+    for (const auto& [index, block] : blocks) {
+        lay(index, block->data(), 1);
+    }
+    lay(0x6100, inputs_.data(), 2);
+    lay(0x6120, inputs_.data(), 4);
+    lay(0x6300, outputs_.data(), 2);
+    lay(0x6320, outputs_.data(), 4);
+    lay(0x6005, &interrupts_on_, 1);
+    lay(0x6423, &analog_interrupts_on_, 1);
+
+    lay(0x2000, &filter_ms_, 2);
+    lay(0x6401, analog_in_.data(), 2);
+    lay(0x6411, analog_out_.data(), 2);
+    lay(0x6421, triggers_.data(), 1);
+    lay(0x6443, analog_error_mode_.data(), 1);
+    lay(0x6424, upper_.data(), 4);
+    lay(0x6425, lower_.data(), 4);
+
+    lay(0x6444, error_analog_.data(), 4);
+    lay(0x6426, delta_.data(), 4);
+    lay(0x6427, negative_delta_.data(), 4);
+
+    lay(0x6428, positive_delta_.data(), 4);
+    for (const int index : {0x6020, 0x6220, 0x6200, 0x6202, 0x6208, 0x6300, 0x6320, 0x6400, 0x6402,
+                            0x6403, 0x6410, 0x6411, 0x6412, 0x6413, 0x6422, 0x6445}) {
         watch(static_cast<std::uint16_t>(index));
+    }
     drive_outputs();
 }
 
@@ -64,7 +86,9 @@ void Io::set_input(unsigned n, bool on) noexcept {
 }
 
 void Io::set_analog_input(unsigned n, double fraction) noexcept {
-    if (n < settings_.analog_inputs) analog_terminals_[n] = counts_of(fraction * 32767.0);
+    if (n < settings_.analog_inputs) {
+        analog_terminals_[n] = counts_of(fraction * 32767.0);
+    }
 }
 
 void Io::sample(Time now) noexcept {
@@ -73,7 +97,10 @@ void Io::sample(Time now) noexcept {
 }
 
 void Io::trigger(std::uint16_t index, std::size_t sub) noexcept {
-    if (const auto* e = device_->dictionary().find(index, static_cast<std::uint8_t>(sub)); e != nullptr) device_->pdos().trigger(*e);
+    if (const auto* e = device_->dictionary().find(index, static_cast<std::uint8_t>(sub));
+        e != nullptr) {
+        device_->pdos().trigger(*e);
+    }
 }
 
 void Io::sample_digital(Time now) noexcept {
@@ -83,22 +110,31 @@ void Io::sample_digital(Time now) noexcept {
         auto taken = static_cast<std::uint8_t>(differs & ~filter_[block]);
         for (unsigned bit = 0; bit < 8 && (filter_[block] != 0); ++bit) {
             auto& since = differs_since_[block * 8 + bit];
-            if ((differs >> bit & 1) == 0) since = now;  // unchanged so far
-            else if ((filter_[block] >> bit & 1) != 0 && now - since >= filter_time) taken = static_cast<std::uint8_t>(taken | 1U << bit);
+            if ((differs >> bit & 1) == 0) {
+                since = now;  // unchanged so far
+            } else if ((filter_[block] >> bit & 1) != 0 && now - since >= filter_time) {
+                taken = static_cast<std::uint8_t>(taken | 1U << bit);
+            }
         }
         filtered_[block] ^= taken;
-        const auto is = static_cast<std::uint8_t>(filtered_[block] ^ input_polarity_[block]), was = inputs_[block];
+        const auto is = static_cast<std::uint8_t>(filtered_[block] ^ input_polarity_[block]);
+
+        const auto was = inputs_[block];
         const auto changed = static_cast<std::uint8_t>(is ^ was);
         if (changed == 0) continue;
         inputs_[block] = is;
-        const auto asks = static_cast<std::uint8_t>((changed & any_change_[block]) | (changed & is & rising_[block]) |
+        const auto asks = static_cast<std::uint8_t>((changed & any_change_[block]) |
+                                                    (changed & is & rising_[block]) |
                                                     (changed & was & falling_[block]));
         if (interrupts_on_ == 0 || asks == 0) continue;
         trigger(0x6000, block + 1);
         trigger(0x6100, block / 2 + 1);
         trigger(0x6120, block / 4 + 1);
-        for (unsigned bit = 0; bit < 8; ++bit)
-            if ((asks >> bit & 1) != 0) trigger(0x6020, block * 8 + bit + 1);
+        for (unsigned bit = 0; bit < 8; ++bit) {
+            if ((asks >> bit & 1) != 0) {
+                trigger(0x6020, block * 8 + bit + 1);
+            }
+        }
     }
 }
 
@@ -106,7 +142,8 @@ void Io::sample_digital(Time now) noexcept {
 bool Io::interrupts(unsigned n, std::int32_t value) const noexcept {
     const auto by = triggers_[n];
     const auto change = std::int64_t{value} - sent_[n];
-    const bool limit = ((by & 1) != 0 && value >= upper_[n]) || ((by & 2) != 0 && value < lower_[n]);
+    const bool limit =
+        ((by & 1) != 0 && value >= upper_[n]) || ((by & 2) != 0 && value < lower_[n]);
     const bool delta = ((by & 4) != 0 && std::abs(change) > std::int64_t{delta_[n]}) ||
                        ((by & 8) != 0 && -change > std::int64_t{negative_delta_[n]}) ||
                        ((by & 16) != 0 && change > std::int64_t{positive_delta_[n]});
@@ -120,8 +157,10 @@ void Io::sample_analog() noexcept {
         if (analog_interrupts_on_ == 0 || !interrupts(n, value)) continue;
         sent_[n] = value;
         interrupted_ |= 1U << n;
-        for (const std::uint16_t view : {std::uint16_t{0x6400}, std::uint16_t{0x6401}, std::uint16_t{0x6402}, std::uint16_t{0x6403}})
+        for (const std::uint16_t view : {std::uint16_t{0x6400}, std::uint16_t{0x6401},
+                                         std::uint16_t{0x6402}, std::uint16_t{0x6403}}) {
             trigger(view, n + 1U);
+        }
         trigger(0x6422, 1);
     }
 }
@@ -137,7 +176,8 @@ Abort Io::reading(Entry& e) noexcept {
     case 0x6402: store(e.data, justified(analog_in_[n])); break;
     case 0x6403:
         store(e.data,
-              static_cast<float>(analog_in_[n]) * dictionary.get<float>(0x642f, e.sub, 1.0F) + dictionary.get<float>(0x642e, e.sub));
+              static_cast<float>(analog_in_[n]) * dictionary.get<float>(0x642f, e.sub, 1.0F) +
+                  dictionary.get<float>(0x642e, e.sub));
         break;
     case 0x6422:
         store(e.data, interrupted_);
@@ -154,7 +194,9 @@ void Io::written(Entry& e) noexcept {
     if (e.sub == 0) return;
     const unsigned n = e.sub - 1U;
     auto& dictionary = device_->dictionary();
-    if (e.index != 0x6202 && e.index != 0x6208 && e.index != 0x6445) safe_ = false;
+    if (e.index != 0x6202 && e.index != 0x6208 && e.index != 0x6445) {
+        safe_ = false;
+    }
     switch (e.index) {
     case 0x6220: {
         const auto bit = static_cast<std::uint8_t>(1U << n % 8);
@@ -162,37 +204,54 @@ void Io::written(Entry& e) noexcept {
         block = static_cast<std::uint8_t>(*e.data != 0 ? block | bit : block & ~bit);
         return drive_outputs();
     }
-    case 0x6410: analog_out_[n] = static_cast<std::int16_t>(static_cast<std::int8_t>(*e.data) * 256); break;
-    case 0x6412: analog_out_[n] = static_cast<std::int16_t>(load<std::int32_t>(e.data) >> 16); break;
+    case 0x6410:
+        analog_out_[n] = static_cast<std::int16_t>(static_cast<std::int8_t>(*e.data) * 256);
+        break;
+    case 0x6412:
+        analog_out_[n] = static_cast<std::int16_t>(load<std::int32_t>(e.data) >> 16);
+        break;
     case 0x6413:
-        analog_out_[n] = counts_of(double{load<float>(e.data)} * double{dictionary.get<float>(0x6442, e.sub, 1.0F)} +
+        analog_out_[n] = counts_of(double{load<float>(e.data)} *
+                                       double{dictionary.get<float>(0x6442, e.sub, 1.0F)} +
                                    double{dictionary.get<float>(0x6441, e.sub)});
         break;
     case 0x6445:
-        error_analog_[n] = justified(counts_of(double{load<float>(e.data)} * double{dictionary.get<float>(0x6442, e.sub, 1.0F)} +
-                                               double{dictionary.get<float>(0x6441, e.sub)}));
+        error_analog_[n] = justified(counts_of(
+            double{load<float>(e.data)} * double{dictionary.get<float>(0x6442, e.sub, 1.0F)} +
+            double{dictionary.get<float>(0x6441, e.sub)}));
         return;
     case 0x6411: break;
     default: return drive_outputs();
     }
-    if (auto* view = dictionary.find(0x6410, e.sub); view != nullptr) *view->data = static_cast<std::uint8_t>(analog_out_[n] >> 8);
-    if (auto* view = dictionary.find(0x6412, e.sub); view != nullptr && view != &e) store(view->data, justified(analog_out_[n]));
+    if (auto* view = dictionary.find(0x6410, e.sub); view != nullptr) {
+        *view->data = static_cast<std::uint8_t>(analog_out_[n] >> 8);
+    }
+    if (auto* view = dictionary.find(0x6412, e.sub); view != nullptr && view != &e) {
+        store(view->data, justified(analog_out_[n]));
+    }
 }
 
 void Io::drive_outputs() noexcept {
     for (unsigned block = 0; block < bytes; ++block) {
-        const auto wanted = static_cast<std::uint8_t>(outputs_[block] ^ output_polarity_[block]), mask = output_mask_[block];
-        terminals_out_[block] = static_cast<std::uint8_t>((terminals_out_[block] & ~mask) | (wanted & mask));
+        const auto wanted = static_cast<std::uint8_t>(outputs_[block] ^ output_polarity_[block]);
+
+        const auto mask = output_mask_[block];
+        terminals_out_[block] =
+            static_cast<std::uint8_t>((terminals_out_[block] & ~mask) | (wanted & mask));
     }
 }
 
 void Io::take_error_values() noexcept {
-    for (unsigned block = 0; block < bytes; ++block)
-        outputs_[block] =
-            static_cast<std::uint8_t>((outputs_[block] & ~error_mode_[block]) | (error_value_[block] & error_mode_[block]));
+    for (unsigned block = 0; block < bytes; ++block) {
+        outputs_[block] = static_cast<std::uint8_t>((outputs_[block] & ~error_mode_[block]) |
+                                                    (error_value_[block] & error_mode_[block]));
+    }
     drive_outputs();
-    for (unsigned n = 0; n < settings_.analog_outputs; ++n)
-        if (analog_error_mode_[n] == 1) analog_out_[n] = static_cast<std::int16_t>(error_analog_[n] >> 16);
+    for (unsigned n = 0; n < settings_.analog_outputs; ++n) {
+        if (analog_error_mode_[n] == 1) {
+            analog_out_[n] = static_cast<std::int16_t>(error_analog_[n] >> 16);
+        }
+    }
     safe_ = true;
 }
 
@@ -206,22 +265,36 @@ bool Io::set(std::string_view name, double value) {
         return wrong == std::errc{} && end == digits.data() + digits.size() && n < count;
     };
     unsigned n = 0;
-    if (place("in-", settings_.digital_inputs, n)) return set_input(n, value != 0.0), true;
-    if (place("analog-in-", settings_.analog_inputs, n)) return set_analog_input(n, value / 10.0), true;
+    if (place("in-", settings_.digital_inputs, n)) {
+        set_input(n, value != 0.0);
+        return true;
+    }
+    if (place("analog-in-", settings_.analog_inputs, n)) {
+        set_analog_input(n, value / 10.0);
+        return true;
+    }
     return false;
 }
 
 std::vector<std::string> Io::settable() const {
     std::vector<std::string> names;
-    for (unsigned n = 0; n < settings_.digital_inputs; ++n) names.push_back("in-" + std::to_string(n));
-    for (unsigned n = 0; n < settings_.analog_inputs; ++n) names.push_back("analog-in-" + std::to_string(n));
+    for (unsigned n = 0; n < settings_.digital_inputs; ++n) {
+        names.push_back("in-" + std::to_string(n));
+    }
+    for (unsigned n = 0; n < settings_.analog_inputs; ++n) {
+        names.push_back("analog-in-" + std::to_string(n));
+    }
     return names;
 }
 
 std::string Io::summary() const {
     std::string text = "outputs ";
-    for (unsigned n = 0; n < settings_.digital_outputs; ++n) text += output(n) ? '1' : '0';
-    if (settings_.digital_outputs == 0) text += "none";
+    for (unsigned n = 0; n < settings_.digital_outputs; ++n) {
+        text += output(n) ? '1' : '0';
+    }
+    if (settings_.digital_outputs == 0) {
+        text += "none";
+    }
     return text + (safe_ ? ", at their error values" : "");
 }
 

@@ -9,12 +9,34 @@ namespace hal::canopen {
 
 namespace {
 
-constexpr std::uint32_t zero_command = 0x6f72657a, tare_command = 0x65726174;  // "zero", "tare"
-constexpr std::uint8_t field_part = 0x00, fv1_part = 0x20, pv1_part = 0x21, fv2_part = 0x22, pv2_part = 0x23, offset_part = 0x24,
-                       factor_part = 0x26, scaling_offset_part = 0x27, process_part = 0x30, delta_part = 0x33, lower_part = 0x34,
-                       upper_part = 0x35, tare_part = 0x38, net_part = 0x40;
-constexpr std::uint16_t sensor_type = 0x6110, mode = 0x6112, rate = 0x6114, autozero = 0x6125, unit = 0x6131, digits = 0x6132,
-                        autotare = 0x6139, status_index = 0x6150;
+constexpr std::uint32_t zero_command = 0x6f72657a;
+constexpr std::uint32_t tare_command = 0x65726174;  // "zero", "tare"
+constexpr std::uint8_t field_part = 0x00;
+constexpr std::uint8_t fv1_part = 0x20;
+constexpr std::uint8_t pv1_part = 0x21;
+constexpr std::uint8_t fv2_part = 0x22;
+
+constexpr std::uint8_t pv2_part = 0x23;
+constexpr std::uint8_t offset_part = 0x24;
+constexpr std::uint8_t factor_part = 0x26;
+
+constexpr std::uint8_t scaling_offset_part = 0x27;
+constexpr std::uint8_t process_part = 0x30;
+constexpr std::uint8_t delta_part = 0x33;
+
+constexpr std::uint8_t lower_part = 0x34;
+constexpr std::uint8_t upper_part = 0x35;
+constexpr std::uint8_t tare_part = 0x38;
+constexpr std::uint8_t net_part = 0x40;
+constexpr std::uint16_t sensor_type = 0x6110;
+constexpr std::uint16_t mode = 0x6112;
+constexpr std::uint16_t rate = 0x6114;
+constexpr std::uint16_t autozero = 0x6125;
+
+constexpr std::uint16_t unit = 0x6131;
+constexpr std::uint16_t digits = 0x6132;
+constexpr std::uint16_t autotare = 0x6139;
+constexpr std::uint16_t status_index = 0x6150;
 constexpr double powers[] = {1, 10, 100, 1e3, 1e4, 1e5, 1e6};
 
 struct Part {
@@ -23,13 +45,20 @@ struct Part {
     bool written, whole;  ///< by SDO; in the families of whole numbers, too
 };
 constexpr Part parts[] = {
-    {"field value", field_part, false, true}, {"scaling 1 field value", fv1_part, true, true},
-    {"scaling 1 process value", pv1_part, true, true}, {"scaling 2 field value", fv2_part, true, true},
-    {"scaling 2 process value", pv2_part, true, true}, {"offset", offset_part, true, true},
-    {"scaling factor", factor_part, true, false}, {"scaling offset", scaling_offset_part, true, false},
-    {"process value", process_part, false, true}, {"interrupt delta", delta_part, true, true},
-    {"interrupt lower limit", lower_part, true, true}, {"interrupt upper limit", upper_part, true, true},
-    {"tare zero", tare_part, true, true}, {"net value", net_part, false, true},
+    {"field value", field_part, false, true},
+    {"scaling 1 field value", fv1_part, true, true},
+    {"scaling 1 process value", pv1_part, true, true},
+    {"scaling 2 field value", fv2_part, true, true},
+    {"scaling 2 process value", pv2_part, true, true},
+    {"offset", offset_part, true, true},
+    {"scaling factor", factor_part, true, false},
+    {"scaling offset", scaling_offset_part, true, false},
+    {"process value", process_part, false, true},
+    {"interrupt delta", delta_part, true, true},
+    {"interrupt lower limit", lower_part, true, true},
+    {"interrupt upper limit", upper_part, true, true},
+    {"tare zero", tare_part, true, true},
+    {"net value", net_part, false, true},
 };
 
 struct Family {
@@ -37,8 +66,10 @@ struct Family {
     Type type;
     const char* name;
 };
-constexpr Family families[] = {{0x6100, Type::real32, " float"}, {0x7100, Type::integer16, " 16-bit"},
-                               {0x8100, Type::integer24, " 24-bit"}, {0x9100, Type::integer32, " 32-bit"}};
+constexpr Family families[] = {{0x6100, Type::real32, " float"},
+                               {0x7100, Type::integer16, " 16-bit"},
+                               {0x8100, Type::integer24, " 24-bit"},
+                               {0x9100, Type::integer32, " 32-bit"}};
 
 struct Common {
     const char* name;
@@ -47,10 +78,13 @@ struct Common {
     Access access;
 };
 constexpr Common common[] = {
-    {"AI sensor type", sensor_type, Type::unsigned16, Access::read_write}, {"AI operating mode", mode, Type::unsigned8, Access::read_write},
-    {"AI ADC sample rate", rate, Type::unsigned32, Access::read_write}, {"AI autozero", autozero, Type::unsigned32, Access::write_only},
+    {"AI sensor type", sensor_type, Type::unsigned16, Access::read_write},
+    {"AI operating mode", mode, Type::unsigned8, Access::read_write},
+    {"AI ADC sample rate", rate, Type::unsigned32, Access::read_write},
+    {"AI autozero", autozero, Type::unsigned32, Access::write_only},
     {"AI physical unit process value", unit, Type::unsigned32, Access::read_write},
-    {"AI decimal digits", digits, Type::unsigned8, Access::read_write}, {"AI autotare", autotare, Type::unsigned32, Access::write_only},
+    {"AI decimal digits", digits, Type::unsigned8, Access::read_write},
+    {"AI autotare", autotare, Type::unsigned32, Access::write_only},
     {"AI status", status_index, Type::unsigned8, Access::read_only},
 };
 
@@ -58,36 +92,47 @@ double power(std::uint8_t n) noexcept { return powers[std::min<unsigned>(n, 6)];
 
 std::int32_t cut(double value, unsigned bits) noexcept {
     const double most = static_cast<double>((std::int64_t{1} << (bits - 1)) - 1);
-    return std::isnan(value) ? 0 : static_cast<std::int32_t>(std::llround(std::clamp(value, -most - 1, most)));
+    return std::isnan(value)
+               ? 0
+               : static_cast<std::int32_t>(std::llround(std::clamp(value, -most - 1, most)));
 }
 
 }  // namespace
 
 void add_analog_inputs(Description& d, std::span<const AnalogChannel> channels) {
     const auto count = static_cast<std::uint8_t>(channels.size());
-    for (const auto& family : families)
+    for (const auto& family : families) {
         for (const auto& part : parts) {
             if (!part.whole && family.type != Type::real32) continue;
             const auto index = static_cast<std::uint16_t>(family.base + part.part);
             d.objects[index] = std::string("AI ") + part.name + family.name;
             d.add(index, 0, Type::unsigned8, Access::constant, count, "Highest sub-index");
             const auto access = part.written ? Access::read_write : Access::read_only;
-            const bool one = part.part == fv2_part || part.part == pv2_part || part.part == factor_part;
+            const bool one =
+                part.part == fv2_part || part.part == pv2_part || part.part == factor_part;
             for (std::uint8_t n = 1; n <= count; ++n) {
-                auto& e = family.type == Type::real32 ? d.add_real(index, n, family.type, access, one ? 1.0 : 0.0, channels[n - 1U].name)
-                                                      : d.add(index, n, family.type, access, 0, channels[n - 1U].name);
+                auto& e = family.type == Type::real32
+                              ? d.add_real(index, n, family.type, access, one ? 1.0 : 0.0,
+                                           channels[n - 1U].name)
+                              : d.add(index, n, family.type, access, 0, channels[n - 1U].name);
                 e.tpdo = !part.written;
             }
         }
+    }
     for (const auto& row : common) {
         d.objects[row.index] = row.name;
         d.add(row.index, 0, Type::unsigned8, Access::constant, count, "Highest sub-index");
         for (std::uint8_t n = 1; n <= count; ++n) {
             const auto& c = channels[n - 1U];
-            const std::uint32_t value = row.index == sensor_type ? c.sensor_type : row.index == mode ? 1 : row.index == unit ? c.unit
-                                        : row.index == digits ? c.digits : 0;
+            const std::uint32_t value = row.index == sensor_type ? c.sensor_type
+                                        : row.index == mode      ? 1
+                                        : row.index == unit      ? c.unit
+                                        : row.index == digits    ? c.digits
+                                                                 : 0;
             auto& e = d.add(row.index, n, row.type, row.access, value, c.name);
-            if (row.index == digits) e.limited(0, 6);
+            if (row.index == digits) {
+                e.limited(0, 6);
+            }
             e.tpdo = row.index == status_index;
         }
     }
@@ -99,13 +144,24 @@ void AnalogInputs::attach(Device& device, unsigned channels) {
     for (unsigned n = 0; n < channels; ++n) {
         auto& c = channels_[n];
         const auto sub = static_cast<std::uint8_t>(n + 1);
-        for (const auto& part : parts) dictionary.bind(static_cast<std::uint16_t>(0x6100 + part.part), sub, *value(c, part.part));
-        dictionary.bind(mode, sub, c.mode), dictionary.bind(rate, sub, c.period_us), dictionary.bind(digits, sub, c.digits);
+        for (const auto& part : parts) {
+            dictionary.bind(static_cast<std::uint16_t>(0x6100 + part.part), sub,
+                            *value(c, part.part));
+        }
+        dictionary.bind(mode, sub, c.mode);
+        dictionary.bind(rate, sub, c.period_us);
+
+        dictionary.bind(digits, sub, c.digits);
         dictionary.bind(status_index, sub, c.status);
     }
-    for (const auto& family : families)
-        for (const auto& part : parts) dictionary.handle(static_cast<std::uint16_t>(family.base + part.part), *this);
-    for (const auto& row : common) dictionary.handle(row.index, *this);
+    for (const auto& family : families) {
+        for (const auto& part : parts) {
+            dictionary.handle(static_cast<std::uint16_t>(family.base + part.part), *this);
+        }
+    }
+    for (const auto& row : common) {
+        dictionary.handle(row.index, *this);
+    }
 }
 
 float* AnalogInputs::value(Channel& c, std::uint8_t part) noexcept {
@@ -128,7 +184,11 @@ float* AnalogInputs::value(Channel& c, std::uint8_t part) noexcept {
 }
 
 void AnalogInputs::reset() noexcept {
-    for (auto& c : channels_) c.sampled = c.changed = false, c.sent = 0, c.sent_zone = 0;
+    for (auto& c : channels_) {
+        c.sampled = c.changed = false;
+        c.sent = 0;
+        c.sent_zone = 0;
+    }
 }
 
 double AnalogInputs::process(unsigned n) const noexcept {
@@ -143,19 +203,27 @@ void AnalogInputs::show(unsigned n) noexcept {
     c.net_shown = static_cast<float>(net(n));
 }
 
-void AnalogInputs::sample(unsigned n, double field, std::int32_t counts, std::uint8_t status, Time now) noexcept {
+void AnalogInputs::sample(unsigned n, double field, std::int32_t counts, std::uint8_t status,
+                          Time now) noexcept {
     auto& c = channels_[n];
     if (c.mode == 0) {
         c.status = not_valid;
         return;
     }
     if (c.sampled && c.period_us != 0 && now - c.last < c.period_us * microsecond) return;
-    c.sampled = true, c.last = now;
-    c.field = field, c.counts = counts, c.status = status;
+    c.sampled = true;
+    c.last = now;
+    c.field = field;
+    c.counts = counts;
+    c.status = status;
     show(n);
-    const double value = process(n), delta = c.delta;
+    const double value = process(n);
+    const double delta = c.delta;
     const bool limits = c.lower < c.upper;  // both 0: no limits
-    c.zone = static_cast<std::int8_t>(!limits ? 0 : value < double{c.lower} ? -1 : value > double{c.upper} ? 1 : 0);
+    c.zone = static_cast<std::int8_t>(!limits                   ? 0
+                                      : value < double{c.lower} ? -1
+                                      : value > double{c.upper} ? 1
+                                                                : 0);
     // Compared in units of the last displayed digit, so that noise below it is not a change.
     const double scale = power(c.digits);
     const double moved = std::abs(std::round(value * scale) - std::round(c.sent * scale));
@@ -165,7 +233,8 @@ void AnalogInputs::sample(unsigned n, double field, std::int32_t counts, std::ui
 void AnalogInputs::mark_sent(unsigned n) noexcept {
     auto& c = channels_[n];
     c.changed = false;
-    c.sent = process(n), c.sent_zone = c.zone;
+    c.sent = process(n);
+    c.sent_zone = c.zone;
 }
 
 Abort AnalogInputs::reading(Entry& e) noexcept {
@@ -177,22 +246,31 @@ Abort AnalogInputs::reading(Entry& e) noexcept {
         return Abort::none;
     }
     const auto part = static_cast<std::uint8_t>(e.index);
-    const std::int32_t whole = part == field_part ? cut(c.counts, e.bits)
+    const std::int32_t whole = part == field_part     ? cut(c.counts, e.bits)
                                : part == process_part ? cut(process(n) * power(c.digits), e.bits)
-                               : part == net_part ? cut(net(n) * power(c.digits), e.bits)
-                                                  : cut(double{*value(c, part)} * power(c.digits), e.bits);
+                               : part == net_part
+                                   ? cut(net(n) * power(c.digits), e.bits)
+                                   : cut(double{*value(c, part)} * power(c.digits), e.bits);
     std::memcpy(e.data, &whole, e.size);
     return Abort::none;
 }
 
 Abort AnalogInputs::writing(Entry& e, std::span<const std::uint8_t> value) noexcept {
     if (e.sub == 0) return Abort::none;
-    if (e.index == autozero) return load<std::uint32_t>(value.data()) == zero_command ? Abort::none : Abort::cannot_store;
-    if (e.index == autotare) return load<std::uint32_t>(value.data()) == tare_command ? Abort::none : Abort::cannot_store;
+    if (e.index == autozero) {
+        return load<std::uint32_t>(value.data()) == zero_command ? Abort::none
+                                                                 : Abort::cannot_store;
+    }
+    if (e.index == autotare) {
+        return load<std::uint32_t>(value.data()) == tare_command ? Abort::none
+                                                                 : Abort::cannot_store;
+    }
     if (e.index == mode) return value[0] <= 1 ? Abort::none : Abort::value;
     if (e.type == Type::real32 && !std::isfinite(load<float>(value.data()))) return Abort::value;
     // The most significant bit of all four types is the sign.
-    if (static_cast<std::uint8_t>(e.index) == delta_part && (value.back() & 0x80) != 0) return Abort::too_low;
+    if (static_cast<std::uint8_t>(e.index) == delta_part && (value.back() & 0x80) != 0) {
+        return Abort::too_low;
+    }
     return Abort::none;
 }
 
@@ -214,7 +292,8 @@ void AnalogInputs::written(Entry& e) noexcept {
         c.factor = (c.pv2 - c.pv1) / (c.fv2 - c.fv1);
         c.scaling_offset = c.pv1 - c.fv1 * c.factor;
     } else if (part == factor_part || part == scaling_offset_part) {
-        c.pv1 = c.fv1 * c.factor + c.scaling_offset, c.pv2 = c.fv2 * c.factor + c.scaling_offset;
+        c.pv1 = c.fv1 * c.factor + c.scaling_offset;
+        c.pv2 = c.fv2 * c.factor + c.scaling_offset;
     }
 }
 

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// A force/torque node after CiA 404: it decodes the bit stream of a JR3 sensor and serves three forces and three torques on the bus.
-// TPDOs 1 and 2 carry the forces, 3 and 4 the torques; 1 and 3 are sent when a value changes, 2 and 4 at each SYNC. Each has two more
-// bytes: status (2201h) and sample counter (2202h), which identifies the PDOs of the same SYNC.
+// A force/torque node after CiA 404: it decodes the bit stream of a JR3 sensor and serves three
+// forces and three torques on the bus. TPDOs 1 and 2 carry the forces, 3 and 4 the torques; 1 and 3
+// are sent when a value changes, 2 and 4 at each SYNC. Each has two more bytes: status (2201h) and
+// sample counter (2202h), which identifies the PDOs of the same SYNC.
 #pragma once
 
 #include <vector>
@@ -13,20 +14,30 @@
 namespace hal::canopen {
 
 struct Jr3Settings {
-    jr3::Calibration calibration{};      ///< contents of the sensor's memory
-    std::vector<std::uint8_t> recording; ///< recorded line, eight clocks per byte, repeated; empty: the sensor is simulated
+    jr3::Calibration calibration{};  ///< contents of the sensor's memory
+    /// recorded line, eight clocks per byte, repeated; empty: the sensor is simulated
+    std::vector<std::uint8_t> recording;
     std::uint32_t serial = 1;
     std::uint16_t heartbeat_ms = 0;
 };
 
 /// Bits of 2201h.
 namespace jr3_status {
-inline constexpr std::uint8_t overload = 0x01, no_signal = 0x02, supply = 0x04, not_calibrated = 0x08, saturated = 0x10;
-}
+inline constexpr std::uint8_t overload = 0x01;
+inline constexpr std::uint8_t no_signal = 0x02;
+inline constexpr std::uint8_t supply = 0x04;
+
+inline constexpr std::uint8_t not_calibrated = 0x08;
+inline constexpr std::uint8_t saturated = 0x10;
+}  // namespace jr3_status
 /// EMCY codes of the node; with `overload`, the first manufacturer byte has one bit per channel.
 namespace jr3_error {
-inline constexpr std::uint16_t overload = 0xff01, no_signal = 0x5010, supply = 0x3210, calibration = 0x6310;
-}
+inline constexpr std::uint16_t overload = 0xff01;
+inline constexpr std::uint16_t no_signal = 0x5010;
+inline constexpr std::uint16_t supply = 0x3210;
+
+inline constexpr std::uint16_t calibration = 0x6310;
+}  // namespace jr3_error
 
 /// Returns the objects of the node. [setup]
 Description jr3_description(const Jr3Settings&);
@@ -39,14 +50,18 @@ public:
 
     // The simulated environment of the sensor; no effect on a recording. [realtime]
     void set_wrench(const jr3::Six& wrench) noexcept { applied_ = wrench; }  ///< N and N·m
-    void set_supply(double share) noexcept { supply_ = share; }             ///< fraction of full scale; nominal 0.75
-    void set_noise(unsigned counts) noexcept { noise_ = counts; }            ///< amplitude on raw readings
-    void set_cable(bool joined) noexcept { cable_ = joined; }               ///< false: the line is idle
+    /// fraction of full scale; nominal 0.75
+    void set_supply(double share) noexcept { supply_ = share; }
+    /// amplitude on raw readings
+    void set_noise(unsigned counts) noexcept { noise_ = counts; }
+    /// false: the line is idle
+    void set_cable(bool joined) noexcept { cable_ = joined; }
 
     /// Returns the decoded wrench in N and N·m, before offset, scaling and tare. [realtime]
     const jr3::Six& wrench() const noexcept { return field_; }
     std::uint8_t status() const noexcept { return status_; }
-    /// Returns the status LED: off in stopped, blinking in pre-operational, on in operational. [realtime]
+    /// Returns the status LED: off in stopped, blinking in pre-operational, on in operational.
+    /// [realtime]
     bool led() const noexcept { return led_; }
     const jr3::Decoder& decoder() const noexcept { return decoder_; }
     bool calibrated() const noexcept { return calibrated_; }
@@ -58,7 +73,10 @@ public:
     std::vector<std::string> settable() const override;
     std::string summary() const override;
     std::string news() const override;
-    void on_sync(std::uint8_t, Time now) noexcept override { sample(now), publish(); }
+    void on_sync(std::uint8_t, Time now) noexcept override {
+        sample(now);
+        publish();
+    }
     void on_reset(bool application) noexcept override;
     Abort reading(Entry&) noexcept override;
 
@@ -69,7 +87,9 @@ private:
         Abort open_read(Entry&, std::uint32_t& size) noexcept override;
         Abort read(Entry&, std::uint32_t offset, std::span<std::uint8_t> room) noexcept override;
         Abort open_write(Entry&, std::uint32_t) noexcept override { return Abort::read_only; }
-        Abort write(Entry&, std::uint32_t, std::span<const std::uint8_t>) noexcept override { return Abort::read_only; }
+        Abort write(Entry&, std::uint32_t, std::span<const std::uint8_t>) noexcept override {
+            return Abort::read_only;
+        }
         Abort close(Entry&, bool, bool) noexcept override { return Abort::none; }
 
     private:
@@ -106,9 +126,16 @@ private:
     std::array<float, 6> limits_{};
     jr3::Six field_{};
     std::int16_t supply_raw_ = 0;
-    std::uint8_t status_ = jr3_status::no_signal | jr3_status::not_calibrated, sent_status_ = 0, counter_ = 0;
-    bool calibrated_ = false, led_ = false, started_ = false;
-    Time last_ = 0, heard_ = 0, began_ = 0;
+    std::uint8_t status_ = jr3_status::no_signal | jr3_status::not_calibrated;
+    std::uint8_t sent_status_ = 0;
+
+    std::uint8_t counter_ = 0;
+    bool calibrated_ = false;
+    bool led_ = false;
+    bool started_ = false;
+    Time last_ = 0;
+    Time heard_ = 0;
+    Time began_ = 0;
     Memory memory_stream_{*this};
 };
 

@@ -6,8 +6,11 @@
 namespace hal::canopen::jr3 {
 
 namespace {
-constexpr std::uint8_t shortest_pulse = start_clocks - 1, longest_pulse = start_clocks + 2, least_gap = 2;
-}
+constexpr std::uint8_t shortest_pulse = start_clocks - 1;
+constexpr std::uint8_t longest_pulse = start_clocks + 2;
+
+constexpr std::uint8_t least_gap = 2;
+}  // namespace
 
 void Decoder::lose(State next) noexcept {
     ++errors_;
@@ -19,23 +22,35 @@ void Decoder::lose(State next) noexcept {
 bool Decoder::take(bool bit) noexcept {
     switch (state_) {
     case State::idle:
-        if (bit) state_ = State::pulse, count_ = 1;
+        if (bit) {
+            state_ = State::pulse;
+            count_ = 1;
+        }
         return false;
     case State::pulse:
         if (bit) {
-            if (++count_ > longest_pulse) lose(State::stuck);
+            if (++count_ > longest_pulse) {
+                lose(State::stuck);
+            }
         } else if (count_ < shortest_pulse) {
             lose(State::idle);
         } else {
-            state_ = State::data, count_ = 20, shift_ = 0;
+            state_ = State::data;
+            count_ = 20;
+            shift_ = 0;
         }
         return false;
     case State::stuck:
-        if (!bit) state_ = State::idle;
+        if (!bit) {
+            state_ = State::idle;
+        }
         return false;
     case State::data:
         shift_ = shift_ << 1 | (bit ? 1U : 0U);
-        if (--count_ == 0) state_ = State::gap, count_ = least_gap;
+        if (--count_ == 0) {
+            state_ = State::gap;
+            count_ = least_gap;
+        }
         return false;
     case State::gap:
         if (bit) {
@@ -46,7 +61,10 @@ bool Decoder::take(bool bit) noexcept {
         state_ = State::idle;
         break;
     }
-    if (!locked_) return locked_ = true, false;
+    if (!locked_) {
+        locked_ = true;
+        return false;
+    }
     ++packets_;
     packet_ = {static_cast<std::uint8_t>(shift_ >> 16), static_cast<std::int16_t>(shift_ & 0xffff)};
     return true;
@@ -70,12 +88,17 @@ bool Generator::next() noexcept {
 }
 
 void Generator::fill(std::span<std::uint8_t> room) noexcept {
-    for (auto& byte : room)
-        for (unsigned bit = 0; bit < 8; ++bit) byte = static_cast<std::uint8_t>(byte << 1 | (next() ? 1 : 0));
+    for (auto& byte : room) {
+        for (unsigned bit = 0; bit < 8; ++bit) {
+            byte = static_cast<std::uint8_t>(byte << 1 | (next() ? 1 : 0));
+        }
+    }
 }
 
 bool MemoryReader::take(std::uint16_t word) noexcept {
-    const auto address = static_cast<std::uint8_t>(word >> 8), value = static_cast<std::uint8_t>(word);
+    const auto address = static_cast<std::uint8_t>(word >> 8);
+
+    const auto value = static_cast<std::uint8_t>(word);
     const bool begins = address == 0 && value == signature[0];
     if (address != (next_ & 0xff) || (next_ < signature.size() && value != signature[next_])) {
         next_ = 0;
@@ -83,7 +106,8 @@ bool MemoryReader::take(std::uint16_t word) noexcept {
     }
     memory_[next_++] = value;
     if (next_ < memory_size) return false;
-    return next_ = 0, true;
+    next_ = 0;
+    return true;
 }
 
 }  // namespace hal::canopen::jr3

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: MIT
-// Checks the identity of a node, 1000h and 1018h, against the set-up (CiA 302-2), and detects duplicate node IDs.
+// Checks the identity of a node, 1000h and 1018h, against the set-up (CiA 302-2), and detects
+// duplicate node IDs.
 #include "boot_node.hpp"
 
 namespace hal::canopen {
 
 namespace {
 
-constexpr Time second_answer = 20 * millisecond;  // in which a second device with the same node ID responds as well
+// in which a second device with the same node ID responds as well
+constexpr Time second_answer = 20 * millisecond;
 
 struct Identity {
     std::uint16_t index;
@@ -34,9 +36,11 @@ void Master::Node::identify() noexcept {
 void Master::Node::next_identity(std::size_t from) noexcept {
     for (auto n = from; n < identity_objects.size(); ++n) {
         const auto& o = identity_objects[n];
-        if (n != 0 && setup.*o.expected == 0) continue;  // 1000h is always read, to find out whether the node responds
+        // 1000h is always read, to find out whether the node responds
+        if (n != 0 && setup.*o.expected == 0) continue;
         asked_ = n;
-        return read(static_cast<Task>(static_cast<std::size_t>(Task::device_type) + n), o.index, o.sub);
+        return read(static_cast<Task>(static_cast<std::size_t>(Task::device_type) + n), o.index,
+                    o.sub);
     }
     if (setup.keep_alive && !state_known_) return check_state();
     check_program();
@@ -59,7 +63,10 @@ void Master::Node::identified() noexcept {
 
 /// Detects two devices with the same node ID: their responses to one request differ.
 void Master::Node::on_sdo_frame(const Frame& f) noexcept {
-    if (status.step < Step::identifying || !booting() || f.remote || f.length != 8 || (f.data[0] & 0xee) != 0x42) return;
+    if (status.step < Step::identifying || !booting() || f.remote || f.length != 8 ||
+        (f.data[0] & 0xee) != 0x42) {
+        return;
+    }
     for (std::size_t n = 0; n < identity_objects.size(); ++n) {
         const auto& o = identity_objects[n];
         if (load<std::uint16_t>(f.data.data() + 1) != o.index || f.data[3] != o.sub) continue;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The boot procedure of a node (CiA 302-2): reset, identity (boot_identity.cpp), program (boot_program.cpp), configuration
-// (boot_configure.cpp), error control, start.
+// The boot procedure of a node (CiA 302-2): reset, identity (boot_identity.cpp), program
+// (boot_program.cpp), configuration (boot_configure.cpp), error control, start.
 #include "boot_node.hpp"
 
 #include <algorithm>
@@ -9,28 +9,40 @@
 namespace hal::canopen {
 
 namespace {
-constexpr Time boot_up_wait = 1 * second;    // after a reset; then the node is identified even without a boot-up message
+// after a reset; then the node is identified even without a boot-up message
+constexpr Time boot_up_wait = 1 * second;
 constexpr unsigned max_starts = 5;
 }  // namespace
 
-Master::Node::Node(const NodeSetup& node_setup, RemoteNode& remote, Master& master) : setup(node_setup), remote_(remote), master_(master) {
+Master::Node::Node(const NodeSetup& node_setup, RemoteNode& remote, Master& master)
+    : setup(node_setup), remote_(remote), master_(master) {
     status.id = setup.id;
     status.mandatory = setup.mandatory;
     request_.context = this;
-    request_.on_done = [](SdoRequest&, void* self) noexcept { static_cast<Node*>(self)->answered(); };
+    request_.on_done = [](SdoRequest&, void* self) noexcept {
+        static_cast<Node*>(self)->answered();
+    };
     make_groups();
     set_sdo_timeout(0);
-    if (setup.sdo_resends >= 0) remote_.sdo().settings().resends = static_cast<unsigned>(setup.sdo_resends);
+    if (setup.sdo_resends >= 0) {
+        remote_.sdo().settings().resends = static_cast<unsigned>(setup.sdo_resends);
+    }
     std::size_t longest = std::max<std::size_t>(64, setup.program.version.size() + 16);
-    for (const auto& w : setup.writes) longest = std::max(longest, w.data.size() + 1);
+    for (const auto& w : setup.writes) {
+        longest = std::max(longest, w.data.size() + 1);
+    }
     buffer_.resize(longest);
 }
 
 void Master::Node::enter(Step step) noexcept {
     if (step == status.step) return;
     const auto count = [&](int by) {
-        if (booting()) master_.booting_ += static_cast<unsigned>(by);
-        if (status.step == Step::ready) master_.ready_ += static_cast<unsigned>(by);
+        if (booting()) {
+            master_.booting_ += static_cast<unsigned>(by);
+        }
+        if (status.step == Step::ready) {
+            master_.ready_ += static_cast<unsigned>(by);
+        }
     };
     count(-1);
     status.step = step;
@@ -52,7 +64,8 @@ void Master::Node::refresh() noexcept {
 
 void Master::Node::cancel_work() noexcept {
     task_ = Task::none;
-    if (request_.status == SdoRequest::Status::waiting || request_.status == SdoRequest::Status::active) {
+    if (request_.status == SdoRequest::Status::waiting ||
+        request_.status == SdoRequest::Status::active) {
         const auto on_done = request_.on_done;
         request_.on_done = nullptr;
         remote_.sdo().cancel(request_, Abort::timeout);
@@ -60,7 +73,10 @@ void Master::Node::cancel_work() noexcept {
     }
     set_sdo_timeout(0);
     stop_supervision();
-    if (status.operational) status.operational = false, master_.dirty_ = true;
+    if (status.operational) {
+        status.operational = false;
+        master_.dirty_ = true;
+    }
     was_operational_ = left_running_ = false;
 }
 
@@ -69,18 +85,26 @@ void Master::Node::stop_supervision() noexcept {
     remote_.guard(0, 0, now());
 }
 
-/// Sets the SDO timeout for requests that take longer, such as writes to flash; 0: the configured timeout.
+/// Sets the SDO timeout for requests that take longer, such as writes to flash; 0: the configured
+/// timeout.
 void Master::Node::set_sdo_timeout(Time time) noexcept {
-    remote_.sdo().settings().timeout = std::max(time, setup.sdo_timeout > 0 ? setup.sdo_timeout : master_.setup_.sdo.timeout);
+    remote_.sdo().settings().timeout =
+        std::max(time, setup.sdo_timeout > 0 ? setup.sdo_timeout : master_.setup_.sdo.timeout);
 }
 
 void Master::Node::leave(Step step, Cause cause) noexcept {
-    if (cause != Cause::none) status.cause = cause, status.failed_in = status.step;
-    const bool was_watched = (status.step >= Step::ready && status.step <= Step::running) || status.step == Step::stopped;
+    if (cause != Cause::none) {
+        status.cause = cause;
+        status.failed_in = status.step;
+    }
+    const bool was_watched = (status.step >= Step::ready && status.step <= Step::running) ||
+                             status.step == Step::stopped;
     cancel_work();
     if (step == Step::stopped) {
         stop_command_ = NmtCommand::stop;
-        if (was_watched) resume_supervision();
+        if (was_watched) {
+            resume_supervision();
+        }
     }
     wanted_since_ = -1;
     backoff_ = 0;
@@ -96,17 +120,24 @@ void Master::Node::begin(How how) noexcept {
     status.compared = status.written = 0;
     reboots_ = 0;
     foreign_command_ = 0;
-    restored_ = updated_ = state_known_ = sent_pre_operational_ = again_ = configuration_current_ = false;
+    restored_ = updated_ = state_known_ = sent_pre_operational_ = again_ = configuration_current_ =
+        false;
     answer_deadline_ = 0;
-    if (wanted_since_ < 0) wanted_since_ = now();
+    if (wanted_since_ < 0) {
+        wanted_since_ = now();
+    }
     how_ = how;
     const auto parallel = master_.setup_.parallel;
-    if (parallel != 0 && master_.booting_ - (booting() ? 1U : 0U) >= parallel) return enter(Step::queued);
+    if (parallel != 0 && master_.booting_ - (booting() ? 1U : 0U) >= parallel) {
+        return enter(Step::queued);
+    }
     begin_now();
 }
 
 void Master::Node::begin_now() noexcept {
-    if (setup.keep_alive && how_ == How::reset && status.result == BootResult::none) how_ = How::in_unknown_state;
+    if (setup.keep_alive && how_ == How::reset && status.result == BootResult::none) {
+        how_ = How::in_unknown_state;
+    }
     switch (how_) {
     case How::reset: return reset(NmtCommand::reset_communication);
     case How::was_reset:
@@ -128,27 +159,36 @@ void Master::Node::reset(NmtCommand command) noexcept {
 void Master::Node::poll() noexcept {
     switch (status.step) {
     case Step::queued:
-        if (master_.booting_ < master_.setup_.parallel || master_.setup_.parallel == 0) begin_now();
+        if (master_.booting_ < master_.setup_.parallel || master_.setup_.parallel == 0) {
+            begin_now();
+        }
         return;
     case Step::resetting:
         if (now() < deadline_) return;
-        if (heartbeats_ != heartbeats_before_ && !again_) {  // the node is alive and was not reset: the command was lost
+        // the node is alive and was not reset: the command was lost
+        if (heartbeats_ != heartbeats_before_ && !again_) {
             again_ = true;
             return reset(restored_ ? NmtCommand::reset_node : NmtCommand::reset_communication);
         }
         return identify();
     case Step::identifying:
-        if (mismatch_ != BootResult::none && now() >= deadline_) fail(mismatch_, Cause::mismatch);
+        if (mismatch_ != BootResult::none && now() >= deadline_) {
+            fail(mismatch_, Cause::mismatch);
+        }
         return;
     case Step::checking_state:
         if (task_ != Task::none || now() < deadline_) return;
-        return setup.guard_ms != 0 ? fail(BootResult::no_guarding, Cause::guarding) : fail(BootResult::no_heartbeat, Cause::heartbeat);
+        return setup.guard_ms != 0 ? fail(BootResult::no_guarding, Cause::guarding)
+                                   : fail(BootResult::no_heartbeat, Cause::heartbeat);
     case Step::updating:
-        if (task_ == Task::none && now() >= deadline_) flash_ready();
+        if (task_ == Task::none && now() >= deadline_) {
+            flash_ready();
+        }
         return;
     case Step::watching:
         if (task_ != Task::none || now() < deadline_) return;
-        return guarding() ? fail(BootResult::no_guarding, Cause::guarding) : fail(BootResult::watching, Cause::heartbeat);
+        return guarding() ? fail(BootResult::no_guarding, Cause::guarding)
+                          : fail(BootResult::watching, Cause::heartbeat);
     case Step::starting:
         if (now() < deadline_) return;
         if ((status.notes & note_unsupervised) != 0 && start_attempts_ != 0) return run();
@@ -157,14 +197,21 @@ void Master::Node::poll() noexcept {
             deadline_ = now() + std::max<Time>(limit(), 100 * millisecond);
             return;
         }
-        status.cause = Cause::not_started, status.failed_in = Step::starting;
+        status.cause = Cause::not_started;
+        status.failed_in = Step::starting;
         cancel_work();
         return react(setup.on_failure, setup.retry, How::reset);
     case Step::running:
-        if (backoff_ != 0 && status.operational && now() - running_since_ >= setup.retry) backoff_ = 0;  // stable since its start
+        // stable since its start
+        if (backoff_ != 0 && status.operational && now() - running_since_ >= setup.retry) {
+            backoff_ = 0;
+        }
         return;
     case Step::waiting:
-        if (now() >= status.next_try) ++status.retries, begin(how_);
+        if (now() >= status.next_try) {
+            ++status.retries;
+            begin(how_);
+        }
         return;
     default: return;
     }
@@ -172,7 +219,8 @@ void Master::Node::poll() noexcept {
 
 void Master::Node::submit(Task task, std::uint16_t index, std::uint8_t sub) noexcept {
     task_ = task;
-    request_.index = index, request_.sub = sub;
+    request_.index = index;
+    request_.sub = sub;
     remote_.sdo().submit(request_);
 }
 void Master::Node::read(Task task, std::uint16_t index, std::uint8_t sub) noexcept {
@@ -180,12 +228,14 @@ void Master::Node::read(Task task, std::uint16_t index, std::uint8_t sub) noexce
     request_.buffer = buffer_;
     submit(task, index, sub);
 }
-void Master::Node::write(Task task, std::uint16_t index, std::uint8_t sub, std::span<const std::uint8_t> data) noexcept {
+void Master::Node::write(Task task, std::uint16_t index, std::uint8_t sub,
+                         std::span<const std::uint8_t> data) noexcept {
     request_.upload = false;
     request_.data = data;
     submit(task, index, sub);
 }
-void Master::Node::write(Task task, std::uint16_t index, std::uint8_t sub, std::uint32_t value, unsigned size) noexcept {
+void Master::Node::write(Task task, std::uint16_t index, std::uint8_t sub, std::uint32_t value,
+                         unsigned size) noexcept {
     store(small_.data(), value);
     write(task, index, sub, std::span<const std::uint8_t>(small_).first(size));
 }
@@ -199,7 +249,10 @@ std::uint64_t Master::Node::number() const noexcept {
 void Master::Node::answered() noexcept {
     status.sdo_retries += request_.retries;
     if (!no_response()) {
-        if (!status.online) status.online = true, master_.dirty_ = true;
+        if (!status.online) {
+            status.online = true;
+            master_.dirty_ = true;
+        }
         status.last_heard = now();
         missing = false;
     }
@@ -207,12 +260,20 @@ void Master::Node::answered() noexcept {
     task_ = Task::none;
     switch (task) {
     case Task::none: return;
-    case Task::device_type: case Task::vendor: case Task::product: case Task::revision: case Task::serial: return identified();
+    case Task::device_type:
+    case Task::vendor:
+    case Task::product:
+    case Task::revision:
+    case Task::serial: return identified();
     case Task::producer:
-        if (no_response()) return fail_transfer(status.step == Step::watching ? BootResult::watching : BootResult::no_heartbeat);
+        if (no_response()) {
+            return fail_transfer(status.step == Step::watching ? BootResult::watching
+                                                               : BootResult::no_heartbeat);
+        }
         producer_ms_ = ok() ? static_cast<std::uint16_t>(number()) : std::uint16_t{0};
         if (status.step == Step::watching) return await_heartbeat();
-        if (producer_ms_ == 0) return state_known(false);  // no heartbeat, so it was not configured yet
+        // no heartbeat, so it was not configured yet
+        if (producer_ms_ == 0) return state_known(false);
         deadline_ = now() + limit() + 100 * millisecond;
         return;
     case Task::program_id:
@@ -230,31 +291,40 @@ void Master::Node::answered() noexcept {
         if (found == setup.program.version) return program_right();
         note_request(0, 0);
         std::memcpy(&status.found, found.data(), std::min<std::size_t>(found.size(), 8));
-        std::memcpy(&status.expected, setup.program.version.data(), std::min<std::size_t>(setup.program.version.size(), 8));
+        std::memcpy(&status.expected, setup.program.version.data(),
+                    std::min<std::size_t>(setup.program.version.size(), 8));
         return program_differs();
     }
-    case Task::control_read: case Task::stop: case Task::erase: case Task::flash: case Task::download: case Task::launch:
-        task_ = task;
-        return update_answered();
+    case Task::control_read:
+    case Task::stop:
+    case Task::erase:
+    case Task::flash:
+    case Task::download:
+    case Task::launch: task_ = task; return update_answered();
     case Task::restore:
         if (!ok()) return fail_transfer(BootResult::configuration);
         restored_ = true;
         again_ = false;
         set_sdo_timeout(0);
         return reset(NmtCommand::reset_node);
-    case Task::date: case Task::time:
+    case Task::date:
+    case Task::time:
         if (no_response()) return fail_transfer(BootResult::configuration);
-        if (!ok()) status.notes |= note_no_date;
-        if (!ok() || number() != (task == Task::date ? setup.configuration_date : setup.configuration_time)) return configure_anew();
+        if (!ok()) {
+            status.notes |= note_no_date;
+        }
+        if (!ok() || number() != (task == Task::date ? setup.configuration_date
+                                                     : setup.configuration_time)) {
+            return configure_anew();
+        }
         if (task == Task::date) return read(Task::time, 0x1020, 2);
         configuration_current_ = true;
         return configure_from(own_group_);
     case Task::compare: return compared();
     case Task::write: return written();
     case Task::verify: return verified();
-    case Task::consumer_count: case Task::consumer_entry:
-        task_ = task;
-        return consumer_answered();
+    case Task::consumer_count:
+    case Task::consumer_entry: task_ = task; return consumer_answered();
     case Task::save:
         set_sdo_timeout(0);
         return ok() ? watch() : fail_transfer(BootResult::configuration);
@@ -290,7 +360,9 @@ void Master::Node::watch() noexcept {
         return;
     }
     if (!setup.supervised()) return await_heartbeat();
-    if (producer_ms_ == 0 || left_running_ || !setup.configure) return read(Task::producer, 0x1017, 0);
+    if (producer_ms_ == 0 || left_running_ || !setup.configure) {
+        return read(Task::producer, 0x1017, 0);
+    }
     await_heartbeat();
 }
 
@@ -304,12 +376,17 @@ void Master::Node::await_heartbeat() noexcept {
 
 /// Resumes the previous supervision.
 void Master::Node::resume_supervision() noexcept {
-    if (guarding()) remote_.guard(guard_period(), setup.guard_factor, now());
-    else if ((status.notes & note_unsupervised) == 0) remote_.expect_heartbeat(limit());
+    if (guarding()) {
+        remote_.guard(guard_period(), setup.guard_factor, now());
+    } else if ((status.notes & note_unsupervised) == 0) {
+        remote_.expect_heartbeat(limit());
+    }
 }
 
 void Master::Node::supervised() noexcept {
-    if (!guarding()) resume_supervision();
+    if (!guarding()) {
+        resume_supervision();
+    }
     booted(left_running_ ? BootResult::was_operational : BootResult::good);
 }
 
@@ -325,7 +402,9 @@ void Master::Node::booted(BootResult result) noexcept {
 
 void Master::Node::start(bool sent_to_all) noexcept {
     start_attempts_ = 0;
-    if (!sent_to_all) master_.send(NmtCommand::start, setup.id);
+    if (!sent_to_all) {
+        master_.send(NmtCommand::start, setup.id);
+    }
     deadline_ = now() + std::max<Time>(limit(), 100 * millisecond);
     enter(Step::starting);
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The program of a node (CiA 302-3): checks it and, if it differs, stops, erases, downloads and starts it.
+// The program of a node (CiA 302-3): checks it and, if it differs, stops, erases, downloads and
+// starts it.
 #include <algorithm>
 
 #include "boot_node.hpp"
@@ -7,9 +8,13 @@
 namespace hal::canopen {
 
 namespace {
-constexpr std::uint8_t stop_program = 0, start_program = 1, clear_program = 3;
+constexpr std::uint8_t stop_program = 0;
+constexpr std::uint8_t start_program = 1;
+constexpr std::uint8_t clear_program = 3;
 constexpr Time flash_poll_interval = 100 * millisecond;  // of 1F57h
-constexpr std::uint64_t flash_busy = 1, flash_error = 0xfe, no_valid_program = 1 << 1;
+constexpr std::uint64_t flash_busy = 1;
+constexpr std::uint64_t flash_error = 0xfe;
+constexpr std::uint64_t no_valid_program = 1 << 1;
 }  // namespace
 
 void Master::Node::check_program() noexcept {
@@ -34,7 +39,8 @@ void Master::Node::update() noexcept {
     read(Task::control_read, 0x1f51, setup.program.number);
 }
 
-/// Polls the flash status until it is ready for the step after `after`. No response means that the node is busy or restarts.
+/// Polls the flash status until it is ready for the step after `after`. No response means that the
+/// node is busy or restarts.
 void Master::Node::await_flash(Task after) noexcept {
     after_ = after;
     set_sdo_timeout(0);
@@ -57,13 +63,17 @@ void Master::Node::update_answered() noexcept {
         if (ok() && number() == stop_program) return control(Task::erase, clear_program);
         return control(Task::stop, stop_program);
     case Task::stop:
-        if (!ok() && !no_response()) return fail_transfer(object_missing() ? BootResult::no_program : BootResult::update);
+        if (!ok() && !no_response()) {
+            return fail_transfer(object_missing() ? BootResult::no_program : BootResult::update);
+        }
         return await_flash(Task::stop);
     case Task::erase:
         if (!ok() && !no_response()) return fail_transfer(BootResult::update);
         return await_flash(Task::erase);
     case Task::download:
-        if (!ok()) return fail_transfer(object_missing() ? BootResult::no_program : BootResult::update);
+        if (!ok()) {
+            return fail_transfer(object_missing() ? BootResult::no_program : BootResult::update);
+        }
         return await_flash(Task::download);
     case Task::launch:
         if (!ok() && !no_response()) return fail_transfer(BootResult::update);
@@ -77,7 +87,8 @@ void Master::Node::update_answered() noexcept {
     case Task::flash: {
         if (!ok() && !no_response()) {  // without 1F57h its answers are all there is
             deadline_ = now();
-            request_.abort = Abort::none, request_.size = 0;
+            request_.abort = Abort::none;
+            request_.size = 0;
             buffer_[0] = 0;
         }
         if (no_response() || (number() & flash_busy) != 0) {
@@ -87,13 +98,17 @@ void Master::Node::update_answered() noexcept {
             return fail(BootResult::update, no_response() ? Cause::no_response : Cause::flash_busy);
         }
         const auto error = number() & flash_error;
-        const bool matters = after_ == Task::download ? error != 0 : after_ == Task::erase && error != 0 && error != no_valid_program;
+        const bool matters = after_ == Task::download
+                                 ? error != 0
+                                 : after_ == Task::erase && error != 0 && error != no_valid_program;
         if (matters) {
             note_request(0, number());
             return fail(BootResult::update, Cause::flash);
         }
         if (after_ == Task::stop) return control(Task::erase, clear_program);
-        if (after_ == Task::erase) return write(Task::download, 0x1f50, number_of, setup.program.image);
+        if (after_ == Task::erase) {
+            return write(Task::download, 0x1f50, number_of, setup.program.image);
+        }
         return control(Task::launch, start_program);
     }
     default: return;

@@ -6,7 +6,13 @@ namespace hal::canopen {
 namespace {
 
 // The identifiers of the flying master services of CiA 302-2.
-constexpr std::uint32_t is_master = 0x71, negotiation = 0x72, who_is_master = 0x73, is_capable = 0x74, who_is_capable = 0x75, force = 0x76;
+constexpr std::uint32_t is_master = 0x71;
+constexpr std::uint32_t negotiation = 0x72;
+constexpr std::uint32_t who_is_master = 0x73;
+
+constexpr std::uint32_t is_capable = 0x74;
+constexpr std::uint32_t who_is_capable = 0x75;
+constexpr std::uint32_t force = 0x76;
 constexpr std::uint32_t heartbeats = 0x700;
 
 }  // namespace
@@ -26,24 +32,37 @@ const char* to_string(FlyingMaster::State s) noexcept {
 std::vector<std::string> problems_of(const FlyingSetup& s) {
     std::vector<std::string> problems;
     if (!s.enabled) return problems;
-    if (s.id < 1 || s.id > 127) problems.emplace_back("invalid node ID of the flying master; use 1 to 127");
-    if (s.priority > 2) problems.emplace_back("invalid priority of the flying master; use 0, 1 or 2");
-    if (s.timeout <= 0 || s.device_slot <= 0) problems.emplace_back("the times of a flying master must be above 0");
-    if (s.priority_slot <= 127 * s.device_slot)
+    if (s.id < 1 || s.id > 127) {
+        problems.emplace_back("invalid node ID of the flying master; use 1 to 127");
+    }
+    if (s.priority > 2) {
+        problems.emplace_back("invalid priority of the flying master; use 0, 1 or 2");
+    }
+    if (s.timeout <= 0 || s.device_slot <= 0) {
+        problems.emplace_back("the times of a flying master must be above 0");
+    }
+    if (s.priority_slot <= 127 * s.device_slot) {
         problems.emplace_back(
-            "the priority slot of a flying master must be longer than 127 of its device slots, otherwise a master of lower priority could win");
+            "the priority slot of a flying master must be longer than 127 of its device slots, "
+            "otherwise a master of lower priority could win");
+    }
     return problems;
 }
 
 void FlyingMaster::enter(State state, Time now, Time wait) noexcept {
     state_ = state;
     until_ = now + wait;
-    if (state != State::passive && state != State::active) master_ = master_priority_ = 0;
+    if (state != State::passive && state != State::active) {
+        master_ = master_priority_ = 0;
+    }
 }
 
 void FlyingMaster::send(std::uint32_t id, bool with_identity) noexcept {
     Frame f = make_frame(id, with_identity ? 2 : 0);
-    if (with_identity) f.data[0] = setup_.priority, f.data[1] = setup_.id;
+    if (with_identity) {
+        f.data[0] = setup_.priority;
+        f.data[1] = setup_.id;
+    }
     out_.push(f);
 }
 
@@ -60,13 +79,15 @@ void FlyingMaster::negotiate(Time now) noexcept {
 
 void FlyingMaster::become_passive(std::uint8_t priority, std::uint8_t id, Time now) noexcept {
     enter(State::passive, now, 0);
-    master_ = id, master_priority_ = priority;
+    master_ = id;
+    master_priority_ = priority;
     heard_ = now;
 }
 
 void FlyingMaster::win(Time now) noexcept {
     enter(State::active, now, 0);
-    master_ = setup_.id, master_priority_ = setup_.priority;
+    master_ = setup_.id;
+    master_priority_ = setup_.priority;
     next_search_ = now + setup_.search_interval();
     send(is_master, true);
 }
@@ -84,10 +105,14 @@ void FlyingMaster::await_negotiation(Time now) noexcept {
 
 /// Another device announces that it is the active master.
 void FlyingMaster::heard_master(std::uint8_t priority, std::uint8_t id, Time now) noexcept {
-    if (id == setup_.id) return;  // this device, or a duplicate node ID, which is reported elsewhere
-    if (state_ == State::active) return call_for_negotiation(now);  // two active masters: the bus was split, or one was disconnected
-    // A running network is taken over only for a better priority, not for a lower node ID; in a negotiation both count.
-    const bool worse = state_ == State::negotiating ? !better(priority, id) : priority > setup_.priority;
+    // this device, or a duplicate node ID, which is reported elsewhere
+    if (id == setup_.id) return;
+    // two active masters: the bus was split, or one was disconnected
+    if (state_ == State::active) return call_for_negotiation(now);
+    // A running network is taken over only for a better priority, not for a lower node ID; in a
+    // negotiation both count.
+    const bool worse =
+        state_ == State::negotiating ? !better(priority, id) : priority > setup_.priority;
     if (worse && !(state_ == State::passive && id == master_)) return call_for_negotiation(now);
     become_passive(priority, id, now);
 }
@@ -102,11 +127,15 @@ bool FlyingMaster::handle(const Frame& f, Time now) noexcept {
     if (state_ == State::off) return true;
     switch (f.id) {
     case is_master:
-        if (f.length >= 2 && f.data[1] >= 1 && f.data[1] <= 127) heard_master(f.data[0], f.data[1], now);
+        if (f.length >= 2 && f.data[1] >= 1 && f.data[1] <= 127) {
+            heard_master(f.data[0], f.data[1], now);
+        }
         break;
     case negotiation: negotiate(now); break;
     case who_is_master:
-        if (state_ == State::active) send(is_master, true);
+        if (state_ == State::active) {
+            send(is_master, true);
+        }
         break;
     case who_is_capable: send(is_capable, true); break;
     case force: await_negotiation(now); break;
@@ -132,7 +161,9 @@ void FlyingMaster::poll(Time now) noexcept {
         send(negotiation, false);
         return negotiate(now);
     case State::negotiating:
-        if (now >= until_) win(now);
+        if (now >= until_) {
+            win(now);
+        }
         return;
     case State::passive:
         if (now - heard_ <= setup_.silence) return;

@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: MIT
-// The flying master of CiA 302-2 elects one NMT master among several capable devices. The device with the best priority, then the lowest node
-// ID, wins the negotiation; it leads until its heartbeat times out or a better device joins.
+// The flying master of CiA 302-2 elects one NMT master among several capable devices. The device
+// with the best priority, then the lowest node ID, wins the negotiation; it leads until its
+// heartbeat times out or a better device joins.
 //
-// A device waits after its start (1F90h:2), requests the active master (073h) and waits for the response (1F90h:1). The response of a better
-// master (071h: priority, node ID) makes it passive; to a worse one it sends the force negotiation command (076h). Without a response it starts
-// a negotiation (072h), in which every device waits for
+// A device waits after its start (1F90h:2), requests the active master (073h) and waits for the
+// response (1F90h:1). The response of a better master (071h: priority, node ID) makes it passive;
+// to a worse one it sends the force negotiation command (076h). Without a response it starts a
+// negotiation (072h), in which every device waits for
 //     priority * priority_slot + node ID * device_slot        (1F90h:3 to :5)
-// A device that has received no 071h by then sends 071h and is the active master. An active master searches for others periodically (073h,
-// 1F90h:6), so two halves of a bus that are joined detect each other and negotiate.
+// A device that has received no 071h by then sends 071h and is the active master. An active master
+// searches for others periodically (073h, 1F90h:6), so two halves of a bus that are joined detect
+// each other and negotiate.
 #pragma once
 
 #include <string>
@@ -19,18 +22,22 @@ namespace hal::canopen {
 
 /// The set-up of a flying master. Times in ns.
 struct FlyingSetup {
-    bool         enabled = false;      ///< 1F80h bit 5
+    bool enabled = false;      ///< 1F80h bit 5
     std::uint8_t id = 127;             ///< node ID of this device
     std::uint8_t priority = 1;         ///< 1F90h:3: 0 (highest) to 2
     Time timeout = 100 * millisecond;  ///< 1F90h:1: response timeout for the active master
-    Time delay = 500 * millisecond;    ///< 1F90h:2: delay before the first request, and before a negotiation forced by 076h
+    /// 1F90h:2: delay before the first request, and before a negotiation forced by 076h
+    Time delay = 500 * millisecond;
     Time priority_slot = 1500 * millisecond;  ///< 1F90h:4: longer than 127 device slots
     Time device_slot = 10 * millisecond;      ///< 1F90h:5
-    Time detect_cycle = 0;             ///< 1F90h:6: interval of the search for other masters; 0: 4 s + 10 ms * node ID
+    /// 1F90h:6: interval of the search for other masters; 0: 4 s + 10 ms * node ID
+    Time detect_cycle = 0;
     Time silence = 250 * millisecond;  ///< heartbeat timeout of the active master
 
     /// Returns the interval of the search for other masters in ns. [any]
-    Time search_interval() const noexcept { return detect_cycle > 0 ? detect_cycle : 4 * second + 10 * millisecond * id; }
+    Time search_interval() const noexcept {
+        return detect_cycle > 0 ? detect_cycle : 4 * second + 10 * millisecond * id;
+    }
 };
 
 /// Returns a sentence for each invalid value. [setup]
@@ -77,7 +84,9 @@ public:
     const FlyingSetup& setup() const noexcept { return setup_; }
 
     /// Returns the waiting time of this device in a negotiation, in ns. [any]
-    Time slot_delay() const noexcept { return setup_.priority * setup_.priority_slot + setup_.id * setup_.device_slot; }
+    Time slot_delay() const noexcept {
+        return setup_.priority * setup_.priority_slot + setup_.id * setup_.device_slot;
+    }
 
 private:
     void enter(State, Time now, Time wait) noexcept;
@@ -93,12 +102,16 @@ private:
     }
 
     const FlyingSetup setup_;
-    FrameQueue&       out_;
-    State         state_ = State::off;
-    Time          until_ = 0, heard_ = 0, next_search_ = 0;
-    std::uint8_t  master_ = 0, master_priority_ = 0;
-    bool          forced_ = false;  // the delay precedes a forced negotiation
-    std::uint64_t negotiations_ = 0, losses_ = 0;
+    FrameQueue& out_;
+    State state_ = State::off;
+    Time until_ = 0;
+    Time heard_ = 0;
+    Time next_search_ = 0;
+    std::uint8_t master_ = 0;
+    std::uint8_t master_priority_ = 0;
+    bool forced_ = false;  // the delay precedes a forced negotiation
+    std::uint64_t negotiations_ = 0;
+    std::uint64_t losses_ = 0;
 };
 
 /// Returns the state as a phrase. [any]

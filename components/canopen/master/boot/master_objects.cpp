@@ -8,9 +8,15 @@ namespace {
 constexpr std::uint16_t request_nmt = 0x1f82;
 constexpr std::uint8_t all_nodes = 128;
 // Values read from 1F82h besides the NMT states.
-constexpr std::uint8_t state_unknown = 0, node_missing = 1;
+constexpr std::uint8_t state_unknown = 0;
+constexpr std::uint8_t node_missing = 1;
 // Values written to 1F82h.
-constexpr std::uint8_t to_stopped = 4, to_operational = 5, reset_node = 6, reset_communication = 7, to_pre_operational = 127;
+constexpr std::uint8_t to_stopped = 4;
+constexpr std::uint8_t to_operational = 5;
+constexpr std::uint8_t reset_node = 6;
+constexpr std::uint8_t reset_communication = 7;
+
+constexpr std::uint8_t to_pre_operational = 127;
 
 }  // namespace
 
@@ -20,22 +26,28 @@ std::uint32_t startup_of(const MasterSetup& s) {
     for (const auto& n : s.nodes) {
         nobody = nobody && !n.start;
         if (!n.mandatory) continue;
-        if (n.on_failure == Reaction::reset_all) value |= 1U << 4;
-        if (n.on_failure == Reaction::stop_all) value |= 1U << 6;
+        if (n.on_failure == Reaction::reset_all) {
+            value |= 1U << 4;
+        }
+        if (n.on_failure == Reaction::stop_all) {
+            value |= 1U << 6;
+        }
     }
     return value | (nobody ? 1U << 3 : 0U);
 }
 
 std::uint32_t assignment_of(const NodeSetup& n) {
     const auto bit = [](bool value, unsigned number) { return value ? 1U << number : 0U; };
-    return bit(true, 0) | bit(n.configure, 2) | bit(n.mandatory, 3) | bit(n.keep_alive, 4) | bit(n.program.checked(), 5) |
-           bit(n.program.update, 6) | bit(n.restore, 7) | std::uint32_t{n.guard_ms != 0 ? n.guard_factor : std::uint8_t{0}} << 8 |
+    return bit(true, 0) | bit(n.configure, 2) | bit(n.mandatory, 3) | bit(n.keep_alive, 4) |
+           bit(n.program.checked(), 5) | bit(n.program.update, 6) | bit(n.restore, 7) |
+           std::uint32_t{n.guard_ms != 0 ? n.guard_factor : std::uint8_t{0}} << 8 |
            std::uint32_t{n.guard_ms} << 16;
 }
 
 void add_master_objects(Description& d, const MasterSetup& s) {
     using enum Access;
-    d.add(0x102a, 0, Type::unsigned16, read_only, static_cast<std::uint64_t>(s.nmt_inhibit / (100 * microsecond)), "NMT inhibit time");
+    d.add(0x102a, 0, Type::unsigned16, read_only,
+          static_cast<std::uint64_t>(s.nmt_inhibit / (100 * microsecond)), "NMT inhibit time");
     d.add(0x1f80, 0, Type::unsigned32, read_only, startup_of(s), "NMT startup");
     Time longest = 0;
     struct List {
@@ -53,30 +65,41 @@ void add_master_objects(Description& d, const MasterSetup& s) {
     };
     for (const auto& list : lists) {
         d.add(list.index, 0, Type::unsigned8, constant, 127, list.name);
-        for (const auto& n : s.nodes) d.add(list.index, n.id, Type::unsigned32, read_only, list.value(n));
+        for (const auto& n : s.nodes) {
+            d.add(list.index, n.id, Type::unsigned32, read_only, list.value(n));
+        }
     }
     d.add(request_nmt, 0, Type::unsigned8, constant, all_nodes, "Request NMT");
     for (const auto& n : s.nodes) {
         d.add(request_nmt, n.id, Type::unsigned8, read_write);
-        if (n.mandatory && n.boot_limit > longest) longest = n.boot_limit;
+        if (n.mandatory && n.boot_limit > longest) {
+            longest = n.boot_limit;
+        }
     }
     d.add(request_nmt, all_nodes, Type::unsigned8, write_only);
-    d.add(0x1f89, 0, Type::unsigned32, read_only, static_cast<std::uint64_t>(longest / millisecond), "Boot time");
+    d.add(0x1f89, 0, Type::unsigned32, read_only, static_cast<std::uint64_t>(longest / millisecond),
+          "Boot time");
 }
 
-MasterObjects::MasterObjects(Dictionary& dictionary, Master& master) : master_(master) { dictionary.handle(request_nmt, *this); }
+MasterObjects::MasterObjects(Dictionary& dictionary, Master& master) : master_(master) {
+    dictionary.handle(request_nmt, *this);
+}
 
 Abort MasterObjects::reading(Entry& e) noexcept {
     if (e.sub == 0 || e.sub >= all_nodes) return Abort::none;
     const auto& s = master_.status(e.sub);
-    e.data[0] = !s.online ? node_missing : s.last_heard == 0 ? state_unknown : static_cast<std::uint8_t>(s.state);
+    e.data[0] = !s.online           ? node_missing
+                : s.last_heard == 0 ? state_unknown
+                                    : static_cast<std::uint8_t>(s.state);
     return Abort::none;
 }
 
 Abort MasterObjects::writing(Entry& e, std::span<const std::uint8_t> value) noexcept {
     if (e.sub == 0) return Abort::none;
     const auto id = e.sub == all_nodes ? std::uint8_t{0} : e.sub;
-    const auto command = [&](NmtCommand c) { return master_.command(c, id, master_.now()) ? Abort::none : Abort::no_sub; };
+    const auto command = [&](NmtCommand c) {
+        return master_.command(c, id, master_.now()) ? Abort::none : Abort::no_sub;
+    };
     switch (value[0]) {
     case to_stopped: return command(NmtCommand::stop);
     case to_operational: return command(NmtCommand::start);

@@ -11,12 +11,18 @@ namespace hal::canopen {
 
 Master::Master(const MasterSetup& setup, FrameQueue& out, MasterEvents& events)
     : setup_(setup), out_(out), events_(events), network_(out, *this, setup.sdo) {
-    if (const auto problems = problems_of(setup_); !problems.empty()) throw std::invalid_argument(problems.front());
+    if (const auto problems = problems_of(setup_); !problems.empty()) {
+        throw std::invalid_argument(problems.front());
+    }
     for (const auto& n : setup_.nodes) {
         nodes_.push_back(std::make_unique<Node>(n, network_.add(n.id), *this));
         by_id_[n.id] = nodes_.back().get();
-        if (n.mandatory) ++status_.mandatory;
-        if (n.keep_alive) keeps_some_ = true;
+        if (n.mandatory) {
+            ++status_.mandatory;
+        }
+        if (n.keep_alive) {
+            keeps_some_ = true;
+        }
     }
     status_.nodes = static_cast<std::uint16_t>(nodes_.size());
     commands_.resize(4 * nodes_.size() + 16);
@@ -36,7 +42,10 @@ void Master::start(Time now) noexcept {
     status_.resets = 0;
     status_.begun = now;
     halted_ = false;
-    for (auto& n : nodes_) n->removed = false, n->status.result = BootResult::none;
+    for (auto& n : nodes_) {
+        n->removed = false;
+        n->status.result = BootResult::none;
+    }
     boot_all(setup_.reset_at_start);
 }
 
@@ -50,21 +59,32 @@ void Master::boot_all(bool reset) noexcept {
         send(NmtCommand::reset_communication, 0);
         how = Node::How::was_reset;
     }
-    for (auto& n : nodes_)
-        if (!n->removed) n->leave(Step::queued, Cause::none);
+    for (auto& n : nodes_) {
+        if (!n->removed) {
+            n->leave(Step::queued, Cause::none);
+        }
+    }
     set_state(NetworkState::booting, 0);
     own_state(NmtState::pre_operational);
-    for (auto& n : nodes_)
-        if (!n->removed) n->begin(how);
+    for (auto& n : nodes_) {
+        if (!n->removed) {
+            n->begin(how);
+        }
+    }
 }
 
 void Master::halt(NetworkState state, std::uint8_t because_of) noexcept {
     halted_ = true;
     commands_waiting_ = 0;
     send(NmtCommand::stop, 0);
-    for (auto& n : nodes_)
-        if (!n->removed && n->setup.id != because_of) n->leave(Step::stopped, because_of == 0 ? Cause::commanded : Cause::network);
-    if (because_of != 0) by_id_[because_of]->leave(Step::failed, Cause::none);
+    for (auto& n : nodes_) {
+        if (!n->removed && n->setup.id != because_of) {
+            n->leave(Step::stopped, because_of == 0 ? Cause::commanded : Cause::network);
+        }
+    }
+    if (because_of != 0) {
+        by_id_[because_of]->leave(Step::failed, Cause::none);
+    }
     set_state(state, because_of);
     own_state(NmtState::pre_operational);
 }
@@ -84,18 +104,27 @@ void Master::stand_by(Time now) noexcept {
     now_ = now;
     halted_ = true;
     commands_waiting_ = 0;
-    for (auto& n : nodes_) n->leave(Step::off, Cause::none);
+    for (auto& n : nodes_) {
+        n->leave(Step::off, Cause::none);
+    }
     set_state(NetworkState::off, 0);
-    if (dirty_) update();
+    if (dirty_) {
+        update();
+    }
 }
 
 bool Master::command(NmtCommand command, std::uint8_t id, Time now) noexcept {
     now_ = now;
-    if (id != 0) return id < by_id_.size() && by_id_[id] != nullptr && by_id_[id]->command(command, false);
+    if (id != 0) {
+        return id < by_id_.size() && by_id_[id] != nullptr && by_id_[id]->command(command, false);
+    }
     send(command, 0);
     halted_ = false;
-    for (auto& n : nodes_)
-        if (!n->removed) n->command(command, true);
+    for (auto& n : nodes_) {
+        if (!n->removed) {
+            n->command(command, true);
+        }
+    }
     return true;
 }
 
@@ -128,7 +157,9 @@ bool Master::handle(const Frame& f, Time now) noexcept {
     if (f.error || f.extended || f.fd) return false;
     if (f.id == 0) {
         if (f.remote) return false;
-        if (f.length == 2) on_foreign_command(f.data[0], f.data[1]);
+        if (f.length == 2) {
+            on_foreign_command(f.data[0], f.data[1]);
+        }
         return true;
     }
     auto* node = by_id_[f.id & 0x7f];
@@ -142,54 +173,80 @@ bool Master::handle(const Frame& f, Time now) noexcept {
     const auto wrong = remote->wrong_toggles();
     if (!network_.handle(f, now)) return false;
     node->refresh();
-    if (service == 0x700 >> 7 && !f.remote && f.length >= 1 && remote->wrong_toggles() == wrong) node->on_heartbeat(f.data[0] == 0);
+    if (service == 0x700 >> 7 && !f.remote && f.length >= 1 && remote->wrong_toggles() == wrong) {
+        node->on_heartbeat(f.data[0] == 0);
+    }
     return true;
 }
 
 void Master::on_foreign_command(std::uint8_t command, std::uint8_t id) noexcept {
     ++status_.foreign_commands;
-    for (auto& n : nodes_)
-        if (id == 0 || n->setup.id == id) n->on_foreign_command(command);
+    for (auto& n : nodes_) {
+        if (id == 0 || n->setup.id == id) {
+            n->on_foreign_command(command);
+        }
+    }
 }
 
 void Master::poll(Time now) noexcept {
     now_ = now;
     network_.poll(now);
-    for (auto& n : nodes_) n->poll();
+    for (auto& n : nodes_) {
+        n->poll();
+    }
     schedule();
-    if (dirty_) update();
+    if (dirty_) {
+        update();
+    }
     send_commands();
     polled_ = now;
 }
 
 void Master::on_node(std::uint8_t id, NodeEvent event, NmtState state, Time now) noexcept {
     events_.on_node(id, event, state, now);
-    if (auto* n = by_id_[id & 0x7f]) n->on_event(event);
+    if (auto* n = by_id_[id & 0x7f]) {
+        n->on_event(event);
+    }
 }
-void Master::on_emergency(std::uint8_t id, const Emergency& e) noexcept { events_.on_emergency(id, e); }
+void Master::on_emergency(std::uint8_t id, const Emergency& e) noexcept {
+    events_.on_emergency(id, e);
+}
 
 /// Starts the nodes that are ready, in their start order.
 void Master::schedule() noexcept {
     if (ready_ == 0) return;
-    bool all = setup_.start_all_at_once && !started_together_, reach = true;
+    bool all = setup_.start_all_at_once && !started_together_;
+    bool reach = true;
     unsigned lowest = UINT_MAX;  // lowest start order that is not settled
     for (auto& n : nodes_) {
         if (n->removed) continue;
         const auto step = n->status.step;
-        if (step == Step::ready ? !n->setup.start : !n->missing && step != Step::running) reach = false;
-        if (step != Step::ready && (n->setup.mandatory || n->booting() || step == Step::queued)) all = false;
-        if (!n->settled()) lowest = std::min(lowest, n->setup.start_order);
+        if (step == Step::ready ? !n->setup.start : !n->missing && step != Step::running) {
+            reach = false;
+        }
+        if (step != Step::ready && (n->setup.mandatory || n->booting() || step == Step::queued)) {
+            all = false;
+        }
+        if (!n->settled()) {
+            lowest = std::min(lowest, n->setup.start_order);
+        }
     }
     if (setup_.start_all_at_once && !started_together_) {
         if (!all) return;
         started_together_ = true;
         if (reach && !send(NmtCommand::start, 0)) return;
-        for (auto& n : nodes_)
-            if (n->status.step == Step::ready) n->start(reach);
+        for (auto& n : nodes_) {
+            if (n->status.step == Step::ready) {
+                n->start(reach);
+            }
+        }
         return;
     }
-    for (auto& n : nodes_)
-        if (n->status.step == Step::ready && n->setup.start_order <= lowest) n->start(false);
+    for (auto& n : nodes_) {
+        if (n->status.step == Step::ready && n->setup.start_order <= lowest) {
+            n->start(false);
+        }
+    }
 }
 
 void Master::update() noexcept {
@@ -202,18 +259,33 @@ void Master::update() noexcept {
         if (n->removed) continue;
         const auto& status = n->status;
         const bool bad = status.step == Step::failed || status.step == Step::waiting;
-        if (status.operational) ++s.operational;
-        if (n->booting() || status.step == Step::queued) ++s.booting;
-        if (bad) ++s.failed;
+        if (status.operational) {
+            ++s.operational;
+        }
+        if (n->booting() || status.step == Step::queued) {
+            ++s.booting;
+        }
+        if (bad) {
+            ++s.failed;
+        }
         if (!n->setup.mandatory) continue;
         ++s.mandatory;
-        if (status.operational) ++s.mandatory_operational;
-        if (!status.operational && (culprit == 0 || (bad && !culprit_failed))) culprit = status.id, culprit_failed = bad;
+        if (status.operational) {
+            ++s.mandatory_operational;
+        }
+        if (!status.operational && (culprit == 0 || (bad && !culprit_failed))) {
+            culprit = status.id;
+            culprit_failed = bad;
+        }
     }
     if (halted_ || s.state == NetworkState::off) return;
-    if (s.mandatory_operational != s.mandatory)
-        return set_state(was_operational_ ? NetworkState::degraded : NetworkState::booting, culprit);
-    if (s.state != NetworkState::operational) s.operational_since = now_;
+    if (s.mandatory_operational != s.mandatory) {
+        return set_state(was_operational_ ? NetworkState::degraded : NetworkState::booting,
+                         culprit);
+    }
+    if (s.state != NetworkState::operational) {
+        s.operational_since = now_;
+    }
     was_operational_ = true;
     set_state(NetworkState::operational, 0);
     own_state(NmtState::operational);
@@ -242,22 +314,27 @@ bool Master::send(NmtCommand command, std::uint8_t id) noexcept {
 
 void Master::send_commands() noexcept {
     std::size_t sent = 0;
-    while (sent < commands_waiting_ && (!commanded_ || setup_.nmt_inhibit == 0 || now_ - last_command_ >= setup_.nmt_inhibit)) {
+    while (sent < commands_waiting_ &&
+           (!commanded_ || setup_.nmt_inhibit == 0 || now_ - last_command_ >= setup_.nmt_inhibit)) {
         if (!network_.command(commands_[sent].command, commands_[sent].id)) break;
         ++sent;
         commanded_ = true;
         last_command_ = now_;
     }
     if (sent == 0) return;
-    std::copy(commands_.begin() + static_cast<std::ptrdiff_t>(sent), commands_.begin() + static_cast<std::ptrdiff_t>(commands_waiting_),
+    std::copy(commands_.begin() + static_cast<std::ptrdiff_t>(sent),
+              commands_.begin() + static_cast<std::ptrdiff_t>(commands_waiting_),
               commands_.begin());
     commands_waiting_ -= sent;
 }
 
 std::string Master::sentence(std::uint8_t id) const {
     const auto* n = setup(id);
-    return n != nullptr ? canopen::sentence(*n, status(id)) : "node " + std::to_string(id) + " is not in the configuration";
+    return n != nullptr ? canopen::sentence(*n, status(id))
+                        : "node " + std::to_string(id) + " is not in the configuration";
 }
-std::string Master::sentence() const { return canopen::sentence(setup_, status_, status(status_.node)); }
+std::string Master::sentence() const {
+    return canopen::sentence(setup_, status_, status(status_.node));
+}
 
 }  // namespace hal::canopen

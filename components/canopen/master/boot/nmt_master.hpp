@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The NMT master of CiA 302-2 and CiA 302-3: boots all nodes concurrently, starts and supervises them, and recovers lost ones. It owns neither
-// bus, clock nor thread; its frames go to a queue, usually that of the master's own node:
+// The NMT master of CiA 302-2 and CiA 302-3: boots all nodes concurrently, starts and supervises
+// them, and recovers lost ones. It owns neither bus, clock nor thread; its frames go to a queue,
+// usually that of the master's own node:
 //
 //     Device own(description, {.node_id = setup.id, .nmt_slave = false}, events);   // [setup]
 //     Master master(setup, own.out(), events);
@@ -10,7 +11,8 @@
 //         own.poll(now), master.poll(now);
 //         while (own.out().pop(frame)) link.send(frame, now);
 //
-// The application may submit its own SDO requests at any time: master.network().node(5)->sdo().submit(request).
+// The application may submit its own SDO requests at any time:
+// master.network().node(5)->sdo().submit(request).
 #pragma once
 
 #include <array>
@@ -23,21 +25,24 @@
 
 namespace hal::canopen {
 
-/// Notifications of the master, besides Events::on_node() and on_emergency(). All calls come from poll(), handle() or a command. [realtime]
+/// Notifications of the master, besides Events::on_node() and on_emergency(). All calls come from
+/// poll(), handle() or a command. [realtime]
 class MasterEvents : public Events {
 public:
     /// NodeStatus::step changed; other members may have changed as well.
     virtual void on_step(const NodeStatus&) noexcept {}
     /// NetworkStatus::state changed.
     virtual void on_network(const NetworkStatus&) noexcept {}
-    /// The master's own node must enter this NMT state, for example by Device::command(). Not called if MasterSetup::start_self is false.
+    /// The master's own node must enter this NMT state, for example by Device::command(). Not
+    /// called if MasterSetup::start_self is false.
     virtual void on_own_state(NmtState) noexcept {}
 };
 
 /// The NMT master. All calls belong to one thread.
 class Master final : private Events {
 public:
-    /// Allocates all memory; queue and events outlive it. Throws std::invalid_argument with the first of problems_of(). [setup]
+    /// Allocates all memory; queue and events outlive it. Throws std::invalid_argument with the
+    /// first of problems_of(). [setup]
     Master(const MasterSetup&, FrameQueue& out, MasterEvents&);
     ~Master() override;
 
@@ -52,12 +57,15 @@ public:
     void stop(Time now) noexcept;
     /// Leaves the network to another master: sends nothing until start(). [realtime]
     void stand_by(Time now) noexcept;
-    /// Sends an NMT command to one node, or with id 0 to all. Stop and pre-operational persist until start or restart(); after a reset the node is
-    /// booted again. Returns false if the node is not in the set-up. [realtime]
+    /// Sends an NMT command to one node, or with id 0 to all. Stop and pre-operational persist
+    /// until start or restart(); after a reset the node is booted again. Returns false if the node
+    /// is not in the set-up. [realtime]
     bool command(NmtCommand, std::uint8_t id, Time now) noexcept;
-    /// Resets the communication of a node and boots it, even if it had failed. Returns false if the node is not in the set-up. [realtime]
+    /// Resets the communication of a node and boots it, even if it had failed. Returns false if the
+    /// node is not in the set-up. [realtime]
     bool restart(std::uint8_t id, Time now) noexcept;
-    /// Stops a node and removes it until restart(); it no longer counts as mandatory. Returns false if the node is not in the set-up. [realtime]
+    /// Stops a node and removes it until restart(); it no longer counts as mandatory. Returns false
+    /// if the node is not in the set-up. [realtime]
     bool remove(std::uint8_t id, Time now) noexcept;
 
     /// Returns the state of the network. [realtime]
@@ -106,9 +114,18 @@ private:
     std::vector<Command> commands_;  // delayed by the inhibit time or a full queue
     std::size_t commands_waiting_ = 0;
     NmtState own_state_ = NmtState::initialising;
-    unsigned booting_ = 0, ready_ = 0;
-    bool keeps_some_ = false, halted_ = false, started_together_ = false, was_operational_ = false, commanded_ = false, dirty_ = false;
-    Time now_ = 0, polled_ = 0, last_command_ = 0;
+    unsigned booting_ = 0;
+    unsigned ready_ = 0;
+    bool keeps_some_ = false;
+    bool halted_ = false;
+    bool started_together_ = false;
+    bool was_operational_ = false;
+
+    bool commanded_ = false;
+    bool dirty_ = false;
+    Time now_ = 0;
+    Time polled_ = 0;
+    Time last_command_ = 0;
 };
 
 }  // namespace hal::canopen

@@ -77,7 +77,10 @@ std::string print(const char* format, T... values) {
     return text.data();
 }
 std::string hex(std::uint64_t value) {
-    return print(value > 0xffffffff ? "%016llXh" : value > 0xffff ? "%08llXh" : "%04llXh", static_cast<unsigned long long>(value));
+    return print(value > 0xffffffff ? "%016llXh"
+                 : value > 0xffff   ? "%08llXh"
+                                    : "%04llXh",
+                 static_cast<unsigned long long>(value));
 }
 std::string seconds(Time t) { return print("%.2f s", static_cast<double>(t) / second); }
 std::string text(std::uint64_t value) {
@@ -90,7 +93,9 @@ std::string node_name(const NodeSetup& n) {
 }
 std::string object(const NodeSetup& n, const NodeStatus& s) {
     std::string result = print("%04X:%u", unsigned{s.index}, unsigned{s.sub});
-    if (s.write == 0 || s.write > n.writes.size() || n.writes[s.write - 1U].name.empty()) return result;
+    if (s.write == 0 || s.write > n.writes.size() || n.writes[s.write - 1U].name.empty()) {
+        return result;
+    }
     return result + " (" + n.writes[s.write - 1U].name + ')';
 }
 const char* identity(std::uint16_t index, std::uint8_t sub) {
@@ -138,26 +143,37 @@ const char* command_text(std::uint8_t command) {
 }
 
 std::string program(const NodeSetup& n, const NodeStatus& s) {
-    if (s.index == 0x100a) return text(s.found) + " (100A:0) where " + text(s.expected) + " is expected";
-    return hex(s.found) + print(" (1F56:%u) where ", unsigned{n.program.number}) + hex(s.expected) + " is expected";
+    if (s.index == 0x100a) {
+        return text(s.found) + " (100A:0) where " + text(s.expected) + " is expected";
+    }
+    return hex(s.found) + print(" (1F56:%u) where ", unsigned{n.program.number}) + hex(s.expected) +
+           " is expected";
 }
 
 std::string emergency(const NodeStatus& s) {
-    if (s.emergency.code == 0) return {};
-    return print("; last emergency %04Xh (", unsigned{s.emergency.code}) + emergency_text(s.emergency.code) + ')';
+    if (s.emergency.code == 0) {
+        return {};
+    }
+    return print("; last emergency %04Xh (", unsigned{s.emergency.code}) +
+           emergency_text(s.emergency.code) + ')';
 }
 
 std::string aborted(const NodeSetup& n, const NodeStatus& s) {
-    const std::string abort = std::string(to_string(s.abort)) + print(" (%08lXh)", static_cast<unsigned long>(s.abort));
-    if (s.failed_in == Step::identifying)
-        return "rejects the read of its " + std::string(identity(s.index, s.sub)) + ", " + object(n, s) + ": " + abort +
-               "; connect the right device, or remove this check";
-    if (static_cast<std::uint32_t>(s.abort) >> 24 == 5)
-        return "failed the SDO transfer of object " + object(n, s) + ' ' + during(s.failed_in) + ": " + abort +
+    const std::string abort =
+        std::string(to_string(s.abort)) + print(" (%08lXh)", static_cast<unsigned long>(s.abort));
+    if (s.failed_in == Step::identifying) {
+        return "rejects the read of its " + std::string(identity(s.index, s.sub)) + ", " +
+               object(n, s) + ": " + abort + "; connect the right device, or remove this check";
+    }
+    if (static_cast<std::uint32_t>(s.abort) >> 24 == 5) {
+        return "failed the SDO transfer of object " + object(n, s) + ' ' + during(s.failed_in) +
+               ": " + abort +
                "; another device disturbs the transfer, or the node's SDO server is defective";
-    if (s.failed_in == Step::configuring)
+    }
+    if (s.failed_in == Step::configuring) {
         return "rejects " + hex(s.expected) + " for object " + object(n, s) + ": " + abort +
                "; correct the value in its configuration or remove the object";
+    }
     return "rejects object " + object(n, s) + ' ' + during(s.failed_in) + ": " + abort;
 }
 
@@ -167,54 +183,84 @@ std::string predicate(const NodeSetup& n, const NodeStatus& s) {
     switch (s.cause) {
     case Cause::none: return {};
     case Cause::no_response:
-        if (s.result == BootResult::no_answer)
+        if (s.result == BootResult::no_answer) {
             return "does not respond (" + object(n, s) +
-                   "): check its power, cable, bit rate and node ID; 'hal can scan' lists the nodes that respond";
-        return "stopped responding at " + object(n, s) + ' ' + during(s.failed_in) + ": check its power and cable";
+                   "): check its power, cable, bit rate and node ID; 'hal can scan' lists the "
+                   "nodes that respond";
+        }
+        return "stopped responding at " + object(n, s) + ' ' + during(s.failed_in) +
+               ": check its power and cable";
     case Cause::not_sent:
         return "could not be asked for " + object(n, s) + ' ' + during(s.failed_in) +
-               ": the bus accepts no frames from the master; check the master's cable, the bit rate, and that another node is connected";
+               ": the bus accepts no frames from the master; check the master's cable, the bit "
+               "rate, and that another node is connected";
     case Cause::aborted: return aborted(n, s);
     case Cause::mismatch:
-        if (of_program) return "runs program " + program(n, s) + ", and updates are not allowed: update it by hand or allow the update";
-        return "is another device: its " + std::string(identity(s.index, s.sub)) + " (" + object(n, s) + ") is " + hex(s.found) +
-               " where " + hex(s.expected) + " is expected; connect the right device or correct its configuration";
+        if (of_program) {
+            return "runs program " + program(n, s) +
+                   ", and updates are not allowed: update it by hand or allow the update";
+        }
+        return "is another device: its " + std::string(identity(s.index, s.sub)) + " (" +
+               object(n, s) + ") is " + hex(s.found) + " where " + hex(s.expected) +
+               " is expected; connect the right device or correct its configuration";
     case Cause::not_retained:
-        if (of_program) return "still runs program " + program(n, s) + " after the download; check the file";
-        return "accepted " + hex(s.expected) + " for object " + object(n, s) + " but holds " + hex(s.found) +
-               "; write a value it can hold, or remove the object";
+        if (of_program) {
+            return "still runs program " + program(n, s) + " after the download; check the file";
+        }
+        return "accepted " + hex(s.expected) + " for object " + object(n, s) + " but holds " +
+               hex(s.found) + "; write a value it can hold, or remove the object";
     case Cause::duplicate_id:
-        return "has a duplicate node ID: two devices respond, object " + object(n, s) + " is " + hex(s.expected) + " and " + hex(s.found) +
-               "; change the node ID of one of them";
-    case Cause::restarting: return std::string("rebooted repeatedly ") + during(s.failed_in) + ": check its supply voltage";
+        return "has a duplicate node ID: two devices respond, object " + object(n, s) + " is " +
+               hex(s.expected) + " and " + hex(s.found) + "; change the node ID of one of them";
+    case Cause::restarting:
+        return std::string("rebooted repeatedly ") + during(s.failed_in) +
+               ": check its supply voltage";
     case Cause::no_object:
-        return "has no object " + object(n, s) + ", so its program cannot be checked or updated: remove the program from its configuration";
-    case Cause::no_image: return "runs program " + program(n, s) + ", and no program file is configured: configure one";
+        return "has no object " + object(n, s) +
+               ", so its program cannot be checked or updated: remove the program from its "
+               "configuration";
+    case Cause::no_image:
+        return "runs program " + program(n, s) +
+               ", and no program file is configured: configure one";
     case Cause::flash:
-        return "reports a flash error: " + std::string(flash_error_text(s.found)) + " (" + object(n, s) + " is " + hex(s.found) +
-               "); check that the file is for this device";
-    case Cause::flash_busy: return "reports its flash busy for more than " + seconds(n.program.limit) + " (" + object(n, s) + ')';
+        return "reports a flash error: " + std::string(flash_error_text(s.found)) + " (" +
+               object(n, s) + " is " + hex(s.found) + "); check that the file is for this device";
+    case Cause::flash_busy:
+        return "reports its flash busy for more than " + seconds(n.program.limit) + " (" +
+               object(n, s) + ')';
     case Cause::heartbeat:
-        return "sent no heartbeat " + std::string(s.failed_in >= Step::ready ? "within its timeout" : during(s.failed_in)) +
+        return "sent no heartbeat " +
+               std::string(s.failed_in >= Step::ready ? "within its timeout"
+                                                      : during(s.failed_in)) +
                ": check its power and cable";
     case Cause::guarding:
-        return "did not respond to node guarding " + std::string(s.failed_in >= Step::ready ? "within its timeout" : during(s.failed_in)) +
+        return "did not respond to node guarding " +
+               std::string(s.failed_in >= Step::ready ? "within its timeout"
+                                                      : during(s.failed_in)) +
                ": check its power and cable, and that it supports node guarding";
     case Cause::guard_toggle:
-        return "responded to node guarding with a toggle bit that did not alternate: supervise it by heartbeat, or look for a second device "
+        return "responded to node guarding with a toggle bit that did not alternate: supervise it "
+               "by heartbeat, or look for a second device "
                "with this node ID";
     case Cause::boot_up:
-        if (s.foreign_command != 0)
-            return std::string("rebooted after another device sent ") + command_text(s.foreign_command) + ": remove the second NMT master";
-        return "rebooted without a command from this master: check its supply voltage, and the bus for another NMT master";
+        if (s.foreign_command != 0) {
+            return std::string("rebooted after another device sent ") +
+                   command_text(s.foreign_command) + ": remove the second NMT master";
+        }
+        return "rebooted without a command from this master: check its supply voltage, and the bus "
+               "for another NMT master";
     case Cause::left_operational:
-        if (s.foreign_command != 0)
-            return "left the operational state after another device sent " + std::string(command_text(s.foreign_command)) + " and is " +
-                   to_string(s.state) + ": remove the second NMT master";
-        return "left the operational state without a command from this master and is " + std::string(to_string(s.state)) + emergency(s) +
+        if (s.foreign_command != 0) {
+            return "left the operational state after another device sent " +
+                   std::string(command_text(s.foreign_command)) + " and is " + to_string(s.state) +
+                   ": remove the second NMT master";
+        }
+        return "left the operational state without a command from this master and is " +
+               std::string(to_string(s.state)) + emergency(s) +
                ": check the node, and the bus for another NMT master";
     case Cause::not_started:
-        return "did not become operational after NMT start and is " + std::string(to_string(s.state)) +
+        return "did not become operational after NMT start and is " +
+               std::string(to_string(s.state)) +
                print("; its error register is %02Xh", unsigned{s.error_register});
     case Cause::commanded: return "was stopped by command";
     case Cause::network: return "was stopped because of another node";
@@ -226,7 +272,9 @@ std::string predicate(const NodeSetup& n, const NodeStatus& s) {
 
 std::string sentence(const NodeSetup& n, const NodeStatus& s) {
     const auto cause = predicate(n, s);
-    if (cause.empty()) return {};
+    if (cause.empty()) {
+        return {};
+    }
     std::string result = node_name(n) + ' ' + cause;
     if (booted(s.result) || s.result == BootResult::none) return result;
     return result + " [result " + static_cast<char>(s.result) + ", " + to_string(s.result) + ']';
@@ -234,30 +282,44 @@ std::string sentence(const NodeSetup& n, const NodeStatus& s) {
 
 std::string sentence(const MasterSetup& setup, const NetworkStatus& s, const NodeStatus& of_node) {
     const auto node = std::ranges::find(setup.nodes, s.node, &NodeSetup::id);
-    if (s.state == NetworkState::operational || s.state == NetworkState::off) return std::string("the network is ") + to_string(s.state);
+    if (s.state == NetworkState::operational || s.state == NetworkState::off) {
+        return std::string("the network is ") + to_string(s.state);
+    }
     std::string result = std::string("the network is ") + to_string(s.state) + ": ";
     if (s.state == NetworkState::stopped) return result + "by command; 'start' boots it";
     if (node == setup.nodes.end()) return result + "cause unknown";
     const auto of = sentence(*node, of_node);
     const bool idle = of_node.step == Step::running && !of_node.operational;
-    result += of.empty() ? node_name(*node) + " is " + (idle ? to_string(of_node.state) : to_string(of_node.step)) : of;
-    if (s.state == NetworkState::failed) result += "; all nodes were stopped";
-    else if (of_node.step == Step::waiting) result += "; retrying";
+    result += of.empty() ? node_name(*node) + " is " +
+                               (idle ? to_string(of_node.state) : to_string(of_node.step))
+                         : of;
+    if (s.state == NetworkState::failed) {
+        result += "; all nodes were stopped";
+    } else if (of_node.step == Step::waiting) {
+        result += "; retrying";
+    }
     return result;
 }
 
 std::string progress(const NetworkStatus& s) {
-    std::string result = std::string(to_string(s.state)) + ": " + std::to_string(s.operational) + " of " + std::to_string(s.nodes);
+    std::string result = std::string(to_string(s.state)) + ": " + std::to_string(s.operational) +
+                         " of " + std::to_string(s.nodes);
     result += " nodes operational";
-    if (s.booting != 0) result += ", " + std::to_string(s.booting) + " booting";
-    if (s.failed != 0) result += ", " + std::to_string(s.failed) + " failed or waiting";
+    if (s.booting != 0) {
+        result += ", " + std::to_string(s.booting) + " booting";
+    }
+    if (s.failed != 0) {
+        result += ", " + std::to_string(s.failed) + " failed or waiting";
+    }
     return result;
 }
 
 std::vector<std::string> note_sentences(const NodeSetup& n, const NodeStatus& s) {
     std::vector<std::string> result;
     const auto add = [&](Note note, const std::string& what) {
-        if ((s.notes & note) != 0) result.push_back(node_name(n) + ' ' + what);
+        if ((s.notes & note) != 0) {
+            result.push_back(node_name(n) + ' ' + what);
+        }
     };
     add(note_guarded, "has no heartbeat producer (1017:0) and is supervised by node guarding");
     add(note_unsupervised, "is not supervised: its loss will not be detected");

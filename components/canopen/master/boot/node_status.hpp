@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The state of a network as the master sees it: numbers that can be copied out of the cycle, and functions that format them as messages.
+// The state of a network as the master sees it: numbers that can be copied out of the cycle, and
+// functions that format them as messages.
 #pragma once
 
 #include <cstdint>
@@ -57,7 +58,9 @@ enum class BootResult : char {
 /// Returns the result as a phrase, such as "wrong vendor". [any]
 const char* to_string(BootResult) noexcept;
 /// Returns true if the boot succeeded. [any]
-constexpr bool booted(BootResult r) noexcept { return r == BootResult::good || r == BootResult::was_operational; }
+constexpr bool booted(BootResult r) noexcept {
+    return r == BootResult::good || r == BootResult::was_operational;
+}
 
 /// The cause of a failure or loss, in more detail than the letter.
 enum class Cause : std::uint8_t {
@@ -76,7 +79,8 @@ enum class Cause : std::uint8_t {
     heartbeat,         ///< heartbeat timeout
     guarding,          ///< node guarding timeout
     guard_toggle,      ///< node guarding responses whose toggle bit does not alternate
-    boot_up,           ///< a boot-up message that this master did not cause: power loss, reset, another NMT master
+    /// a boot-up message that this master did not cause: power loss, reset, another NMT master
+    boot_up,
     left_operational,  ///< an NMT state change that this master did not command
     not_started,       ///< did not become operational after NMT start
     commanded,         ///< stopped by command
@@ -102,29 +106,37 @@ struct NodeStatus {
     Cause cause = Cause::none;             ///< of the last failure or loss
     Step failed_in = Step::off;            ///< the step in which it occurred
     std::uint8_t notes = 0;                ///< bits of Note
-    std::uint8_t foreign_command = 0;      ///< NMT command specifier that another device sent before the last loss; 0: none was received
+    /// NMT command specifier that another device sent before the last loss; 0: none was received
+    std::uint8_t foreign_command = 0;
 
     // Details of the last failure.
     std::uint16_t index = 0;
     std::uint8_t sub = 0;
     Abort abort = Abort::none;
-    std::uint64_t expected = 0, found = 0; ///< up to 8 bytes of the values
-    std::uint16_t write = 0;               ///< position in NodeSetup::writes, counted from 1; 0: none
+    std::uint64_t expected = 0;
+    std::uint64_t found = 0;  ///< up to 8 bytes of the values
+    /// position in NodeSetup::writes, counted from 1; 0: none
+    std::uint16_t write = 0;
 
     NmtState state = NmtState::initialising;  ///< as last received
-    bool online = false;                   ///< responding, not lost since
+    bool online = false;  ///< responding, not lost since
     bool operational = false;
     bool mandatory = false;
-    std::uint32_t attempts = 0;            ///< boots since start()
-    std::uint32_t retries = 0;             ///< boots repeated after a failure or loss
+    std::uint32_t attempts = 0;  ///< boots since start()
+    std::uint32_t retries = 0;  ///< boots repeated after a failure or loss
     std::uint32_t losses = 0;
-    std::uint64_t boot_ups = 0, sdo_retries = 0, wrong_toggles = 0, emergencies = 0;
-    std::uint16_t written = 0, compared = 0;  ///< objects in the last boot
-    Time begun = 0, booted = 0;            ///< start and end of the last boot
-    Time last_heard = 0;                   ///< last frame received; 0: none yet
-    Time next_try = 0;                     ///< in Step::waiting: when the next boot starts
-    Emergency emergency{};                 ///< the newest emergency; time 0: none received yet
-    std::uint8_t error_register = 0;       ///< 1001h as the newest emergency carried it
+    std::uint64_t boot_ups = 0;
+    std::uint64_t sdo_retries = 0;
+    std::uint64_t wrong_toggles = 0;
+    std::uint64_t emergencies = 0;
+    std::uint16_t written = 0;
+    std::uint16_t compared = 0;  ///< objects in the last boot
+    Time begun = 0;
+    Time booted = 0;  ///< start and end of the last boot
+    Time last_heard = 0;  ///< last frame received; 0: none yet
+    Time next_try = 0;  ///< in Step::waiting: when the next boot starts
+    Emergency emergency{};  ///< the newest emergency; time 0: none received yet
+    std::uint8_t error_register = 0;  ///< 1001h as the newest emergency carried it
 
     /// Returns the time since the last frame of the node in ns; -1: none received yet. [any]
     Time age(Time now) const noexcept { return last_heard == 0 ? -1 : now - last_heard; }
@@ -133,11 +145,11 @@ struct NodeStatus {
 /// The state of the whole network.
 enum class NetworkState : std::uint8_t {
     off,
-    booting,      ///< not all mandatory nodes are operational yet
+    booting,  ///< not all mandatory nodes are operational yet
     operational,  ///< all mandatory nodes are operational
-    degraded,     ///< was operational; a mandatory node is lost or restarting
-    stopped,      ///< stopped by command
-    failed,       ///< stopped because of a node
+    degraded,  ///< was operational; a mandatory node is lost or restarting
+    stopped,  ///< stopped by command
+    failed,  ///< stopped because of a node
 };
 /// Returns the state as a word. [any]
 const char* to_string(NetworkState) noexcept;
@@ -145,16 +157,26 @@ const char* to_string(NetworkState) noexcept;
 /// Counters of the whole network.
 struct NetworkStatus {
     NetworkState state = NetworkState::off;
-    std::uint8_t node = 0;          ///< the node that prevents the network from being operational; 0: none
-    std::uint16_t nodes = 0, mandatory = 0, operational = 0, mandatory_operational = 0, booting = 0, failed = 0;
-    std::uint32_t resets = 0;       ///< of the whole network
+    /// the node that prevents the network from being operational; 0: none
+    std::uint8_t node = 0;
+    std::uint16_t nodes = 0;
+    std::uint16_t mandatory = 0;
+    std::uint16_t operational = 0;
+    std::uint16_t mandatory_operational = 0;
+    std::uint16_t booting = 0;
+
+    std::uint16_t failed = 0;
+    std::uint32_t resets = 0;  ///< of the whole network
     std::uint64_t foreign_commands = 0;  ///< NMT commands of other devices
-    Time begun = 0, operational_since = 0;
+    Time begun = 0;
+    Time operational_since = 0;
 };
 
-/// Returns what happened to a node and what to do about it, in one sentence; empty if nothing did. [setup]
+/// Returns what happened to a node and what to do about it, in one sentence; empty if nothing did.
+/// [setup]
 std::string sentence(const NodeSetup&, const NodeStatus&);
-/// Returns the state of the network and its cause in one sentence; `of_node` is the state of NetworkStatus::node. [setup]
+/// Returns the state of the network and its cause in one sentence; `of_node` is the state of
+/// NetworkStatus::node. [setup]
 std::string sentence(const MasterSetup&, const NetworkStatus&, const NodeStatus& of_node);
 /// Returns the progress of the boot as one short line. [setup]
 std::string progress(const NetworkStatus&);

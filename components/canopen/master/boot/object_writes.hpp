@@ -17,8 +17,10 @@ namespace hal::canopen {
 
 /// One object to write.
 struct ObjectWrite : eds::Write {
-    std::string name{};     ///< for messages
-    bool always = false;    ///< written without comparing or verifying: a command, or an object that reads back as another value
+    std::string name{};  ///< for messages
+    /// written without comparing or verifying: a command, or an object that reads back as another
+    /// value
+    bool always = false;
     bool optional = false;  ///< skipped if the node does not have the object
 };
 
@@ -30,9 +32,11 @@ ObjectWrite object_write(std::uint16_t index, std::uint8_t sub, T value, std::st
     return w;
 }
 
-/// Returns the writes that configure RPDO `number` of a node, 1..512, in the remapping order of CiA 301: disable, clear the mapping, entries,
-/// count, communication parameters, enable. `node` is the node ID that PdoDescription::plus_node_id adds. With cob 0, PDOs 1..4 get the predefined
-/// COB-ID and others stay disabled. An empty mapping disables the PDO and leaves its mapping unchanged. [setup]
+/// Returns the writes that configure RPDO `number` of a node, 1..512, in the remapping order of CiA
+/// 301: disable, clear the mapping, entries, count, communication parameters, enable. `node` is the
+/// node ID that PdoDescription::plus_node_id adds. With cob 0, PDOs 1..4 get the predefined COB-ID
+/// and others stay disabled. An empty mapping disables the PDO and leaves its mapping unchanged.
+/// [setup]
 std::vector<ObjectWrite> rpdo_writes(unsigned number, const PdoDescription&, std::uint8_t node = 0);
 /// Returns the writes that configure TPDO `number` of a node; see rpdo_writes(). [setup]
 std::vector<ObjectWrite> tpdo_writes(unsigned number, const PdoDescription&, std::uint8_t node = 0);
@@ -40,8 +44,10 @@ std::vector<ObjectWrite> tpdo_writes(unsigned number, const PdoDescription&, std
 /// Converts the writes of a DCF or of object 1F22h (concise DCF). [setup]
 std::vector<ObjectWrite> object_writes(std::span<const eds::Write>);
 
-/// Returns true if the value `found` in the node equals the value `expected`. Of a disabled PDO only bit 31 of the COB-ID is compared, and bit 30
-/// never: many devices return their own. [realtime]
-bool same_value(std::uint16_t index, std::uint8_t sub, std::span<const std::uint8_t> expected, std::span<const std::uint8_t> found) noexcept;
+/// Returns true if the value `found` in the node equals the value `expected`. Of a disabled PDO
+/// only bit 31 of the COB-ID is compared, and bit 30 never: many devices return their own.
+/// [realtime]
+bool same_value(std::uint16_t index, std::uint8_t sub, std::span<const std::uint8_t> expected,
+                std::span<const std::uint8_t> found) noexcept;
 
 }  // namespace hal::canopen

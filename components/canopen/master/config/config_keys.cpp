@@ -20,8 +20,11 @@ void Keys::take(Section& section) {
     for (Line& line : section.lines) {
         const auto [before, fresh] = own.emplace(line.key.text, &line);
         if (!fresh) {
-            report_.error(Topic::line, line.key.at, "duplicate key '" + line.key.text + "' in this section",
-                          "first in line " + std::to_string(before->second->key.at.line) + "; delete one of them", "duplicate");
+            report_.error(Topic::line, line.key.at,
+                          "duplicate key '" + line.key.text + "' in this section",
+                          "first in line " + std::to_string(before->second->key.at.line) +
+                              "; delete one of them",
+                          "duplicate");
             continue;
         }
         lines_[line.key.text] = &line;
@@ -37,9 +40,13 @@ const Line* Keys::find(const std::string& key) {
 
 std::vector<Line*> Keys::all_of(std::string_view beginning) const {
     std::vector<Line*> out;
-    for (const auto& [key, line] : lines_)
-        if (key.starts_with(beginning)) out.push_back(line);
-    std::sort(out.begin(), out.end(), [](const Line* a, const Line* b) { return a->key.at.offset < b->key.at.offset; });
+    for (const auto& [key, line] : lines_) {
+        if (key.starts_with(beginning)) {
+            out.push_back(line);
+        }
+    }
+    std::sort(out.begin(), out.end(),
+              [](const Line* a, const Line* b) { return a->key.at.offset < b->key.at.offset; });
     return out;
 }
 
@@ -50,42 +57,56 @@ std::vector<Line*> Keys::rest() const {
 }
 
 void Keys::reject(const Line& line, const std::string& instead) {
-    report_.error(Topic::value, line.value.at, "invalid " + line.key.text + " '" + line.value.text + "'", "write " + instead);
+    report_.error(Topic::value, line.value.at,
+                  "invalid " + line.key.text + " '" + line.value.text + "'", "write " + instead);
 }
 
 void Keys::take_text(const char* key, std::string& to) {
-    if (const Line* line = find(key)) to = line->value.text;
+    if (const Line* line = find(key)) {
+        to = line->value.text;
+    }
 }
 
 void Keys::take_flag(const char* key, bool& to) {
     const Line* line = find(key);
     if (line == nullptr) return;
-    if (const auto value = yes_or_no(line->value.text)) to = *value;
-    else reject(*line, "yes or no");
+    if (const auto value = yes_or_no(line->value.text)) {
+        to = *value;
+    } else {
+        reject(*line, "yes or no");
+    }
 }
 
 bool Keys::take_time(const char* key, Time& to, Time least, Time most, bool none) {
     const Line* line = find(key);
     if (line == nullptr) return false;
     const std::string word = lower(line->value.text);
-    if (none && (word == "no" || word == "none" || word == "0")) return to = 0, true;
+    if (none && (word == "no" || word == "none" || word == "0")) {
+        to = 0;
+        return true;
+    }
     const auto value = duration(line->value.text);
     if (!value || *value < least || *value > most) {
-        reject(*line, std::string(none ? "none, or " : "") + "a time of " + time_text(least) + ".." + time_text(most) + ", as in 10ms or 0.5s");
+        reject(*line, std::string(none ? "none, or " : "") + "a time of " + time_text(least) +
+                          ".." + time_text(most) + ", as in 10ms or 0.5s");
         return false;
     }
-    return to = *value, true;
+    to = *value;
+    return true;
 }
 
-bool Keys::take_number(const char* key, std::uint64_t& to, std::uint64_t least, std::uint64_t most) {
+bool Keys::take_number(const char* key, std::uint64_t& to, std::uint64_t least,
+                       std::uint64_t most) {
     const Line* line = find(key);
     if (line == nullptr) return false;
     const auto value = parse_natural(line->value.text);
     if (!value || *value < least || *value > most) {
-        reject(*line, "a number of " + std::to_string(least) + ".." + std::to_string(most) + ", decimal or with 0x");
+        reject(*line, "a number of " + std::to_string(least) + ".." + std::to_string(most) +
+                          ", decimal or with 0x");
         return false;
     }
-    return to = *value, true;
+    to = *value;
+    return true;
 }
 
 }  // namespace hal::canopen::config

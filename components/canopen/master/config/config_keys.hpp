@@ -14,7 +14,7 @@ namespace hal::canopen::config {
 template <class T>
 struct Choice {
     const char* word;
-    T           value;
+    T value;
 };
 
 /// The keys that apply to one node or bus; a later section overrides an earlier one.
@@ -32,14 +32,16 @@ public:
 
     void take_text(const char* key, std::string& to);
     void take_flag(const char* key, bool& to);
-    /// Reads a time of `least` to `most` ns; with `none`, "no" and "none" are 0. Returns whether the key has a valid value.
+    /// Reads a time of `least` to `most` ns; with `none`, "no" and "none" are 0. Returns whether
+    /// the key has a valid value.
     bool take_time(const char* key, Time& to, Time least, Time most, bool none = false);
     bool take_number(const char* key, std::uint64_t& to, std::uint64_t least, std::uint64_t most);
     template <class T>
     bool take_small(const char* key, T& to, std::uint64_t least, std::uint64_t most) {
         std::uint64_t value = 0;
         if (!take_number(key, value, least, most)) return false;
-        return to = static_cast<T>(value), true;
+        to = static_cast<T>(value);
+        return true;
     }
     template <class T, std::size_t N>
     bool take_choice(const char* key, T& to, const Choice<T> (&choices)[N]) {
@@ -47,7 +49,10 @@ public:
         if (line == nullptr) return false;
         std::vector<std::string> words;
         for (const auto& c : choices) {
-            if (same_word(line->value.text, c.word)) return to = c.value, true;
+            if (same_word(line->value.text, c.word)) {
+                to = c.value;
+                return true;
+            }
             words.push_back(c.word);
         }
         reject(*line, listed(words));
@@ -59,7 +64,7 @@ public:
     Report& report() { return report_; }
 
 private:
-    Report&                      report_;
+    Report& report_;
     std::map<std::string, Line*> lines_;
 };
 

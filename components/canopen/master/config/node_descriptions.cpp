@@ -4,7 +4,9 @@
 
 namespace hal::canopen::config {
 
-std::string Descriptions::path(const Word& file) const { return file.text.front() == '/' ? file.text : folder_ + file.text; }
+std::string Descriptions::path(const Word& file) const {
+    return file.text.front() == '/' ? file.text : folder_ + file.text;
+}
 
 bool Descriptions::read(const Word& file, std::string& bytes, Report& report) {
     const bool whole = file.text.front() == '/';
@@ -16,21 +18,28 @@ bool Descriptions::read(const Word& file, std::string& bytes, Report& report) {
 
 const eds::DeviceDescription* Descriptions::get(const Word& file, Report& report) {
     if (const auto at = known_.find(file.text); at != known_.end()) return at->second.get();
-    auto&       description = known_[file.text];
+    auto& description = known_[file.text];
     std::string text;
     if (!read(file, text, report)) return nullptr;
     eds::Reading reading = eds::read_description(text);
     if (!reading.description) {
         std::string why = "not a device description";
-        for (const auto& m : reading.messages)
-            if (m.severity == eds::Severity::error) why = "line " + std::to_string(m.at.line) + ": " + m.sentence;
-        report.error(Topic::value, file.at, "cannot use device description '" + file.text + "': " + why,
+        for (const auto& m : reading.messages) {
+            if (m.severity == eds::Severity::error) {
+                why = "line " + std::to_string(m.at.line) + ": " + m.sentence;
+            }
+        }
+        report.error(Topic::value, file.at,
+                     "cannot use device description '" + file.text + "': " + why,
                      "see: hal can eds check " + path(file));
         return nullptr;
     }
-    if (const std::size_t warnings = reading.count(eds::Severity::warning); warnings != 0)
-        report.note(Topic::value, file.at, "'" + file.text + "' has " + counted(warnings, "warning"),
-                    "list them with hal can eds check " + path(file) + "; those about objects used here matter");
+    if (const std::size_t warnings = reading.count(eds::Severity::warning); warnings != 0) {
+        report.note(Topic::value, file.at,
+                    "'" + file.text + "' has " + counted(warnings, "warning"),
+                    "list them with hal can eds check " + path(file) +
+                        "; those about objects used here matter");
+    }
     std::vector<eds::Message> ignored;
     eds::connect_modules(*reading.description, ignored);
     description = std::make_unique<eds::DeviceDescription>(std::move(*reading.description));
@@ -39,8 +48,12 @@ const eds::DeviceDescription* Descriptions::get(const Word& file, Report& report
 
 bool Descriptions::bytes(const std::string& file, std::vector<std::uint8_t>& to, std::string& why) {
     std::string text;
-    if (read_(path({file, {}}), text)) return to.assign(text.begin(), text.end()), true;
-    return why = text, false;
+    if (read_(path({file, {}}), text)) {
+        to.assign(text.begin(), text.end());
+        return true;
+    }
+    why = text;
+    return false;
 }
 
 bool Descriptions::bytes(const Word& file, std::vector<std::uint8_t>& to, Report& report) {

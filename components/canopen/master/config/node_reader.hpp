@@ -15,7 +15,8 @@ namespace hal::canopen::config {
 /// Device descriptions by their path, each read once.
 class Descriptions {
 public:
-    Descriptions(const ReadFile& read, std::string folder) : read_(read), folder_(std::move(folder)) {}
+    Descriptions(const ReadFile& read, std::string folder)
+        : read_(read), folder_(std::move(folder)) {}
     /// Returns nullptr after reporting an error at the value that names the file.
     const eds::DeviceDescription* get(const Word& file, Report& report);
     /// Reads a file that the configuration names. Returns false after reporting an error.
@@ -25,64 +26,70 @@ public:
 
 private:
     std::string path(const Word& file) const;
-    bool        read(const Word& file, std::string& bytes, Report& report);
+    bool read(const Word& file, std::string& bytes, Report& report);
 
-    const ReadFile&                                                read_;
-    std::string                                                    folder_;
+    const ReadFile& read_;
+    std::string folder_;
     std::map<std::string, std::unique_ptr<eds::DeviceDescription>> known_;
 };
 
 class NodeReader {
 public:
     NodeReader(Keys& keys, Descriptions& descriptions, const MasterConfig& bus, Node& node)
-        : keys_(keys), report_(keys.report()), descriptions_(descriptions), bus_(bus), node_(node) {}
+        : keys_(keys),
+          report_(keys.report()),
+          descriptions_(descriptions),
+          bus_(bus),
+          node_(node) {}
     void read();
 
 private:
     struct PdoWish {
-        unsigned                           number = 0;
-        bool                               to_node = false;
-        const Line*                        objects = nullptr;
+        unsigned number = 0;
+        bool to_node = false;
+        const Line* objects = nullptr;
         std::map<std::string, const Line*> options{};
     };
-    void                                         describe();
-    void                                         identity(const char* key, std::uint32_t& to, std::uint64_t described);
-    void                                         settings();
-    void                                         firmware();
-    void                                         writes();
-    void                                         values_of_dcf();
-    bool                                         dcf_fits(const Word& file);
-    void                                         write_one(const Line& line);
-    void                                         pdos();
-    std::map<std::pair<bool, unsigned>, PdoWish> wishes(const char* what = "pdo", unsigned most = 512);
-    void                                         pdo(const PdoWish& wish);
-    void                                         pdo_options(const PdoWish& wish, Pdo& pdo);
-    void                                         objects_of(const Word& list, Pdo& pdo);
-    void                                         srdos();
-    void                                         srdo(const PdoWish& wish);
-    void                                         srdo_options(const PdoWish& wish, Pdo& pdo);
-    void                                         configure_srdos();
-    bool                                         multiplexable(const Object& o, const Pdo& pdo);
-    bool                                         default_objects(const PdoWish& wish, Pdo& pdo);
-    bool                                         object(const Word& word, Pdo& pdo, Object& out);
-    Object                                       known_object(const Known& known, unsigned bits) const;
-    void                                         scanner_list();
-    void                                         configure(Pdo& pdo);
-    void                                         object_options();
-    void                                         option(Object& object, const std::string& property, const Line& line);
-    bool                                         set_safe(Object& object, const Line& line);
-    void                                         finish_objects();
-    void                                         name_feedback();
-    void                                         leftover();
+    void describe();
+    void identity(const char* key, std::uint32_t& to, std::uint64_t described);
+    void settings();
+    void firmware();
+    void writes();
+    void values_of_dcf();
+    bool dcf_fits(const Word& file);
+    void write_one(const Line& line);
+    void pdos();
+    std::map<std::pair<bool, unsigned>, PdoWish> wishes(const char* what = "pdo",
+                                                        unsigned most = 512);
+    void pdo(const PdoWish& wish);
+    void pdo_options(const PdoWish& wish, Pdo& pdo);
+    void objects_of(const Word& list, Pdo& pdo);
+    void srdos();
+    void srdo(const PdoWish& wish);
+    void srdo_options(const PdoWish& wish, Pdo& pdo);
+    void configure_srdos();
+    bool multiplexable(const Object& o, const Pdo& pdo);
+    bool default_objects(const PdoWish& wish, Pdo& pdo);
+    bool object(const Word& word, Pdo& pdo, Object& out);
+    Object known_object(const Known& known, unsigned bits) const;
+    void scanner_list();
+    void configure(Pdo& pdo);
+    void object_options();
+    void option(Object& object, const std::string& property, const Line& line);
+    bool set_safe(Object& object, const Line& line);
+    void finish_objects();
+    void name_feedback();
+    void leftover();
 
-    Keys&                         keys_;
-    Report&                       report_;
-    Descriptions&                 descriptions_;
-    const MasterConfig&           bus_;
-    Node&                         node_;
+    Keys& keys_;
+    Report& report_;
+    Descriptions& descriptions_;
+    const MasterConfig& bus_;
+    Node& node_;
     const eds::DeviceDescription* eds_ = nullptr;
-    std::unique_ptr<Catalog>      catalog_;
-    bool undescribed_ = false;  // its description is invalid, which was reported: unknown objects are not
+    std::unique_ptr<Catalog> catalog_;
+    // its description is invalid, which was reported: unknown objects are not
+    bool undescribed_ = false;
 };
 
 /// Adds the writes that configure a PDO whose identifier is known. [setup]
@@ -91,7 +98,8 @@ void configure_pdo(NodeSetup&, const Pdo&);
 /// Returns the configuration of an SRDO in the node. [setup]
 SrdoDescription node_srdo(const Pdo&);
 
-/// Converts the value of a pin to the bits of its object, limited to the range of the object's type.
+/// Converts the value of a pin to the bits of its object, limited to the range of the object's
+/// type.
 std::uint64_t raw_of(const Object&, double pin_value);
 
 }  // namespace hal::canopen::config

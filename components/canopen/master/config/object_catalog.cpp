@@ -14,10 +14,10 @@ enum class Direction : std::uint8_t { kept, sent, received };  // by the node
 
 struct Row {
     std::uint16_t index;
-    std::uint8_t  first, last;  // sub-indices; 0, 0: a plain variable
-    const char*   name;          // with a # for the sub-index
-    Type          type;
-    Direction           direction;
+    std::uint8_t first, last;  // sub-indices; 0, 0: a plain variable
+    const char* name;          // with a # for the sub-index
+    Type type;
+    Direction direction;
 };
 using enum Type;
 using enum Direction;
@@ -124,51 +124,70 @@ constexpr Row inputs_and_outputs[] = {
 };
 
 constexpr Row force_torque[] = {
-    {0x6130, 1, 6, "Process value float #", real32, sent},  {0x7130, 1, 6, "Process value #", integer16, sent},
-    {0x7100, 1, 6, "Field value #", integer16, sent}, {0x7140, 1, 6, "Net value #", integer16, sent},
-    {0x6150, 1, 6, "Status #", unsigned8, sent},      {0x6125, 1, 6, "Autozero #", unsigned32, kept},
+    {0x6130, 1, 6, "Process value float #", real32, sent},
+    {0x7130, 1, 6, "Process value #", integer16, sent},
+    {0x7100, 1, 6, "Field value #", integer16, sent},
+    {0x7140, 1, 6, "Net value #", integer16, sent},
+    {0x6150, 1, 6, "Status #", unsigned8, sent},
+    {0x6125, 1, 6, "Autozero #", unsigned32, kept},
     {0x6139, 1, 6, "Autotare #", unsigned32, kept},
 };
 
 /// Default mapping of a profile: PDO n carries these.
 struct Default {
-    bool                                 to_node;
-    unsigned                             number;
+    bool to_node;
+    unsigned number;
     std::initializer_list<std::uint32_t> objects;
 };
 
 std::uint64_t value_of(const std::vector<std::uint8_t>& bytes) {
     std::uint64_t out = 0;
-    for (std::size_t i = 0; i < bytes.size() && i < 8; ++i) out |= std::uint64_t{bytes[i]} << (8 * i);
+    for (std::size_t i = 0; i < bytes.size() && i < 8; ++i) {
+        out |= std::uint64_t{bytes[i]} << (8 * i);
+    }
     return out;
 }
 
 std::vector<std::uint8_t> little(std::uint64_t value, unsigned bytes) {
     std::vector<std::uint8_t> out;
-    for (unsigned i = 0; i < bytes; ++i) out.push_back(static_cast<std::uint8_t>(value >> (8 * i)));
+    for (unsigned i = 0; i < bytes; ++i) {
+        out.push_back(static_cast<std::uint8_t>(value >> (8 * i)));
+    }
     return out;
 }
 
-void add(std::vector<Known>& all, std::span<const Row> rows, std::uint16_t offset, const std::string& prefix) {
-    for (const Row& row : rows)
+void add(std::vector<Known>& all, std::span<const Row> rows, std::uint16_t offset,
+         const std::string& prefix) {
+    for (const Row& row : rows) {
         for (unsigned sub = row.first; sub <= row.last; ++sub) {
             std::string name = row.name;
-            if (const auto at = name.find('#'); at != name.npos) name.replace(at, 1, std::to_string(sub));
+            if (const auto at = name.find('#'); at != name.npos) {
+                name.replace(at, 1, std::to_string(sub));
+            }
             Known k;
-            k.index = static_cast<std::uint16_t>(row.index + offset), k.sub = static_cast<std::uint8_t>(sub);
+            k.index = static_cast<std::uint16_t>(row.index + offset);
+
+            k.sub = static_cast<std::uint8_t>(sub);
             k.single = row.last == 0;
-            k.name = prefix + dashed(name), k.about = name;
+            k.name = prefix + dashed(name);
+            k.about = name;
             k.type = row.type;
-            k.to_node = row.direction == received, k.from_node = row.direction != kept;
+            k.to_node = row.direction == received;
+            k.from_node = row.direction != kept;
             k.writable = row.direction != sent;
             all.push_back(std::move(k));
         }
+    }
 }
 
 void map(std::vector<Known>& all, const Default& pdo) {
     const auto put = [&](unsigned index, unsigned sub, Type type, std::uint64_t value) {
         Known k;
-        k.index = static_cast<std::uint16_t>(index), k.sub = static_cast<std::uint8_t>(sub), k.single = false, k.type = type;
+        k.index = static_cast<std::uint16_t>(index);
+        k.sub = static_cast<std::uint8_t>(sub);
+
+        k.single = false;
+        k.type = type;
         k.value = little(value, bytes_of(type));
         all.push_back(std::move(k));
     };
@@ -177,7 +196,9 @@ void map(std::vector<Known>& all, const Default& pdo) {
     put(base, 2, unsigned8, 255);
     put(base + 0x200, 0, unsigned8, pdo.objects.size());
     unsigned n = 0;
-    for (const std::uint32_t object : pdo.objects) put(base + 0x200, ++n, unsigned32, object);
+    for (const std::uint32_t object : pdo.objects) {
+        put(base + 0x200, ++n, unsigned32, object);
+    }
 }
 
 }  // namespace
@@ -187,20 +208,29 @@ Catalog::Catalog(const eds::DeviceDescription& device, unsigned node_id) {
     for (const eds::Object& object : device.objects) {
         if (object.index < 0x1000) continue;
         std::string prefix;
-        if (several_axes && object.index >= 0x6000 && object.index < 0xa000)
+        if (several_axes && object.index >= 0x6000 && object.index < 0xa000) {
             prefix = "axis-" + std::to_string((object.index - 0x6000) / 0x800 + 1) + ".";
+        }
         for (const eds::Entry& entry : object.entries) {
             Known k;
-            k.index = object.index, k.sub = entry.sub, k.single = object.single();
+            k.index = object.index;
+            k.sub = entry.sub;
+            k.single = object.single();
             k.about = k.single ? object.name : object.name + " " + entry.name;
             k.name = prefix + dashed(k.single ? object.name : object.name + "-" + entry.name);
-            k.type =
-                bits_of(static_cast<Type>(entry.data_type)) != 0 || entry.data_type >= 9 ? static_cast<Type>(entry.data_type) : Type::none;
-            k.writable = entry.writable(), k.readable = entry.readable();
+            k.type = bits_of(static_cast<Type>(entry.data_type)) != 0 || entry.data_type >= 9
+                         ? static_cast<Type>(entry.data_type)
+                         : Type::none;
+            k.writable = entry.writable();
+            k.readable = entry.readable();
             k.to_node = entry.pdo_mapping && k.writable && entry.access != eds::Access::rwr;
-            k.from_node = entry.pdo_mapping && k.readable && entry.access != eds::Access::rww && entry.access != eds::Access::constant;
-            const std::string& text = entry.parameter_value.empty() ? entry.default_value : entry.parameter_value;
-            if (eds::Encoded value = eds::encode(text, entry.data_type, node_id)) k.value = std::move(value.bytes);
+            k.from_node = entry.pdo_mapping && k.readable && entry.access != eds::Access::rww &&
+                          entry.access != eds::Access::constant;
+            const std::string& text =
+                entry.parameter_value.empty() ? entry.default_value : entry.parameter_value;
+            if (eds::Encoded value = eds::encode(text, entry.data_type, node_id)) {
+                k.value = std::move(value.bytes);
+            }
             all_.push_back(std::move(k));
         }
     }
@@ -208,10 +238,14 @@ Catalog::Catalog(const eds::DeviceDescription& device, unsigned node_id) {
 }
 
 Catalog::Catalog(std::string_view profile, unsigned axes) {
-    const std::uint32_t controlword = map_entry(0x6040, 0, 16), statusword = map_entry(0x6041, 0, 16);
+    const std::uint32_t controlword = map_entry(0x6040, 0, 16);
+
+    const std::uint32_t statusword = map_entry(0x6041, 0, 16);
     if (profile == "cia402") {
-        for (unsigned axis = 0; axis < axes; ++axis)
-            add(all_, drive, static_cast<std::uint16_t>(0x800 * axis), axes > 1 ? "axis-" + std::to_string(axis + 1) + "." : "");
+        for (unsigned axis = 0; axis < axes; ++axis) {
+            add(all_, drive, static_cast<std::uint16_t>(0x800 * axis),
+                axes > 1 ? "axis-" + std::to_string(axis + 1) + "." : "");
+        }
         map(all_, {true, 1, {controlword}});
         map(all_, {true, 2, {controlword, map_entry(0x6060, 0, 8)}});
         map(all_, {true, 3, {controlword, map_entry(0x607a, 0, 32)}});
@@ -226,26 +260,39 @@ Catalog::Catalog(std::string_view profile, unsigned axes) {
         map(all_, {false, 1, {map_entry(0x6000, 1, 8)}});
     } else if (profile == "jr3") {
         add(all_, force_torque, 0, "");
-        const auto channel = [](unsigned n) { return map_entry(0x7130, static_cast<std::uint8_t>(n), 16); };
-        map(all_, {false, 2, {channel(1), channel(2), channel(3), map_entry(0x2201, 0, 8), map_entry(0x2202, 0, 8)}});
-        map(all_, {false, 4, {channel(4), channel(5), channel(6), map_entry(0x2201, 0, 8), map_entry(0x2202, 0, 8)}});
+        const auto channel = [](unsigned n) {
+            return map_entry(0x7130, static_cast<std::uint8_t>(n), 16);
+        };
+        map(all_, {false,
+                   2,
+                   {channel(1), channel(2), channel(3), map_entry(0x2201, 0, 8),
+                    map_entry(0x2202, 0, 8)}});
+        map(all_, {false,
+                   4,
+                   {channel(4), channel(5), channel(6), map_entry(0x2201, 0, 8),
+                    map_entry(0x2202, 0, 8)}});
     }
     finish();
 }
 
 void Catalog::finish() {
-    std::stable_sort(all_.begin(), all_.end(),
-                     [](const Known& a, const Known& b) { return a.index != b.index ? a.index < b.index : a.sub < b.sub; });
+    std::stable_sort(all_.begin(), all_.end(), [](const Known& a, const Known& b) {
+        return a.index != b.index ? a.index < b.index : a.sub < b.sub;
+    });
     for (std::size_t i = 0; i < all_.size(); ++i) {
         Known& k = all_[i];
         if (k.name.empty() || k.index < 0x1000) continue;
-        if (by_name_.contains(k.name)) k.name += "-" + dashed(object_label(k.index, k.sub, k.single)).substr(2);  // two of one name
+        // two of one name
+        if (by_name_.contains(k.name)) {
+            k.name += "-" + dashed(object_label(k.index, k.sub, k.single)).substr(2);
+        }
         by_name_.emplace(k.name, i);
     }
 }
 
 const Known* Catalog::find(std::uint16_t index, std::uint8_t sub) const {
-    const auto at = std::lower_bound(all_.begin(), all_.end(), std::pair(index, sub), [](const Known& k, const auto& key) {
+    const auto at = std::lower_bound(all_.begin(), all_.end(), std::pair(index, sub),
+                                     [](const Known& k, const auto& key) {
         return k.index != key.first ? k.index < key.first : k.sub < key.second;
     });
     return at != all_.end() && at->index == index && at->sub == sub ? &*at : nullptr;
@@ -260,22 +307,29 @@ bool Catalog::has(std::uint16_t index) const {
     return std::any_of(all_.begin(), all_.end(), [&](const Known& k) { return k.index == index; });
 }
 
-std::uint64_t Catalog::number(std::uint16_t index, std::uint8_t sub, std::uint64_t otherwise) const {
+std::uint64_t Catalog::number(std::uint16_t index, std::uint8_t sub,
+                              std::uint64_t otherwise) const {
     const Known* k = find(index, sub);
     return k == nullptr || k->value.empty() || k->value.size() > 8 ? otherwise : value_of(k->value);
 }
 
 std::vector<std::string> Catalog::names(bool to_node) const {
     std::vector<std::string> out;
-    for (const Known& k : all_)
-        if (!k.name.empty() && (to_node ? k.to_node : k.from_node)) out.push_back(k.name);
+    for (const Known& k : all_) {
+        if (!k.name.empty() && (to_node ? k.to_node : k.from_node)) {
+            out.push_back(k.name);
+        }
+    }
     return out;
 }
 
 std::vector<std::string> Catalog::names() const {
     std::vector<std::string> out;
-    for (const Known& k : all_)
-        if (!k.name.empty()) out.push_back(k.name);
+    for (const Known& k : all_) {
+        if (!k.name.empty()) {
+            out.push_back(k.name);
+        }
+    }
     return out;
 }
 

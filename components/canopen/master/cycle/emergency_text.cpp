@@ -14,18 +14,22 @@ namespace {
 bool is_drive(const config::Node& node) noexcept {
     const auto of_drive = [](const config::Object& o) {
         const auto index = cia402::of_first_axis(o.index);
-        return !o.filler && (index == cia402::object::controlword || index == cia402::object::statusword);
+        return !o.filler &&
+               (index == cia402::object::controlword || index == cia402::object::statusword);
     };
     return (node.setup.device_type & 0xffff) == cia402::profile_number ||
-           std::any_of(node.pdos.begin(), node.pdos.end(),
-                       [&](const config::Pdo& p) { return std::any_of(p.objects.begin(), p.objects.end(), of_drive); });
+           std::any_of(node.pdos.begin(), node.pdos.end(), [&](const config::Pdo& p) {
+        return std::any_of(p.objects.begin(), p.objects.end(), of_drive);
+    });
 }
 
 }  // namespace
 
-const char* emergency_text(const config::MasterConfig& config, std::uint8_t id, std::uint16_t code) noexcept {
-    for (const config::Node& n : config.nodes)
+const char* emergency_text(const config::MasterConfig& config, std::uint8_t id,
+                           std::uint16_t code) noexcept {
+    for (const config::Node& n : config.nodes) {
         if (n.setup.id == id && is_drive(n)) return cia402::error_word(code);
+    }
     return emergency_text(code);
 }
 

@@ -12,7 +12,9 @@ namespace {
 // All nodes send for the first time, and frames of an instance before this one still come.
 constexpr Time start_transient = 100 * millisecond;
 
-void set_value(Entry& e, std::uint64_t value) noexcept { std::memcpy(e.data, &value, e.size < 8 ? e.size : 8); }
+void set_value(Entry& e, std::uint64_t value) noexcept {
+    std::memcpy(e.data, &value, e.size < 8 ? e.size : 8);
+}
 
 DeviceSettings device_settings(const config::MasterConfig& config) {
     DeviceSettings s;
@@ -39,45 +41,76 @@ Runner::Runner(const config::MasterConfig& config, RunnerEvents& events)
         place_[id] = static_cast<std::uint8_t>(n);
         statuses_.push_back(&master_.status(id));
         if (config.at_stop == config::AtStop::nothing) continue;
-        can::Frame f(
-            0, {static_cast<std::uint8_t>(config.at_stop == config::AtStop::stopped ? NmtCommand::stop : NmtCommand::enter_pre_operational),
-                id});
+        can::Frame f(0, {static_cast<std::uint8_t>(config.at_stop == config::AtStop::stopped
+                                                       ? NmtCommand::stop
+                                                       : NmtCommand::enter_pre_operational),
+                         id});
         farewell_.push_back(f);
     }
     for (const Placed& p : own_.placed) {
         Slot s;
         s.entry = device_.dictionary().find(p.index, p.sub);
-        s.node = static_cast<std::uint16_t>(p.node), s.to_node = p.to_node, s.object = p.object;
-        s.has_safe = p.object->safe.has_value(), s.safe = p.object->safe.value_or(0);
-        if (s.to_node && s.has_safe) set_value(*s.entry, s.safe);
+        s.node = static_cast<std::uint16_t>(p.node);
+        s.to_node = p.to_node;
+        s.object = p.object;
+        s.has_safe = p.object->safe.has_value();
+        s.safe = p.object->safe.value_or(0);
+        if (s.to_node && s.has_safe) {
+            set_value(*s.entry, s.safe);
+        }
         slots_.push_back(s);
     }
     for (const Sent& sent : own_.sent) {
-        if (!sent.pdo->synchronous() || sent.pdo->transmission == 0) device_.pdos().send_on_change(sent.number);
-        outputs_.push_back({&sent, make_frame(sent.pdo->cob, static_cast<std::uint8_t>(sent.pdo->bytes()))});
+        if (!sent.pdo->synchronous() || sent.pdo->transmission == 0) {
+            device_.pdos().send_on_change(sent.number);
+        }
+        outputs_.push_back(
+            {&sent, make_frame(sent.pdo->cob, static_cast<std::uint8_t>(sent.pdo->bytes()))});
     }
-    for (const Sent& sent : own_.sent)
-        if (sent.pdo->multiplexed())
-            for (const Sent::Part& part : sent.parts)
-                alone_.push_back({sent.number, part.placed, sent.pdo->inhibit_100us * 100 * microsecond});
-    for (const Received& r : own_.received)
-        if (r.pdo->request != 0) asked_.push_back({r.number, r.node, r.pdo->request});
+    for (const Sent& sent : own_.sent) {
+        if (sent.pdo->multiplexed()) {
+            for (const Sent::Part& part : sent.parts) {
+                alone_.push_back(
+                    {sent.number, part.placed, sent.pdo->inhibit_100us * 100 * microsecond});
+            }
+        }
+    }
+    for (const Received& r : own_.received) {
+        if (r.pdo->request != 0) {
+            asked_.push_back({r.number, r.node, r.pdo->request});
+        }
+    }
     device_.srdos().listen(*this);
-    for (const OwnSrdo& s : own_.srdos)
-        if (s.pdo->to_node) device_.srdos().derive_inverted(s.number);
+    for (const OwnSrdo& s : own_.srdos) {
+        if (s.pdo->to_node) {
+            device_.srdos().derive_inverted(s.number);
+        }
+    }
     open_.assign(statuses_.size(), 0);
     was_operational_.assign(statuses_.size(), 0);
     ever_operational_.assign(statuses_.size(), 0);
     produces_ = config.sync == config::SyncMode::cycle || config.sync == config::SyncMode::timed;
     sync_frame_ = make_frame(config.sync_cob, config.sync_counter != 0 ? 1 : 0);
     foreign_.resize(ours_.size());
-    if (produces_) ours_.set(sync_frame_.id);
-    if (config.time_period > 0) ours_.set(0x100);
-    if (!config.flying.enabled) ours_.set(0);
+    if (produces_) {
+        ours_.set(sync_frame_.id);
+    }
+    if (config.time_period > 0) {
+        ours_.set(0x100);
+    }
+    if (!config.flying.enabled) {
+        ours_.set(0);
+    }
     ours_.set(0x80U + config.node_id);
-    for (const config::Node& n : config.nodes) ours_.set(0x600U + n.setup.id);
-    for (const Output& out : outputs_)
-        if (!out.frame.extended) ours_.set(out.frame.id), ours_to_nodes_.set(out.frame.id);
+    for (const config::Node& n : config.nodes) {
+        ours_.set(0x600U + n.setup.id);
+    }
+    for (const Output& out : outputs_) {
+        if (!out.frame.extended) {
+            ours_.set(out.frame.id);
+            ours_to_nodes_.set(out.frame.id);
+        }
+    }
 }
 
 void Runner::open(can::Link& link) noexcept {
@@ -93,7 +126,9 @@ void Runner::open(can::Link& link) noexcept {
 void Runner::begin(Time now) noexcept {
     was_active_ = false;
     safe_.store(false);
-    if (std::exchange(begun_, true)) drop_backlog(now);
+    if (std::exchange(begun_, true)) {
+        drop_backlog(now);
+    }
     foreign_from_ = now + start_transient;
     if (!config_.flying.enabled) return boot(now);
     device_.out().clear();
@@ -112,8 +147,9 @@ void Runner::boot(Time now) noexcept {
     std::fill(ever_operational_.begin(), ever_operational_.end(), std::uint8_t{0});
     sync_begun_ = time_begun_ = false;
     // A node that is kept alive needs the SYNC while it is found out that it is.
-    sync_open_ = config_.sync_at_boot ||
-                 std::any_of(config_.nodes.begin(), config_.nodes.end(), [](const auto& n) { return n.setup.keep_alive; });
+    sync_open_ =
+        config_.sync_at_boot || std::any_of(config_.nodes.begin(), config_.nodes.end(),
+                                            [](const auto& n) { return n.setup.keep_alive; });
     steps_changed_ = true;
     vain_waits_ = 0;
 }
@@ -133,7 +169,10 @@ void Runner::fly(Time now) noexcept {
 }
 
 void Runner::note_sync(const can::Frame& f, Time now) noexcept {
-    if (f.id != config_.sync_cob || f.extended || f.remote || config_.sync != config::SyncMode::follow) return;
+    if (f.id != config_.sync_cob || f.extended || f.remote ||
+        config_.sync != config::SyncMode::follow) {
+        return;
+    }
     ++syncs_heard_;
     sync_came_ = f.time_ns != 0 ? f.time_ns : now;
     sync_ours_ = f.own;
@@ -142,34 +181,56 @@ void Runner::note_sync(const can::Frame& f, Time now) noexcept {
 void Runner::receive(Time now) noexcept {
     if (link_ == nullptr) return;
     now_ = now;
-    if (boots_.exchange(false)) begin(now);
+    if (boots_.exchange(false)) {
+        begin(now);
+    }
     take_frames(now);
     statistics_ = link_->statistics();
-    for (can::Rejected what; link_->rejected(what);) events_.on_rejected(what);
-    const auto out_of_order = [](can::State s) { return s == can::State::bus_off || s == can::State::down; };
+    for (can::Rejected what; link_->rejected(what);) {
+        events_.on_rejected(what);
+    }
+    const auto out_of_order = [](can::State s) {
+        return s == can::State::bus_off || s == can::State::down;
+    };
     had_bus_ = had_bus_ || !out_of_order(statistics_.state);
     if (statistics_.state != bus_state_) {
-        if (out_of_order(statistics_.state) && !out_of_order(bus_state_)) device_.bus_off(now);
-        if (!out_of_order(statistics_.state) && out_of_order(bus_state_)) device_.bus_recovered();
+        if (out_of_order(statistics_.state) && !out_of_order(bus_state_)) {
+            device_.bus_off(now);
+        }
+        if (!out_of_order(statistics_.state) && out_of_order(bus_state_)) {
+            device_.bus_recovered();
+        }
         bus_state_ = statistics_.state;
         events_.on_bus_state(bus_state_);
     }
-    if (config_.flying.enabled) fly(now);
-    if (active()) master_.poll(now);
+    if (config_.flying.enabled) {
+        fly(now);
+    }
+    if (active()) {
+        master_.poll(now);
+    }
     open_and_close();
     watch_srdos(now);
-    if (config_.sync == config::SyncMode::follow) send(now);  // what a SYNC asked for does not wait for transmit()
-    // Another thread made the network safe meanwhile, but this cycle went on sending: it is done once more.
-    if (boots_.load()) safe_.store(false);
+    // what a SYNC asked for does not wait for transmit()
+    if (config_.sync == config::SyncMode::follow) {
+        send(now);
+    }
+    // Another thread made the network safe meanwhile, but this cycle went on sending: it is done
+    // once more.
+    if (boots_.load()) {
+        safe_.store(false);
+    }
 }
 
 std::size_t Runner::take_frames(Time now) noexcept {
     constexpr std::size_t most = 4096;
     std::array<can::Frame, 32> frames;
-    std::size_t                taken = 0;
+    std::size_t taken = 0;
     while (taken < most) {
         const std::size_t count = link_->receive(frames, now);
-        for (std::size_t i = 0; i < count; ++i) take(frames[i], now);
+        for (std::size_t i = 0; i < count; ++i) {
+            take(frames[i], now);
+        }
         taken += count;
         if (count < frames.size()) break;
     }
@@ -182,10 +243,14 @@ void Runner::take(const can::Frame& f, Time now) noexcept {
     if ((own_beat && (f.own || !leads_)) || (f.id == 0 && !leads_)) return;
     note_sync(f, now);
     if (config_.flying.enabled && flying_.handle(f, now)) return;
-    if (!f.own && active()) note_foreign(f, now);
+    if (!f.own && active()) {
+        note_foreign(f, now);
+    }
     device_.handle(f, now);
     if (!active()) return;
-    if (f.id >> 7 == 0x580 >> 7) vain_waits_ = 0;
+    if (f.id >> 7 == 0x580 >> 7) {
+        vain_waits_ = 0;
+    }
     master_.handle(f, now);
     open_and_close();  // what follows in this cycle may be the node's first PDO
 }
@@ -193,56 +258,85 @@ void Runner::take(const can::Frame& f, Time now) noexcept {
 void Runner::take_wishes() noexcept {
     for (std::size_t n = 0; n < statuses_.size(); ++n) {
         const bool now = statuses_[n]->operational;
-        if (now && was_operational_[n] == 0)  // it has not heard what was sent on a change before
-            for (const Output& out : outputs_)
-                for (const Sent::Part& part : out.sent->parts)
-                    if (slots_[part.placed].node == n) device_.pdos().trigger(out.sent->number);
-        if (now && was_operational_[n] == 0)
-            for (Alone& a : alone_)
-                if (slots_[a.slot].node == n) a.sent = false;
+        if (now && was_operational_[n] == 0) {  // it has not heard what was sent on a change before
+            for (const Output& out : outputs_) {
+                for (const Sent::Part& part : out.sent->parts) {
+                    if (slots_[part.placed].node == n) {
+                        device_.pdos().trigger(out.sent->number);
+                    }
+                }
+            }
+        }
+        if (now && was_operational_[n] == 0) {
+            for (Alone& a : alone_) {
+                if (slots_[a.slot].node == n) {
+                    a.sent = false;
+                }
+            }
+        }
         was_operational_[n] = now ? 1 : 0;
-        if (now) ever_operational_[n] = 1;
+        if (now) {
+            ever_operational_[n] = 1;
+        }
     }
     for (Slot& s : slots_) {
         if (!s.to_node) continue;
-        // One that is kept alive may be operational before we know: it gets what it is to have, not what we would have it held at.
+        // One that is kept alive may be operational before we know: it gets what it is to have, not
+        // what we would have it held at.
         const bool kept = config_.nodes[s.node].setup.keep_alive && ever_operational_[s.node] == 0;
-        if (statuses_[s.node]->operational || kept) set_value(*s.entry, s.wish);
-        else if (s.has_safe) set_value(*s.entry, s.safe);
+        if (statuses_[s.node]->operational || kept) {
+            set_value(*s.entry, s.wish);
+        } else if (s.has_safe) {
+            set_value(*s.entry, s.safe);
+        }
     }
 }
 
 /// Round robin, so that an object that changes in every cycle does not block the others.
 void Runner::tell_alone(Time now) noexcept {
-    for (std::size_t n = alone_.size(); n > 0; --n, next_alone_ = (next_alone_ + 1) % alone_.size()) {
-        Alone&      a = alone_[next_alone_ % alone_.size()];
+    for (std::size_t n = alone_.size(); n > 0;
+         --n, next_alone_ = (next_alone_ + 1) % alone_.size()) {
+        Alone& a = alone_[next_alone_ % alone_.size()];
         const Slot& s = slots_[a.slot];
-        const auto  value = static_cast<std::uint32_t>(number_in(*s.entry) & (~std::uint64_t{0} >> (64 - s.object->bits)));
+        const auto value = static_cast<std::uint32_t>(number_in(*s.entry) &
+                                                      (~std::uint64_t{0} >> (64 - s.object->bits)));
         if (!statuses_[s.node]->operational || (a.sent && value == a.announced)) continue;
         const auto sent = device_.pdos().tpdo(a.number);
         if (a.inhibit != 0 && sent.count != 0 && now - sent.last < a.inhibit) continue;
-        if (!device_.pdos().send_dam(a.number, statuses_[s.node]->id, s.object->index, s.object->sub, value)) return;
-        a.announced = value, a.sent = true;
+        if (!device_.pdos().send_dam(a.number, statuses_[s.node]->id, s.object->index,
+                                     s.object->sub, value)) {
+            return;
+        }
+        a.announced = value;
+        a.sent = true;
     }
 }
 
 /// Requests the PDOs that nodes send on request.
 void Runner::ask(Time now) noexcept {
     for (Asked& a : asked_) {
-        if (!statuses_[a.node]->operational || now < a.next || !device_.pdos().request(a.number)) continue;
+        if (!statuses_[a.node]->operational || now < a.next || !device_.pdos().request(a.number)) {
+            continue;
+        }
         a.next = std::max(a.next + a.every, now + a.every / 2);
     }
 }
 
-/// Expects every SRDO of an operational node; invalid data is replaced by its safe values in the same cycle.
+/// Expects every SRDO of an operational node; invalid data is replaced by its safe values in the
+/// same cycle.
 void Runner::watch_srdos(Time now) noexcept {
     if (own_.srdos.empty()) return;
-    for (const OwnSrdo& s : own_.srdos) device_.srdos().expect(s.number, statuses_[s.node]->operational, now);
+    for (const OwnSrdo& s : own_.srdos) {
+        device_.srdos().expect(s.number, statuses_[s.node]->operational, now);
+    }
     device_.srdos().poll(now);
     for (const OwnSrdo& s : own_.srdos) {
         if (s.pdo->to_node || device_.srdos().status(s.number).valid) continue;
-        for (const std::size_t n : s.placed)
-            if (slots_[n].has_safe) set_value(*slots_[n].entry, slots_[n].safe);
+        for (const std::size_t n : s.placed) {
+            if (slots_[n].has_safe) {
+                set_value(*slots_[n].entry, slots_[n].safe);
+            }
+        }
     }
 }
 
@@ -252,54 +346,76 @@ void Runner::transmit(Time now, Time period, bool leads) noexcept {
     take_wishes();
     open_and_close();
     sync_open_ = sync_open_ || mandatory_are_configured();
-    if (produces_ && sync_open_ && leads && active()) produce_sync(now, period);
-    if (config_.time_period > 0 && leads && active()) produce_time(now);
-    if (active()) tell_alone(now), ask(now);
+    if (produces_ && sync_open_ && leads && active()) {
+        produce_sync(now, period);
+    }
+    if (config_.time_period > 0 && leads && active()) {
+        produce_time(now);
+    }
+    if (active()) {
+        tell_alone(now);
+        ask(now);
+    }
     device_.poll(now);
     leads_ = leads;
     send(now);
     serve_boot(now, period);
-    if (boots_.load()) safe_.store(false);
+    if (boots_.load()) {
+        safe_.store(false);
+    }
 }
 
 void Runner::produce_sync(Time now, Time period) noexcept {
     if (config_.sync == config::SyncMode::timed) {
-        // The phase is kept, but a SYNC is never more than half a thread period early: its period need not be a multiple of that of the thread.
-        if (!sync_begun_) next_sync_ = now;
+        // The phase is kept, but a SYNC is never more than half a thread period early: its period
+        // need not be a multiple of that of the thread.
+        if (!sync_begun_) {
+            next_sync_ = now;
+        }
         if (now + period / 2 < next_sync_) return;
-        const Time behind = now > next_sync_ ? (now - next_sync_ + period / 2) / config_.sync_period : 0;
+        const Time behind =
+            now > next_sync_ ? (now - next_sync_ + period / 2) / config_.sync_period : 0;
         next_sync_ += (behind + 1) * config_.sync_period;
     }
     // Nodes that are being configured fill the queue, too.
     const NetworkStatus& network = master_.status();
-    const bool settled = network.state == NetworkState::operational && now - network.operational_since >= start_transient;
+    const bool settled = network.state == NetworkState::operational &&
+                         now - network.operational_since >= start_transient;
     const bool behind = sync_begun_ && settled && statistics_.queued != 0;
     sync_begun_ = true;
     if (behind) {
         ++overruns_;
         events_.on_sync_overrun();
     }
-    if (device_.produce_sync(now)) ++syncs_;
+    if (device_.produce_sync(now)) {
+        ++syncs_;
+    }
 }
 
 void Runner::produce_time(Time now) noexcept {
     if (time_begun_ && now < next_time_) return;
     next_time_ = (time_begun_ ? next_time_ : now) + config_.time_period;
-    if (next_time_ <= now) next_time_ = now + config_.time_period;
+    if (next_time_ <= now) {
+        next_time_ = now + config_.time_period;
+    }
     time_begun_ = true;
-    constexpr std::int64_t day_ms = 86'400'000, days_to_1984 = 5113;
-    std::int64_t           ms = now / millisecond;  // on a bus in memory every run is the same
+    constexpr std::int64_t day_ms = 86'400'000;
+    constexpr std::int64_t days_to_1984 = 5113;
+    std::int64_t ms = now / millisecond;  // on a bus in memory every run is the same
     if (!link_->description().simulated) {
         timespec t{};
         clock_gettime(CLOCK_REALTIME, &t);
         ms = t.tv_sec * 1000 + t.tv_nsec / 1'000'000 - days_to_1984 * day_ms;
     }
-    device_.time().produce({static_cast<std::uint32_t>(ms % day_ms), static_cast<std::uint16_t>(ms / day_ms)});
+    device_.time().produce(
+        {static_cast<std::uint32_t>(ms % day_ms), static_cast<std::uint16_t>(ms / day_ms)});
 }
 
 void Runner::send(Time now) noexcept {
     const bool stuck = is_stuck(now);
-    if (!stuck && std::exchange(kept_back_, false)) tell_again();
+    if (!stuck && std::exchange(kept_back_, false)) {
+        tell_again();
+    }
     while (const Frame* f = device_.out().front()) {
         const bool heartbeat = f->id == 0x700U + config_.node_id && !f->extended;
         if (stuck && is_process_data(*f)) {
@@ -309,7 +425,9 @@ void Runner::send(Time now) noexcept {
             continue;
         }
         const can::Sent sent = heartbeat && !leads_ ? can::Sent::queued : link_->send(*f, now);
-        if (sent == can::Sent::full) break;  // it stays, and goes first in the next cycle
+        if (sent == can::Sent::full) {
+            break;  // it stays, and goes first in the next cycle
+        }
         device_.out().drop();
     }
     link_->flush(now);
@@ -317,34 +435,49 @@ void Runner::send(Time now) noexcept {
 
 /// What is sent on a change only was lost with what was kept back.
 void Runner::tell_again() noexcept {
-    for (const Output& out : outputs_) device_.pdos().trigger(out.sent->number);
-    for (Alone& a : alone_) a.sent = false;
+    for (const Output& out : outputs_) {
+        device_.pdos().trigger(out.sent->number);
+    }
+    for (Alone& a : alone_) {
+        a.sent = false;
+    }
 }
 
-/// The bus takes nothing: nobody acknowledges, or others keep it. Set-points of these cycles would wait in the queue, and move the
-/// machine by what was wanted long ago when the cable is back.
+/// The bus takes nothing: nobody acknowledges, or others keep it. Set-points of these cycles would
+/// wait in the queue, and move the machine by what was wanted long ago when the cable is back.
 bool Runner::is_stuck(Time now) noexcept {
     constexpr Time longest_wait = 20 * millisecond;
     constexpr Time longest_frame_bits = 160;  // 29-bit identifier, eight bytes, all stuff bits
     const can::Statistics s = link_->statistics();
-    if (moved_ == 0 || s.queued == 0 || s.sent != sent_before_) moved_ = now;
+    if (moved_ == 0 || s.queued == 0 || s.sent != sent_before_) {
+        moved_ = now;
+    }
     sent_before_ = s.sent;
-    return now - moved_ > std::max(longest_wait, 100 * longest_frame_bits * second / std::max<Time>(config_.bit_rate, 1));
+    return now - moved_ > std::max(longest_wait, 100 * longest_frame_bits * second /
+                                                     std::max<Time>(config_.bit_rate, 1));
 }
 
 bool Runner::is_process_data(const can::Frame& f) const noexcept {
-    const auto same = [&](const can::Frame& other) { return f.id == other.id && f.extended == other.extended; };
+    const auto same = [&](const can::Frame& other) {
+        return f.id == other.id && f.extended == other.extended;
+    };
     const bool asks = f.remote && (f.extended || f.id < 0x700);  // not the guarding of a node
-    return asks || same(sync_frame_) || std::any_of(outputs_.begin(), outputs_.end(), [&](const Output& o) { return same(o.frame); });
+    return asks || same(sync_frame_) ||
+           std::any_of(outputs_.begin(), outputs_.end(),
+                       [&](const Output& o) { return same(o.frame); });
 }
 
 void Runner::on_step(const NodeStatus& status) noexcept {
     steps_changed_ = true;
-    if (place_[status.id & 0x7f] != 255) events_.on_step(place_[status.id & 0x7f], status);
+    if (place_[status.id & 0x7f] != 255) {
+        events_.on_step(place_[status.id & 0x7f], status);
+    }
 }
 void Runner::on_network(const NetworkStatus& status) noexcept { events_.on_network(status); }
 void Runner::on_emergency(std::uint8_t node, const Emergency& e) noexcept {
-    if (place_[node & 0x7f] != 255) events_.on_emergency(place_[node & 0x7f], e);
+    if (place_[node & 0x7f] != 255) {
+        events_.on_emergency(place_[node & 0x7f], e);
+    }
 }
 
 }  // namespace hal::canopen

@@ -27,11 +27,13 @@ namespace hal::canopen {
 
 /// An object at work. The value is the object's: of a real its bits, of a number all 64.
 struct Slot {
-    Entry*                entry = nullptr;
-    std::uint16_t         node = 0;
-    bool                  to_node = false, has_safe = false;
-    std::uint64_t         safe = 0;
-    std::uint64_t         wish = 0;           ///< to_node: what is to be sent while the node is operational
+    Entry* entry = nullptr;
+    std::uint16_t node = 0;
+    bool to_node = false;
+    bool has_safe = false;
+    std::uint64_t safe = 0;
+    /// to_node: what is to be sent while the node is operational
+    std::uint64_t wish = 0;
     const config::Object* object = nullptr;
 };
 
@@ -52,19 +54,23 @@ public:
     virtual void on_emergency(std::size_t node, const Emergency&) noexcept { (void)node; }
     /// A PDO of a node did not come for its time-out. `place` is that in OwnNode::received.
     virtual void on_late(std::size_t place) noexcept { (void)place; }
-    /// It came with fewer bytes than its objects have; they keep their values. `place` is that in OwnNode::received.
+    /// It came with fewer bytes than its objects have; they keep their values. `place` is that in
+    /// OwnNode::received.
     virtual void on_short(std::size_t place, unsigned bytes) noexcept { (void)place, (void)bytes; }
     /// Another device sends what only this master may send. `begins`: after a second without it.
     struct Foreign {
-        std::uint16_t               id = 0;
+        std::uint16_t id = 0;
         std::array<std::uint8_t, 2> data{};
-        std::uint32_t               frames = 0;  ///< since the last report
-        bool                        sync = false, rpdo = false, begins = false;
+        std::uint32_t frames = 0;  ///< since the last report
+        bool sync = false;
+        bool rpdo = false;
+        bool begins = false;
     };
     virtual void on_foreign(const Foreign&) noexcept {}
     /// Another device has the master's own node-id.
     virtual void on_own_id_collision() noexcept {}
-    /// The data of an SRDO is invalid; its objects have their safe values. `place` is that in OwnNode::srdos.
+    /// The data of an SRDO is invalid; its objects have their safe values. `place` is that in
+    /// OwnNode::srdos.
     virtual void on_srdo_fault(std::size_t place, SrdoFault) noexcept { (void)place; }
     virtual void on_bus_state(can::State) noexcept {}
     /// The link did not pass on what its sender may not send.
@@ -88,41 +94,51 @@ public:
     void receive(Time now) noexcept;
     /// `leads`: the SYNC and the heartbeat are ours; another master on the same bus makes them otherwise. [realtime]
     void transmit(Time now, Time period, bool leads = true) noexcept;
-    /// Sets all outputs to their safe values and takes nodes out of the operational state as configured.
-    /// The network boots anew when cycles go on. Sends nothing while a cycle of another thread uses the
-    /// link: call it again at the end of that cycle. Async-signal-safe.
+    /// Sets all outputs to their safe values and takes nodes out of the operational state as
+    /// configured. The network boots anew when cycles go on. Sends nothing while a cycle of another
+    /// thread uses the link: call it again at the end of that cycle. Async-signal-safe.
     void make_safe() noexcept;
 
-    std::span<Slot>             slots() noexcept { return slots_; }
-    bool                        operational(std::size_t node) const noexcept { return statuses_[node]->operational; }
-    const NodeStatus&           status(std::size_t node) const noexcept { return *statuses_[node]; }
-    const NetworkStatus&        network() const noexcept { return master_.status(); }
-    const can::Statistics&      link_statistics() const noexcept { return statistics_; }
-    /// Returns the number of process data frames and SYNCs withheld because the bus accepted none; they would be stale. [any]
-    std::uint64_t               withheld() const noexcept { return withheld_; }
-    std::uint64_t               syncs() const noexcept { return syncs_; }
-    std::uint64_t               sync_overruns() const noexcept { return overruns_; }
+    std::span<Slot> slots() noexcept { return slots_; }
+    bool operational(std::size_t node) const noexcept { return statuses_[node]->operational; }
+    const NodeStatus& status(std::size_t node) const noexcept { return *statuses_[node]; }
+    const NetworkStatus& network() const noexcept { return master_.status(); }
+    const can::Statistics& link_statistics() const noexcept { return statistics_; }
+    /// Returns the number of process data frames and SYNCs withheld because the bus accepted none;
+    /// they would be stale. [any]
+    std::uint64_t withheld() const noexcept { return withheld_; }
+    std::uint64_t syncs() const noexcept { return syncs_; }
+    std::uint64_t sync_overruns() const noexcept { return overruns_; }
     // The newest SYNC of another node.
-    std::uint64_t               syncs_heard() const noexcept { return syncs_heard_; }
-    Time                        sync_came() const noexcept { return sync_came_; }
-    bool                        sync_is_ours() const noexcept { return sync_ours_; }  ///< it was made by another master of this process
-    const FlyingMaster&         flying() const noexcept { return flying_; }
+    std::uint64_t syncs_heard() const noexcept { return syncs_heard_; }
+    Time sync_came() const noexcept { return sync_came_; }
+    /// it was made by another master of this process
+    bool sync_is_ours() const noexcept { return sync_ours_; }
+    const FlyingMaster& flying() const noexcept { return flying_; }
     /// It is the NMT master: the only one, or the active one of several.
-    bool                        active() const noexcept { return !config_.flying.enabled || flying_.active(); }
+    bool active() const noexcept { return !config_.flying.enabled || flying_.active(); }
     /// The bus was in order, now or earlier: before that it is only waited for.
-    bool                        had_bus() const noexcept { return had_bus_; }
-    const OwnNode&              own() const noexcept { return own_; }
-    Master&                     master() noexcept { return master_; }
-    Device&                     device() noexcept { return device_; }
+    bool had_bus() const noexcept { return had_bus_; }
+    const OwnNode& own() const noexcept { return own_; }
+    Master& master() noexcept { return master_; }
+    Device& device() noexcept { return device_; }
     const config::MasterConfig& config() const noexcept { return config_; }
     /// [realtime]
-    void restart_node(std::size_t node, Time now) noexcept { master_.restart(config_.nodes[node].setup.id, now); }
-    void restart(Time now) noexcept {
-        if (active()) boot(now);
+    void restart_node(std::size_t node, Time now) noexcept {
+        master_.restart(config_.nodes[node].setup.id, now);
     }
-    Srdos::Status               srdo(std::size_t place) const noexcept { return device_.srdos().status(own_.srdos[place].number); }
+    void restart(Time now) noexcept {
+        if (active()) {
+            boot(now);
+        }
+    }
+    Srdos::Status srdo(std::size_t place) const noexcept {
+        return device_.srdos().status(own_.srdos[place].number);
+    }
     /// Acknowledges the fault of an SRDO; its data is valid from the next valid SRDO on. [realtime]
-    void acknowledge_srdo(std::size_t place, Time now) noexcept { device_.srdos().acknowledge(own_.srdos[place].number, now); }
+    void acknowledge_srdo(std::size_t place, Time now) noexcept {
+        device_.srdos().acknowledge(own_.srdos[place].number, now);
+    }
     /// The global fail-safe command goes out with the next transmit(). [realtime]
     bool send_fail_safe() noexcept { return device_.srdos().send_fail_safe(); }
 
@@ -130,16 +146,16 @@ private:
     /// A PDO for when things go wrong.
     struct Output {
         const Sent* sent;
-        can::Frame  frame;
-        bool        open = false;  // for a node that is configured
+        can::Frame frame;
+        bool open = false;  // for a node that is configured
     };
     /// An object that goes alone, by a multiplexed PDO, whenever its value is another.
     struct Alone {
-        unsigned      number = 0;  // of our TPDO
-        std::size_t   slot = 0;
-        Time          inhibit = 0;
+        unsigned number = 0;  // of our TPDO
+        std::size_t slot = 0;
+        Time inhibit = 0;
         std::uint32_t announced = 0;
-        bool          sent = false;  // since the node is operational
+        bool sent = false;  // since the node is operational
     };
     void begin(Time now) noexcept;
     void drop_backlog(Time now) noexcept;
@@ -169,59 +185,80 @@ private:
     void on_network(const NetworkStatus&) noexcept override;
     void on_emergency(std::uint8_t node, const Emergency&) noexcept override;
     void on_rpdo_late(unsigned number, Time) noexcept override { events_.on_late(number - 1); }
-    void on_rpdo_short(unsigned number, unsigned bytes, Time) noexcept override { events_.on_short(number - 1, bytes); }
+    void on_rpdo_short(unsigned number, unsigned bytes, Time) noexcept override {
+        events_.on_short(number - 1, bytes);
+    }
     void on_id_collision(Time) noexcept override { events_.on_own_id_collision(); }
-    void on_srdo_fault(unsigned number, SrdoFault fault, Time) noexcept override { events_.on_srdo_fault(number - 1, fault); }
+    void on_srdo_fault(unsigned number, SrdoFault fault, Time) noexcept override {
+        events_.on_srdo_fault(number - 1, fault);
+    }
 
-    const config::MasterConfig&    config_;
-    RunnerEvents&                  events_;
-    const OwnNode                  own_;
-    Device                         device_;
-    Master                         master_;
-    MasterObjects                  master_objects_;
-    FlyingMaster                   flying_;
-    can::Link*                     link_ = nullptr;
-    std::vector<Slot>              slots_;
+    const config::MasterConfig& config_;
+    RunnerEvents& events_;
+    const OwnNode own_;
+    Device device_;
+    Master master_;
+    MasterObjects master_objects_;
+    FlyingMaster flying_;
+    can::Link* link_ = nullptr;
+    std::vector<Slot> slots_;
     std::vector<const NodeStatus*> statuses_;
-    std::array<std::uint8_t, 128>  place_{};     // node-id to place in the configuration; 255: none
-    std::vector<std::uint8_t>      open_;  // by node: it is configured, so PDOs go to and fro
-    bool                           steps_changed_ = true, sync_open_ = false;
+    std::array<std::uint8_t, 128> place_{};  // node-id to place in the configuration; 255: none
+    std::vector<std::uint8_t> open_;  // by node: it is configured, so PDOs go to and fro
+    bool steps_changed_ = true;
+    bool sync_open_ = false;
     /// What others sent under an identifier of ours.
     struct ForeignCount {
-        Time          last = 0, sent = 0;
+        Time last = 0;
+        Time sent = 0;
         std::uint32_t frames = 0;
     };
-    std::vector<ForeignCount>      foreign_;     // by identifier
-    Time                           foreign_from_ = 0;
-    std::bitset<2048>              ours_, ours_to_nodes_;  // identifiers that only we send; RPDOs among them
-    unsigned                       vain_waits_ = 0;        // of serve_boot(), in a row
-    std::vector<std::uint8_t> was_operational_, ever_operational_;  // by node; ever: since the network was booted
-    std::vector<Output>            outputs_;
+    std::vector<ForeignCount> foreign_;  // by identifier
+    Time foreign_from_ = 0;
+    // identifiers that only we send; RPDOs among them
+    std::bitset<2048> ours_, ours_to_nodes_;
+    unsigned vain_waits_ = 0;  // of serve_boot(), in a row
+    // by node; ever: since the network was booted
+    std::vector<std::uint8_t> was_operational_, ever_operational_;
+    std::vector<Output> outputs_;
     /// A PDO of a node that is asked for.
     struct Asked {
-        unsigned    number = 0;  // of our RPDO
+        unsigned number = 0;  // of our RPDO
         std::size_t node = 0;
-        Time        every = 0, next = 0;
+        Time every = 0;
+        Time next = 0;
     };
-    std::vector<Asked>             asked_;
-    std::vector<Alone>             alone_;
-    std::size_t                    next_alone_ = 0;
-    std::vector<can::Frame>        farewell_;          // NMT commands for make_safe()
-    can::Frame                     sync_frame_;
-    can::Statistics                statistics_{};
-    can::State                     bus_state_ = can::State::active;
-    Time                           now_ = 0, next_sync_ = 0, next_time_ = 0;
-    std::uint64_t                  syncs_ = 0, overruns_ = 0, syncs_heard_ = 0;
-    Time                           sync_came_ = 0;
-    std::uint64_t                  sent_before_ = 0, withheld_ = 0;  // for is_stuck()
-    Time                           moved_ = 0;
-    bool                           kept_back_ = false;  // something was withheld since the bus took the last
-    bool                           sync_ours_ = false, was_active_ = false, had_bus_ = false;
-    FlyingMaster::State            flying_state_ = FlyingMaster::State::off;
-    bool                           sync_begun_ = false, time_begun_ = false, produces_ = false, leads_ = true;
-    std::atomic<bool>              boots_{true};             // set by make_safe(), from whichever thread; taken by receive()
-    std::atomic<bool>              safe_{true};  // nothing was sent since make_safe()
-    bool                           begun_ = false;           // since open()
+    std::vector<Asked> asked_;
+    std::vector<Alone> alone_;
+    std::size_t next_alone_ = 0;
+    std::vector<can::Frame> farewell_;  // NMT commands for make_safe()
+    can::Frame sync_frame_;
+    can::Statistics statistics_{};
+    can::State bus_state_ = can::State::active;
+    Time now_ = 0;
+    Time next_sync_ = 0;
+    Time next_time_ = 0;
+    std::uint64_t syncs_ = 0;
+    std::uint64_t overruns_ = 0;
+    std::uint64_t syncs_heard_ = 0;
+    Time sync_came_ = 0;
+    std::uint64_t sent_before_ = 0;
+    std::uint64_t withheld_ = 0;  // for is_stuck()
+    Time moved_ = 0;
+    // something was withheld since the bus took the last
+    bool kept_back_ = false;
+    bool sync_ours_ = false;
+    bool was_active_ = false;
+    bool had_bus_ = false;
+    FlyingMaster::State flying_state_ = FlyingMaster::State::off;
+    bool sync_begun_ = false;
+    bool time_begun_ = false;
+    bool produces_ = false;
+    bool leads_ = true;
+    // set by make_safe(), from whichever thread; taken by receive()
+    std::atomic<bool> boots_{true};
+    std::atomic<bool> safe_{true};  // nothing was sent since make_safe()
+    bool begun_ = false;  // since open()
 };
 
 }  // namespace hal::canopen

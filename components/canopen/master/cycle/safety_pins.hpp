@@ -21,16 +21,22 @@ public:
         if (srdos.empty()) return;
         for (const OwnSrdo& s : srdos) {
             const config::Node& node = runner.config().nodes[s.node];
-            const std::string name = node.name + (s.pdo->to_node ? ".rsrdo" : ".tsrdo") + std::to_string(s.pdo->number);
-            const std::string who =
-                "SRDO " + std::to_string(s.pdo->number) + " of node " + std::to_string(node.setup.id) + " (" + node.name + "): ";
+            const std::string name =
+                node.name + (s.pdo->to_node ? ".rsrdo" : ".tsrdo") + std::to_string(s.pdo->number);
+            const std::string who = "SRDO " + std::to_string(s.pdo->number) + " of node " +
+                                    std::to_string(node.setup.id) + " (" + node.name + "): ";
             Row& row = rows_.emplace_back(c, shows, name);
-            if (!s.pdo->to_node) row.received.emplace(c, shows, name);
-            for (std::size_t n = 0; n < row.words.size(); ++n)
-                row.words[n] = who + to_string(static_cast<SrdoFault>(n)) + (s.pdo->to_node ? "" : "; its pins were set to their safe values");
+            if (!s.pdo->to_node) {
+                row.received.emplace(c, shows, name);
+            }
+            for (std::size_t n = 0; n < row.words.size(); ++n) {
+                row.words[n] = who + to_string(static_cast<SrdoFault>(n)) +
+                               (s.pdo->to_node ? "" : "; its pins were set to their safe values");
+            }
         }
         fail_safe_.emplace(c, shows, "fail-safe",
-                           "rising edge: sends the global fail-safe command; all receivers enter their safe state");
+                           "rising edge: sends the global fail-safe command; all receivers enter "
+                           "their safe state");
     }
 
     /// [realtime]
@@ -42,11 +48,15 @@ public:
             if (!row.received) continue;
             row.received->valid = status.valid && runner.operational(runner.own().srdos[n].node);
             row.received->fault = static_cast<std::uint32_t>(status.fault);
-            if (row.received->reset && !row.was_reset) runner.acknowledge_srdo(n, now);
+            if (row.received->reset && !row.was_reset) {
+                runner.acknowledge_srdo(n, now);
+            }
             row.was_reset = row.received->reset;
         }
         if (!fail_safe_) return;
-        if (*fail_safe_ && !was_fail_safe_) runner.send_fail_safe();
+        if (*fail_safe_ && !was_fail_safe_) {
+            runner.send_fail_safe();
+        }
         was_fail_safe_ = *fail_safe_;
     }
 
@@ -57,27 +67,31 @@ public:
 
 private:
     struct Received {
-        hal::Out<bool>          valid;
+        hal::Out<bool> valid;
         hal::Out<std::uint32_t> fault;
-        hal::In<bool>           reset;
+        hal::In<bool> reset;
         Received(Component& c, const Function& f, const std::string& n)
-            : valid(c, f, (n + "-valid").c_str(), "SRDO data valid; otherwise its pins have their safe values", {.safe = false}),
+            : valid(c, f, (n + "-valid").c_str(),
+                    "SRDO data valid; otherwise its pins have their safe values", {.safe = false}),
               fault(c, f, (n + "-fault").c_str(),
-                    "why the data is invalid: 0 no fault, 1 late, 2 incomplete, 3 order, 4 length, 5 not inverted, "
+                    "why the data is invalid: 0 no fault, 1 late, 2 incomplete, 3 order, 4 length, "
+                    "5 not inverted, "
                     "6 global fail-safe command"),
-              reset(c, f, (n + "-reset").c_str(), "rising edge: acknowledges the fault; the data is valid from the next valid SRDO on") {}
+              reset(c, f, (n + "-reset").c_str(),
+                    "rising edge: acknowledges the fault; the data is valid from the next valid "
+                    "SRDO on") {}
     };
     struct Row {
-        hal::Out<std::uint32_t>    count;
-        std::optional<Received>    received;
+        hal::Out<std::uint32_t> count;
+        std::optional<Received> received;
         std::array<std::string, 8> words;
-        bool                       was_reset = false;
+        bool was_reset = false;
         Row(Component& c, const Function& f, const std::string& n)
             : count(c, f, (n + "-count").c_str(), "SRDOs sent, or received and valid") {}
     };
-    std::deque<Row>               rows_;  // a pin may not move once it is declared
-    std::optional<hal::In<bool>>  fail_safe_;
-    bool                          was_fail_safe_ = false;
+    std::deque<Row> rows_;  // a pin may not move once it is declared
+    std::optional<hal::In<bool>> fail_safe_;
+    bool was_fail_safe_ = false;
 };
 
 }  // namespace hal::canopen

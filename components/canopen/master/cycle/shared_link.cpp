@@ -17,9 +17,12 @@ public:
     /// [realtime] Only tries: who does not get it comes again in its next cycle.
     class Try {
     public:
-        explicit Try(SharedBus& bus) noexcept : bus_(bus), got_(!bus.busy_.test_and_set(std::memory_order_acquire)) {}
+        explicit Try(SharedBus& bus) noexcept
+            : bus_(bus), got_(!bus.busy_.test_and_set(std::memory_order_acquire)) {}
         ~Try() {
-            if (got_) bus_.busy_.clear(std::memory_order_release);
+            if (got_) {
+                bus_.busy_.clear(std::memory_order_release);
+            }
         }
         explicit operator bool() const noexcept { return got_; }
 
@@ -29,21 +32,29 @@ public:
     };
     /// [setup]
     void change(SharedLink* from, SharedLink* to) {
-        while (busy_.test_and_set(std::memory_order_acquire)) std::this_thread::yield();
+        while (busy_.test_and_set(std::memory_order_acquire)) {
+            std::this_thread::yield();
+        }
         const auto place = std::find(users.begin(), users.end(), from);
-        if (place != users.end()) *place = to;
-        count = static_cast<std::size_t>(std::count_if(users.begin(), users.end(), [](const SharedLink* u) { return u != nullptr; }));
+        if (place != users.end()) {
+            *place = to;
+        }
+        count = static_cast<std::size_t>(std::count_if(
+            users.begin(), users.end(), [](const SharedLink* u) { return u != nullptr; }));
         busy_.clear(std::memory_order_release);
     }
     /// To all but `from`. By who holds the bus. [realtime]
     void deliver(const can::Frame& frame, const SharedLink* from) noexcept {
-        for (SharedLink* user : users)
-            if (user != nullptr && user != from) user->incoming_.push(frame);
+        for (SharedLink* user : users) {
+            if (user != nullptr && user != from) {
+                user->incoming_.push(frame);
+            }
+        }
     }
 
     const std::unique_ptr<can::Link> link;
-    std::array<SharedLink*, most>    users{};
-    std::size_t                      count = 0;
+    std::array<SharedLink*, most> users{};
+    std::size_t count = 0;
     struct Leader {
         std::atomic<const SharedLink*> link{nullptr};
         std::atomic<std::int64_t> at{0};
@@ -54,21 +65,31 @@ private:
     std::atomic_flag busy_;
 };
 
-std::unique_ptr<SharedLink> SharedLink::open(const std::string& address, const can::Options& options, std::string& problem) {
-    static std::mutex                                      mutex;
+std::unique_ptr<SharedLink> SharedLink::open(const std::string& address,
+                                             const can::Options& options, std::string& problem) {
+    static std::mutex mutex;
     static std::map<std::string, std::weak_ptr<SharedBus>> all;
-    const std::lock_guard                                  lock(mutex);
-    auto                                                   bus = all[address].lock();
+    const std::lock_guard lock(mutex);
+    auto bus = all[address].lock();
     if (!bus) {
         auto opened = can::open(address, options);
-        if (!opened) return problem = opened.problem, nullptr;
+        if (!opened) {
+            problem = opened.problem;
+            return nullptr;
+        }
         all[address] = bus = std::make_shared<SharedBus>(std::move(opened.link));
     }
-    if (bus->count >= SharedBus::most) return problem = address + " has " + std::to_string(SharedBus::most) + " masters already", nullptr;
+    if (bus->count >= SharedBus::most) {
+        problem = address + " has " + std::to_string(SharedBus::most) + " masters already";
+
+        return nullptr;
+    }
     return std::unique_ptr<SharedLink>(new SharedLink(std::move(bus)));
 }
 
-SharedLink::SharedLink(std::shared_ptr<SharedBus> bus) : bus_(std::move(bus)) { bus_->change(nullptr, this); }
+SharedLink::SharedLink(std::shared_ptr<SharedBus> bus) : bus_(std::move(bus)) {
+    bus_->change(nullptr, this);
+}
 
 SharedLink::~SharedLink() {
     bus_->change(this, nullptr);
@@ -82,7 +103,8 @@ bool SharedLink::leads(std::uint8_t node_id, std::int64_t now_ns, std::int64_t p
     auto& of_id = bus_->leaders[node_id & 0x7f];
     const SharedLink* leader = of_id.link.load(std::memory_order_relaxed);
     if (leader != this) {
-        const bool silent = leader == nullptr || now_ns - of_id.at.load(std::memory_order_relaxed) > 4 * period_ns;
+        const bool silent =
+            leader == nullptr || now_ns - of_id.at.load(std::memory_order_relaxed) > 4 * period_ns;
         if (!silent || !of_id.link.compare_exchange_strong(leader, this)) return false;
     }
     of_id.at.store(now_ns, std::memory_order_relaxed);
@@ -103,29 +125,40 @@ can::Sent SharedLink::send(const can::Frame& frame, std::int64_t now_ns) noexcep
 }
 
 void SharedLink::flush(std::int64_t now_ns) noexcept {
-    if (const SharedBus::Try held(*bus_); held) bus_->link->flush(now_ns);
+    if (const SharedBus::Try held(*bus_); held) {
+        bus_->link->flush(now_ns);
+    }
 }
 
 std::size_t SharedLink::receive(std::span<can::Frame> room, std::int64_t now_ns) noexcept {
     const SharedBus::Try held(*bus_);
     if (!held) return 0;
     if (bus_->count == 1 && incoming_.front() == nullptr) return bus_->link->receive(room, now_ns);
-    for (can::Frame frame; bus_->link->receive(std::span(&frame, 1), now_ns) == 1;) bus_->deliver(frame, nullptr);
+    for (can::Frame frame; bus_->link->receive(std::span(&frame, 1), now_ns) == 1;) {
+        bus_->deliver(frame, nullptr);
+    }
     std::size_t taken = 0;
-    for (const can::Frame* f; taken < room.size() && (f = incoming_.front()) != nullptr; incoming_.drop()) room[taken++] = *f;
+    for (const can::Frame* f; taken < room.size() && (f = incoming_.front()) != nullptr;
+         incoming_.drop()) {
+        room[taken++] = *f;
+    }
     return taken;
 }
 
-can::Statistics         SharedLink::statistics() const noexcept { return bus_->link->statistics(); }
-can::State              SharedLink::state() const noexcept { return bus_->link->state(); }
-void                    SharedLink::restart() noexcept { bus_->link->restart(); }
-const can::Description& SharedLink::description() const noexcept { return bus_->link->description(); }
-std::vector<can::DeliveryTime> SharedLink::delivery_times() const { return bus_->link->delivery_times(); }
+can::Statistics SharedLink::statistics() const noexcept { return bus_->link->statistics(); }
+can::State SharedLink::state() const noexcept { return bus_->link->state(); }
+void SharedLink::restart() noexcept { bus_->link->restart(); }
+const can::Description& SharedLink::description() const noexcept {
+    return bus_->link->description();
+}
+std::vector<can::DeliveryTime> SharedLink::delivery_times() const {
+    return bus_->link->delivery_times();
+}
 bool SharedLink::rejected(can::Rejected& what) noexcept {
     const SharedBus::Try held(*bus_);
     return held && bus_->link->rejected(what);
 }
-std::int64_t            SharedLink::closing_ns() const noexcept { return bus_->link->closing_ns(); }
-bool                    SharedLink::wait(std::int64_t at_most_ns) { return bus_->link->wait(at_most_ns); }
+std::int64_t SharedLink::closing_ns() const noexcept { return bus_->link->closing_ns(); }
+bool SharedLink::wait(std::int64_t at_most_ns) { return bus_->link->wait(at_most_ns); }
 
 }  // namespace hal::canopen

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// One CAN controller for several masters of this process: two independent masters would send NMT commands, SYNCs and heartbeats with the same
-// identifier at the same time, which CAN does not allow.
+// One CAN controller for several masters of this process: two independent masters would send NMT
+// commands, SYNCs and heartbeats with the same identifier at the same time, which CAN does not
+// allow.
 #pragma once
 
 #include <array>
@@ -8,23 +9,24 @@
 #include <memory>
 #include <string>
 
-#include "link/can.hpp"
 #include "hal/queue.hpp"
+#include "link/can.hpp"
 
 namespace hal::canopen {
 
 class SharedBus;
 
-/// A master's share of a link. What one sends the others hear, too. Those of one bus belong into one thread; in another one a master that
-/// finds the link in use waits for its next cycle.
+/// A master's share of a link. What one sends the others hear, too. Those of one bus belong into
+/// one thread; in another one a master that finds the link in use waits for its next cycle.
 class SharedLink final : public can::Link {
 public:
     /// Opens the address, or joins those that have it open. [setup]
-    static std::unique_ptr<SharedLink> open(const std::string& address, const can::Options&, std::string& problem);
+    static std::unique_ptr<SharedLink> open(const std::string& address, const can::Options&,
+                                            std::string& problem);
     ~SharedLink() override;
 
-    /// True for the one of those with this node-id that makes the SYNC and the heartbeat. When it goes, or has not asked for four periods,
-    /// another takes over. [realtime]
+    /// True for the one of those with this node-id that makes the SYNC and the heartbeat. When it
+    /// goes, or has not asked for four periods, another takes over. [realtime]
     bool leads(std::uint8_t node_id, std::int64_t now_ns, std::int64_t period_ns) noexcept;
 
     can::Sent send(const can::Frame&, std::int64_t now_ns) noexcept override;

@@ -22,9 +22,12 @@ public:
 
     SyncFollower(Component& component, const Function& shows, const config::MasterConfig& config)
         : config_(config),
-          locked_(component, shows, "sync-locked", "the cycles are synchronised to the SYNC", {.safe = false}),
+          locked_(component, shows, "sync-locked", "the cycles are synchronised to the SYNC",
+                  {.safe = false}),
           error_(component, shows, "sync-error-us", "lateness of the newest SYNC", {.unit = "us"}),
-          rate_(component, shows, "sync-rate-ppm", "drift of the clock of the SYNC producer; positive: slower than this host", {.unit = "ppm"}) {}
+          rate_(component, shows, "sync-rate-ppm",
+                "drift of the clock of the SYNC producer; positive: slower than this host",
+                {.unit = "ppm"}) {}
 
     /// Throws if the threads already follow another reference. [setup]
     void start() {
@@ -52,8 +55,11 @@ public:
         if (runner.syncs_heard() != seen_) {
             seen_ = runner.syncs_heard();
             ours_ = runner.sync_is_ours();
-            if (ours_) following_ = false;
-            else notice = take(runner.sync_came(), every, start, period);
+            if (ours_) {
+                following_ = false;
+            } else {
+                notice = take(runner.sync_came(), every, start, period);
+            }
         } else if (following_) {
             notice = miss(every, start);
         }
@@ -71,9 +77,14 @@ private:
 
     Notice take(Time came, Time every, Time start, Time period) noexcept {
         const Time phase = config_.sync_phase >= 0 ? config_.sync_phase : period / 2;
-        Time       error = (came + phase - start) % period;  // cycles follow each other, so it counts within half of one
-        if (error >= (period + 1) / 2) error -= period;
-        if (error < -period / 2) error += period;
+        // cycles follow each other, so it counts within half of one
+        Time error = (came + phase - start) % period;
+        if (error >= (period + 1) / 2) {
+            error -= period;
+        }
+        if (error < -period / 2) {
+            error += period;
+        }
         came_ = came;
         following_ = true;
         missed_ = 0;
@@ -95,14 +106,16 @@ private:
     }
 
     const config::MasterConfig& config_;
-    DisciplinedClock            clock_;
-    Discipline                  beat_;
-    Time                        came_ = 0;
-    std::uint64_t               seen_ = 0;
-    unsigned                    missed_ = 0;
-    bool                        following_ = false, ours_ = false, unequal_ = false;
-    Out<bool>                   locked_;
-    Out<double>                 error_, rate_;
+    DisciplinedClock clock_;
+    Discipline beat_;
+    Time came_ = 0;
+    std::uint64_t seen_ = 0;
+    unsigned missed_ = 0;
+    bool following_ = false;
+    bool ours_ = false;
+    bool unequal_ = false;
+    Out<bool> locked_;
+    Out<double> error_, rate_;
 };
 
 }  // namespace hal::canopen

@@ -16,9 +16,10 @@ enum class Scope : std::uint8_t { gateway, net, node };
 
 struct Row {
     std::string_view first, second;  ///< words; the second may be empty
-    Verb             verb;
-    Scope            scope;
-    std::uint8_t     least = 0, most = 0;  ///< numbers behind them
+    Verb verb;
+    Scope scope;
+    std::uint8_t least = 0;
+    std::uint8_t most = 0;  ///< numbers behind them
 };
 
 constexpr Row rows[] = {
@@ -58,25 +59,32 @@ constexpr Row rows[] = {
     {"_lss_fastscan", "", Verb::lss_fastscan, Scope::net, 0, 1},
 };
 
-/// Words, those in quotation marks without them (a doubled mark is one). False: a mark is never closed.
+/// Words, those in quotation marks without them (a doubled mark is one). False: a mark is never
+/// closed.
 bool split(std::string_view line, std::vector<std::string>& words) {
     for (std::size_t n = 0; n < line.size();) {
         if (line[n] == ' ' || line[n] == '\t') {
             ++n;
             continue;
         }
-        if (line[n] == '#') return true;  // a comment
+        if (line[n] == '#') {
+            return true;  // a comment
+        }
         std::string word;
         if (line[n] == '"') {
             for (++n;; ++n) {
                 if (n == line.size()) return false;
                 if (line[n] == '"' && (n + 1 == line.size() || line[n + 1] != '"')) break;
-                if (line[n] == '"') ++n;
+                if (line[n] == '"') {
+                    ++n;
+                }
                 word += line[n];
             }
             ++n;
         } else {
-            while (n < line.size() && line[n] != ' ' && line[n] != '\t') word += line[n++];
+            while (n < line.size() && line[n] != ' ' && line[n] != '\t') {
+                word += line[n++];
+            }
         }
         words.push_back(std::move(word));
     }
@@ -84,7 +92,7 @@ bool split(std::string_view line, std::vector<std::string>& words) {
 }
 
 bool number(std::string_view text, std::uint32_t most, std::uint32_t& value) {
-    bool          negative = false;
+    bool negative = false;
     std::uint64_t read = 0;
     if (!read_number(text, negative, read) || negative || read > most) return false;
     value = static_cast<std::uint32_t>(read);
@@ -92,21 +100,27 @@ bool number(std::string_view text, std::uint32_t most, std::uint32_t& value) {
 }
 
 struct Reader {
-    Parsed                   out = {};
+    Parsed out = {};
     std::vector<std::string> words = {};
-    std::size_t              at = 0;
+    std::size_t at = 0;
 
     bool fail(std::string why, Error error = Error::syntax) {
-        out.error = error, out.why = std::move(why);
+        out.error = error;
+        out.why = std::move(why);
         return false;
     }
     bool more() const { return at < words.size(); }
     bool take(std::uint32_t most, std::uint32_t& value, const char* what) {
         if (!more()) return fail(std::string("the ") + what + " is missing");
-        if (!number(words[at], most, value)) return fail("'" + words[at].substr(0, 40) + "' is no " + what);
-        return ++at, true;
+        if (!number(words[at], most, value)) {
+            return fail("'" + words[at].substr(0, 40) + "' is no " + what);
+        }
+        ++at;
+        return true;
     }
-    bool end() { return !more() || fail("nothing is expected at '" + words[at].substr(0, 40) + "'"); }
+    bool end() {
+        return !more() || fail("nothing is expected at '" + words[at].substr(0, 40) + "'");
+    }
 
     bool numbers(std::size_t least, std::size_t most) {
         Command& c = out.command;
@@ -119,53 +133,79 @@ struct Reader {
     }
     bool scope(Scope scope, const std::vector<std::uint32_t>& before) {
         Command& c = out.command;
-        if (before.size() > (scope == Scope::gateway ? 0U : scope == Scope::net ? 1U : 2U))
+        if (before.size() > (scope == Scope::gateway ? 0U : scope == Scope::net ? 1U : 2U)) {
             return fail("there are too many numbers before the command");
-        if (scope == Scope::node && !before.empty()) c.node = before.back();
-        if (scope == Scope::node ? before.size() == 2 : !before.empty()) c.net = before.front();
+        }
+        if (scope == Scope::node && !before.empty()) {
+            c.node = before.back();
+        }
+        if (scope == Scope::node ? before.size() == 2 : !before.empty()) {
+            c.net = before.front();
+        }
         return true;
     }
     bool object(bool writes) {
-        Command&      c = out.command;
-        std::uint32_t index = 0, sub = 0;
+        Command& c = out.command;
+        std::uint32_t index = 0;
+        std::uint32_t sub = 0;
         if (!take(0xffff, index, "index") || !take(0xff, sub, "sub-index")) return false;
-        c.index = static_cast<std::uint16_t>(index), c.sub = static_cast<std::uint8_t>(sub);
+        c.index = static_cast<std::uint16_t>(index);
+        c.sub = static_cast<std::uint8_t>(sub);
         if (!more()) return !writes || fail("data type and value are missing");
         c.format = format(words[at]);
-        if (!c.format) return fail("unknown data type '" + words[at].substr(0, 40) + "'; see: help");
+        if (!c.format) {
+            return fail("unknown data type '" + words[at].substr(0, 40) + "'; see: help");
+        }
         ++at;
         if (!writes) return end();
-        if (!bytes_of(std::span(words).subspan(at), *c.format, c.value))
+        if (!bytes_of(std::span(words).subspan(at), *c.format, c.value)) {
             return fail("invalid value for type " + std::string(c.format->word));
+        }
         at = words.size();
         return true;
     }
     bool transmission(std::uint32_t& type) {
         if (!more()) return fail("the transmission type is missing: event, rtr, sync0 to sync240");
         const std::string word = eds::lower(words[at]);
-        if (word == "event") type = on_event;
-        else if (word == "rtr") type = on_request;
-        else if (word.starts_with("sync") && (word.size() == 4 || number(word.substr(4), 240, type))) type = word.size() == 4 ? 1 : type;
-        else return fail("invalid transmission type '" + word.substr(0, 40) + "': use event, rtr, sync0 to sync240");
-        return ++at, true;
+        if (word == "event") {
+            type = on_event;
+        } else if (word == "rtr") {
+            type = on_request;
+        } else if (word.starts_with("sync") &&
+                   (word.size() == 4 || number(word.substr(4), 240, type))) {
+            type = word.size() == 4 ? 1 : type;
+        } else {
+            return fail("invalid transmission type '" + word.substr(0, 40) +
+                        "': use event, rtr, sync0 to sync240");
+        }
+        ++at;
+        return true;
     }
     bool pdo_setup() {
-        Command&      c = out.command;
-        std::uint32_t number = 0, cob = 0, type = 0, count = 0;
-        if (!take(512, number, "PDO number") || !take(UINT32_MAX, cob, "COB-ID") || !transmission(type) || !take(64, count, "count"))
+        Command& c = out.command;
+        std::uint32_t number = 0;
+        std::uint32_t cob = 0;
+        std::uint32_t type = 0;
+        std::uint32_t count = 0;
+        if (!take(512, number, "PDO number") || !take(UINT32_MAX, cob, "COB-ID") ||
+            !transmission(type) || !take(64, count, "count")) {
             return false;
+        }
         c.numbers = {number, cob, type};
         for (; count > 0; --count, ++at) {
             if (!more()) return fail("a data type is missing");
             const Format* f = format(words[at]);
-            if (!f || bits_of(f->type) == 0) return fail("'" + words[at].substr(0, 40) + "' is not a data type of fixed length");
+            if (!f || bits_of(f->type) == 0) {
+                return fail("'" + words[at].substr(0, 40) + "' is not a data type of fixed length");
+            }
             c.formats.push_back(f);
         }
         return end();
     }
     bool pdo_values(bool writes) {
-        Command&      c = out.command;
-        std::uint32_t number = 0, count = 0;
+        Command& c = out.command;
+        std::uint32_t number = 0;
+        std::uint32_t count = 0;
         if (!take(512, number, "PDO number")) return false;
         c.numbers = {number};
         if (!writes) return end();
@@ -177,28 +217,45 @@ struct Reader {
     }
     bool flag() {
         if (!more()) return fail("enable or disable is missing");
-        const bool on = same_word(words[at], "enable") || words[at] == "1", off = same_word(words[at], "disable") || words[at] == "0";
-        if (!on && !off) return fail("'" + words[at].substr(0, 40) + "' is neither enable nor disable");
+        const bool on = same_word(words[at], "enable") || words[at] == "1";
+
+        const bool off = same_word(words[at], "disable") || words[at] == "0";
+        if (!on && !off) {
+            return fail("'" + words[at].substr(0, 40) + "' is neither enable nor disable");
+        }
         out.command.numbers = {on ? 1U : 0U};
-        return ++at, end();
+        ++at;
+        return end();
     }
     bool command();
 };
 
 bool Reader::command() {
-    Command&                   c = out.command;
+    Command& c = out.command;
     std::vector<std::uint32_t> before;
-    std::uint32_t              value = 0;
-    while (more() && before.size() < 3 && number(words[at], UINT32_MAX, value)) before.push_back(value), ++at;
+    std::uint32_t value = 0;
+    while (more() && before.size() < 3 && number(words[at], UINT32_MAX, value)) {
+        before.push_back(value);
+        ++at;
+    }
     if (!more()) return fail("the command is missing");
     const std::string first = words[at++];
-    const auto        is = [&](const char* a, const char* b) { return same_word(first, a) || same_word(first, b); };
-    const auto next_is = [&](const char* a, const char* b) { return more() && (same_word(words[at], a) || same_word(words[at], b)); };
+    const auto is = [&](const char* a, const char* b) {
+        return same_word(first, a) || same_word(first, b);
+    };
+    const auto next_is = [&](const char* a, const char* b) {
+        return more() && (same_word(words[at], a) || same_word(words[at], b));
+    };
     if (is("read", "r") || is("write", "w")) {
-        const bool writes = is("write", "w"), pdo = next_is("pdo", "p");
-        c.verb = pdo ? writes ? Verb::write_pdo : Verb::read_pdo : writes ? Verb::write : Verb::read;
+        const bool writes = is("write", "w");
+        const bool pdo = next_is("pdo", "p");
+        c.verb = pdo      ? writes ? Verb::write_pdo : Verb::read_pdo
+                 : writes ? Verb::write
+                          : Verb::read;
         if (!scope(pdo ? Scope::net : Scope::node, before)) return false;
-        if (pdo) ++at;
+        if (pdo) {
+            ++at;
+        }
         return pdo ? pdo_values(writes) : object(writes);
     }
     if (is("set", "set") && next_is("rpdo", "tpdo")) {
@@ -210,19 +267,27 @@ bool Reader::command() {
         c.verb = Verb::boot_up_indication;
         return scope(Scope::net, before) && flag();
     }
-    if (is("help", "help")) return c.verb = Verb::help, true;
+    if (is("help", "help")) {
+        c.verb = Verb::help;
+        return true;
+    }
     bool known = false;
     for (const Row& row : rows) {
         if (!same_word(first, row.first)) continue;
         known = true;
         if (!row.second.empty() && !(more() && same_word(words[at], row.second))) continue;
-        if (!row.second.empty()) ++at;
+        if (!row.second.empty()) {
+            ++at;
+        }
         c.verb = row.verb;
         return scope(row.scope, before) && numbers(row.least, row.most);
     }
-    if (known)
-        return fail("what to " + first + (more() ? " is not '" + words[at].substr(0, 40) + "'" : " is missing") + "; see: help",
+    if (known) {
+        return fail("what to " + first +
+                        (more() ? " is not '" + words[at].substr(0, 40) + "'" : " is missing") +
+                        "; see: help",
                     Error::not_supported);
+    }
     return fail("unknown command '" + first.substr(0, 40) + "'; see: help", Error::not_supported);
 }
 
@@ -261,7 +326,8 @@ Parsed parse(std::string_view line) {
     line = eds::trimmed(line);
     if (line.starts_with('[')) {
         const auto close = line.find(']');
-        if (close == std::string_view::npos || !number(eds::trimmed(line.substr(1, close - 1)), UINT32_MAX, reader.out.command.sequence)) {
+        if (close == std::string_view::npos || !number(eds::trimmed(line.substr(1, close - 1)),
+                                                       UINT32_MAX, reader.out.command.sequence)) {
             reader.fail("a line begins with [NUMBER]");
             return std::move(reader.out);
         }
@@ -271,24 +337,35 @@ Parsed parse(std::string_view line) {
         reader.fail("a quotation mark is not closed");
         return std::move(reader.out);
     }
-    if (!reader.words.empty()) reader.command();
+    if (!reader.words.empty()) {
+        reader.command();
+    }
     return std::move(reader.out);
 }
 
 std::string_view help_text() {
-    return "[SEQ] begins a line; NET and NODE may be left out after `set network`, `set node`; numbers as in C; answers are OK, a value, "
+    return "[SEQ] begins a line; NET and NODE may be left out after `set network`, `set node`; "
+           "numbers as in C; answers are OK, a value, "
            "or ERROR:n\n"
-           "[[NET] NODE] r[ead] INDEX SUB [TYPE]            [[NET] NODE] w[rite] INDEX SUB TYPE VALUE\n"
+           "[[NET] NODE] r[ead] INDEX SUB [TYPE]            [[NET] NODE] w[rite] INDEX SUB TYPE "
+           "VALUE\n"
            "[[NET] NODE] start | stop | preop[erational] | reset node | reset comm[unication]\n"
-           "[[NET] NODE] enable guarding MS FACTOR | disable guarding | enable heartbeat MS | disable heartbeat\n"
-           "[NET] set rpdo|tpdo N COB-ID event|rtr|syncN COUNT TYPE...    [NET] r p N    [NET] w p N COUNT VALUE...\n"
-           "[NET] init BIT-RATE-INDEX | set heartbeat MS | set id NODE | boot_up_indication enable|disable | store | restore\n"
-           "[NET] set command_timeout MS | set command_size BYTES | set sdo_timeout MS | set sdo_block 0|1\n"
+           "[[NET] NODE] enable guarding MS FACTOR | disable guarding | enable heartbeat MS | "
+           "disable heartbeat\n"
+           "[NET] set rpdo|tpdo N COB-ID event|rtr|syncN COUNT TYPE...    [NET] r p N    [NET] w p "
+           "N COUNT VALUE...\n"
+           "[NET] init BIT-RATE-INDEX | set heartbeat MS | set id NODE | boot_up_indication "
+           "enable|disable | store | restore\n"
+           "[NET] set command_timeout MS | set command_size BYTES | set sdo_timeout MS | set "
+           "sdo_block 0|1\n"
            "set network NET | [NET] set node NODE | [NET] info version | help\n"
-           "[NET] lss_switch_glob 0|1 | lss_switch_sel VENDOR PRODUCT REVISION SERIAL | lss_set_node NODE | lss_conf_bitrate 0 INDEX\n"
-           "[NET] lss_activate_bitrate MS | lss_store | lss_inquire_addr [0..3] | lss_get_node | lss_ident_nonconf | _lss_fastscan [MS]\n"
+           "[NET] lss_switch_glob 0|1 | lss_switch_sel VENDOR PRODUCT REVISION SERIAL | "
+           "lss_set_node NODE | lss_conf_bitrate 0 INDEX\n"
+           "[NET] lss_activate_bitrate MS | lss_store | lss_inquire_addr [0..3] | lss_get_node | "
+           "lss_ident_nonconf | _lss_fastscan [MS]\n"
            "[NET] lss_identity VENDOR PRODUCT REVISION-FROM REVISION-TO SERIAL-FROM SERIAL-TO\n"
-           "types: b i8..i64 u8..u64 r32 r64 t td vs os us d (os, us, d in base64), and as additions x8..x64 hex\n";
+           "types: b i8..i64 u8..u64 r32 r64 t td vs os us d (os, us, d in base64), and as "
+           "additions x8..x64 hex\n";
 }
 
 }  // namespace hal::canopen::gateway

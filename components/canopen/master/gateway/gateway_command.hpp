@@ -86,30 +86,35 @@ enum class Verb : std::uint8_t {
 };
 
 struct Command {
-    std::uint32_t                sequence = 0;
-    Verb                         verb = Verb::none;
-    std::optional<std::uint32_t> net = {}, node = {};
-    std::uint16_t                index = 0;               ///< of read and write
-    std::uint8_t                 sub = 0;
-    const Format*                format = nullptr;        ///< none was given: the bytes as they are
-    std::vector<std::uint8_t>    value = {};  ///< of write
-    std::vector<std::uint32_t>   numbers = {};   ///< arguments; of PDOs: number, COB-ID, transmission type
-    std::vector<const Format*>   formats = {};   ///< of set rpdo and set tpdo
-    std::vector<std::string>     values = {};      ///< of write pdo: their words
+    std::uint32_t sequence = 0;
+    Verb verb = Verb::none;
+    std::optional<std::uint32_t> net = {};
+    std::optional<std::uint32_t> node = {};
+    std::uint16_t index = 0;               ///< of read and write
+    std::uint8_t sub = 0;
+    const Format* format = nullptr;        ///< none was given: the bytes as they are
+    std::vector<std::uint8_t> value = {};  ///< of write
+    /// arguments; of PDOs: number, COB-ID, transmission type
+    std::vector<std::uint32_t> numbers = {};
+    std::vector<const Format*> formats = {};   ///< of set rpdo and set tpdo
+    std::vector<std::string> values = {};      ///< of write pdo: their words
 };
 
 struct Parsed {
-    Command     command;
-    Error       error = Error::none;
+    Command command;
+    Error error = Error::none;
     std::string why;  ///< what is wrong, for the comment behind an error
 };
 
-/// Reads one line without its end. Never throws; what cannot be read is an error with the sequence number as far as there is one.
+/// Reads one line without its end. Never throws; what cannot be read is an error with the sequence
+/// number as far as there is one.
 Parsed parse(std::string_view line);
 /// What can be typed, a line each.
 std::string_view help_text();
 
-/// Transmission types of PDO commands that are written as a word: `event`, `rtr`, `sync0` … `sync240`.
-inline constexpr std::uint32_t on_event = 255, on_request = 253;
+/// Transmission types of PDO commands that are written as a word: `event`, `rtr`, `sync0` …
+/// `sync240`.
+inline constexpr std::uint32_t on_event = 255;
+inline constexpr std::uint32_t on_request = 253;
 
 }  // namespace hal::canopen::gateway

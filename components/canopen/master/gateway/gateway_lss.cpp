@@ -38,17 +38,19 @@ bool fits(const Command& c) {
 }  // namespace
 
 void Gateway::start_lss(int client, Command&& c, Net& net, Time now) {
-    if (fits(c)) enqueue(client, std::move(c), net, 0, now);
-    else
+    if (fits(c)) {
+        enqueue(client, std::move(c), net, 0, now);
+    } else {
         reject(client, c.sequence,
                c.verb == Verb::lss_bit_rate   ? Error::lss_bit_rate
                : c.verb == Verb::lss_set_node ? Error::lss_node_id
                                               : Error::syntax);
+    }
 }
 
 /// Returns false while the transmit queue is full.
 bool Gateway::begin_lss(Pending& p, Net& net, Time now) {
-    LssMaster&  lss = net.lss;
+    LssMaster& lss = net.lss;
     const auto& n = p.command.numbers;
     switch (p.command.verb) {
     case Verb::lss_switch_global: return lss.switch_global(n[0] != 0);
@@ -59,10 +61,13 @@ bool Gateway::begin_lss(Pending& p, Net& net, Time now) {
     case Verb::lss_store: return lss.store_configuration(now);
     case Verb::lss_inquire: return lss.inquire(n.empty() ? p.part : n[0], now);
     case Verb::lss_get_node: return lss.inquire(4, now);
-    case Verb::lss_identify: return lss.identify({n[0], n[1], n[2], n[4]}, {n[0], n[1], n[3], n[5]}, now);
+    case Verb::lss_identify:
+        return lss.identify({n[0], n[1], n[2], n[4]}, {n[0], n[1], n[3], n[5]}, now);
     case Verb::lss_identify_unconfigured: return lss.identify_unconfigured(now);
     case Verb::lss_fastscan:
-        if (!n.empty()) lss.settings().scan_timeout = n[0] * millisecond;
+        if (!n.empty()) {
+            lss.settings().scan_timeout = n[0] * millisecond;
+        }
         return lss.scan(now);
     default: return true;
     }
@@ -72,28 +77,37 @@ bool Gateway::proceed_lss(Pending& p, Time now) {
     Net& net = *nets_[p.net - 1];
     if (!p.lss_started) {
         if (net.lss_owner != nullptr || net.lss.busy() || !begin_lss(p, net, now)) return false;
-        net.lss_owner = &p, p.lss_started = true;
+        net.lss_owner = &p;
+        p.lss_started = true;
     }
     if (net.lss.busy()) return false;
     const LssMaster::Result& r = net.lss.result();
-    const auto               end = [&](Error error, const std::string& text = "OK") {
+    const auto end = [&](Error error, const std::string& text = "OK") {
         net.lss_owner = nullptr;
-        if (error != Error::none) reject(p.client, p.command.sequence, error);
-        else answer(p.client, p.command.sequence, text);
+        if (error != Error::none) {
+            reject(p.client, p.command.sequence, error);
+        } else {
+            answer(p.client, p.command.sequence, text);
+        }
         return true;
     };
-    if (p.command.verb == Verb::lss_switch_global || p.command.verb == Verb::lss_activate) return end(Error::none);  // nobody answers these
+    // nobody answers these
+    if (p.command.verb == Verb::lss_switch_global || p.command.verb == Verb::lss_activate) {
+        return end(Error::none);
+    }
     if (!r.answered) return end(Error::timeout);
     switch (p.command.verb) {
     case Verb::lss_inquire:
         p.text += (p.text.empty() ? "" : " ") + hexadecimal(r.value);
         if (!p.command.numbers.empty() || p.part == 3) return end(Error::none, p.text);
         ++p.part;
-        net.lss_owner = nullptr, p.lss_started = false;
+        net.lss_owner = nullptr;
+        p.lss_started = false;
         return false;
     case Verb::lss_get_node: return end(Error::none, std::to_string(r.value));
     case Verb::lss_fastscan:
-        return end(Error::none, hexadecimal(r.identity[0]) + " " + hexadecimal(r.identity[1]) + " " + hexadecimal(r.identity[2]) + " " +
+        return end(Error::none, hexadecimal(r.identity[0]) + " " + hexadecimal(r.identity[1]) +
+                                    " " + hexadecimal(r.identity[2]) + " " +
                                     hexadecimal(r.identity[3]));
     default: return end(error_of(p.command.verb, r));
     }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The gateway's own node: a few objects that its clients read and write, and the bus does not reach.
+// The gateway's own node: a few objects that its clients read and write, and the bus does not
+// reach.
 #include <cstdio>
 
 #include "gateway.hpp"
@@ -12,10 +13,12 @@ std::string abort_text(Abort abort) {
     return std::string(text) + canopen::to_string(abort);
 }
 
-/// Only objects that act or hold something: no PDO, SYNC or SDO parameters of a node whose object dictionary the bus does not reach.
+/// Only objects that act or hold something: no PDO, SYNC or SDO parameters of a node whose object
+/// dictionary the bus does not reach.
 Description own_objects(const Identity& identity) {
     Description d;
-    const auto number = [&d](std::uint16_t index, std::uint8_t sub, Type type, const char* name, std::uint64_t value = 0) {
+    const auto number = [&d](std::uint16_t index, std::uint8_t sub, Type type, const char* name,
+                             std::uint64_t value = 0) {
         d.add(index, sub, type, Access::read_only, value, name);
     };
     number(0x1000, 0, Type::unsigned32, "Device type");
@@ -24,7 +27,8 @@ Description own_objects(const Identity& identity) {
     d.add_text(0x100a, 0, Access::constant, "1.0", 0, "Manufacturer software version");
     d.add(0x1017, 0, Type::unsigned16, Access::read_write, 0, "Producer heartbeat time");
     number(0x1018, 0, Type::unsigned8, "Highest sub-index", 4);
-    number(0x1018, 1, Type::unsigned32, "Vendor-ID", identity.vendor);  // as `info version` reports them
+    // as `info version` reports them
+    number(0x1018, 1, Type::unsigned32, "Vendor-ID", identity.vendor);
     number(0x1018, 2, Type::unsigned32, "Product code", identity.product);
     number(0x1018, 3, Type::unsigned32, "Revision number", identity.revision);
     number(0x1018, 4, Type::unsigned32, "Serial number", identity.serial);
@@ -40,15 +44,22 @@ Description own_objects(const Identity& identity) {
 void Gateway::own_transfer(int client, const Command& c, Net& net, Time now) {
     net.own.set(0x1017, 0, static_cast<std::uint16_t>(net.heartbeat / millisecond));
     if (c.verb == Verb::write) {
-        if (const Abort abort = net.own.write(c.index, c.sub, c.value); abort != Abort::none)
+        if (const Abort abort = net.own.write(c.index, c.sub, c.value); abort != Abort::none) {
             return answer(client, c.sequence, abort_text(abort));
-        if (c.index == 0x1017) net.heartbeat = net.own.get<std::uint16_t>(0x1017, 0) * millisecond, net.next_heartbeat = now;
+        }
+        if (c.index == 0x1017) {
+            net.heartbeat = net.own.get<std::uint16_t>(0x1017, 0) * millisecond;
+
+            net.next_heartbeat = now;
+        }
         return answer(client, c.sequence, "OK");
     }
     std::uint8_t room[Identity::most_name];  // as long as the longest of own_objects()
-    std::size_t  size = 0;
-    const Abort  abort = net.own.read(c.index, c.sub, room, size);
-    answer(client, c.sequence, abort != Abort::none ? abort_text(abort) : text_of({room, size}, c.format ? *c.format : *format("hex")));
+    std::size_t size = 0;
+    const Abort abort = net.own.read(c.index, c.sub, room, size);
+    answer(client, c.sequence,
+           abort != Abort::none ? abort_text(abort)
+                                : text_of({room, size}, c.format ? *c.format : *format("hex")));
 }
 
 }  // namespace hal::canopen::gateway

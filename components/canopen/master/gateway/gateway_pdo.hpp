@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The gateway's own PDOs: no object dictionary, only values of types, as `set rpdo` and `set tpdo` name them.
+// The gateway's own PDOs: no object dictionary, only values of types, as `set rpdo` and `set tpdo`
+// name them.
 #pragma once
 
 #include <functional>
@@ -28,23 +29,28 @@ public:
 
     /// Takes PDOs and SYNC. `on_pdo` gets the text of those received.
     void handle(const Frame&, const std::function<void(const std::string&)>& on_pdo);
-    void clear() { received_.clear(), sent_.clear(); }
+    void clear() {
+        received_.clear();
+        sent_.clear();
+    }
 
 private:
     struct Pdo {
-        std::uint32_t               cob = 0, transmission = on_event;
-        std::vector<const Format*>  formats = {};
+        std::uint32_t cob = 0;
+        std::uint32_t transmission = on_event;
+        std::vector<const Format*> formats = {};
         std::array<std::uint8_t, 8> data = {};
-        bool                        fresh = false;        ///< has a value; of a synchronous one sent: it waits for its SYNC
-        bool                        held = false;         ///< received, and waits for the SYNC
+        /// has a value; of a synchronous one sent: it waits for its SYNC
+        bool fresh = false;
+        bool held = false;         ///< received, and waits for the SYNC
         std::array<std::uint8_t, 8> waiting = {};
-        unsigned                    syncs = 0;
+        unsigned syncs = 0;
     };
-    static unsigned    bits(const Pdo&);
+    static unsigned bits(const Pdo&);
     static std::string text(unsigned number, const Pdo&);
-    bool               send(const Pdo&);
+    bool send(const Pdo&);
 
-    FrameQueue&             out_;
+    FrameQueue& out_;
     std::map<unsigned, Pdo> received_, sent_;
 };
 

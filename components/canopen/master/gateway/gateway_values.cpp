@@ -45,21 +45,25 @@ constexpr Format table[] = {
     {"hex", Type::none, true},
 };
 
-constexpr std::string_view digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+constexpr std::string_view digits =
+    "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 
 std::string number_text(std::span<const std::uint8_t> bytes, const Format& format) {
     std::uint64_t value = 0;
     std::copy(bytes.begin(), bytes.end(), reinterpret_cast<std::uint8_t*>(&value));
     std::array<char, 40> text{};
     if (format.hex) {
-        std::snprintf(text.data(), text.size(), "0x%0*llX", static_cast<int>(2 * bytes.size()), static_cast<unsigned long long>(value));
+        std::snprintf(text.data(), text.size(), "0x%0*llX", static_cast<int>(2 * bytes.size()),
+                      static_cast<unsigned long long>(value));
         return text.data();
     }
-    char*       end = text.data();
+    char* end = text.data();
     char* const limit = text.data() + text.size();
-    if (format.type == Type::real32) end = std::to_chars(end, limit, load<float>(bytes.data())).ptr;
-    else if (format.type == Type::real64) end = std::to_chars(end, limit, load<double>(bytes.data())).ptr;
-    else if (is_signed(format.type)) {
+    if (format.type == Type::real32) {
+        end = std::to_chars(end, limit, load<float>(bytes.data())).ptr;
+    } else if (format.type == Type::real64) {
+        end = std::to_chars(end, limit, load<double>(bytes.data())).ptr;
+    } else if (is_signed(format.type)) {
         const unsigned unused = 64 - bits_of(format.type);
         end = std::to_chars(end, limit, static_cast<std::int64_t>(value << unused) >> unused).ptr;
     } else {
@@ -70,9 +74,11 @@ std::string number_text(std::span<const std::uint8_t> bytes, const Format& forma
 
 std::string quoted(std::span<const std::uint8_t> bytes) {
     const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-    std::string            out = "\"";
+    std::string out = "\"";
     for (const char c : text) {
-        if (c == '"') out += '"';
+        if (c == '"') {
+            out += '"';
+        }
         out += c == '\r' || c == '\n' || c == '\0' ? ' ' : c;  // an answer is one line
     }
     return out + "\"";
@@ -80,20 +86,27 @@ std::string quoted(std::span<const std::uint8_t> bytes) {
 
 bool number(std::string_view text, const Format& format, std::vector<std::uint8_t>& bytes) {
     const unsigned bits = bits_of(format.type);
-    std::uint64_t  value = 0;
+    std::uint64_t value = 0;
     if (is_real(format.type)) {
         double real = 0;
         const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), real);
         if (text.empty() || error != std::errc() || end != text.data() + text.size()) return false;
-        if (format.type == Type::real32) store(&value, static_cast<float>(real));
-        else store(&value, real);
+        if (format.type == Type::real32) {
+            store(&value, static_cast<float>(real));
+        } else {
+            store(&value, real);
+        }
     } else {
         bool negative = false;
         if (!read_number(text, negative, value)) return false;
         const std::uint64_t top = bits == 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << bits) - 1;
-        const std::uint64_t most = negative ? (top >> 1) + 1 : is_signed(format.type) && !text.starts_with("0x") ? top >> 1 : top;
+        const std::uint64_t most = negative ? (top >> 1) + 1
+                                   : is_signed(format.type) && !text.starts_with("0x") ? top >> 1
+                                                                                       : top;
         if (value > most || (negative && !is_signed(format.type) && value != 0)) return false;
-        if (negative) value = ~value + 1;
+        if (negative) {
+            value = ~value + 1;
+        }
     }
     bytes.resize((bits + 7) / 8);
     std::copy_n(reinterpret_cast<const std::uint8_t*>(&value), bytes.size(), bytes.begin());
@@ -107,8 +120,9 @@ bool hex_bytes(std::span<const std::string> words, std::vector<std::uint8_t>& by
         for (std::size_t n = 0; n < word.size(); n += 2) {
             std::uint8_t byte = 0;
             if (const auto r = std::from_chars(word.data() + n, word.data() + n + 2, byte, 16);
-                r.ec != std::errc() || r.ptr != word.data() + n + 2)
+                r.ec != std::errc() || r.ptr != word.data() + n + 2) {
                 return false;
+            }
             bytes.push_back(byte);
         }
     }
@@ -117,9 +131,14 @@ bool hex_bytes(std::span<const std::string> words, std::vector<std::uint8_t>& by
 
 /// Days and milliseconds: 6 bytes, the milliseconds first.
 bool time(std::string_view days, std::string_view ms, std::vector<std::uint8_t>& bytes) {
-    bool          minus = false, sign = false;
-    std::uint64_t d = 0, m = 0;
-    if (!read_number(days, minus, d) || !read_number(ms, sign, m) || minus || sign || d > 0xffff || m >= 1U << 28) return false;
+    bool minus = false;
+    bool sign = false;
+    std::uint64_t d = 0;
+    std::uint64_t m = 0;
+    if (!read_number(days, minus, d) || !read_number(ms, sign, m) || minus || sign || d > 0xffff ||
+        m >= 1U << 28) {
+        return false;
+    }
     bytes.resize(6);
     store(bytes.data(), static_cast<std::uint32_t>(m));
     store(bytes.data() + 4, static_cast<std::uint16_t>(d));
@@ -131,12 +150,14 @@ bool time(std::string_view days, std::string_view ms, std::vector<std::uint8_t>&
 std::span<const Format> formats() { return table; }
 
 const Format* format(std::string_view word) {
-    const auto* found = std::find_if(std::begin(table), std::end(table), [&](const Format& f) { return eds::same_word(f.word, word); });
+    const auto* found = std::find_if(std::begin(table), std::end(table),
+                                     [&](const Format& f) { return eds::same_word(f.word, word); });
     return found == std::end(table) ? nullptr : found;
 }
 
 const Format* format(Type type) {
-    const auto* found = std::find_if(std::begin(table), std::end(table), [&](const Format& f) { return f.type == type; });
+    const auto* found = std::find_if(std::begin(table), std::end(table),
+                                     [&](const Format& f) { return f.type == type; });
     return found == std::end(table) ? nullptr : found;
 }
 
@@ -148,12 +169,15 @@ std::string text_of(std::span<const std::uint8_t> bytes, const Format& format) {
     case Type::domain: return base64(bytes);
     case Type::time_of_day:
     case Type::time_difference:
-        if (bytes.size() == 6)
+        if (bytes.size() == 6) {
             return std::to_string(load<std::uint16_t>(bytes.data() + 4)) + " " +
                    std::to_string(load<std::uint32_t>(bytes.data()) & 0x0fffffff);
+        }
         break;
     default:
-        if (bytes_of(format.type) == bytes.size() && !bytes.empty()) return number_text(bytes, format);
+        if (bytes_of(format.type) == bytes.size() && !bytes.empty()) {
+            return number_text(bytes, format);
+        }
     }
     std::string text;
     for (const std::uint8_t byte : bytes) {
@@ -164,11 +188,15 @@ std::string text_of(std::span<const std::uint8_t> bytes, const Format& format) {
     return text;
 }
 
-bool bytes_of(std::span<const std::string> words, const Format& format, std::vector<std::uint8_t>& bytes) {
-    if (words.size() < words_of(format) || (words.size() > words_of(format) && format.type != Type::none)) return false;
+bool bytes_of(std::span<const std::string> words, const Format& format,
+              std::vector<std::uint8_t>& bytes) {
+    if (words.size() < words_of(format) ||
+        (words.size() > words_of(format) && format.type != Type::none)) {
+        return false;
+    }
     switch (format.type) {
     case Type::none: return hex_bytes(words, bytes);
-    case Type::visible_string: return bytes.assign(words[0].begin(), words[0].end()), true;
+    case Type::visible_string: bytes.assign(words[0].begin(), words[0].end()); return true;
     case Type::octet_string:
     case Type::unicode_string:
     case Type::domain: return base64(words[0], bytes);
@@ -180,11 +208,18 @@ bool bytes_of(std::span<const std::string> words, const Format& format, std::vec
 
 bool read_number(std::string_view text, bool& negative, std::uint64_t& magnitude) {
     negative = !text.empty() && text[0] == '-';
-    if (negative || (!text.empty() && text[0] == '+')) text.remove_prefix(1);
+    if (negative || (!text.empty() && text[0] == '+')) {
+        text.remove_prefix(1);
+    }
     int base = 10;
-    if (text.size() > 2 && text[0] == '0' && (text[1] == 'x' || text[1] == 'X')) base = 16, text.remove_prefix(2);
-    else if (text.size() > 1 && text[0] == '0') base = 8;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), magnitude, base);
+    if (text.size() > 2 && text[0] == '0' && (text[1] == 'x' || text[1] == 'X')) {
+        base = 16;
+        text.remove_prefix(2);
+    } else if (text.size() > 1 && text[0] == '0') {
+        base = 8;
+    }
+    const auto [end, error] =
+        std::from_chars(text.data(), text.data() + text.size(), magnitude, base);
     return !text.empty() && error == std::errc() && end == text.data() + text.size();
 }
 
@@ -193,9 +228,13 @@ std::string base64(std::span<const std::uint8_t> bytes) {
     text.reserve((bytes.size() + 2) / 3 * 4);
     for (std::size_t n = 0; n < bytes.size(); n += 3) {
         const std::size_t have = std::min<std::size_t>(3, bytes.size() - n);
-        std::uint32_t     group = 0;
-        for (std::size_t i = 0; i < 3; ++i) group = group << 8 | (i < have ? bytes[n + i] : 0U);
-        for (std::size_t i = 0; i < 4; ++i) text += i <= have ? digits[group >> (18 - 6 * i) & 63] : '=';
+        std::uint32_t group = 0;
+        for (std::size_t i = 0; i < 3; ++i) {
+            group = group << 8 | (i < have ? bytes[n + i] : 0U);
+        }
+        for (std::size_t i = 0; i < 4; ++i) {
+            text += i <= have ? digits[group >> (18 - 6 * i) & 63] : '=';
+        }
     }
     return text;
 }
@@ -204,7 +243,9 @@ bool base64(std::string_view text, std::vector<std::uint8_t>& bytes) {
     bytes.clear();
     if (text.size() % 4 != 0) return false;
     std::size_t padding = 0;
-    while (padding < 2 && padding < text.size() && text[text.size() - 1 - padding] == '=') ++padding;
+    while (padding < 2 && padding < text.size() && text[text.size() - 1 - padding] == '=') {
+        ++padding;
+    }
     std::uint32_t group = 0;
     for (std::size_t n = 0; n < text.size(); ++n) {
         const bool pad = n >= text.size() - padding;
@@ -213,7 +254,9 @@ bool base64(std::string_view text, std::vector<std::uint8_t>& bytes) {
         group = group << 6 | static_cast<std::uint32_t>(digit);
         if (n % 4 != 3) continue;
         const std::size_t have = n + 1 == text.size() ? 3 - padding : 3;
-        for (std::size_t i = 0; i < have; ++i) bytes.push_back(static_cast<std::uint8_t>(group >> (16 - 8 * i)));
+        for (std::size_t i = 0; i < have; ++i) {
+            bytes.push_back(static_cast<std::uint8_t>(group >> (16 - 8 * i)));
+        }
         group = 0;
     }
     return true;

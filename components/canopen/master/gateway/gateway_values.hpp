@@ -14,8 +14,9 @@ namespace hal::canopen::gateway {
 
 struct Format {
     std::string_view word;
-    Type             type = Type::none;
-    bool             hex = false;  ///< an addition: unsigned in hexadecimal (x8 … x64), or bytes (hex)
+    Type type = Type::none;
+    /// an addition: unsigned in hexadecimal (x8 … x64), or bytes (hex)
+    bool hex = false;
 };
 
 std::span<const Format> formats();
@@ -24,14 +25,17 @@ const Format* format(std::string_view word);
 /// The first of that type; nullptr when there is none.
 const Format* format(Type type);
 
-/// The value in one word, quoted where it needs to be; two words for times. Bytes of another length than the type's come as `hex`.
+/// The value in one word, quoted where it needs to be; two words for times. Bytes of another length
+/// than the type's come as `hex`.
 std::string text_of(std::span<const std::uint8_t> bytes, const Format& format);
 /// Returns the number of words of its value.
 constexpr std::size_t words_of(const Format& format) {
     return format.type == Type::time_of_day || format.type == Type::time_difference ? 2 : 1;
 }
-/// Reads the value from words_of() words, the last of which may be followed by more for `hex`; false when they do not spell one.
-bool bytes_of(std::span<const std::string> words, const Format& format, std::vector<std::uint8_t>& bytes);
+/// Reads the value from words_of() words, the last of which may be followed by more for `hex`;
+/// false when they do not spell one.
+bool bytes_of(std::span<const std::string> words, const Format& format,
+              std::vector<std::uint8_t>& bytes);
 
 /// As C spells it: decimal, 0x… hexadecimal, 0… octal, with a sign.
 bool read_number(std::string_view text, bool& negative, std::uint64_t& magnitude);

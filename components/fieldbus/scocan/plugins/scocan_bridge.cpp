@@ -6,21 +6,33 @@ namespace {
 using namespace hal::scocan;
 
 struct ScocanBridge : StationComponent {
-    explicit ScocanBridge(const hal_host* host) : StationComponent(host, "scocan-bridge.0", {Role::bridge}) {}
+    explicit ScocanBridge(const hal_host* host)
+        : StationComponent(host, "scocan-bridge.0", {Role::bridge}) {}
 
     hal::TextArgument pc{
-        *this, "pc", "", "bus of the ordinary CAN participant: udp:239.74.163.2:43113, sim:NAME or can:can1", {.per_instance = true}};
+        *this,
+        "pc",
+        "",
+        "bus of the ordinary CAN participant: udp:239.74.163.2:43113, sim:NAME or can:can1",
+        {.per_instance = true}};
 
     hal::Out<std::uint64_t> to_pc{*this, receive_, "to-pc", "frames forwarded from the bus"};
-    hal::Out<std::uint64_t> from_pc{*this, transmit_, "from-pc", "frames of the participant that were queued for a slot"};
-    hal::Out<std::uint64_t> rejected{
-        *this, transmit_, "rejected",
-        "frames of the participant dropped: identifier of another node or reserved, queue full, or not a classic base frame"};
+    hal::Out<std::uint64_t> from_pc{*this, transmit_, "from-pc",
+                                    "frames of the participant that were queued for a slot"};
+    hal::Out<std::uint64_t> rejected{*this, transmit_, "rejected",
+                                     "frames of the participant dropped: identifier of another "
+                                     "node or reserved, queue full, or not a classic base frame"};
 
     void start() {
-        if (pc.get().empty())
-            throw hal::ArgumentError("pc", "missing pc=; write the bus of the ordinary participant: pc=udp:239.74.163.2:43113");
-        if (pc.get() == arguments_.link.get()) throw hal::ArgumentError("pc", "pc= and link= are the same bus; name two different ones");
+        if (pc.get().empty()) {
+            throw hal::ArgumentError("pc",
+                                     "missing pc=; write the bus of the ordinary participant: "
+                                     "pc=udp:239.74.163.2:43113");
+        }
+        if (pc.get() == arguments_.link.get()) {
+            throw hal::ArgumentError("pc",
+                                     "pc= and link= are the same bus; name two different ones");
+        }
         auto opened = hal::can::open(pc.get(), {.stamps = hal::can::describe(pc.get()).has_stamps});
         if (!opened) throw std::runtime_error(opened.problem);
         StationComponent::start();
@@ -34,31 +46,42 @@ struct ScocanBridge : StationComponent {
 
 private:
     void passed(const hal::can::Frame& frame) noexcept override {
-        if (pc_ && pc_->send(frame, now_) == hal::can::Sent::queued) ++to_pc_;
+        if (pc_ && pc_->send(frame, now_) == hal::can::Sent::queued) {
+            ++to_pc_;
+        }
     }
     void received() noexcept override {
         pc_->flush(now_);
         to_pc = to_pc_;
     }
-    /// Takes at most one buffer of frames, so that a babbling participant costs a bounded time; the rest waits.
+    /// Takes at most one buffer of frames, so that a babbling participant costs a bounded time; the
+    /// rest waits.
     void before_slots() noexcept override {
         const auto count = pc_->receive(buffer_, now_);
         for (std::size_t i = 0; i < count; ++i) {
-            const bool is_state = station_->table().owner(station_->mode(), buffer_[i].id) != nullptr;
-            if (station_->send(buffer_[i], is_state) == hal::can::Sent::queued) ++from_pc_;
-            else ++rejected_;
+            const bool is_state =
+                station_->table().owner(station_->mode(), buffer_[i].id) != nullptr;
+            if (station_->send(buffer_[i], is_state) == hal::can::Sent::queued) {
+                ++from_pc_;
+            } else {
+                ++rejected_;
+            }
         }
-        from_pc = from_pc_, rejected = rejected_;
+        from_pc = from_pc_;
+        rejected = rejected_;
     }
 
     std::unique_ptr<hal::can::Link> pc_;
     std::array<hal::can::Frame, 32> buffer_;
-    std::uint64_t                   to_pc_ = 0, from_pc_ = 0, rejected_ = 0;
+    std::uint64_t to_pc_ = 0;
+    std::uint64_t from_pc_ = 0;
+    std::uint64_t rejected_ = 0;
 };
 
 }  // namespace
 
-HAL_COMPONENT(ScocanBridge, "scocan_bridge", "Bridge between a CAN bus with time slots (SCoCAN) and an ordinary one", R"(
+HAL_COMPONENT(ScocanBridge, "scocan_bridge",
+              "Bridge between a CAN bus with time slots (SCoCAN) and an ordinary one", R"(
 A node with two controllers: an ordinary participant on `pc=`, which knows nothing of slots, takes part in the bus. Its frames are held and sent in the private
 slot that the table gives their identifier, only the newest of each, or else in shared slots; frames from the bus are forwarded at once.
 

@@ -6,19 +6,27 @@ namespace {
 using namespace hal::scocan;
 
 struct ScocanMonitor : StationComponent {
-    explicit ScocanMonitor(const hal_host* host) : StationComponent(host, "scocan-monitor.0", {Role::monitor}) {
+    explicit ScocanMonitor(const hal_host* host)
+        : StationComponent(host, "scocan-monitor.0", {Role::monitor}) {
         const auto& nodes = arguments_.table.nodes;
-        for (std::uint32_t i = 0; i < nodes.size(); ++i)
-            if (i != arguments_.own) silences_.emplace_back(*this, i, nodes[i].name);
+        for (std::uint32_t i = 0; i < nodes.size(); ++i) {
+            if (i != arguments_.own) {
+                silences_.emplace_back(*this, i, nodes[i].name);
+            }
+        }
     }
 
     hal::Out<std::uint64_t> idle{*this, receive_, "idle", "private slots whose owner sent nothing"};
-    hal::Out<std::uint64_t> announced{*this, receive_, "announced", "idle slots announced to nodes of type B"};
-    hal::Out<double>        load{*this, receive_, "load", "share of the time in which the bus is busy, 0..1"};
+    hal::Out<std::uint64_t> announced{*this, receive_, "announced",
+                                      "idle slots announced to nodes of type B"};
+    hal::Out<double> load{*this, receive_, "load",
+                          "share of the time in which the bus is busy, 0..1"};
 
     void start() {
         StationComponent::start();
-        for (auto& s : silences_) s.was = false;
+        for (auto& s : silences_) {
+            s.was = false;
+        }
     }
 
 private:
@@ -27,15 +35,20 @@ private:
         Silence(ScocanMonitor& m, std::uint32_t number, const std::string& name)
             : node(number),
               pin(m, m.transmit_, ("silence-" + name).c_str(),
-                  "rising edge: node sends nothing until its reset; falling edge: it sends again") {}
+                  "rising edge: node sends nothing until its reset; falling edge: it sends again") {
+        }
         std::uint32_t node;
         hal::In<bool> pin;
-        bool          was = false;
+        bool was = false;
     };
 
     void before_slots() noexcept override {
-        for (auto& s : silences_)
-            if (s.pin != s.was && station_->state() == State::running && station_->request_silence(s.node, s.pin)) s.was = s.pin;
+        for (auto& s : silences_) {
+            if (s.pin != s.was && station_->state() == State::running &&
+                station_->request_silence(s.node, s.pin)) {
+                s.was = s.pin;
+            }
+        }
     }
     void received() noexcept override {
         idle = station_->count().idle;
@@ -48,7 +61,8 @@ private:
 
 }  // namespace
 
-HAL_COMPONENT(ScocanMonitor, "scocan_monitor", "Monitor of a CAN bus with time slots (SCoCAN): announces idle slots", R"(
+HAL_COMPONENT(ScocanMonitor, "scocan_monitor",
+              "Monitor of a CAN bus with time slots (SCoCAN): announces idle slots", R"(
 Announces each private slot whose owner has not sent by the idle time of the table, by a frame with identifier 1 and the number of the slot: nodes of type B,
 which cannot detect that themselves, then share the rest of it. It counts idle slots and frames outside of their slots, and reports their senders by the table.
 

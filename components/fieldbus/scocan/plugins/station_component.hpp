@@ -13,8 +13,8 @@
 #include "discipline/slot_exchange.hpp"
 #include "event_words.hpp"
 #include "hal/component.hpp"
-#include "hal/lasting_fault.hpp"
 #include "hal/discipline.hpp"
+#include "hal/lasting_fault.hpp"
 #include "hal/naming.hpp"
 #include "hal/reporter.hpp"
 #include "message_pins.hpp"
@@ -25,43 +25,65 @@ namespace hal::scocan {
 
 class StationComponent : public hal::Component, protected Sink {
 public:
-    StationComponent(const hal_host* host, const char* fallback_name, std::initializer_list<Role> roles)
+    StationComponent(const hal_host* host, const char* fallback_name,
+                     std::initializer_list<Role> roles)
         : Component(host), name_(hal::own_name(fallback_name)) {
         arguments_.load(roles);
         if (!arguments_.loaded) return;
         const Table& t = arguments_.table;
         words_.emplace(t, arguments_.own, "setp " + name_ + ".reset TRUE");
         faults_text_.emplace(t, *words_);
-        station_ = std::make_unique<Station>(t, arguments_.own, arguments_.options(), static_cast<Sink&>(*this));
-        reporter_ =
-            std::make_unique<hal::Reporter<Happened>>(name_, [this](const Happened& h) { return (*words_)(h); }, 256, &EventWords::subject);
+        station_ = std::make_unique<Station>(t, arguments_.own, arguments_.options(),
+                                             static_cast<Sink&>(*this));
+        reporter_ = std::make_unique<hal::Reporter<Happened>>(
+            name_, [this](const Happened& h) { return (*words_)(h); }, 256, &EventWords::subject);
         for (const Message& m : t.messages) {
             const bool is_own = m.node == arguments_.own;
-            if (is_own && t.nodes[m.node].role != Role::bridge)
-                sent_.emplace_back(*this, transmit_, receive_, m);  // a bridge sends the participant's
-            else if (!is_own && arguments_.wants(m)) by_id_[m.id] = &received_.emplace_back(*this, receive_, m);
+            if (is_own && t.nodes[m.node].role != Role::bridge) {
+                sent_.emplace_back(*this, transmit_, receive_,
+                                   m);  // a bridge sends the participant's
+            } else if (!is_own && arguments_.wants(m)) {
+                by_id_[m.id] = &received_.emplace_back(*this, receive_, m);
+            }
         }
     }
 
     void start() {
-        if (!arguments_.loaded) throw std::runtime_error("missing table: write link=sim:NAME config=FILE.scocan node=NAME");
+        if (!arguments_.loaded) {
+            throw std::runtime_error(
+                "missing table: write link=sim:NAME config=FILE.scocan node=NAME");
+        }
         faults_ = hal::extension<hal_faults>("hal.faults/1");
         const can::Description bus = can::describe(arguments_.link.get());
-        can::Options           options{.own_frames = true, .stamps = bus.has_stamps};
-        if (bus.in_memory && bus.has_bit_rate) options.bit_rate = arguments_.table.bit_rate;
-        if (bus.in_memory) options.receive_capacity = Station::receive_capacity;
+        can::Options options{.own_frames = true, .stamps = bus.has_stamps};
+        if (bus.in_memory && bus.has_bit_rate) {
+            options.bit_rate = arguments_.table.bit_rate;
+        }
+        if (bus.in_memory) {
+            options.receive_capacity = Station::receive_capacity;
+        }
         auto opened = can::open(arguments_.link.get(), options);
         if (!opened) throw std::runtime_error(opened.problem);
         const can::Description& d = opened.link->description();
-        if (d.bit_rate != 0 && d.bit_rate != arguments_.table.bit_rate)
-            throw std::runtime_error(arguments_.link.get() + " runs at " + std::to_string(d.bit_rate) + " bit/s, the table is for " +
-                                     std::to_string(arguments_.table.bit_rate) + "; correct one of them");
-        if ((arguments_.ppm != 0.0 || arguments_.tick_ns != 0) && !d.in_memory)
-            throw std::runtime_error("ppm= and tick_ns= are for simulated nodes; " + arguments_.link.get() + " has clocks of its own");
+        if (d.bit_rate != 0 && d.bit_rate != arguments_.table.bit_rate) {
+            throw std::runtime_error(arguments_.link.get() + " runs at " +
+                                     std::to_string(d.bit_rate) + " bit/s, the table is for " +
+                                     std::to_string(arguments_.table.bit_rate) +
+                                     "; correct one of them");
+        }
+        if ((arguments_.ppm != 0.0 || arguments_.tick_ns != 0) && !d.in_memory) {
+            throw std::runtime_error("ppm= and tick_ns= are for simulated nodes; " +
+                                     arguments_.link.get() + " has clocks of its own");
+        }
         exchange_ = can::offer_slots(arguments_.node.get(), d);
-        if (!exchange_) throw std::runtime_error("node " + arguments_.node.get() + " is in this process already; load each node once");
+        if (!exchange_) {
+            throw std::runtime_error("node " + arguments_.node.get() +
+                                     " is in this process already; load each node once");
+        }
         try {
-            if (arguments_.follow != 0) clock_.claim();
+            if (arguments_.follow != 0) {
+                clock_.claim();
+            }
         } catch (...) {
             can::withdraw_slots(*exchange_);
             throw;
@@ -71,16 +93,26 @@ public:
         discipline_.lose();
         followed_ = 0;
         raised_.fill(std::numeric_limits<Time>::min());
-        for (auto& m : sent_) m.begin();
-        for (auto& m : received_) m.begin();
+        for (auto& m : sent_) {
+            m.begin();
+        }
+        for (auto& m : received_) {
+            m.begin();
+        }
         reporter_->start();
     }
 
     void stop() noexcept {
-        if (exchange_) can::withdraw_slots(*exchange_);
+        if (exchange_) {
+            can::withdraw_slots(*exchange_);
+        }
         exchange_.reset();
-        if (station_) station_->detach();
-        if (reporter_) reporter_->stop();
+        if (station_) {
+            station_->detach();
+        }
+        if (reporter_) {
+            reporter_->stop();
+        }
         link_.reset();
     }
 
@@ -92,11 +124,19 @@ public:
             recover();
         }
         was_reset_ = pins_.reset;
-        if (interrupted_.exchange(false, std::memory_order_acquire)) restart();
+        if (interrupted_.exchange(false, std::memory_order_acquire)) {
+            restart();
+        }
         station_->receive(now_);
-        exchange_->state.store(station_->state() == State::running ? can::State::active : can::State::down, std::memory_order_relaxed);
-        for (auto& m : received_) m.show(now_);
-        if (arguments_.follow != 0) follow(cycle.period_ns());
+        exchange_->state.store(
+            station_->state() == State::running ? can::State::active : can::State::down,
+            std::memory_order_relaxed);
+        for (auto& m : received_) {
+            m.show(now_);
+        }
+        if (arguments_.follow != 0) {
+            follow(cycle.period_ns());
+        }
         pins_.show(*station_);
         received();
     }
@@ -104,12 +144,18 @@ public:
     void transmit(hal::Cycle cycle) noexcept {
         if (!link_) return;
         now_ = cycle.start_ns();
-        for (auto& m : sent_) m.transmit(*station_, now_);
+        for (auto& m : sent_) {
+            m.transmit(*station_, now_);
+        }
         exchange_->each([this](can::SlotUser& user) {
             while (const can::SlotFrame* next = user.outgoing.front()) {
                 const can::Sent result = station_->send(next->frame, false, next->slot);
-                if (result == can::Sent::full) break;  // waits for the next cycle
-                if (result != can::Sent::queued) user.rejected.fetch_add(1, std::memory_order_relaxed);
+                if (result == can::Sent::full) {
+                    break;  // waits for the next cycle
+                }
+                if (result != can::Sent::queued) {
+                    user.rejected.fetch_add(1, std::memory_order_relaxed);
+                }
                 user.outgoing.drop();
             }
         });
@@ -125,29 +171,44 @@ protected:
     virtual void passed(const can::Frame&) noexcept {}  ///< a frame of another node. [realtime]
 
     void on_frame(const can::Frame& frame, Time begin) noexcept override {
-        if (ReceivedMessage* const m = by_id_[frame.id % identifiers]) m->arrived(frame, begin);
+        if (ReceivedMessage* const m = by_id_[frame.id % identifiers]) {
+            m->arrived(frame, begin);
+        }
         exchange_->each([&](can::SlotUser& user) {
-            if (frame.id < request_id || frame.id > answer_id + arguments_.table.nodes.size())
-                if (!user.incoming.push(frame)) user.lost.fetch_add(1, std::memory_order_relaxed);
+            if (frame.id < request_id || frame.id > answer_id + arguments_.table.nodes.size()) {
+                if (!user.incoming.push(frame)) {
+                    user.lost.fetch_add(1, std::memory_order_relaxed);
+                }
+            }
         });
         passed(frame);
     }
     void on_sent(const can::Frame& frame, Time) noexcept override {
-        for (auto& m : sent_)
-            if (m.id() == frame.id) m.sent();
+        for (auto& m : sent_) {
+            if (m.id() == frame.id) {
+                m.sent();
+            }
+        }
     }
     void on_event(Event e, std::uint32_t who, std::uint32_t id, Time value) noexcept override {
         reporter_->tell({e, who, id, value});
-        if (e == Event::running || e == Event::table_agrees || e == Event::bus_on || e == Event::monitor_found) recover();
+        if (e == Event::running || e == Event::table_agrees || e == Event::bus_on ||
+            e == Event::monitor_found) {
+            recover();
+        }
         const char* text = faults_text_->of(e, id);
         if (text == nullptr) return;
         pins_.fault = true;
         Time& last = raised_[static_cast<std::size_t>(e)];
-        if (last != std::numeric_limits<Time>::min() && now_ - last < 1'000'000'000 && fault_.lasts())
+        if (last != std::numeric_limits<Time>::min() && now_ - last < 1'000'000'000 &&
+            fault_.lasts()) {
             return;  // one a second of each kind
+        }
         last = now_;
         const bool counts = std::strstr(text, "{}") != nullptr;
-        fault_.begin(faults_, this, text, counts ? static_cast<double>(value) : std::numeric_limits<double>::quiet_NaN());
+        fault_.begin(
+            faults_, this, text,
+            counts ? static_cast<double>(value) : std::numeric_limits<double>::quiet_NaN());
     }
 
     /// The fault is over. [realtime]
@@ -160,7 +221,9 @@ protected:
     void restart() noexcept {
         station_->restart(now_);
         exchange_->each([](can::SlotUser& user) {
-            while (user.outgoing.front() != nullptr) user.outgoing.drop();
+            while (user.outgoing.front() != nullptr) {
+                user.outgoing.drop();
+            }
         });
         discipline_.lose();
     }
@@ -168,40 +231,49 @@ protected:
     /// Synchronises the threads of this process: their cycles begin with slots. [realtime]
     void follow(Time period) noexcept {
         const std::uint64_t syncs = station_->count().syncs;
-        if (station_->state() == State::silent || station_->state() == State::listening) return discipline_.lose();
+        if (station_->state() == State::silent || station_->state() == State::listening) {
+            return discipline_.lose();
+        }
         if (syncs == followed_ || !station_->clock().known() || station_->leading()) return;
         followed_ = syncs;
         Time error = (station_->slot_start(0) - now_) % period;
-        if (error > period / 2) error -= period;
-        if (error < -period / 2) error += period;
+        if (error > period / 2) {
+            error -= period;
+        }
+        if (error < -period / 2) {
+            error += period;
+        }
         clock_.step(discipline_.follow(error, arguments_.table.cycle, clock_.limit_ns()));
     }
 
     const std::string name_;
-    TableArguments    arguments_{*this};
-    hal::Function     receive_{*this, "receive", &StationComponent::receive, "receives frames and follows the SYNC; first in the thread"};
-    hal::Function transmit_{*this, "transmit", &StationComponent::transmit, "sends in the slots until the next cycle; last in the thread"};
+    TableArguments arguments_{*this};
+    hal::Function receive_{*this, "receive", &StationComponent::receive,
+                           "receives frames and follows the SYNC; first in the thread"};
+    hal::Function transmit_{*this, "transmit", &StationComponent::transmit,
+                            "sends in the slots until the next cycle; last in the thread"};
     hal::Emergency interruption_{*this, &StationComponent::interrupt,
                                  "when the thread runs again, the node listens before it sends"};
-    StationPins   pins_{*this, receive_};
-    std::deque<SentMessage>                  sent_;
-    std::deque<ReceivedMessage>              received_;
-    std::vector<ReceivedMessage*>            by_id_ = std::vector<ReceivedMessage*>(identifiers, nullptr);
-    std::optional<EventWords>                words_;
-    std::optional<FaultWords>                faults_text_;
-    std::unique_ptr<Station>                 station_;
+    StationPins pins_{*this, receive_};
+    std::deque<SentMessage> sent_;
+    std::deque<ReceivedMessage> received_;
+    std::vector<ReceivedMessage*> by_id_ = std::vector<ReceivedMessage*>(identifiers, nullptr);
+    std::optional<EventWords> words_;
+    std::optional<FaultWords> faults_text_;
+    std::unique_ptr<Station> station_;
     std::unique_ptr<hal::Reporter<Happened>> reporter_;  // behind the words that its thread uses
-    std::shared_ptr<can::SlotExchange>       exchange_;
-    std::unique_ptr<can::Link>               link_;
-    hal::DisciplinedClock                    clock_;
-    hal::Discipline                          discipline_;
-    const hal_faults*                        faults_ = nullptr;
-    hal::LastingFault                        fault_;
-    std::array<Time, 32>                     raised_{};
-    std::uint64_t                            followed_ = 0;
-    Time                                     now_ = 0;
-    bool                                     was_reset_ = false;
-    std::atomic<bool>                        interrupted_{false};  // set by interrupt(), taken by receive()
+    std::shared_ptr<can::SlotExchange> exchange_;
+    std::unique_ptr<can::Link> link_;
+    hal::DisciplinedClock clock_;
+    hal::Discipline discipline_;
+    const hal_faults* faults_ = nullptr;
+    hal::LastingFault fault_;
+    std::array<Time, 32> raised_{};
+    std::uint64_t followed_ = 0;
+    Time now_ = 0;
+    bool was_reset_ = false;
+    // set by interrupt(), taken by receive()
+    std::atomic<bool> interrupted_{false};
 };
 
 }  // namespace hal::scocan

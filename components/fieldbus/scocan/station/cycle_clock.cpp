@@ -7,22 +7,27 @@
 namespace hal::scocan {
 
 namespace {
-constexpr double        a = 0.3, b = 0.03;
-constexpr double        largest_drift = 1e-3;  // 1000 ppm: no crystal
+constexpr double a = 0.3;
+constexpr double b = 0.03;
+constexpr double largest_drift = 1e-3;  // 1000 ppm: no crystal
 constexpr std::uint32_t settling = 8;   // SYNCs until deviations are known
 
-Time rounded(double ns) noexcept { return static_cast<Time>(ns < 0 ? ns - 0.5 : ns + 0.5); }  // llround is a call
+// llround is a call
+Time rounded(double ns) noexcept { return static_cast<Time>(ns < 0 ? ns - 0.5 : ns + 0.5); }
 }  // namespace
 
 void CycleClock::clear() noexcept {
-    period_ = nominal_, p_ = error_ = square_ = 0;
+    period_ = nominal_;
+    p_ = error_ = square_ = 0;
     taken_ = lost_ = rejected_ = 0;
     seen_ = false;
 }
 
 void CycleClock::lead(Time begin) noexcept {
     clear();
-    epoch_ = begin, taken_ = 2, seen_ = true;
+    epoch_ = begin;
+    taken_ = 2;
+    seen_ = true;
     ++cycle_;
 }
 
@@ -35,7 +40,9 @@ void CycleClock::advance(std::uint32_t cycles) noexcept {
 CycleClock::Taken CycleClock::take(Time stamp) noexcept {
     const auto begin = [&] {
         clear();
-        epoch_ = stamp, taken_ = 1, seen_ = true;
+        epoch_ = stamp;
+        taken_ = 1;
+        seen_ = true;
         ++cycle_;
         return Taken::first;
     };
@@ -52,7 +59,10 @@ CycleClock::Taken CycleClock::take(Time stamp) noexcept {
         }
         period_ = d / n;
         cycle_ += static_cast<std::uint64_t>(n);
-        p_ += d, taken_ = 2, lost_ = 0, seen_ = true;
+        p_ += d;
+        taken_ = 2;
+        lost_ = 0;
+        seen_ = true;
         return Taken::good;
     }
     const double e = d - n * period_;
@@ -63,12 +73,14 @@ CycleClock::Taken CycleClock::take(Time stamp) noexcept {
         if (++rejected_ <= most_rejected) return Taken::rejected;
         const double kept = period_;
         begin();
-        period_ = kept, taken_ = 2;
+        period_ = kept;
+        taken_ = 2;
         return Taken::jumped;
     }
     advance(static_cast<std::uint32_t>(n));
     p_ += a * e;
-    period_ = std::clamp(period_ + b * e / std::max(n, 1.0), nominal_ * (1 - largest_drift), nominal_ * (1 + largest_drift));
+    period_ = std::clamp(period_ + b * e / std::max(n, 1.0), nominal_ * (1 - largest_drift),
+                         nominal_ * (1 + largest_drift));
     error_ = e;
     square_ = taken_ == 2 ? e * e : square_ + (e * e - square_) / 16;
     ++taken_;
@@ -79,8 +91,11 @@ CycleClock::Taken CycleClock::take(Time stamp) noexcept {
 
 void CycleClock::own(Time stamp) noexcept {
     const auto n = std::llround((static_cast<double>(stamp - epoch_) - p_) / period_);
-    if (n > 0) advance(static_cast<std::uint32_t>(n));
-    seen_ = true, lost_ = rejected_ = 0;
+    if (n > 0) {
+        advance(static_cast<std::uint32_t>(n));
+    }
+    seen_ = true;
+    lost_ = rejected_ = 0;
 }
 
 std::uint32_t CycleClock::pass(Time now, Time wait) noexcept {

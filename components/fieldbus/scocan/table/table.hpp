@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The table of a bus with time slots: one text file, `NAME.scocan`, that all nodes have. Its CRC is that of a normalised form, so that
-// comments and blanks do not matter. Reading is [setup]; the functions marked [realtime] only look up.
+// The table of a bus with time slots: one text file, `NAME.scocan`, that all nodes have. Its CRC is
+// that of a normalised form, so that comments and blanks do not matter. Reading is [setup]; the
+// functions marked [realtime] only look up.
 #pragma once
 
 #include <algorithm>
@@ -20,17 +21,25 @@ using text::Span;
 
 /// Subject of a message: its diagnostic code, with a page each (`hal explain`).
 enum class Topic : std::uint8_t {
-    line,   ///< an invalid line or key
+    line,  ///< an invalid line or key
     value,  ///< an invalid value
     slots,  ///< a table that cannot work
 };
 const char* code_of(Topic);  ///< "scocan-line", …: the diagnostic's code
 
-inline constexpr std::uint32_t sync_id = 0, announce_id = 1, request_id = 0x780, answer_id = 0x781;
+inline constexpr std::uint32_t sync_id = 0;
+inline constexpr std::uint32_t announce_id = 1;
+inline constexpr std::uint32_t request_id = 0x780;
+inline constexpr std::uint32_t answer_id = 0x781;
 inline constexpr std::uint32_t identifiers = 0x800;
-/// Returns whether the discipline itself uses the identifier: 0x000..0x00F, 0x780..0x7FF. [realtime]
-constexpr bool               is_reserved(std::uint32_t id) noexcept { return id < 0x10 || id >= request_id; }
-inline constexpr std::size_t most_nodes = 126, most_slots = 256, most_modes = 16, counter_cycles = 64;
+/// Returns whether the discipline itself uses the identifier: 0x000..0x00F, 0x780..0x7FF.
+/// [realtime]
+constexpr bool is_reserved(std::uint32_t id) noexcept { return id < 0x10 || id >= request_id; }
+inline constexpr std::size_t most_nodes = 126;
+inline constexpr std::size_t most_slots = 256;
+inline constexpr std::size_t most_modes = 16;
+
+inline constexpr std::size_t counter_cycles = 64;
 /// An error flag with its delimiter: bits that the bus is busy after a disturbed frame.
 inline constexpr std::uint32_t error_bits = 20;
 /// Longest SYNC: DLC 2 with all stuff bits and the intermission.
@@ -40,12 +49,13 @@ enum class Role : std::uint8_t { node, sync, backup, monitor, bridge };
 const char* to_string(Role);
 
 struct Node {
-    std::string   name;
-    bool          senses = true;    ///< type A: detects an idle slot itself; type B waits for the announcement
-    Role          role = Role::node;
+    std::string name;
+    /// type A: detects an idle slot itself; type B waits for the announcement
+    bool senses = true;
+    Role role = Role::node;
     std::uint32_t backup = 0;  ///< of a backup: 1, 2 …
-    Span          at{};
-    friend bool   operator==(const Node&, const Node&) = default;
+    Span at{};
+    friend bool operator==(const Node&, const Node&) = default;
 };
 
 enum class Kind : std::uint8_t { shared, priv, sync };
@@ -53,104 +63,120 @@ const char* to_string(Kind);
 
 /// What a slot is used for, in every cycle or in some.
 struct Use {
-    Kind                       kind = Kind::shared;
-    std::size_t                node = 0;                ///< of a private slot
-    std::vector<std::uint32_t> ids{};    ///< of a private slot; none: any identifier
-    std::uint32_t              every = 1, offset = 0; ///< used in the cycles with counter % every == offset
-    Span                       at{};
-    bool                       active(std::uint32_t counter) const noexcept { return counter % every == offset; }
+    Kind kind = Kind::shared;
+    std::size_t node = 0;  ///< of a private slot
+    std::vector<std::uint32_t> ids{};  ///< of a private slot; none: any identifier
+    /// used in the cycles with counter % every == offset
+    std::uint32_t every = 1;
+    std::uint32_t offset = 0;
+    Span at{};
+    bool active(std::uint32_t counter) const noexcept { return counter % every == offset; }
     /// Returns whether a frame with this identifier belongs into the private slot. [realtime]
     bool carries(std::uint32_t id) const noexcept {
-        return kind == Kind::priv && (ids.empty() || std::find(ids.begin(), ids.end(), id) != ids.end());
+        return kind == Kind::priv &&
+               (ids.empty() || std::find(ids.begin(), ids.end(), id) != ids.end());
     }
     friend bool operator==(const Use&, const Use&) = default;
 };
 
 struct Mode {
-    std::string                   name;
-    std::uint32_t                 number = 0;
+    std::string name;
+    std::uint32_t number = 0;
     std::vector<std::vector<Use>> slots{};  ///< by slot; none: shared
-    Span                          at{};
-    friend bool                   operator==(const Mode&, const Mode&) = default;
+    Span at{};
+    friend bool operator==(const Mode&, const Mode&) = default;
 };
 
 /// Part of a message's data, little endian.
 enum class FieldType : std::uint8_t { u8, s8, u16, s16, u32, s32, f32, f64 };
 struct Field {
-    std::string   name;
-    FieldType     type = FieldType::u8;
+    std::string name;
+    FieldType type = FieldType::u8;
     std::uint32_t at = 0;  ///< first byte
-    friend bool   operator==(const Field&, const Field&) = default;
+    friend bool operator==(const Field&, const Field&) = default;
 };
 std::uint32_t size_of(FieldType) noexcept;
-const char*   to_string(FieldType);
+const char* to_string(FieldType);
 
 /// A message of the application.
 struct Message {
-    std::string        name;
-    std::uint32_t      id = 0;
-    std::uint32_t      bytes = 0;
-    std::size_t        node = 0;   ///< its sender
-    Time               period = 0;        ///< of a cyclic message, or the shortest interval of an event; 0: as often as its slot
-    bool               event = false;
-    Time               deadline = 0;      ///< 0: the period
-    Time               jitter = 0;        ///< queueing jitter
+    std::string name;
+    std::uint32_t id = 0;
+    std::uint32_t bytes = 0;
+    std::size_t node = 0;  ///< its sender
+    /// of a cyclic message, or the shortest interval of an event; 0: as often as its slot
+    Time period = 0;
+    bool event = false;
+    Time deadline = 0;  ///< 0: the period
+    Time jitter = 0;  ///< queueing jitter
     std::vector<Field> fields{};
-    Span               at{};
-    friend bool        operator==(const Message&, const Message&) = default;
+    Span at{};
+    friend bool operator==(const Message&, const Message&) = default;
 };
 
 struct Table {
-    std::uint32_t        bit_rate = 1'000'000;
-    Time                 cycle = 10'000'000;
-    std::uint32_t        slots = 20;
-    Time                 guard = 0;        ///< gap between two slots, for the clock errors of two nodes
-    Time                 idle = 0;         ///< T_idle: a private slot without a frame by then is recycled
-    std::uint32_t        lost = 10;  ///< SYNCs lost until a node stops sending in private slots
-    std::vector<Node>    nodes;
-    std::vector<Mode>    modes;
+    std::uint32_t bit_rate = 1'000'000;
+    Time cycle = 10'000'000;
+    std::uint32_t slots = 20;
+    /// gap between two slots, for the clock errors of two nodes
+    Time guard = 0;
+    /// T_idle: a private slot without a frame by then is recycled
+    Time idle = 0;
+    std::uint32_t lost = 10;  ///< SYNCs lost until a node stops sending in private slots
+    std::vector<Node> nodes;
+    std::vector<Mode> modes;
     std::vector<Message> messages;
-    std::uint16_t        crc = 0;
+    std::uint16_t crc = 0;
 
     friend bool operator==(const Table&, const Table&) = default;
 
     Time slot() const noexcept { return cycle / slots; }
-    Time bits(std::uint32_t count) const noexcept;  ///< time of that many bits, rounded up. [realtime]
+    /// time of that many bits, rounded up. [realtime]
+    Time bits(std::uint32_t count) const noexcept;
     /// Time of the longest frame with that many bytes, with the intermission. [realtime]
     Time frame(std::uint32_t bytes) const noexcept;
     /// Latest start of the owner's frame behind the begin of its slot. [realtime]
     Time enabled() const noexcept { return idle - guard - bits(2); }
     /// Latest start of a frame in a slot, behind the slot's begin. [realtime]
-    Time last_start(std::uint32_t bytes) const noexcept { return slot() - frame(bytes) - bits(error_bits) - guard; }
+    Time last_start(std::uint32_t bytes) const noexcept {
+        return slot() - frame(bytes) - bits(error_bits) - guard;
+    }
     /// Offset of the SYNC of backup k; 0: of the primary. [realtime]
-    Time sync_offset(std::uint32_t backup) const noexcept { return backup * (bits(sync_bits + error_bits) + guard); }
-    /// Guard time that is required `age` after the last SYNC, with clocks that agree within 4 ppm. [realtime]
+    Time sync_offset(std::uint32_t backup) const noexcept {
+        return backup * (bits(sync_bits + error_bits) + guard);
+    }
+    /// Guard time that is required `age` after the last SYNC, with clocks that agree within 4 ppm.
+    /// [realtime]
     Time required_guard(Time age) const noexcept { return bits(3) + 300 + age * 4 / 1'000'000; }
 
     /// Returns the use of a slot in a cycle; nullptr: shared. [realtime]
     const Use* use(std::uint32_t mode, std::uint32_t slot, std::uint32_t counter) const noexcept;
-    /// Returns whether the identifier is assigned to a private slot of the mode, and its use. [realtime]
-    const Use*  owner(std::uint32_t mode, std::uint32_t id) const noexcept;
-    bool        has_mode(std::uint32_t mode) const noexcept { return mode < most_modes && index_[mode] >= 0; }
+    /// Returns whether the identifier is assigned to a private slot of the mode, and its use.
+    /// [realtime]
+    const Use* owner(std::uint32_t mode, std::uint32_t id) const noexcept;
+    bool has_mode(std::uint32_t mode) const noexcept {
+        return mode < most_modes && index_[mode] >= 0;
+    }
     const Mode* mode(std::uint32_t number) const noexcept {
         return has_mode(number) ? &modes[static_cast<std::size_t>(index_[number])] : nullptr;
     }
-    const Message*             message(std::uint32_t id) const noexcept;
+    const Message* message(std::uint32_t id) const noexcept;
     std::optional<std::size_t> find(std::string_view node) const;
-    std::size_t                backups() const noexcept;
-    void                       index();  ///< [setup] after a change of `modes`
+    std::size_t backups() const noexcept;
+    void index();  ///< [setup] after a change of `modes`
 
 private:
     std::array<int, most_modes> index_{};
-    std::vector<std::uint16_t>  owner_slots_;  ///< by mode and identifier: the first private slot that carries it; no_owner: none
+    /// by mode and identifier: the first private slot that carries it; no_owner: none
+    std::vector<std::uint16_t> owner_slots_;
 };
 
 using Report = text::Message<Topic>;
 
 struct Reading {
-    Table               table;
+    Table table;
     std::vector<Report> messages;  ///< in order of place
-    bool                good() const { return text::good(messages); }
+    bool good() const { return text::good(messages); }
 };
 
 /// Reads and checks a table.

@@ -5,14 +5,20 @@ namespace hal::scocan {
 
 namespace {
 
-bool is_plain(const can::Frame& f, std::uint32_t id) noexcept { return f.id == id && !f.extended && !f.remote && !f.fd && !f.error; }
+bool is_plain(const can::Frame& f, std::uint32_t id) noexcept {
+    return f.id == id && !f.extended && !f.remote && !f.fd && !f.error;
+}
 std::uint8_t low(std::uint32_t value) noexcept { return static_cast<std::uint8_t>(value & 0xff); }
 
 }  // namespace
 
 can::Frame encode(const Sync& s) noexcept {
-    if (!s.numbered) return {sync_id, {}};
-    return {sync_id, {low(s.counter), low((s.mode & 15U) | (s.sender & 7U) << 4 | (s.pending ? 0x80U : 0U))}};
+    if (!s.numbered) {
+        return {sync_id, {}};
+    }
+    return {
+        sync_id,
+        {low(s.counter), low((s.mode & 15U) | (s.sender & 7U) << 4 | (s.pending ? 0x80U : 0U))}};
 }
 
 bool decode(const can::Frame& f, Sync& s) noexcept {
@@ -20,8 +26,11 @@ bool decode(const can::Frame& f, Sync& s) noexcept {
     s = {};
     if (f.length == 0) return true;
     if (f.data[0] >= counter_cycles) return false;
-    s.numbered = true, s.counter = f.data[0];
-    s.mode = f.data[1] & 15U, s.sender = f.data[1] >> 4 & 7U, s.pending = (f.data[1] & 0x80U) != 0;
+    s.numbered = true;
+    s.counter = f.data[0];
+    s.mode = f.data[1] & 15U;
+    s.sender = f.data[1] >> 4 & 7U;
+    s.pending = (f.data[1] & 0x80U) != 0;
     return true;
 }
 
@@ -35,24 +44,33 @@ bool decode_announcement(const can::Frame& f, std::uint32_t& slot) noexcept {
 
 can::Frame encode(const Request& r) noexcept {
     return {request_id,
-            {low(static_cast<std::uint32_t>(r.what)), r.mode, low(r.crc), low(static_cast<std::uint32_t>(r.crc) >> 8), r.at_counter}};
+            {low(static_cast<std::uint32_t>(r.what)), r.mode, low(r.crc),
+             low(static_cast<std::uint32_t>(r.crc) >> 8), r.at_counter}};
 }
 
 bool decode(const can::Frame& f, Request& r) noexcept {
-    if (!is_plain(f, request_id) || f.length != 5 || f.data[0] > 4 || f.data[4] >= counter_cycles) return false;
+    if (!is_plain(f, request_id) || f.length != 5 || f.data[0] > 4 || f.data[4] >= counter_cycles) {
+        return false;
+    }
     if (f.data[1] >= (f.data[0] >= 3 ? most_nodes : most_modes)) return false;
-    r = {static_cast<Request::What>(f.data[0]), f.data[1], static_cast<std::uint16_t>(f.data[2] | f.data[3] << 8), f.data[4]};
+    r = {static_cast<Request::What>(f.data[0]), f.data[1],
+         static_cast<std::uint16_t>(f.data[2] | f.data[3] << 8), f.data[4]};
     return true;
 }
 
 can::Frame encode(const Answer& a) noexcept {
     return {answer_id + a.node,
-            {low(static_cast<std::uint32_t>(a.reason)), a.mode, low(a.crc), low(static_cast<std::uint32_t>(a.crc) >> 8)}};
+            {low(static_cast<std::uint32_t>(a.reason)), a.mode, low(a.crc),
+             low(static_cast<std::uint32_t>(a.crc) >> 8)}};
 }
 
 bool decode(const can::Frame& f, Answer& a) noexcept {
-    if (f.id < answer_id || f.id > 0x7ff || !is_plain(f, f.id) || f.length != 4 || f.data[0] > 1 || f.data[1] >= most_modes) return false;
-    a = {f.id - answer_id, f.data[1], static_cast<Answer::Reason>(f.data[0]), static_cast<std::uint16_t>(f.data[2] | f.data[3] << 8)};
+    if (f.id < answer_id || f.id > 0x7ff || !is_plain(f, f.id) || f.length != 4 || f.data[0] > 1 ||
+        f.data[1] >= most_modes) {
+        return false;
+    }
+    a = {f.id - answer_id, f.data[1], static_cast<Answer::Reason>(f.data[0]),
+         static_cast<std::uint16_t>(f.data[2] | f.data[3] << 8)};
     return true;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The frames of the discipline itself: SYNC, the announcement of an idle slot, and the configuration messages.
-// Source: facts can-timing.md 1.2; the paper names the identifiers 0 and 1 only.
+// The frames of the discipline itself: SYNC, the announcement of an idle slot, and the
+// configuration messages. Source: facts can-timing.md 1.2; the paper names the identifiers 0 and 1
+// only.
 #pragma once
 
 #include <cstdint>
@@ -12,11 +13,12 @@ namespace hal::scocan {
 
 /// SYNC, identifier 0: begins a cycle.
 struct Sync {
-    bool         numbered = false;     ///< false: DLC 0, from a simple sender: counter and mode are unknown
+    /// false: DLC 0, from a simple sender: counter and mode are unknown
+    bool numbered = false;
     std::uint8_t counter = 0;  ///< of the cycle, modulo 64
     std::uint8_t mode = 0;     ///< 0..15
     std::uint8_t sender = 0;   ///< 0: the primary; 1..7: backup
-    bool         pending = false;      ///< a mode change takes place at the announced counter
+    bool pending = false;      ///< a mode change takes place at the announced counter
 };
 can::Frame encode(const Sync&) noexcept;
 /// Returns false for a frame that is not a valid SYNC. [realtime]
@@ -27,26 +29,30 @@ can::Frame announcement(std::uint32_t slot) noexcept;
 /// Returns false for a frame that is not a valid announcement. [realtime]
 bool decode_announcement(const can::Frame&, std::uint32_t& slot) noexcept;
 
-/// Configuration, identifier 0x780: from the SYNC sender to all nodes, or from the monitor to one (silence, resume).
+/// Configuration, identifier 0x780: from the SYNC sender to all nodes, or from the monitor to one
+/// (silence, resume).
 struct Request {
     enum class What : std::uint8_t { table = 0, prepare = 1, cancel = 2, silence = 3, resume = 4 };
-    What          what = What::table;
-    std::uint8_t  mode = 0;       ///< silence, resume: the node
+    What what = What::table;
+    std::uint8_t mode = 0;       ///< silence, resume: the node
     std::uint16_t crc = 0;        ///< of the sender's table
-    std::uint8_t  at_counter = 0;  ///< prepare: cycle of the switch
+    std::uint8_t at_counter = 0;  ///< prepare: cycle of the switch
 };
 can::Frame encode(const Request&) noexcept;
-bool       decode(const can::Frame&, Request&) noexcept;  ///< Returns false for an invalid frame. [realtime]
+/// Returns false for an invalid frame. [realtime]
+bool decode(const can::Frame&, Request&) noexcept;
 
 /// Answer, identifier 0x781 + node.
 struct Answer {
-    enum class Reason : std::uint8_t { ready = 0, unknown_mode = 1, offline = 2 };  ///< offline: no answer
+    /// offline: no answer
+    enum class Reason : std::uint8_t { ready = 0, unknown_mode = 1, offline = 2 };
     std::uint32_t node = 0;
-    std::uint8_t  mode = 0;
-    Reason        reason = Reason::ready;
+    std::uint8_t mode = 0;
+    Reason reason = Reason::ready;
     std::uint16_t crc = 0;  ///< of this node's table
 };
 can::Frame encode(const Answer&) noexcept;
-bool       decode(const can::Frame&, Answer&) noexcept;  ///< Returns false for an invalid frame. [realtime]
+/// Returns false for an invalid frame. [realtime]
+bool decode(const can::Frame&, Answer&) noexcept;
 
 }  // namespace hal::scocan

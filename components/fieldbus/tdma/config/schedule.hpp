@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The schedule of a segment as read from its configuration file: the blocks of RTnet's tdma.conf and some more keys. Everything is [setup].
+// The schedule of a segment as read from its configuration file: the blocks of RTnet's tdma.conf
+// and some more keys. Everything is [setup].
 #pragma once
 
 #include <array>
@@ -31,42 +32,48 @@ using Ip = std::array<std::uint8_t, 4>;
 
 struct SlotEntry {
     SlotSetup setup;
-    bool      sized = false;  ///< its size is in the file; else it extends to the next frame on the segment
-    Span     at;
+    /// its size is in the file; else it extends to the next frame on the segment
+    bool sized = false;
+    Span at;
 };
 
 struct StationEntry {
-    Role                   role = Role::slave;
-    std::string            name;  ///< given, or master, backup-1, slave-1 …
-    std::optional<Ip>      ip;
+    Role role = Role::slave;
+    std::string name;  ///< given, or master, backup-1, slave-1 …
+    std::optional<Ip> ip;
     std::optional<Address> mac;
     std::vector<SlotEntry> slots;
-    Time                   backup_offset = 0;
-    Time                   phase = -1, lead = -1;  ///< -1: not given
-    std::string            stage_2;  ///< file that RTcfg sends to it in stage 2
-    Span                  at;       ///< of the block's first line
-    Span                  backup_at{};
+    Time backup_offset = 0;
+    Time phase = -1;
+    Time lead = -1;  ///< -1: not given
+    std::string stage_2;  ///< file that RTcfg sends to it in stage 2
+    Span at;       ///< of the block's first line
+    Span backup_at{};
 };
 
 struct Schedule {
-    Time                      cycle = 0;
-    std::uint32_t             speed = 100;        ///< Mbit/s
-    Time                      guard = 10'000;     ///< minimum gap between two frames, for the jitter of both
-    Time                      forward = 2'000;    ///< delay of the switch; 0: no switch
-    std::uint32_t             lost = 4;           ///< cycles without a sync until outputs go to their safe values
-    std::uint32_t             rounds = 100;
-    std::uint16_t             heartbeat_ms = 1000;///< of RTcfg
+    Time cycle = 0;
+    std::uint32_t speed = 100;        ///< Mbit/s
+    /// minimum gap between two frames, for the jitter of both
+    Time guard = 10'000;
+    Time forward = 2'000;    ///< delay of the switch; 0: no switch
+    /// cycles without a sync until outputs go to their safe values
+    std::uint32_t lost = 4;
+    std::uint32_t rounds = 100;
+    std::uint16_t heartbeat_ms = 1000;///< of RTcfg
     std::vector<StationEntry> stations;           ///< as in the file
 
-    Time wire(std::size_t length) const;  ///< time that a frame (length without check sequence) occupies the line
-    Time path(std::size_t length) const;  ///< time from sending to reception: two lines and the switch
+    /// time that a frame (length without check sequence) occupies the line
+    Time wire(std::size_t length) const;
+    /// time from sending to reception: two lines and the switch
+    Time path(std::size_t length) const;
     const StationEntry* master() const;
 };
 
 struct Reading {
-    Schedule             schedule;
+    Schedule schedule;
     std::vector<Message> messages;  ///< in order of place
-    bool                 good() const;
+    bool good() const;
 };
 
 /// Reads and checks a schedule.
@@ -81,7 +88,8 @@ std::optional<std::size_t> find(const Schedule&, std::string_view which);
 /// Lists the names of all stations: "master, x, y".
 std::string names(const Schedule&);
 
-/// Returns the part of a file that one station needs, complete in itself: the payload of RTcfg stage 1.
+/// Returns the part of a file that one station needs, complete in itself: the payload of RTcfg
+/// stage 1.
 std::string block_of(const Schedule&, std::size_t index);
 
 /// Reads a whole file. Returns false and sets `bytes` to the reason.

@@ -13,17 +13,21 @@ namespace hal::tdma {
 class Reporter {
 public:
     /// The schedule outlives it; `known_as` as of EventWords. [setup]
-    Reporter(const std::string& instance, const config::Schedule& schedule, std::string known_as = {})
+    Reporter(const std::string& instance, const config::Schedule& schedule,
+             std::string known_as = {})
         : words_(schedule, "setp " + instance + ".reset TRUE", std::move(known_as)),
-          reported_(instance, [this](const Happened& h) { return words_(h); }, 256, [](const Happened& h, const std::string&) { return subject(h); }) {}
+          reported_(instance, [this](const Happened& h) { return words_(h); }, 256,
+                    [](const Happened& h, const std::string&) { return subject(h); }) {}
 
-    void start() { reported_.start(); }         // [setup]
+    void start() { reported_.start(); }  // [setup]
     void stop() noexcept { reported_.stop(); }  // [setup]
     /// By the cycle. [realtime]
-    void event(Event event, const Address& who, Time value) noexcept { reported_.tell({event, who, value}); }
+    void event(Event event, const Address& who, Time value) noexcept {
+        reported_.tell({event, who, value});
+    }
 
 private:
-    const EventWords        words_;
+    const EventWords words_;
     hal::Reporter<Happened> reported_;  // the last: its thread uses the words
 };
 

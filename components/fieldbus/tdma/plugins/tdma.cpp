@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 
+#include "discipline/discipline.hpp"
 #include "fieldbus/tdma/config/schedule.hpp"
 #include "fieldbus/tdma/config/schedule_plan.hpp"
 #include "fieldbus/tdma/config/segment_reporter.hpp"
@@ -19,18 +20,18 @@
 #include "fieldbus/tdma/tunnel/tap.hpp"
 #include "hal/background.hpp"
 #include "hal/component.hpp"
-#include "hal/lasting_fault.hpp"
 #include "hal/discipline.hpp"
+#include "hal/lasting_fault.hpp"
 #include "hal/naming.hpp"
 #include "hal/texts.hpp"
-#include "discipline/discipline.hpp"
 
 namespace {
 
 using namespace hal::tdma;
 namespace ethernet = hal::ethernet;
 
-/// The first instance of the process disciplines its threads' clock; the others, if there are any, share these threads.
+/// The first instance of the process disciplines its threads' clock; the others, if there are any,
+/// share these threads.
 std::atomic<const void*> leading_instance{nullptr};  // written in start and stop
 
 class Tdma : public hal::Component, private Events {
@@ -40,18 +41,24 @@ public:
         station_ = std::make_unique<Station>(arguments_.setup, static_cast<Events*>(this));
         own_words_ = std::make_unique<FaultWords>(arguments_.setup);
         join_rtcfg();
-        waiting_.emplace(*this, transmit_, "slot-#.waiting", static_cast<std::int64_t>(arguments_.setup.slots.size()),
+        waiting_.emplace(*this, transmit_, "slot-#.waiting",
+                         static_cast<std::int64_t>(arguments_.setup.slots.size()),
                          "frames queued for this slot of the schedule");
-        if (arguments_.entry)
-            for (const config::StationEntry& other : arguments_.schedule.stations)
-                if (other.name != arguments_.entry->name) others_.emplace_back(*this, receive_, other);
+        if (arguments_.entry) {
+            for (const config::StationEntry& other : arguments_.schedule.stations) {
+                if (other.name != arguments_.entry->name) {
+                    others_.emplace_back(*this, receive_, other);
+                }
+            }
+        }
         if (arguments_.setup.asks_master) {  // a station without a schedule knows no other
             config::StationEntry master;
             master.name = "master";
             others_.emplace_back(*this, receive_, master);
         }
         const auto& ip = arguments_.own_ip;
-        reporter_ = std::make_unique<Reporter>(name_, arguments_.schedule, ip ? config::to_string(*ip) : std::string());
+        reporter_ = std::make_unique<Reporter>(name_, arguments_.schedule,
+                                               ip ? config::to_string(*ip) : std::string());
     }
 
     void start() {
@@ -61,58 +68,91 @@ public:
         const ethernet::Description line = ethernet::describe(arguments_.link.get());
         options.pacer = line.paced;
         const auto wanted = arguments_.entry ? arguments_.entry->mac : arguments_.own_mac;
-        if (wanted && line.in_memory) options.address = *wanted;
+        if (wanted && line.in_memory) {
+            options.address = *wanted;
+        }
         auto opened = ethernet::open(arguments_.link.get(), options);
         if (!opened) throw std::runtime_error(opened.problem);
-        if (arguments_.own_mac && opened.port->address() != *arguments_.own_mac)
-            throw std::runtime_error(arguments_.link.get() + " has the address " + ethernet::to_string(opened.port->address()) +
-                                     ", not that of station=" + arguments_.station.get() + "; write station=auto");
-        if (arguments_.entry && arguments_.entry->mac && opened.port->address() != *arguments_.entry->mac)
-            throw std::runtime_error(arguments_.link.get() + " has the address " + ethernet::to_string(opened.port->address()) +
+        if (arguments_.own_mac && opened.port->address() != *arguments_.own_mac) {
+            throw std::runtime_error(arguments_.link.get() + " has the address " +
+                                     ethernet::to_string(opened.port->address()) +
+                                     ", not that of station=" + arguments_.station.get() +
+                                     "; write station=auto");
+        }
+        if (arguments_.entry && arguments_.entry->mac &&
+            opened.port->address() != *arguments_.entry->mac) {
+            throw std::runtime_error(arguments_.link.get() + " has the address " +
+                                     ethernet::to_string(opened.port->address()) +
                                      ", the configuration gives " + arguments_.entry->name + " " +
-                                     ethernet::to_string(*arguments_.entry->mac) + "; correct the line 'mac' of its block");
+                                     ethernet::to_string(*arguments_.entry->mac) +
+                                     "; correct the line 'mac' of its block");
+        }
         OpenedTap tap = open_tunnel(*opened.port);
-        if (!ethernet::offer_discipline(*opened.port, station_.get(), delivery_times()))
+        if (!ethernet::offer_discipline(*opened.port, station_.get(), delivery_times())) {
             throw std::runtime_error(opened.port->description().address +
-                                     " already has a station of this process; give this one its own port, for example sim:NAME/STATION");
+                                     " already has a station of this process; give this one its "
+                                     "own port, for example sim:NAME/STATION");
+        }
         const void* none = nullptr;
         leads_ = leading_instance.compare_exchange_strong(none, this);
         try {
-            if (leads_) clock_.claim();
+            if (leads_) {
+                clock_.claim();
+            }
         } catch (...) {
             ethernet::withdraw_discipline(station_.get());
-            if (leads_) leading_instance.store(nullptr);
+            if (leads_) {
+                leading_instance.store(nullptr);
+            }
             throw;
         }
         port_ = std::move(opened.port);
         tap_ = std::move(tap.tap);
         const std::string& remark = port_->description().remark;
-        if (!remark.empty()) hal::MessageLog(name_).print(remark);
+        if (!remark.empty()) {
+            hal::MessageLog(name_).print(remark);
+        }
         discipline_.lose();
-        period_reported_ = was_reset_ = false, had_carrier_ = true;
+        period_reported_ = was_reset_ = false;
+        had_carrier_ = true;
         words_ = own_words_.get();
-        if (service_) service_->begin();
-        if (applicant_) applicant_->begin(), background_->start();
+        if (service_) {
+            service_->begin();
+        }
+        if (applicant_) {
+            applicant_->begin();
+            background_->start();
+        }
         reporter_->start();
         station_->accompany(companion(), tunnel_.get());
         station_->attach(*port_);
-        if (applicant_) reporter_->event(Event::unconfigured, port_->address(), 0);
+        if (applicant_) {
+            reporter_->event(Event::unconfigured, port_->address(), 0);
+        }
     }
 
     void stop() noexcept {
         ethernet::withdraw_discipline(station_.get());
         station_->detach();
-        if (leads_) leading_instance.store(nullptr);
+        if (leads_) {
+            leading_instance.store(nullptr);
+        }
         leads_ = false;
-        if (background_) background_->stop();
-        if (applicant_) applicant_->finish();  // writes what was received so far
+        if (background_) {
+            background_->stop();
+        }
+        if (applicant_) {
+            applicant_->finish();  // writes what was received so far
+        }
         reporter_->stop();
         tap_.reset();
         port_.reset();
     }
 
     void receive(hal::Cycle cycle) noexcept {
-        if (applicant_ && applicant_->cycle()) use_schedule(*applicant_->accepted());
+        if (applicant_ && applicant_->cycle()) {
+            use_schedule(*applicant_->accepted());
+        }
         const bool fits = is_cycle(cycle);
         if (!fits && !period_reported_) {
             period_reported_ = true;
@@ -121,13 +161,19 @@ public:
         }
         const bool interrupted = interrupted_.exchange(false, std::memory_order_acquire);
         if (fits) {
-            if (interrupted) station_->restart();
+            if (interrupted) {
+                station_->restart();
+            }
             if (pins_.reset && !was_reset_) {
                 station_->reset();
-                if (had_carrier_) recover();
+                if (had_carrier_) {
+                    recover();
+                }
             }
             was_reset_ = pins_.reset;
-            for (std::size_t n = 0; n < others_.size(); ++n) others_[n].ask(*station_, n);
+            for (std::size_t n = 0; n < others_.size(); ++n) {
+                others_[n].ask(*station_, n);
+            }
             station_->receive(cycle.start_ns());
             follow(cycle.period_ns());
         }
@@ -135,9 +181,13 @@ public:
     }
 
     void transmit(hal::Cycle cycle) noexcept {
-        if (is_cycle(cycle)) station_->transmit(cycle.start_ns());
-        for (std::size_t i = 0; i < waiting_->size(); ++i)
-            (*waiting_)[i] = static_cast<std::uint32_t>(station_->waiting(arguments_.setup.slots[i].id));
+        if (is_cycle(cycle)) {
+            station_->transmit(cycle.start_ns());
+        }
+        for (std::size_t i = 0; i < waiting_->size(); ++i) {
+            (*waiting_)[i] =
+                static_cast<std::uint32_t>(station_->waiting(arguments_.setup.slots[i].id));
+        }
     }
 
     void interrupt(hal::Cycle) noexcept { interrupted_.store(true, std::memory_order_release); }
@@ -146,42 +196,63 @@ private:
     /// Returns the latency of values that pass through this station's slots. [setup]
     ethernet::SlotTimes delivery_times() const {
         ethernet::SlotTimes times;
-        const auto          which = arguments_.entry ? config::find(arguments_.schedule, arguments_.entry->name) : std::nullopt;
+        const auto which = arguments_.entry
+                               ? config::find(arguments_.schedule, arguments_.entry->name)
+                               : std::nullopt;
         if (!which) return times;
-        for (std::size_t n = 0; n < arguments_.entry->slots.size(); ++n)
-            for (const plan::Way& w : plan::ways_of(arguments_.schedule, *which, n))
+        for (std::size_t n = 0; n < arguments_.entry->slots.size(); ++n) {
+            for (const plan::Way& w : plan::ways_of(arguments_.schedule, *which, n)) {
                 times[arguments_.entry->slots[n].setup.id].push_back(
-                    {arguments_.schedule.stations[w.other].name, w.there, w.back, w.there_cycles, w.back_cycles, w.round_trip});
+                    {arguments_.schedule.stations[w.other].name, w.there, w.back, w.there_cycles,
+                     w.back_cycles, w.round_trip});
+            }
+        }
         return times;
     }
 
     /// Uses a schedule received by RTcfg. [realtime]
     void use_schedule(const rtcfg::Accepted& accepted) noexcept {
-        words_ = &accepted.words, period_reported_ = false;
-        if (tap_) tap_->scheduled(accepted.schedule.stations.front().ip, tunnel_mtu(accepted.setup));
+        words_ = &accepted.words;
+        period_reported_ = false;
+        if (tap_) {
+            tap_->scheduled(accepted.schedule.stations.front().ip, tunnel_mtu(accepted.setup));
+        }
     }
 
-    bool is_cycle(hal::Cycle cycle) const noexcept { return !station_->setup().configured || cycle.period_ns() == station_->setup().cycle; }
+    bool is_cycle(hal::Cycle cycle) const noexcept {
+        return !station_->setup().configured || cycle.period_ns() == station_->setup().cycle;
+    }
     Companion* companion() const noexcept {
-        return service_ ? static_cast<Companion*>(&service_->server()) : applicant_ ? &applicant_->client() : nullptr;
+        return service_     ? static_cast<Companion*>(&service_->server())
+               : applicant_ ? &applicant_->client()
+                            : nullptr;
     }
 
     static constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
 
-    /// Creates the RTcfg service of a master, or the applicant of a station without a schedule. [setup]
+    /// Creates the RTcfg service of a master, or the applicant of a station without a schedule.
+    /// [setup]
     void join_rtcfg() {
         if (!arguments_.setup.configured) {
             rtcfg::Logical own;
-            if (arguments_.own_ip) own = {true, *arguments_.own_ip};
-            applicant_ = std::make_unique<rtcfg::Applicant>(name_, *station_, own, arguments_.stage_2.get(), static_cast<Events&>(*this));
-            background_ = std::make_unique<hal::Background>([this](std::int64_t now, bool may_wait) {
+            if (arguments_.own_ip) {
+                own = {true, *arguments_.own_ip};
+            }
+            applicant_ = std::make_unique<rtcfg::Applicant>(
+                name_, *station_, own, arguments_.stage_2.get(), static_cast<Events&>(*this));
+            background_ =
+                std::make_unique<hal::Background>([this](std::int64_t now, bool may_wait) {
                 applicant_->work(now);
-                if (may_wait) std::this_thread::sleep_for(std::chrono::milliseconds(20));
+                if (may_wait) {
+                    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+                }
             });
         } else if (arguments_.entry && arguments_.entry->role != Role::slave) {
             const hal::Texts texts(*this);
             const auto own = config::find(arguments_.schedule, arguments_.entry->name).value();
-            const auto read = [&](const std::string& file, std::string& bytes) { return config::read_from_disk(texts.find(file), bytes); };
+            const auto read = [&](const std::string& file, std::string& bytes) {
+                return config::read_from_disk(texts.find(file), bytes);
+            };
             service_ = std::make_unique<rtcfg::Service>(*station_, arguments_.schedule, own, read,
                                                         static_cast<Events&>(*this));
         }
@@ -189,15 +260,23 @@ private:
 
     /// Creates the network interface for ordinary packets, if any. [setup]
     OpenedTap open_tunnel(const ethernet::Port& port) {
-        if (arguments_.tunnel.get().empty()) return {};
+        if (arguments_.tunnel.get().empty()) {
+            return {};
+        }
         tunnel_ = std::make_unique<Tunnel>(*station_);
         const auto ip = arguments_.entry ? arguments_.entry->ip : arguments_.own_ip;
-        OpenedTap opened =
-            open_tap(*tunnel_, {arguments_.tunnel.get(), port.address(), ip, parse_prefix(arguments_.netmask.get()).value_or(24)}, name_);
+        OpenedTap opened = open_tap(*tunnel_,
+                                    {arguments_.tunnel.get(), port.address(), ip,
+                                     parse_prefix(arguments_.netmask.get()).value_or(24)},
+                                    name_);
         if (!opened.tap) throw std::runtime_error("tunnel: " + opened.problem);
-        if (!arguments_.entry) return opened;  // reported once there is a schedule
-        hal::MessageLog(name_).print("tunnel open for ordinary packets: " + opened.tap->name() + ", MTU " + std::to_string(tunnel_->mtu()) +
-                                     (arguments_.entry->ip ? ", IP " + config::to_string(*arguments_.entry->ip) : ""));
+        if (!arguments_.entry) {
+            return opened;  // reported once there is a schedule
+        }
+        hal::MessageLog(name_).print(
+            "tunnel open for ordinary packets: " + opened.tap->name() + ", MTU " +
+            std::to_string(tunnel_->mtu()) +
+            (arguments_.entry->ip ? ", IP " + config::to_string(*arguments_.entry->ip) : ""));
         return opened;
     }
 
@@ -205,9 +284,12 @@ private:
     void follow(std::int64_t period) noexcept {
         const Status& s = station_->status();
         if (!leads_) return;
-        const bool synchronised = s.state != State::listening && s.state != State::withdrawn && s.state != State::unconfigured;
+        const bool synchronised = s.state != State::listening && s.state != State::withdrawn &&
+                                  s.state != State::unconfigured;
         if (!synchronised) {
-            if (was_synchronised_) discipline_.lose();
+            if (was_synchronised_) {
+                discipline_.lose();
+            }
         } else {
             clock_.step(discipline_.follow(s.error, period, clock_.limit_ns()));
         }
@@ -222,18 +304,30 @@ private:
             had_carrier_ = port.up;
             on_event(port.up ? Event::carrier : Event::no_carrier, {}, 0);
         }
-        pins_.foreign = s.count.foreign + (service_ ? service_->server().foreign() : applicant_ ? applicant_->foreign() : 0);
-        if (service_) pins_.stations = service_->server().ready(), pins_.stations_dead = service_->dead();
-        if (applicant_) pins_.stage_2_bytes = applicant_->file_bytes();
+        pins_.foreign = s.count.foreign + (service_     ? service_->server().foreign()
+                                           : applicant_ ? applicant_->foreign()
+                                                        : 0);
+        if (service_) {
+            pins_.stations = service_->server().ready();
+            pins_.stations_dead = service_->dead();
+        }
+        if (applicant_) {
+            pins_.stage_2_bytes = applicant_->file_bytes();
+        }
         const Time now = s.global - s.offset;
         const std::size_t known = station_->roster().size();
-        for (std::size_t n = 0; n < others_.size() && n < station_->pings().size(); ++n)
-            others_[n].show(n < known ? station_->roster()[n] : heard_of_master(s, now), station_->pings()[n], now, station_->setup().cycle);
+        for (std::size_t n = 0; n < others_.size() && n < station_->pings().size(); ++n) {
+            others_[n].show(n < known ? station_->roster()[n] : heard_of_master(s, now),
+                            station_->pings()[n], now, station_->setup().cycle);
+        }
     }
 
     /// Returns what a station without a schedule knows of the master, from its syncs. [realtime]
     const Heard& heard_of_master(const Status& s, Time now) noexcept {
-        if (heard_.alive != s.master_active) heard_.alive = s.master_active, heard_.since = now;
+        if (heard_.alive != s.master_active) {
+            heard_.alive = s.master_active;
+            heard_.since = now;
+        }
         heard_.frames = s.count.syncs;
         return heard_;
     }
@@ -251,14 +345,12 @@ private:
     // Events of the station. [realtime]
     void on_event(Event e, const Address& who, Time value) noexcept override {
         switch (e) {
-        case Event::sync_lost:
-            raise(words_->sync_lost, static_cast<double>(value) * 1e-9);
-            break;
-        case Event::other_master:
-            raise(words_->other_master, not_a_number);
-            break;
+        case Event::sync_lost: raise(words_->sync_lost, static_cast<double>(value) * 1e-9); break;
+        case Event::other_master: raise(words_->other_master, not_a_number); break;
         case Event::other_master_gone:
-            if (station_->ready()) recover();
+            if (station_->ready()) {
+                recover();
+            }
             break;
         case Event::master_there:
             withdrawn_ = true;
@@ -276,27 +368,29 @@ private:
             break;
         case Event::foreign_frame:
             pins_.fault = true;
-            for (const auto& [id, words] : words_->foreign)
-                if (static_cast<Time>(id) == value) raise(words, not_a_number);
+            for (const auto& [id, words] : words_->foreign) {
+                if (static_cast<Time>(id) == value) {
+                    raise(words, not_a_number);
+                }
+            }
             break;
         case Event::duplicate_slot:
             pins_.fault = true;
             raise(words_->duplicate_slot, not_a_number);
             break;
-        case Event::babbling:
-            raise(words_->babbling, static_cast<double>(value));
-            break;
-        case Event::uncalibrated:
-            raise(words_->uncalibrated, static_cast<double>(value));
-            break;
-        case Event::no_carrier:
-            raise(words_->no_carrier, not_a_number);
-            break;
+        case Event::babbling: raise(words_->babbling, static_cast<double>(value)); break;
+        case Event::uncalibrated: raise(words_->uncalibrated, static_cast<double>(value)); break;
+        case Event::no_carrier: raise(words_->no_carrier, not_a_number); break;
         case Event::carrier:
-            if (station_->ready()) recover();
+            if (station_->ready()) {
+                recover();
+            }
             break;
         case Event::running:
-            if (station_->status().count.losses + station_->status().count.unanswered == 0 && !withdrawn_) break;
+            if (station_->status().count.losses + station_->status().count.unanswered == 0 &&
+                !withdrawn_) {
+                break;
+            }
             withdrawn_ = false;
             recover();  // by itself
             break;
@@ -309,35 +403,43 @@ private:
     StationArguments arguments_{*this};
 
     hal::Function receive_{*this, "receive", &Tdma::receive,
-                           "receives frames and synchronises the clock; first in the thread, whose period is the cycle"};
+                           "receives frames and synchronises the clock; first in the thread, whose "
+                           "period is the cycle"};
     hal::Function transmit_{*this, "transmit", &Tdma::transmit,
-                            "sends the frames queued for the slots of this cycle, and the master's sync; last in the thread"};
+                            "sends the frames queued for the slots of this cycle, and the master's "
+                            "sync; last in the thread"};
 
     hal::Emergency interruption_{*this, &Tdma::interrupt,
                                  "when the thread runs again, the station listens before it sends"};
 
     StationPins pins_{*this, receive_};
 
-    std::deque<OtherPins>                   others_;  // in the order of the setup's `others`, then the master of a station without a schedule
-    Heard                                   heard_;   // of the master
+    // in the order of the setup's `others`, then the master of a station without a schedule
+    std::deque<OtherPins> others_;
+    Heard heard_;  // of the master
     std::optional<hal::Outs<std::uint32_t>> waiting_;
-    std::unique_ptr<FaultWords>             own_words_;
-    const FaultWords*                       words_ = nullptr;  // or those of the received schedule
-    std::unique_ptr<Station>                station_;
-    std::unique_ptr<rtcfg::Service>         service_;     // of the master
-    std::unique_ptr<rtcfg::Applicant>       applicant_;   // of a station without a schedule
-    std::unique_ptr<hal::Background>        background_;  // the applicant's helper
-    std::unique_ptr<Reporter>               reporter_;
-    std::unique_ptr<ethernet::Port>         port_;
-    std::unique_ptr<Tunnel>                 tunnel_;  // before tap_, which uses it
-    std::unique_ptr<Tap>                    tap_;
-    hal::DisciplinedClock                   clock_;
-    hal::Discipline                         discipline_;
-    const hal_faults*                       faults_ = nullptr;
-    hal::LastingFault                       fault_;
-    bool                                    leads_ = false, period_reported_ = false, was_reset_ = false;
-    bool                                    was_synchronised_ = false, withdrawn_ = false, had_carrier_ = true;
-    std::atomic<bool>                       interrupted_{false};  // set by interrupt(), taken by receive()
+    std::unique_ptr<FaultWords> own_words_;
+    const FaultWords* words_ = nullptr;  // or those of the received schedule
+    std::unique_ptr<Station> station_;
+    std::unique_ptr<rtcfg::Service> service_;  // of the master
+    std::unique_ptr<rtcfg::Applicant> applicant_;  // of a station without a schedule
+    std::unique_ptr<hal::Background> background_;  // the applicant's helper
+    std::unique_ptr<Reporter> reporter_;
+    std::unique_ptr<ethernet::Port> port_;
+    std::unique_ptr<Tunnel> tunnel_;  // before tap_, which uses it
+    std::unique_ptr<Tap> tap_;
+    hal::DisciplinedClock clock_;
+    hal::Discipline discipline_;
+    const hal_faults* faults_ = nullptr;
+    hal::LastingFault fault_;
+    bool leads_ = false;
+    bool period_reported_ = false;
+    bool was_reset_ = false;
+    bool was_synchronised_ = false;
+    bool withdrawn_ = false;
+    bool had_carrier_ = true;
+    // set by interrupt(), taken by receive()
+    std::atomic<bool> interrupted_{false};
 };
 
 }  // namespace

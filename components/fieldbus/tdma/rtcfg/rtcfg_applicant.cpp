@@ -10,8 +10,10 @@ namespace hal::tdma::rtcfg {
 
 namespace {
 
-constexpr std::size_t   most_accepted = 1000;  // against a server that never stops changing
-constexpr std::uint32_t most_rejections = 3, most_dead = 100;  // reported ones, against a hostile station
+constexpr std::size_t most_accepted = 1000;  // against a server that never stops changing
+// reported ones, against a hostile station
+constexpr std::uint32_t most_rejections = 3;
+constexpr std::uint32_t most_dead = 100;
 
 /// Returns the first error without control characters: the text is untrusted.
 std::string first_error(const config::Reading& reading) {
@@ -23,7 +25,8 @@ std::string first_error(const config::Reading& reading) {
 
 }  // namespace
 
-Applicant::Applicant(std::string instance, Station& station, Logical own, std::string file, Events& events)
+Applicant::Applicant(std::string instance, Station& station, Logical own, std::string file,
+                     Events& events)
     : path_(std::move(file)),
       station_(station),
       events_(events),
@@ -36,24 +39,30 @@ void Applicant::begin() noexcept {
     accepted_ = nullptr;
     offered_ = writing_ = server_reported_ = other_reported_ = false;
     file_bytes_ = dead_reported_ = rejections_ = 0;
-    Offer           offer;
+    Offer offer;
     const Accepted* answer = nullptr;
-    File            file;
-    std::uint32_t   bytes = 0;
-    while (offers_.pop(offer) || answers_.pop(answer) || files_.pop(file) || written_.pop(bytes)) {}
+    File file;
+    std::uint32_t bytes = 0;
+    while (offers_.pop(offer) || answers_.pop(answer) || files_.pop(file) || written_.pop(bytes)) {
+    }
 }
 
 void Applicant::on_stage_1(std::span<const std::uint8_t> text, const Address& server) noexcept {
     if (offered_ || text.size() > std::tuple_size_v<decltype(Offer::text)>) return;
     if (accepted_ != nullptr) {
         if (std::equal(text.begin(), text.end(), accepted_->text.begin(), accepted_->text.end())) {
-            client_.accept(server, accepted_->schedule.heartbeat_ms);  // the server restarted: announce this station again
+            // the server restarted: announce this station again
+            client_.accept(server, accepted_->schedule.heartbeat_ms);
             return;
         }
         const State state = station_.status().state;
-        if (state != State::unconfigured && state != State::listening) {  // slots in use do not move
+        // slots in use do not move
+        if (state != State::unconfigured && state != State::listening) {
             ++foreign_;
-            if (!other_reported_) other_reported_ = true, events_.on_event(Event::other_configuration, server, 0);
+            if (!other_reported_) {
+                other_reported_ = true;
+                events_.on_event(Event::other_configuration, server, 0);
+            }
             return;
         }
     }
@@ -64,22 +73,32 @@ void Applicant::on_stage_1(std::span<const std::uint8_t> text, const Address& se
     offered_ = offers_.push(offer);
 }
 
-void Applicant::on_stage_2(std::vector<std::uint8_t>& file, std::uint32_t length, const Address& server) noexcept {
+void Applicant::on_stage_2(std::vector<std::uint8_t>& file, std::uint32_t length,
+                           const Address& server) noexcept {
     if (writing_) return;
     std::swap(file, spare_);
     writing_ = files_.push({server, length});
 }
 
 void Applicant::on_dead_station(const Address& who) noexcept {
-    if (dead_reported_ < most_dead) ++dead_reported_, events_.on_event(Event::reported_dead, who, 0);
+    if (dead_reported_ < most_dead) {
+        ++dead_reported_;
+        events_.on_event(Event::reported_dead, who, 0);
+    }
 }
 
 void Applicant::on_other_server(const Address& who) noexcept {
-    if (!server_reported_) server_reported_ = true, events_.on_event(Event::other_server, who, 0);
+    if (!server_reported_) {
+        server_reported_ = true;
+        events_.on_event(Event::other_server, who, 0);
+    }
 }
 
 bool Applicant::cycle() noexcept {
-    if (std::uint32_t bytes = 0; written_.pop(bytes)) writing_ = false, file_bytes_ = bytes;
+    if (std::uint32_t bytes = 0; written_.pop(bytes)) {
+        writing_ = false;
+        file_bytes_ = bytes;
+    }
     const Accepted* answer = nullptr;
     if (!answers_.pop(answer)) return false;
     offered_ = false;
@@ -95,8 +114,12 @@ bool Applicant::cycle() noexcept {
 
 void Applicant::work(std::int64_t now_ns) {
     now_ns_ = now_ns;
-    for (Offer offer; offers_.pop(offer);) check(offer);
-    for (File file; files_.pop(file);) write(file);
+    for (Offer offer; offers_.pop(offer);) {
+        check(offer);
+    }
+    for (File file; files_.pop(file);) {
+        write(file);
+    }
     log_.flush(now_ns);
 }
 
@@ -107,41 +130,52 @@ void Applicant::check(const Offer& offer) {
         return;
     }
     const std::string server = ethernet::to_string(offer.server);
-    config::Reading   reading = config::read(text);
-    const bool        one = reading.good() && reading.schedule.stations.size() == 1 && !reading.schedule.stations[0].slots.empty();
+    config::Reading reading = config::read(text);
+    const bool one = reading.good() && reading.schedule.stations.size() == 1 &&
+                     !reading.schedule.stations[0].slots.empty();
     if (!one || all_.size() >= most_accepted) {
         rejected_ = text;
-        if (++rejections_ <= most_rejections)
+        if (++rejections_ <= most_rejections) {
             log("rejected the configuration from " + server + ": " +
-                (reading.good() ? one ? "it changed too often" : "it is not the block of one station with a slot" : first_error(reading)) +
-                "; waiting for another" + (rejections_ == most_rejections ? " (further rejections are not reported)" : ""));
+                (reading.good() ? one ? "it changed too often"
+                                      : "it is not the block of one station with a slot"
+                                : first_error(reading)) +
+                "; waiting for another" +
+                (rejections_ == most_rejections ? " (further rejections are not reported)" : ""));
+        }
         answers_.push(nullptr);
         return;
     }
     rejections_ = 0;
     StationSetup setup = config::setup_of(reading.schedule, 0);
-    const auto&  entry = reading.schedule.stations[0];
-    const auto   count = std::to_string(setup.slots.size()) + (setup.slots.size() == 1 ? " slot" : " slots");
-    log("configured by " + server + " as station " + entry.name + ": " + count + ", cycle " + config::microseconds(reading.schedule.cycle));
+    const auto& entry = reading.schedule.stations[0];
+    const auto count =
+        std::to_string(setup.slots.size()) + (setup.slots.size() == 1 ? " slot" : " slots");
+    log("configured by " + server + " as station " + entry.name + ": " + count + ", cycle " +
+        config::microseconds(reading.schedule.cycle));
     FaultWords words(setup);
-    all_.push_back(std::make_unique<Accepted>(
-        Accepted{offer.server, std::move(text), std::move(reading.schedule), std::move(setup), std::move(words)}));
+    all_.push_back(std::make_unique<Accepted>(Accepted{offer.server, std::move(text),
+                                                       std::move(reading.schedule),
+                                                       std::move(setup), std::move(words)}));
     answers_.push(all_.back().get());
 }
 
 /// Replaces the file atomically; a device or a pipe is written in place.
 void Applicant::write(const File& file) {
     const std::string server = ethernet::to_string(file.server);
-    std::uint32_t     written = 0;
+    std::uint32_t written = 0;
     if (file.length == 0) {
         log(server + " has no file (stage 2) for this station; '" + path_ + "' is unchanged");
     } else {
-        const std::string why = replace_file(path_, {reinterpret_cast<const char*>(spare_.data()), file.length});
+        const std::string why =
+            replace_file(path_, {reinterpret_cast<const char*>(spare_.data()), file.length});
         if (!why.empty()) {
-            log("cannot write the file from " + server + " to '" + path_ + "': " + why + "; correct stage2=");
+            log("cannot write the file from " + server + " to '" + path_ + "': " + why +
+                "; correct stage2=");
         } else {
             written = file.length;
-            log("received '" + path_ + "' from " + server + " (" + std::to_string(written) + " bytes)");
+            log("received '" + path_ + "' from " + server + " (" + std::to_string(written) +
+                " bytes)");
         }
     }
     written_.push(written);

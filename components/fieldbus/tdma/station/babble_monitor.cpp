@@ -9,18 +9,28 @@ void BabbleMonitor::heard(const Address& address, Time arrived, Time cycle) noex
     for (std::size_t i = 0; i < used_; ++i) {
         Peer& p = peers_[i];
         if (p.address != address) continue;
-        if (arrived - p.since >= cycle) p.since = arrived, p.frames = 0;
+        if (arrived - p.since >= cycle) {
+            p.since = arrived;
+            p.frames = 0;
+        }
         p.most = std::max(p.most, ++p.frames);
         return;
     }
-    if (used_ < peers_.size()) peers_[used_++] = {address, arrived, 1, 1};
+    if (used_ < peers_.size()) {
+        peers_[used_++] = {address, arrived, 1, 1};
+    }
 }
 
 const Address* BabbleMonitor::babbler(std::uint32_t limit, std::uint32_t& frames) noexcept {
     const Address* worst = nullptr;
     frames = limit;
-    for (std::size_t i = 0; i < used_; ++i)
-        if (peers_[i].most > frames) frames = peers_[i].most, found_ = peers_[i].address, worst = &found_;
+    for (std::size_t i = 0; i < used_; ++i) {
+        if (peers_[i].most > frames) {
+            frames = peers_[i].most;
+            found_ = peers_[i].address;
+            worst = &found_;
+        }
+    }
     used_ = 0;  // a forged address does not keep its entry
     return worst;
 }

@@ -9,81 +9,120 @@ namespace hal::tdma {
 namespace {
 
 constexpr double alpha_end = 0.05;
-constexpr double outlier_sigmas = 5.0, smallest_outlier_ns = 2'000.0;
-// Consecutive outliers after which the clock has jumped. Syncs may be delayed, on a busy computer for many cycles, but never arrive early.
-constexpr std::uint32_t most_early = 8, most_late = 100;
-constexpr double        largest_drift = 1e-3;  // 1000 ppm: no crystal
-constexpr double        long_ns = 1e9;         // time constant of the long average
-constexpr double        certain = 2e-6;        // uncertainty (sigma) of a drift that a master may use
-constexpr double        smallest_noise_ns = 100.0;
+constexpr double outlier_sigmas = 5.0;
+constexpr double smallest_outlier_ns = 2'000.0;
+// Consecutive outliers after which the clock has jumped. Syncs may be delayed, on a busy computer
+// for many cycles, but never arrive early.
+constexpr std::uint32_t most_early = 8;
+constexpr std::uint32_t most_late = 100;
+constexpr double largest_drift = 1e-3;  // 1000 ppm: no crystal
+constexpr double long_ns = 1e9;         // time constant of the long average
+// uncertainty (sigma) of a drift that a master may use
+constexpr double certain = 2e-6;
+constexpr double smallest_noise_ns = 100.0;
 constexpr std::uint32_t least_taken = 32;      // syncs for a certain drift
-constexpr double        decay_per_ns = 20e-6 / 1e9;
+constexpr double decay_per_ns = 20e-6 / 1e9;
 
-/// Gains of a least-squares line through n points, and not less than `alpha_least`, critically damped.
+/// Gains of a least-squares line through n points, and not less than `alpha_least`, critically
+/// damped.
 struct Gains {
     double alpha, beta;
     Gains(double n, double alpha_least) noexcept
         : alpha(std::min(1.0, std::max(alpha_least, 2.0 * (2.0 * n - 1.0) / (n * (n + 1.0))))),
-          beta(std::min(1.0, std::max(alpha_least * alpha_least / (2.0 - alpha_least), 6.0 / (n * (n + 1.0))))) {}
+          beta(std::min(1.0, std::max(alpha_least * alpha_least / (2.0 - alpha_least),
+                                      6.0 / (n * (n + 1.0))))) {}
 };
 
 }  // namespace
 
 void ClockEstimate::lead(Time local) noexcept {
     if (leading_) return;
-    if (is_certain()) held_ = long_drift_, holds_ = true;
+    if (is_certain()) {
+        held_ = long_drift_;
+        holds_ = true;
+    }
     const Time at_now = known() ? global(local) : local;
-    base_ = at_now - local, at_ = local, offset_ = long_offset_ = 0.0, drift_ = long_drift_ = holds_ ? held_ : 0.0, leading_ = true;
+    base_ = at_now - local;
+    at_ = local;
+    offset_ = long_offset_ = 0.0;
+
+    drift_ = long_drift_ = holds_ ? held_ : 0.0;
+    leading_ = true;
 }
 
 void ClockEstimate::decay(Time local) noexcept {
     if (!leading_) return;
     const auto dt = static_cast<double>(local - at_);
     if (dt <= 0.0) return;
-    offset_ += drift_ * dt, at_ = local;  // no step
+    offset_ += drift_ * dt;
+    at_ = local;  // no step
     const Time whole = std::llround(offset_);
-    base_ += whole, offset_ -= static_cast<double>(whole);
+    base_ += whole;
+    offset_ -= static_cast<double>(whole);
     const double by = decay_per_ns * dt;
     drift_ = drift_ > 0.0 ? std::max(0.0, drift_ - by) : std::min(0.0, drift_ + by);
-    if (holds_) held_ = drift_;
-    long_drift_ = drift_, long_offset_ = offset_;
+    if (holds_) {
+        held_ = drift_;
+    }
+    long_drift_ = drift_;
+    long_offset_ = offset_;
 }
 
 void ClockEstimate::another_master() noexcept {
-    if (is_certain()) held_ = long_drift_, holds_ = true;
+    if (is_certain()) {
+        held_ = long_drift_;
+        holds_ = true;
+    }
     long_taken_ = 0;
 }
 
-bool ClockEstimate::is_certain() const noexcept { return long_taken_ >= least_taken && uncertainty() <= certain; }
+bool ClockEstimate::is_certain() const noexcept {
+    return long_taken_ >= least_taken && uncertainty() <= certain;
+}
 
 double ClockEstimate::uncertainty() const noexcept {
     if (long_taken_ < 3 || interval_ <= 0.0) return largest_drift;
     // Of the slope of a line through n points; with the final gains n is what they remember.
-    const double n = std::min<double>(long_taken_, std::max(static_cast<double>(least_taken), 2.0 * long_ns / interval_));
+    const double n = std::min<double>(
+        long_taken_, std::max(static_cast<double>(least_taken), 2.0 * long_ns / interval_));
     return std::sqrt(12.0) * std::max(jitter(), smallest_noise_ns) / (interval_ * n * std::sqrt(n));
 }
 
-double ClockEstimate::drift() const noexcept { return leading_ ? drift_ : is_certain() ? long_drift_ : holds_ ? held_ : drift_; }
+double ClockEstimate::drift() const noexcept {
+    return leading_ ? drift_ : is_certain() ? long_drift_ : holds_ ? held_ : drift_;
+}
 
 /// Updates the long average.
 void ClockEstimate::take_long(double measured, double dt) noexcept {
     if (long_taken_ == 0) {
-        long_offset_ = measured, long_drift_ = 0.0, long_taken_ = 1;
+        long_offset_ = measured;
+        long_drift_ = 0.0;
+        long_taken_ = 1;
         return;
     }
     ++long_taken_;
-    const double predicted = long_offset_ + long_drift_ * dt, e = measured - predicted;
-    const Gains  gains(long_taken_, std::min(alpha_end, 2.0 * dt / long_ns));
+    const double predicted = long_offset_ + long_drift_ * dt;
+    const double e = measured - predicted;
+    const Gains gains(long_taken_, std::min(alpha_end, 2.0 * dt / long_ns));
     long_offset_ = predicted + gains.alpha * e;
     long_drift_ = std::clamp(long_drift_ + gains.beta * e / dt, -largest_drift, largest_drift);
-    if (is_certain()) held_ = long_drift_, holds_ = true;
+    if (is_certain()) {
+        held_ = long_drift_;
+        holds_ = true;
+    }
 }
 
 bool ClockEstimate::take(Time sent, Time arrived, Time delay) noexcept {
-    if (leading_) leading_ = false, long_taken_ = 0;
+    if (leading_) {
+        leading_ = false;
+        long_taken_ = 0;
+    }
     const Time measured = sent + delay - arrived;
     if (taken_ == 0) {
-        base_ = measured, at_ = arrived, offset_ = long_offset_ = 0.0, taken_ = long_taken_ = 1;
+        base_ = measured;
+        at_ = arrived;
+        offset_ = long_offset_ = 0.0;
+        taken_ = long_taken_ = 1;
         return true;
     }
     const auto dt = static_cast<double>(arrived - at_);
@@ -94,7 +133,8 @@ bool ClockEstimate::take(Time sent, Time arrived, Time delay) noexcept {
         const double limit = std::max(outlier_sigmas * std::sqrt(square_), smallest_outlier_ns);
         if (std::abs(e) > limit) {
             const bool early = e > 0.0;
-            outliers_ = early == early_ ? outliers_ + 1 : 1, early_ = early;
+            outliers_ = early == early_ ? outliers_ + 1 : 1;
+            early_ = early;
             if (outliers_ <= (early ? most_early : most_late)) return false;
             clear();
             return take(sent, arrived, delay);
@@ -106,12 +146,14 @@ bool ClockEstimate::take(Time sent, Time arrived, Time delay) noexcept {
     outliers_ = 0;
     ++taken_;
     const double n = taken_;
-    const Gains  gains(n, alpha_end);
+    const Gains gains(n, alpha_end);
     offset_ = predicted + gains.alpha * e;
     drift_ = std::clamp(drift_ + gains.beta * e / dt, -largest_drift, largest_drift);
     at_ = arrived;
     interval_ = interval_ == 0.0 ? dt : interval_ + (dt - interval_) * std::max(0.01, 1.0 / n);
-    if (taken_ > 4) square_ += (e * e - square_) * std::max(0.01, 1.0 / (n - 4.0));
+    if (taken_ > 4) {
+        square_ += (e * e - square_) * std::max(0.01, 1.0 / (n - 4.0));
+    }
     take_long(static_cast<double>(measured - base_), dt);
     return true;
 }
@@ -121,7 +163,8 @@ Time ClockEstimate::global(Time local) const noexcept {
 }
 
 Time ClockEstimate::local(Time global) const noexcept {
-    // The drift over the offset itself is below a nanosecond after one step: (1 + d)^-1 = 1 - d + d^2 …
+    // The drift over the offset itself is below a nanosecond after one step: (1 + d)^-1 = 1 - d +
+    // d^2 …
     const Time near = global - base_ - std::llround(offset_);
     const double grown = drift_ * static_cast<double>(near - at_);
     return near - std::llround(grown / (1.0 + drift_));

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The stations that follow this master's schedule: those that calibrated with it, and those whose frames it receives.
+// The stations that follow this master's schedule: those that calibrated with it, and those whose
+// frames it receives.
 #pragma once
 
 #include <algorithm>
@@ -17,10 +18,12 @@ public:
     void calibrated(const Address& who, Time now) noexcept { heard(who, now); }
     /// Notes any other frame. [realtime]
     void sent(const Address& who, Time now) noexcept {
-        if (Follower* f = heard(who, now)) f->sends = true;
+        if (Follower* f = heard(who, now)) {
+            f->sends = true;
+        }
     }
-    /// Returns true when there is a follower: a sending station heard within `timeout` (ns), or one that calibrated and never sends.
-    /// [realtime]
+    /// Returns true when there is a follower: a sending station heard within `timeout` (ns), or one
+    /// that calibrated and never sends. [realtime]
     bool any(Time now, Time timeout) const noexcept {
         return std::any_of(list_.begin(), list_.begin() + static_cast<std::ptrdiff_t>(used_),
                            [&](const Follower& f) { return !f.sends || now - f.heard <= timeout; });
@@ -31,16 +34,18 @@ public:
 private:
     struct Follower {
         Address who{};
-        Time    heard = 0;
-        bool    sends = false;
+        Time heard = 0;
+        bool sends = false;
     };
     /// Returns its entry; a new one replaces the least recently heard when the list is full.
     Follower* heard(const Address& who, Time now) noexcept {
         const auto end = list_.begin() + static_cast<std::ptrdiff_t>(used_);
-        auto       f = std::find_if(list_.begin(), end, [&](const Follower& x) { return x.who == who; });
+        auto f = std::find_if(list_.begin(), end, [&](const Follower& x) { return x.who == who; });
         if (f == end) {
             f = used_ < most ? list_.begin() + static_cast<std::ptrdiff_t>(used_++)
-                             : std::min_element(list_.begin(), list_.end(), [](const auto& a, const auto& b) { return a.heard < b.heard; });
+                             : std::min_element(
+                                   list_.begin(), list_.end(),
+                                   [](const auto& a, const auto& b) { return a.heard < b.heard; });
             *f = {who, now, false};
         }
         f->heard = now;
@@ -48,7 +53,7 @@ private:
     }
 
     std::array<Follower, most> list_{};
-    std::size_t                used_ = 0;
+    std::size_t used_ = 0;
 };
 
 }  // namespace hal::tdma

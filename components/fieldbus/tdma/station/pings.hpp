@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Pings between stations: reachability and round-trip time. Request and answer use the time that real-time frames leave in their senders'
-// slots. A station has at most one pending ping to each other station, and one pending answer for each.
+// Pings between stations: reachability and round-trip time. Request and answer use the time that
+// real-time frames leave in their senders' slots. A station has at most one pending ping to each
+// other station, and one pending answer for each.
 #pragma once
 
 #include <array>
@@ -16,7 +17,7 @@ enum class Outcome : std::uint8_t {
     answered,
     unanswered,   ///< sent, but no answer within the timeout
     no_room,      ///< not sent: no space in the slots of this station
-    no_address,   ///< not sent: no frame of the station received yet, and no `mac` in the schedule
+    no_address,  ///< not sent: no frame of the station received yet, and no `mac` in the schedule
     not_running,  ///< not sent: this station was not running
 };
 
@@ -25,21 +26,22 @@ public:
     static constexpr Time timeout = 1'000'000'000;  ///< ns, from ask() to the answer
 
     struct Asked {
-        std::uint32_t number = 0;   ///< of the last ping
-        std::uint32_t done = 0;     ///< of the last ping that ended
-        Outcome       outcome = Outcome::none;
-        Time          round_trip = 0;  ///< ns on this station's clock, from sending to reception
-        Time          held = 0;        ///< ns of it at the other station, on its clock
+        std::uint32_t number = 0;  ///< of the last ping
+        std::uint32_t done = 0;  ///< of the last ping that ended
+        Outcome outcome = Outcome::none;
+        Time round_trip = 0;  ///< ns on this station's clock, from sending to reception
+        Time held = 0;  ///< ns of it at the other station, on its clock
     };
     struct Owed {
-        Address       to{};
-        Time          ping_stamp = 0, received = 0;
+        Address to{};
+        Time ping_stamp = 0;
+        Time received = 0;
         std::uint32_t number = 0;
     };
 
     /// Allocates an entry per other station of the setup. [setup]
     explicit Pings(std::size_t others = 0) : list_(others) {}
-    std::size_t  size() const noexcept { return list_.size(); }
+    std::size_t size() const noexcept { return list_.size(); }
     const Asked& operator[](std::size_t n) const noexcept { return list_[n].asked; }
 
     /// Requests a ping to station `n`; cancels a pending one. [realtime]
@@ -47,9 +49,9 @@ public:
     /// Returns the next station whose ping is to be sent; size(): none. [realtime]
     std::size_t waiting() const noexcept;
     /// Notes that the ping was sent, no earlier than `not_before` (local ns). [realtime]
-    void        sent(std::size_t n, const Address& to, Time not_before) noexcept;
+    void sent(std::size_t n, const Address& to, Time not_before) noexcept;
     /// Ends the ping without an answer. [realtime]
-    void        fail(std::size_t n, Outcome why) noexcept { end(list_[n], why); }
+    void fail(std::size_t n, Outcome why) noexcept { end(list_[n], why); }
     /// Evaluates an answer. Returns true when it answers the pending ping. [realtime]
     bool take(std::size_t n, const Address& from, const Echo& echo, Time arrived) noexcept;
     /// Ends pings older than `timeout_ns`; called once a cycle. [realtime]
@@ -67,16 +69,21 @@ public:
 private:
     enum class Step : std::uint8_t { idle, wanted, sent };
     struct Entry {
-        Asked   asked;
-        Step    step = Step::idle;
+        Asked asked;
+        Step step = Step::idle;
         Address to{};
-        Time    began = 0, not_before = 0;  // local; began 0: in this cycle
+        Time began = 0;
+        Time not_before = 0;  // local; began 0: in this cycle
     };
-    static void end(Entry& e, Outcome how) noexcept { e.step = Step::idle, e.asked.done = e.asked.number, e.asked.outcome = how; }
+    static void end(Entry& e, Outcome how) noexcept {
+        e.step = Step::idle;
+        e.asked.done = e.asked.number;
+        e.asked.outcome = how;
+    }
 
-    std::vector<Entry>   list_;
+    std::vector<Entry> list_;
     std::array<Owed, 16> queue_{};
-    std::size_t          answers_ = 0;
+    std::size_t answers_ = 0;
 };
 
 }  // namespace hal::tdma

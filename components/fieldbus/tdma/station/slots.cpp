@@ -6,13 +6,18 @@
 namespace hal::tdma {
 
 Slot::Slot(const SlotSetup& setup, std::size_t queue)
-    : setup_(setup), count_(std::max<std::size_t>(queue, 1)), places_(std::make_unique<Place[]>(count_)) {}
+    : setup_(setup),
+      count_(std::max<std::size_t>(queue, 1)),
+      places_(std::make_unique<Place[]>(count_)) {}
 
-bool Slot::push(std::span<const std::uint8_t> frame, unsigned priority, ethernet::Finisher* finisher) noexcept {
-    if (frame.size() < ethernet::header_bytes || frame.size() > ethernet::header_bytes + setup_.size ||
+bool Slot::push(std::span<const std::uint8_t> frame, unsigned priority,
+                ethernet::Finisher* finisher) noexcept {
+    if (frame.size() < ethernet::header_bytes ||
+        frame.size() > ethernet::header_bytes + setup_.size ||
         frame.size() > ethernet::largest_frame || waiting_ == count_ ||
-        ahead_of(priority) + ethernet::wire_bytes(frame.size()) > turn_bytes())
+        ahead_of(priority) + ethernet::wire_bytes(frame.size()) > turn_bytes()) {
         return false;
+    }
     for (std::size_t i = 0; i < count_; ++i) {
         Place& place = places_[i];
         if (place.length != 0) continue;
@@ -29,8 +34,11 @@ bool Slot::push(std::span<const std::uint8_t> frame, unsigned priority, ethernet
 
 std::size_t Slot::ahead_of(unsigned priority) const noexcept {
     std::size_t bytes = 0;
-    for (std::size_t i = 0; waiting_ != 0 && i < count_; ++i)
-        if (const Place& p = places_[i]; p.length != 0 && p.priority <= priority) bytes += ethernet::wire_bytes(p.length);
+    for (std::size_t i = 0; waiting_ != 0 && i < count_; ++i) {
+        if (const Place& p = places_[i]; p.length != 0 && p.priority <= priority) {
+            bytes += ethernet::wire_bytes(p.length);
+        }
+    }
     return bytes;
 }
 
@@ -40,15 +48,17 @@ std::size_t Slot::most_urgent() const noexcept {
         const Place& p = places_[i];
         if (p.length == 0) continue;
         if (best == count_ || p.priority < places_[best].priority ||
-            (p.priority == places_[best].priority && p.order < places_[best].order))
+            (p.priority == places_[best].priority && p.order < places_[best].order)) {
             best = i;
+        }
     }
     return best;
 }
 
 std::span<const std::uint8_t> Slot::front() const noexcept {
     const std::size_t i = most_urgent();
-    return i == count_ ? std::span<const std::uint8_t>{} : std::span<const std::uint8_t>(places_[i].bytes.data(), places_[i].length);
+    return i == count_ ? std::span<const std::uint8_t>{}
+                       : std::span<const std::uint8_t>(places_[i].bytes.data(), places_[i].length);
 }
 
 ethernet::Finisher* Slot::finisher() const noexcept {
@@ -58,11 +68,16 @@ ethernet::Finisher* Slot::finisher() const noexcept {
 
 void Slot::pop() noexcept {
     const std::size_t i = most_urgent();
-    if (i != count_) places_[i].length = 0, --waiting_;
+    if (i != count_) {
+        places_[i].length = 0;
+        --waiting_;
+    }
 }
 
 void Slot::clear() noexcept {
-    for (std::size_t i = 0; i < count_; ++i) places_[i].length = 0;
+    for (std::size_t i = 0; i < count_; ++i) {
+        places_[i].length = 0;
+    }
     waiting_ = 0;
 }
 

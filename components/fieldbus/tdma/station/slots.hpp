@@ -20,20 +20,30 @@ public:
 
     const SlotSetup& setup() const noexcept { return setup_; }
     /// Changes the slot and empties its queue. [realtime]
-    void change(const SlotSetup& setup) noexcept { setup_ = setup, clear(); }
+    void change(const SlotSetup& setup) noexcept {
+        setup_ = setup;
+        clear();
+    }
     /// Returns true when the slot is used in this cycle.
-    bool used_in(std::uint32_t cycle) const noexcept { return setup_.id != unused_slot && cycle % setup_.period == setup_.phasing; }
+    bool used_in(std::uint32_t cycle) const noexcept {
+        return setup_.id != unused_slot && cycle % setup_.period == setup_.phasing;
+    }
     std::size_t room() const noexcept { return setup_.size; }  ///< bytes behind the Ethernet header
     /// Bytes on the line that all frames of one turn may take together.
-    std::size_t turn_bytes() const noexcept { return ethernet::wire_bytes(ethernet::header_bytes + setup_.size); }
+    std::size_t turn_bytes() const noexcept {
+        return ethernet::wire_bytes(ethernet::header_bytes + setup_.size);
+    }
 
-    /// Queues a copy of the frame. Returns false when it is too long, or when frames of at least its priority already fill the next turn: a
-    /// longer queue would delay everything by a cycle after each missed turn. [realtime]
-    bool push(std::span<const std::uint8_t> frame, unsigned priority, ethernet::Finisher* finisher = nullptr) noexcept;
-    /// Returns the oldest frame of the highest priority; empty: none. Valid until the next push(). [realtime]
+    /// Queues a copy of the frame. Returns false when it is too long, or when frames of at least
+    /// its priority already fill the next turn: a longer queue would delay everything by a cycle
+    /// after each missed turn. [realtime]
+    bool push(std::span<const std::uint8_t> frame, unsigned priority,
+              ethernet::Finisher* finisher = nullptr) noexcept;
+    /// Returns the oldest frame of the highest priority; empty: none. Valid until the next push().
+    /// [realtime]
     std::span<const std::uint8_t> front() const noexcept;
     ethernet::Finisher* finisher() const noexcept;  ///< of front(). [realtime]
-    void pop() noexcept;    ///< removes front(). [realtime]
+    void pop() noexcept;  ///< removes front(). [realtime]
     void clear() noexcept;  ///< empties the queue. [realtime]
     std::size_t waiting() const noexcept { return waiting_; }
 
@@ -48,9 +58,10 @@ private:
     std::size_t most_urgent() const noexcept;
     std::size_t ahead_of(unsigned priority) const noexcept;  // bytes on the line
 
-    SlotSetup                setup_;
-    std::size_t              count_ = 0, waiting_ = 0;
-    std::uint64_t            order_ = 0;
+    SlotSetup setup_;
+    std::size_t count_ = 0;
+    std::size_t waiting_ = 0;
+    std::uint64_t order_ = 0;
     std::unique_ptr<Place[]> places_;
 };
 

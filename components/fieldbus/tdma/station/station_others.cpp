@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Unexpected stations: a second master, an unknown master, frames outside the slots of their sender.
+// Unexpected stations: a second master, an unknown master, frames outside the slots of their
+// sender.
 #include <algorithm>
 #include <cstdlib>
 
@@ -10,9 +11,12 @@ namespace hal::tdma {
 /// Updates and returns what is known of the sender's schedule.
 const Station::Claimant& Station::claim(const Decoded& d) noexcept {
     const Sync& s = d.sync;
-    Claimant*   c = nullptr;
-    for (Claimant& known : claimants_)
-        if (known.row != 0 && known.who == d.from) c = &known;
+    Claimant* c = nullptr;
+    for (Claimant& known : claimants_) {
+        if (known.row != 0 && known.who == d.from) {
+            c = &known;
+        }
+    }
     if (c == nullptr) {
         c = &claimants_[next_claimant_++ % claimants_.size()];
         *c = {d.from, s.cycle, 1, s.scheduled, 0};
@@ -36,19 +40,29 @@ void Station::take_foreign_sync(const Decoded& d, Time now) noexcept {
     }
     if (claim(d).row < rows || is_master) return;
     const bool first = other_heard_ == 0;
-    other_ = d.from, other_heard_ = now;
-    if (first) established_ = followers_.any(now, gone_after);
+    other_ = d.from;
+    other_heard_ = now;
+    if (first) {
+        established_ = followers_.any(now, gone_after);
+    }
     if (foreign_gap_ == 0 || !other_reported_) {
-        foreign_gap_ = silence_after, other_reported_ = true;
+        foreign_gap_ = silence_after;
+        other_reported_ = true;
         report(Event::other_master, d.from);
     }
-    if (!status_.leading || established_) return;  // a schedule with followers is kept
+    if (!status_.leading || established_) {
+        return;  // a schedule with followers is kept
+    }
     const Time lateness = d.sync.stamp - d.sync.scheduled;
     if (setup_.role == Role::master && is_from_master(lateness)) {
-        if (d.from < address_) unfit_sync_ = now, withdraw(Event::withdrew, d.from);
+        if (d.from < address_) {
+            unfit_sync_ = now;
+            withdraw(Event::withdrew, d.from);
+        }
         return;
     }
-    // A backup yields to a master; a master that finds a backup's schedule listens and takes that over.
+    // A backup yields to a master; a master that finds a backup's schedule listens and takes that
+    // over.
     if (setup_.role == Role::master || is_from_master(lateness)) {
         report(Event::yielded, d.from);
         begin();
@@ -58,7 +72,10 @@ void Station::take_foreign_sync(const Decoded& d, Time now) noexcept {
 
 /// The addresses of the master and its backups in the schedule are an allow list.
 bool Station::is_allowed(const Address& master) noexcept {
-    if (setup_.masters.empty() || std::find(setup_.masters.begin(), setup_.masters.end(), master) != setup_.masters.end()) return true;
+    if (setup_.masters.empty() ||
+        std::find(setup_.masters.begin(), setup_.masters.end(), master) != setup_.masters.end()) {
+        return true;
+    }
     ++status_.count.foreign;
     if (unknown_gap_ == 0) {
         unknown_gap_ = silence_after;
@@ -67,15 +84,21 @@ bool Station::is_allowed(const Address& master) noexcept {
     return false;
 }
 
-/// A station that led and was cut off for this duration has lost its followers: when it meets another schedule, that one takes precedence.
+/// A station that led and was cut off for this duration has lost its followers: when it meets
+/// another schedule, that one takes precedence.
 void Station::check_carrier(Time now) noexcept {
     if (!port_->statistics().up) {
-        if (no_carrier_ == 0) no_carrier_ = now;
+        if (no_carrier_ == 0) {
+            no_carrier_ = now;
+        }
         return;
     }
-    const bool was_long = no_carrier_ != 0 && now - no_carrier_ >= static_cast<Time>(setup_.lost_limit) * setup_.cycle;
+    const bool was_long = no_carrier_ != 0 &&
+                          now - no_carrier_ >= static_cast<Time>(setup_.lost_limit) * setup_.cycle;
     no_carrier_ = 0;
-    if (was_long) followers_.clear();
+    if (was_long) {
+        followers_.clear();
+    }
 }
 
 void Station::withdraw(Event why, const Address& who) noexcept {
@@ -86,25 +109,34 @@ void Station::withdraw(Event why, const Address& who) noexcept {
 }
 
 /// With a schedule from RTcfg a station knows its own block only, and accepts all senders.
-ethernet::Discipline::Origin Station::origin(const Address& from, std::int64_t arrived, std::size_t length) const noexcept {
+ethernet::Discipline::Origin Station::origin(const Address& from, std::int64_t arrived,
+                                             std::size_t length) const noexcept {
     if (setup_.others.empty()) return Origin::plausible;
-    const bool named = std::any_of(setup_.others.begin(), setup_.others.end(), [&](const Other& o) { return o.mac == from; });
-    // A block without an address may belong to any station without a block; the sender of the syncs has a block of a master.
+    const bool named = std::any_of(setup_.others.begin(), setup_.others.end(),
+                                   [&](const Other& o) { return o.mac == from; });
+    // A block without an address may belong to any station without a block; the sender of the syncs
+    // has a block of a master.
     const auto may_be = [&](const Other& o) {
-        return named ? o.mac == from : o.mac == Address{} && (o.role != Role::slave || from != status_.master);
+        return named ? o.mac == from
+                     : o.mac == Address{} && (o.role != Role::slave || from != status_.master);
     };
-    if (std::none_of(setup_.others.begin(), setup_.others.end(), may_be)) return Origin::unknown_station;
+    if (std::none_of(setup_.others.begin(), setup_.others.end(), may_be)) {
+        return Origin::unknown_station;
+    }
     if (status_.state != State::running || !based_) return Origin::plausible;
     std::uint32_t cycle = 0;
-    const Time    at = left_at(arrived, length, cycle);
-    for (const Other& o : setup_.others)
+    const Time at = left_at(arrived, length, cycle);
+    for (const Other& o : setup_.others) {
         if (may_be(o) && is_in_slot(o, at, cycle)) return Origin::plausible;
+    }
     return Origin::out_of_slot;
 }
 
 /// Allows for the lateness of the sender, the path delay and the time stamp.
 bool Station::is_in_slot(const Other& o, Time at, std::uint32_t cycle) const noexcept {
-    const Time early = std::max<Time>(2'000, setup_.guard), late = setup_.guard + std::max<Time>(20'000, setup_.cycle / 20);
+    const Time early = std::max<Time>(2'000, setup_.guard);
+
+    const Time late = setup_.guard + std::max<Time>(20'000, setup_.cycle / 20);
     for (const SlotSetup& slot : o.slots) {
         const Time end = slot.offset + wire(ethernet::header_bytes + slot.size) + late;
         const auto used_in = [&](std::uint32_t c) { return c % slot.period == slot.phasing; };
@@ -115,48 +147,68 @@ bool Station::is_in_slot(const Other& o, Time at, std::uint32_t cycle) const noe
     return false;
 }
 
-/// Returns the index of the sender: by its address, or for blocks without one by earlier frames, its syncs, or its slot.
-std::size_t Station::other_of(const Address& from, Time arrived, std::size_t length) const noexcept {
+/// Returns the index of the sender: by its address, or for blocks without one by earlier frames,
+/// its syncs, or its slot.
+std::size_t Station::other_of(const Address& from, Time arrived,
+                              std::size_t length) const noexcept {
     const auto& others = setup_.others;
-    for (std::size_t n = 0; n < others.size(); ++n)
+    for (std::size_t n = 0; n < others.size(); ++n) {
         if (others[n].mac == from) return n;
-    for (std::size_t n = 0; n < others.size(); ++n)
+    }
+    for (std::size_t n = 0; n < others.size(); ++n) {
         if (others[n].mac == Address{} && roster_[n].from == from) return n;
+    }
     if (status_.state != State::running || !based_) return others.size();
     std::uint32_t cycle = 0;
-    const Time    at = left_at(arrived, length, cycle);
-    for (std::size_t n = 0; n < others.size(); ++n)
-        if (others[n].mac == Address{} && !roster_[n].alive && is_in_slot(others[n], at, cycle)) return n;
+    const Time at = left_at(arrived, length, cycle);
+    for (std::size_t n = 0; n < others.size(); ++n) {
+        if (others[n].mac == Address{} && !roster_[n].alive && is_in_slot(others[n], at, cycle)) {
+            return n;
+        }
+    }
     return others.size();
 }
 
 void Station::note(const Decoded& d, Time arrived, std::size_t length, Time now) noexcept {
-    const bool by_slot = d.kind != Kind::sync && d.kind != Kind::reply;  // a reply is in the requester's slot
+    // a reply is in the requester's slot
+    const bool by_slot = d.kind != Kind::sync && d.kind != Kind::reply;
     std::size_t n = other_of(d.from, arrived, length);
     if (d.kind == Kind::sync && n == setup_.others.size()) {  // a block without an address
-        const Role role = is_from_master(d.sync.stamp - d.sync.scheduled) ? Role::master : Role::backup;
-        for (std::size_t i = 0; i < setup_.others.size(); ++i)
-            if (const Other& o = setup_.others[i]; o.mac == Address{} && o.role == role && !roster_[i].alive) n = i;
+        const Role role =
+            is_from_master(d.sync.stamp - d.sync.scheduled) ? Role::master : Role::backup;
+        for (std::size_t i = 0; i < setup_.others.size(); ++i) {
+            if (const Other& o = setup_.others[i];
+                o.mac == Address{} && o.role == role && !roster_[i].alive) {
+                n = i;
+            }
+        }
     }
     if (n == setup_.others.size()) {
-        if (by_slot) check_duplicate(d.from, arrived, length);
+        if (by_slot) {
+            check_duplicate(d.from, arrived, length);
+        }
         return;
     }
     const bool knows = status_.state == State::running && based_ && by_slot;
     std::uint32_t cycle = 0;
-    const Time    at = left_at(arrived, length, cycle);
+    const Time at = left_at(arrived, length, cycle);
     roster_.frame(n, d.from, now, knows && !is_in_slot(setup_.others[n], at, cycle));
-    if (d.kind == Kind::request && status_.leading) roster_.stamp(n, d.request.stamp, clock_.global(arrived));
+    if (d.kind == Kind::request && status_.leading) {
+        roster_.stamp(n, d.request.stamp, clock_.global(arrived));
+    }
 }
 
-/// Detects a station that no block names in the slots of another one that sends, too: two stations were given the same block.
+/// Detects a station that no block names in the slots of another one that sends, too: two stations
+/// were given the same block.
 void Station::check_duplicate(const Address& from, Time arrived, std::size_t length) noexcept {
     if (status_.state != State::running || !based_) return;
     std::uint32_t cycle = 0;
-    const Time    at = left_at(arrived, length, cycle);
+    const Time at = left_at(arrived, length, cycle);
     for (std::size_t n = 0; n < setup_.others.size(); ++n) {
         const Heard& first = roster_[n];
-        if (!first.alive || first.from == from || !is_in_slot(setup_.others[n], at, cycle)) continue;
+        if (!first.alive || first.from == from || !is_in_slot(setup_.others[n], at, cycle)) {
+            continue;
+        }
         duplicate_row_ = from == duplicate_ ? duplicate_row_ + 1 : 1;
         duplicate_ = from;
         if (duplicate_row_ < rows || duplicate_gap_ != 0) return;
@@ -170,22 +222,28 @@ void Station::check_duplicate(const Address& from, Time arrived, std::size_t len
 void Station::take_echo(const Decoded& d, Time arrived) noexcept {
     for (std::size_t n = 0; n < pings_.size(); ++n) {
         if (!pings_.take(n, d.from, d.echo, arrived)) continue;
-        if (clock_.known()) roster_.stamp(n, d.echo.stamp, clock_.global(arrived));
+        if (clock_.known()) {
+            roster_.stamp(n, d.echo.stamp, clock_.global(arrived));
+        }
         return;
     }
     ++status_.count.foreign;
 }
 
 /// Detects frames of other stations in own slots; needs the path delay.
-void Station::check_slot(std::span<const std::uint8_t> frame, const Address& from, Time arrived) noexcept {
+void Station::check_slot(std::span<const std::uint8_t> frame, const Address& from,
+                         Time arrived) noexcept {
     if (status_.state != State::running || !status_.calibrated || own_schedule_) return;
-    const Time tolerance = std::max<Time>(2'000, setup_.guard / 2);  // frames of other slots are farther away
+    // frames of other slots are farther away
+    const Time tolerance = std::max<Time>(2'000, setup_.guard / 2);
     std::uint32_t cycle = 0;
-    const Time    at = left_at(arrived, frame.size(), cycle);
+    const Time at = left_at(arrived, frame.size(), cycle);
     for (const Slot& s : slots_) {
         const SlotSetup& slot = s.setup();
-        if (!s.used_in(cycle) || at < slot.offset - tolerance || at > slot.offset + wire(ethernet::header_bytes + slot.size) + tolerance)
+        if (!s.used_in(cycle) || at < slot.offset - tolerance ||
+            at > slot.offset + wire(ethernet::header_bytes + slot.size) + tolerance) {
             continue;
+        }
         ++status_.count.intruders;
         if (++intruder_row_ >= rows && intruder_gap_ == 0) {
             intruder_gap_ = silence_after;

@@ -16,13 +16,17 @@ public:
     bool good() const noexcept { return good_; }
     template <class T>
     T number() noexcept {
-        if (!has(sizeof(T))) return {};
+        if (!has(sizeof(T))) {
+            return {};
+        }
         const T value = get<T>(bytes_, 0);
         bytes_ = bytes_.subspan(sizeof(T));
         return value;
     }
     std::span<const std::uint8_t> take(std::size_t count) noexcept {
-        if (!has(count)) return {};
+        if (!has(count)) {
+            return {};
+        }
         const auto part = bytes_.first(count);
         bytes_ = bytes_.subspan(count);
         return part;
@@ -33,7 +37,7 @@ public:
 private:
     bool has(std::size_t count) noexcept { return good_ = good_ && bytes_.size() >= count; }
     std::span<const std::uint8_t> bytes_;
-    bool                          good_ = true;
+    bool good_ = true;
 };
 
 /// Appends fields; one that does not fit makes it fail.
@@ -42,18 +46,25 @@ public:
     explicit Putter(std::span<std::uint8_t> bytes) noexcept : bytes_(bytes) {}
     template <class T>
     void number(T value) noexcept {
-        if (room(sizeof(T))) put(bytes_, at_, value), at_ += sizeof(T);
+        if (room(sizeof(T))) {
+            put(bytes_, at_, value);
+            at_ += sizeof(T);
+        }
     }
     void bytes(std::span<const std::uint8_t> data) noexcept {
-        if (room(data.size())) std::copy(data.begin(), data.end(), bytes_.begin() + static_cast<std::ptrdiff_t>(at_)), at_ += data.size();
+        if (room(data.size())) {
+            std::copy(data.begin(), data.end(), bytes_.begin() + static_cast<std::ptrdiff_t>(at_));
+
+            at_ += data.size();
+        }
     }
     std::size_t length() const noexcept { return good_ ? at_ : 0; }
 
 private:
     bool room(std::size_t count) noexcept { return good_ = good_ && at_ + count <= bytes_.size(); }
     std::span<std::uint8_t> bytes_;
-    std::size_t             at_ = 0;
-    bool                    good_ = true;
+    std::size_t at_ = 0;
+    bool good_ = true;
 };
 
 constexpr std::size_t physical_bytes = 32;
@@ -70,17 +81,22 @@ bool take_logical(Taker& t, std::uint8_t type, Logical& out) noexcept {
 }
 
 void put_logical(Putter& p, const Logical& l) noexcept {
-    if (l.by_ip) p.bytes(l.ip);
+    if (l.by_ip) {
+        p.bytes(l.ip);
+    }
 }
 
 }  // namespace
 
 bool decode(std::span<const std::uint8_t> frame, Message& m) noexcept {
-    if (frame.size() < ethernet::header_bytes + 1 || get<std::uint16_t>(frame, 12) != rtcfg_type) return false;
+    if (frame.size() < ethernet::header_bytes + 1 || get<std::uint16_t>(frame, 12) != rtcfg_type) {
+        return false;
+    }
     m = {};
     std::copy_n(frame.begin(), 6, m.to.begin());
     std::copy_n(frame.begin() + 6, 6, m.from.begin());
-    const std::uint8_t id = frame[ethernet::header_bytes] & 0x1f;  // bits 5..7: a version to be ignored
+    // bits 5..7: a version to be ignored
+    const std::uint8_t id = frame[ethernet::header_bytes] & 0x1f;
     if (id >= ids) return false;
     m.id = static_cast<Id>(id);
     Taker t(frame.subspan(ethernet::header_bytes + 1));
@@ -116,7 +132,9 @@ bool decode(std::span<const std::uint8_t> frame, Message& m) noexcept {
     case Id::dead_station: {
         if (!take_logical(t, t.number<std::uint8_t>(), m.client)) return false;
         const auto physical = t.take(physical_bytes);
-        if (t.good()) std::copy_n(physical.begin(), 6, m.dead.begin());
+        if (t.good()) {
+            std::copy_n(physical.begin(), 6, m.dead.begin());
+        }
         break;
     }
     }
@@ -173,7 +191,8 @@ std::size_t encode(const Message& m, std::span<std::uint8_t> out) noexcept {
     const std::size_t length = p.length();
     if (length == 0 || length >= ethernet::smallest_frame) return length;
     if (out.size() < ethernet::smallest_frame) return 0;
-    std::fill(out.begin() + static_cast<std::ptrdiff_t>(length), out.begin() + ethernet::smallest_frame, std::uint8_t{0});
+    std::fill(out.begin() + static_cast<std::ptrdiff_t>(length),
+              out.begin() + ethernet::smallest_frame, std::uint8_t{0});
     return ethernet::smallest_frame;
 }
 

@@ -9,9 +9,17 @@ namespace hal::tdma {
 
 namespace {
 
-constexpr std::size_t rtmac_at = ethernet::header_bytes, tdma_at = rtmac_at + rtmac_bytes, fields_at = tdma_at + 4;
-constexpr std::uint16_t sync_id = 0x0000, request_id = 0x0010, reply_id = 0x0011, ping_id = 0x0020, echo_id = 0x0021;
-constexpr std::uint8_t  tunnelling = 0x01;
+constexpr std::size_t rtmac_at = ethernet::header_bytes;
+constexpr std::size_t tdma_at = rtmac_at + rtmac_bytes;
+
+constexpr std::size_t fields_at = tdma_at + 4;
+constexpr std::uint16_t sync_id = 0x0000;
+constexpr std::uint16_t request_id = 0x0010;
+constexpr std::uint16_t reply_id = 0x0011;
+constexpr std::uint16_t ping_id = 0x0020;
+
+constexpr std::uint16_t echo_id = 0x0021;
+constexpr std::uint8_t tunnelling = 0x01;
 
 Frame begun(const Address& to, const Address& from, std::uint16_t id) noexcept {
     Frame frame{};
@@ -28,8 +36,11 @@ Frame begun(const Address& to, const Address& from, std::uint16_t id) noexcept {
 }  // namespace
 
 Decoded decode(std::span<const std::uint8_t> frame) noexcept {
-    Decoded    d;
-    const auto bad = [&d](Defect why) { return d.defect = why, d; };
+    Decoded d;
+    const auto bad = [&d](Defect why) {
+        d.defect = why;
+        return d;
+    };
     if (frame.size() < ethernet::header_bytes) return bad(Defect::cut);
     std::copy_n(frame.begin(), 6, d.to.begin());
     std::copy_n(frame.begin() + 6, 6, d.from.begin());
@@ -49,17 +60,20 @@ Decoded decode(std::span<const std::uint8_t> frame) noexcept {
     case sync_id:
         if (frame.size() < tdma_at + 24) return bad(Defect::cut);
         d.kind = Kind::sync;
-        d.sync = {get<std::uint32_t>(frame, fields_at), get<Time>(frame, sync_stamp_at), get<Time>(frame, fields_at + 12)};
+        d.sync = {get<std::uint32_t>(frame, fields_at), get<Time>(frame, sync_stamp_at),
+                  get<Time>(frame, fields_at + 12)};
         return d;
     case request_id:
         if (frame.size() < tdma_at + 24) return bad(Defect::cut);
         d.kind = Kind::request;
-        d.request = {get<Time>(frame, request_stamp_at), get<std::uint32_t>(frame, fields_at + 8), get<Time>(frame, fields_at + 12)};
+        d.request = {get<Time>(frame, request_stamp_at), get<std::uint32_t>(frame, fields_at + 8),
+                     get<Time>(frame, fields_at + 12)};
         return d;
     case reply_id:
         if (frame.size() < tdma_at + 28) return bad(Defect::cut);
         d.kind = Kind::reply;
-        d.reply = {get<Time>(frame, fields_at), get<Time>(frame, fields_at + 8), get<Time>(frame, reply_stamp_at)};
+        d.reply = {get<Time>(frame, fields_at), get<Time>(frame, fields_at + 8),
+                   get<Time>(frame, reply_stamp_at)};
         return d;
     case ping_id:
         if (frame.size() < tdma_at + 16) return bad(Defect::cut);
@@ -69,8 +83,8 @@ Decoded decode(std::span<const std::uint8_t> frame) noexcept {
     case echo_id:
         if (frame.size() < tdma_at + 32) return bad(Defect::cut);
         d.kind = Kind::echo;
-        d.echo = {get<Time>(frame, fields_at), get<Time>(frame, fields_at + 8), get<Time>(frame, echo_stamp_at),
-                  get<std::uint32_t>(frame, fields_at + 24)};
+        d.echo = {get<Time>(frame, fields_at), get<Time>(frame, fields_at + 8),
+                  get<Time>(frame, echo_stamp_at), get<std::uint32_t>(frame, fields_at + 24)};
         return d;
     default: return bad(Defect::frame_id);
     }
@@ -121,7 +135,8 @@ std::size_t tunnel(std::span<const std::uint8_t> frame, std::span<std::uint8_t> 
     if (frame.size() < ethernet::header_bytes || length > out.size()) return 0;
     std::copy_n(frame.begin(), 12, out.begin());
     put(out, 12, rtmac_type);
-    std::copy_n(frame.begin() + 12, 2, out.begin() + rtmac_at);  // the type moves into the RTmac header
+    // the type moves into the RTmac header
+    std::copy_n(frame.begin() + 12, 2, out.begin() + rtmac_at);
     out[rtmac_at + 2] = rtmac_version;
     out[rtmac_at + 3] = tunnelling;
     std::copy(frame.begin() + ethernet::header_bytes, frame.end(), out.begin() + tdma_at);
@@ -135,7 +150,8 @@ std::size_t untunnel(std::span<const std::uint8_t> frame, std::span<std::uint8_t
     if (length > out.size()) return 0;
     std::copy_n(frame.begin(), 12, out.begin());
     put(out, 12, d.tunnelled.type);
-    std::copy(d.tunnelled.payload.begin(), d.tunnelled.payload.end(), out.begin() + ethernet::header_bytes);
+    std::copy(d.tunnelled.payload.begin(), d.tunnelled.payload.end(),
+              out.begin() + ethernet::header_bytes);
     return length;
 }
 
